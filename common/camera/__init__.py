@@ -1,0 +1,1 @@
+"""Sources of still-encoded frames: one class for each kind, all with the same behaviour."""

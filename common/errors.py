@@ -1,0 +1,55 @@
+"""The one error tree. Each class says when it is raised, whose fault it is and which exit code it means.
+
+Every message is one line that names the culprit (option, key, file, device, peer) and the remedy.
+Exit codes are the commands' contract: 0 done, 2 wrong usage or settings, 3 a device or link cannot be had, 4 the data are bad
+or a check failed, 130 interrupted.
+"""
+
+from typing import ClassVar
+
+
+class TandemError(Exception):
+    """Base of all errors a user may see; never raised itself.
+
+    Args:
+        problem: what is wrong, naming the culprit.
+        remedy: what to do about it.
+    """
+
+    exit_code: ClassVar[int] = 1
+
+    def __init__(self, problem: str, remedy: str) -> None:
+        super().__init__(problem, remedy)
+        self.problem = problem
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        return f"{self.problem}: {self.remedy}"
+
+
+class SettingsError(TandemError):
+    """Raised for an option, key or URI that makes no sense. The user's fault; nothing was started."""
+
+    exit_code = 2
+
+
+class UnavailableError(TandemError):
+    """Raised when a device, port or peer cannot be had now. Nobody's fault; trying again later may help."""
+
+    exit_code = 3
+
+
+class DataError(TandemError):
+    """Raised when a file, image or result is bad, or a check failed. The input's fault."""
+
+    exit_code = 4
+
+
+class ProtocolError(TandemError):
+    """Raised by the codec for bytes that are no message of ours. The peer's fault; the packet is dropped and counted."""
+
+    exit_code = 4
+
+
+class ClockMismatchError(TypeError):
+    """Raised when stamps of two clocks are mixed. Our fault: a bug, never caught."""

@@ -1,0 +1,1 @@
+"""File formats of results: PFM, PLY, PNG. One file each."""

@@ -1,0 +1,1 @@
+"""The stereo core: calibration, rectification, matching, reprojection. Pure functions on arrays."""

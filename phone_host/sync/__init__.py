@@ -1,0 +1,1 @@
+"""One notion of time: clock estimate, pairing, FIFO. Pure cores, `now` passed in."""
