@@ -4,6 +4,7 @@ Conventions: camera axes x right, y down, z forward; pixel centres are integers 
 """
 
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,3 +44,60 @@ class RectifiedPair:
 
     left: Image
     right: Image
+
+
+class Side(Enum):
+    """Which of the two views; the left camera is the reference whose pixels get a depth."""
+
+    LEFT = "left"
+    RIGHT = "right"
+
+    @property
+    def other(self) -> "Side":
+        """The opposite side."""
+        return Side.RIGHT if self is Side.LEFT else Side.LEFT
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """Intrinsics of one camera, OpenCV's pinhole model with its distortion polynomial.
+
+    Attributes:
+        width_px: image width, px.
+        height_px: image height, px.
+        matrix: (3, 3) float64 camera matrix K, px.
+        distortion: (N,) float64 coefficients k1 k2 p1 p2 k3 ..., N in 4, 5, 8, 12, 14 as OpenCV takes them.
+    """
+
+    width_px: int
+    height_px: int
+    matrix: NDArray[np.float64]
+    distortion: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig:
+    """Two calibrated cameras, possibly of different size, and how they stand to each other.
+
+    A point p_left in the left camera's axes is p_right = R_right_left @ p_left + t_right_left_m in the right camera's
+    (OpenCV's R and T of stereoCalibrate).
+
+    Attributes:
+        left: the reference camera.
+        right: the other one.
+        R_right_left: (3, 3) float64 rotation.
+        t_right_left_m: (3,) float64 translation, m; its x is negative when the right camera stands to the right.
+        board_side: which of the two hangs on the board.
+        rms_left_px: reprojection RMS of the left camera alone, px; NaN = not measured.
+        rms_right_px: the same for the right camera.
+        rms_stereo_px: reprojection RMS of the stereo calibration, px; NaN = not measured.
+    """
+
+    left: Camera
+    right: Camera
+    R_right_left: NDArray[np.float64]
+    t_right_left_m: NDArray[np.float64]
+    board_side: Side = Side.LEFT
+    rms_left_px: float = float("nan")
+    rms_right_px: float = float("nan")
+    rms_stereo_px: float = float("nan")
