@@ -1,0 +1,88 @@
+"""Matchers: from a rectified pair to a disparity map. One protocol, one factory; each algorithm has its own module.
+
+Rules that every matcher keeps (tests/contract/test_matcher.py):
+
+- disparity d = left x - right x, px, float32, the left image's size; NaN where there is no trust; every value in [0, N);
+- any N >= 1 and any image size, down to 1 x 1 and narrower than N;
+- the result depends on the pair alone: not on earlier pairs, not on the number of OpenCV's threads.
+
+This module knows the matchers; the matchers do not know it.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol, assert_never
+
+from common.errors import SettingsError
+from phone_host.model import Disparity, RectifiedPair
+from phone_host.stereo.match_block import BlockMatcher
+from phone_host.stereo.match_sgbm import SgbmMatcher
+
+
+class Matcher(Protocol):
+    """What finds, for each pixel of the left image, where the same point stands in the right one."""
+
+    def match(self, pair: RectifiedPair) -> Disparity:
+        """Match one pair.
+
+        Args:
+            pair: two uint8 images of one size, grey (H, W) or BGR (H, W, 3), rectified.
+
+        Returns:
+            (H, W) float32, px, left x - right x, in [0, N); NaN = no trust.
+
+        Raises:
+            DataError: the two images differ in size, or are no uint8 images.
+        """
+        ...
+
+
+class MatcherName(Enum):
+    """The matchers by the name a user types.
+
+    BLOCK is the paper's: 8 x 8 sum of absolute differences, winner takes all. SGBM is semi-global matching, the default.
+    """
+
+    BLOCK = "block"
+    SGBM = "sgbm"
+
+
+@dataclass(frozen=True, slots=True)
+class MatchSettings:
+    """What a matcher is built from.
+
+    Attributes:
+        matcher: the algorithm.
+        disparities: N, px: 0 <= d < N is searched. Any number from 1; far above the image's width it costs nothing more.
+
+    Raises:
+        SettingsError: disparities below 1.
+    """
+
+    matcher: MatcherName = MatcherName.SGBM
+    disparities: int = 64
+
+    def __post_init__(self) -> None:
+        if self.disparities < 1:
+            raise SettingsError(
+                f"disparities = {self.disparities} leaves nothing to search",
+                "give the number of disparities, 1 or more (64 suits most 640 px wide pairs)",
+            )
+
+
+def create_matcher(settings: MatchSettings) -> Matcher:
+    """Build the matcher that the settings name. It may be used for any number of pairs, of any sizes, by one thread at a time.
+
+    Args:
+        settings: the algorithm and its search range.
+
+    Returns:
+        The matcher.
+    """
+    match settings.matcher:
+        case MatcherName.BLOCK:
+            return BlockMatcher(settings.disparities)
+        case MatcherName.SGBM:
+            return SgbmMatcher(settings.disparities)
+        case _:
+            assert_never(settings.matcher)
