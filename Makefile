@@ -1,0 +1,57 @@
+# `make` prints what there is to make. A fresh machine needs nothing but `make demo` and `make test`.
+#   PYTHON=/path/to/python3   the interpreter for .venv (default: the first of python3, python3.13, ... that is 3.11 or newer)
+#   SCAN_DATA=/path           the folder of real images (default: ../shared/data when it exists)
+#   PYTEST_FLAGS="-k clock"   passed on to pytest
+SHELL := /bin/sh
+BIN := .venv/bin
+READY := .venv/.ready
+PARTS := unit contract system
+BENCHES := $(patsubst tests/bench/%.py,%,$(sort $(wildcard tests/bench/bench_*.py)))
+
+ifndef SCAN_DATA
+ifneq ($(wildcard ../shared/data/.),)
+export SCAN_DATA := $(abspath ../shared/data)
+endif
+endif
+
+.DEFAULT_GOAL := help
+.PHONY: help venv demo test $(PARTS:%=test-%) lint types bench lock clean
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+
+venv: $(READY) ## create or update the virtual environment .venv (the targets below do so by themselves)
+
+$(READY): requirements/dev.txt pyproject.toml
+	@.ci/venv
+
+demo: $(READY) ## both programs on this machine, a rendered scene, a full report in out/demo
+	@$(BIN)/phone-host demo --out out/demo
+
+test: $(READY) ## unit, contract and system tests, with the minutes of each part
+	@.ci/test $(PARTS)
+
+$(PARTS:%=test-%): test-%: $(READY) # one part alone: make test-unit
+	@.ci/test $*
+
+lint: $(READY) ## ruff (rules and format) and the layers of the packages
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/ruff format --check --quiet . || { echo "error: not formatted; run: $(BIN)/ruff format ." >&2; exit 1; }
+	@$(BIN)/lint-imports
+
+types: $(READY) ## mypy --strict
+	@$(BIN)/mypy
+
+bench: .venv/.ready-bench ## the figures: every benchmark in tests/bench prints its table
+	@for bench in $(BENCHES); do $(BIN)/python -m tests.bench.$$bench || exit; done
+
+.venv/.ready-bench: $(READY) requirements/bench.txt
+	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: -r requirements/bench.txt
+	@touch $@
+
+lock: ## pin again what no longer fits pyproject.toml (UPGRADE=1: everything to its newest)
+	@.ci/lock $(if $(UPGRADE),--upgrade)
+
+clean: ## remove results, caches and build leftovers (.venv stays)
+	@rm -rf out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	@find . -path './.venv*' -prune -o -type d -name __pycache__ -prune -exec rm -rf {} +
