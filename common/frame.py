@@ -1,0 +1,80 @@
+"""One image of one camera with its header. Its bytes stay as the camera encoded them."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from common.stamp import Stamp
+
+Buffer = bytes | bytearray | memoryview
+"""Bytes that are handed on without a copy."""
+
+
+class PixelFormat(Enum):
+    """How a frame's bytes encode its image."""
+
+    MJPEG = "mjpeg"
+    PNG = "png"
+
+
+class FrameFault(Enum):
+    """Why a frame's bytes are not the whole image that they claim to be."""
+
+    EMPTY = "empty"
+    NO_START = "no_start"
+    NO_END = "no_end"
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One image and what the camera says of it.
+
+    Attributes:
+        sequence: number of this grab since the camera was opened, from 0; every grab counts, also a spoiled one.
+        exposed: exposure mid-point.
+        grabbed: when it was dequeued from the driver, same clock as `exposed`.
+        width_px: image width, px.
+        height_px: image height, px.
+        pixel_format: encoding of `payload`.
+        exposure_ns: exposure time, ns; None where the camera does not tell.
+        payload: the encoded image.
+    """
+
+    sequence: int
+    exposed: Stamp
+    grabbed: Stamp
+    width_px: int
+    height_px: int
+    pixel_format: PixelFormat
+    exposure_ns: int | None
+    payload: Buffer
+
+
+_PADDING_BYTES = 256
+"""Some webcams pad a JPEG with zeros after its end marker; more than this was not seen."""
+
+_BRACKETS = {
+    PixelFormat.MJPEG: (b"\xff\xd8", b"\xff\xd9"),
+    PixelFormat.PNG: (b"\x89PNG\r\n\x1a\n", b"IEND\xae\x42\x60\x82"),
+}
+"""First and last bytes of a whole image: JPEG ITU-T T.81 B.1.1.3 (SOI, EOI); PNG 1.2, 3.1 and 3.4 (signature, IEND with its CRC)."""
+
+
+def find_fault(pixel_format: PixelFormat, payload: Buffer) -> FrameFault | None:
+    """Check that encoded bytes begin and end as their format demands; the driver's error flag is not enough (DESIGN 5.5).
+
+    Args:
+        pixel_format: what the bytes claim to be.
+        payload: the encoded image.
+
+    Returns:
+        The fault, or None for a sound frame.
+    """
+    if not len(payload):
+        return FrameFault.EMPTY
+    start, end = _BRACKETS[pixel_format]
+    if bytes(payload[: len(start)]) != start:
+        return FrameFault.NO_START
+    tail = bytes(payload[-_PADDING_BYTES:])
+    if pixel_format is PixelFormat.MJPEG:
+        tail = tail.rstrip(b"\0")
+    return None if tail.endswith(end) else FrameFault.NO_END

@@ -1,0 +1,142 @@
+"""The marks on a pair's life line and the delays between them: integer nanoseconds that add up exactly.
+
+Board marks are taken on the board's clock. Only `sent` is mapped to the host's clock, once, on receipt; the other board marks follow by
+their differences on the board's own clock. So end-to-end is the sum of the delays to the nanosecond, whatever the clock estimate was worth.
+"""
+
+import json
+from dataclasses import asdict, dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class StageTimes:
+    """How long each stage of processing took, ns; together at most the processing delay."""
+
+    decode: int = 0
+    rectify: int = 0
+    match: int = 0
+    reproject: int = 0
+    write: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class BoardMarks:
+    """A frame's marks on one clock: its exposure mid-point, its dequeue from the driver, the moment before its first byte was written (ns)."""
+
+    exposed_ns: int
+    grabbed_ns: int
+    sent_ns: int
+
+    def moved_to(self, sent_ns: int) -> "BoardMarks":
+        """Express the marks on another clock on which `sent` is known; differences stay as they are."""
+        shift = sent_ns - self.sent_ns
+        return BoardMarks(self.exposed_ns + shift, self.grabbed_ns + shift, sent_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class PairLedger:
+    """Everything measured about one pair. All marks in ns on the host's clock; the delays are defined in DESIGN, section 4.
+
+    Attributes:
+        session: the board process's life that sent the frame.
+        sequence: the board frame's number.
+        host_sequence: the host frame's number.
+        bytes: size of the board frame's payload.
+        link: the link's kind, for example `tcp`.
+        board: exposed, grabbed and sent of the board's frame.
+        received_ns: last byte arrived.
+        paired_ns: the partner was found.
+        queued_ns: the pair entered the FIFO.
+        dequeued_ns: processing began.
+        done_ns: results were written.
+        previous_done_ns: when the pair before this one was done; the first pair carries its own `queued_ns`.
+        stages: shares of the processing delay.
+        time_skew_ns: exposure of the board's frame minus that of the host's.
+        offset_ns: host clock minus board clock as estimated for this frame.
+        uncertainty_ns: of that offset.
+    """
+
+    session: str
+    sequence: int
+    host_sequence: int
+    bytes: int
+    link: str
+    board: BoardMarks
+    received_ns: int
+    paired_ns: int
+    queued_ns: int
+    dequeued_ns: int
+    done_ns: int
+    previous_done_ns: int
+    stages: StageTimes
+    time_skew_ns: int
+    offset_ns: int
+    uncertainty_ns: int
+
+    @property
+    def capture_ns(self) -> int:
+        """From exposure mid-point to dequeue."""
+        return self.board.grabbed_ns - self.board.exposed_ns
+
+    @property
+    def outbox_ns(self) -> int:
+        """Waiting for the link."""
+        return self.board.sent_ns - self.board.grabbed_ns
+
+    @property
+    def propagation_ns(self) -> int:
+        """From the first byte written to the last received; carries the clock estimate's error."""
+        return self.received_ns - self.board.sent_ns
+
+    @property
+    def pairing_ns(self) -> int:
+        """Waiting for the partner."""
+        return self.queued_ns - self.received_ns
+
+    @property
+    def queuing_ns(self) -> int:
+        """The FIFO's backlog."""
+        return self.dequeued_ns - self.queued_ns
+
+    @property
+    def processing_ns(self) -> int:
+        """From dequeue to results written."""
+        return self.done_ns - self.dequeued_ns
+
+    @property
+    def end_to_end_ns(self) -> int:
+        """From exposure mid-point to results: the sum of the six delays above."""
+        return self.done_ns - self.board.exposed_ns
+
+    @property
+    def starvation_ns(self) -> int:
+        """How long the processor had nothing to do before this pair was queued."""
+        return max(0, self.queued_ns - self.previous_done_ns)
+
+    def to_json(self) -> str:
+        """One line of delays.jsonl, with the keys of DESIGN, section 4."""
+        record = {
+            "session": self.session,
+            "sequence": self.sequence,
+            "host_sequence": self.host_sequence,
+            "bytes": self.bytes,
+            "link": self.link,
+            "exposed_ns": self.board.exposed_ns,
+            "grabbed_ns": self.board.grabbed_ns,
+            "sent_ns": self.board.sent_ns,
+        }
+        marks = ("received_ns", "paired_ns", "queued_ns", "dequeued_ns", "done_ns")
+        delays = (
+            "capture_ns",
+            "outbox_ns",
+            "propagation_ns",
+            "pairing_ns",
+            "queuing_ns",
+            "processing_ns",
+            "end_to_end_ns",
+            "starvation_ns",
+        )
+        record |= {name: getattr(self, name) for name in marks + delays}
+        record["stages_ns"] = asdict(self.stages)
+        record |= {name: getattr(self, name) for name in ("time_skew_ns", "offset_ns", "uncertainty_ns")}
+        return json.dumps(record, separators=(",", ":"))

@@ -1,0 +1,78 @@
+"""A link is a packet pipe: headers with payloads go in at one end and come out whole, in order, or not at all, at the other.
+
+A link has named byte paths (connections). The side that dials opens one for each lane; the side that listens learns of a connection when
+its first packet arrives. A link never blocks, never decides what a packet means, and is used by one thread only, save `Link.close`.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Protocol
+
+from common.frame import Buffer
+from common.protocol.message import Lane
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """What came in over a connection.
+
+    Attributes:
+        connection: the byte path, opaque.
+        header: the message's header.
+        payload: its payload, often empty; backed by the transport's own memory, no copy.
+    """
+
+    connection: bytes
+    header: Buffer
+    payload: Buffer
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """A connection that this side had dialled broke; what was under way on it is gone. The link dials again by itself."""
+
+    connection: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Garbage:
+    """Something that is no packet came in and was thrown away."""
+
+    connection: bytes
+
+
+Incoming = Packet | Broken | Garbage
+
+
+class SendResult(Enum):
+    """What became of a packet that was to be sent."""
+
+    SENT = 0
+    FULL = 1
+    UNREACHABLE = 2
+
+
+class Link(Protocol):
+    """What every transport offers."""
+
+    @property
+    def kind(self) -> str:
+        """The transport's name as it stands in delays.jsonl, for example `tcp`."""
+
+    @property
+    def dialled(self) -> dict[Lane, bytes]:
+        """The connections that this side opened; empty on the side that listens."""
+
+    @property
+    def pollables(self) -> Sequence[Any]:
+        """Sockets or file descriptors to wait on with a zmq.Poller; readable means that `receive` has something."""
+
+    def receive(self) -> Iterator[Incoming]:
+        """Give all that has come in, without waiting."""
+
+    def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
+        """Hand a packet over, without waiting."""
+
+    def close(self) -> None:
+        """Give what was handed over a moment to leave, then let go of everything."""

@@ -1,0 +1,225 @@
+"""ZeroMQ over tcp:// and ipc://. One side binds a ROUTER, the other dials one DEALER for each lane.
+
+Frames and control thus travel on TCP connections of their own and a clock echo never waits behind image bytes. Socket options are set before
+anything is accepted. A high-water mark does not bound the age of frames; credit does (session), so the marks here are only a fence.
+"""
+
+import os
+import socket
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from typing import Final
+
+import zmq
+
+from common.errors import SettingsError, UnavailableError
+from common.frame import Buffer
+from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
+from common.protocol.message import Lane
+from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
+
+_SOCKET_BUFFER_BYTES: Final = 256 * 1024
+"""About five 50 KB JPEGs in the kernel at most, so that a frame is not sent long before it can leave."""
+
+_QUEUE_PACKETS: Final = 8
+"""Packets in ZeroMQ's own queue for a connection: a wave of echoes and a few accounts; frames wait in the outbox instead."""
+
+_LINGER_MS: Final = 500
+_HEARTBEAT_MS: Final = 1000
+_HEARTBEAT_TIMEOUT_MS: Final = 3000
+_RECONNECT_MS: Final = 50
+_RECONNECT_MAX_MS: Final = 400
+"""A peer that comes back is met within this time, well below the second allowed for recovery."""
+
+_COPY_BELOW_BYTES: Final = 256 * 1024
+"""Below this one memcpy into ZeroMQ's message is cheaper than pyzmq's bookkeeping for a borrowed buffer (bench_link shows it)."""
+
+_UNIX_PATH_MAX: Final = 107
+
+
+def _configure(sock: zmq.Socket[bytes]) -> None:
+    for option, value in (
+        (zmq.MAXMSGSIZE, max(MAX_PAYLOAD_BYTES, MAX_HEADER_BYTES)),
+        (zmq.LINGER, _LINGER_MS),
+        (zmq.IMMEDIATE, 1),
+        (zmq.SNDHWM, _QUEUE_PACKETS),
+        (zmq.RCVHWM, _QUEUE_PACKETS),
+        (zmq.SNDBUF, _SOCKET_BUFFER_BYTES),
+        (zmq.RCVBUF, _SOCKET_BUFFER_BYTES),
+        (zmq.HEARTBEAT_IVL, _HEARTBEAT_MS),
+        (zmq.HEARTBEAT_TIMEOUT, _HEARTBEAT_TIMEOUT_MS),
+        (zmq.HANDSHAKE_IVL, _HEARTBEAT_TIMEOUT_MS),
+        (zmq.CONNECT_TIMEOUT, _HEARTBEAT_TIMEOUT_MS),
+        (zmq.RECONNECT_IVL, _RECONNECT_MS),
+        (zmq.RECONNECT_IVL_MAX, _RECONNECT_MAX_MS),
+        (zmq.IPV6, 1),
+    ):
+        sock.setsockopt(option, value)
+
+
+def _send(sock: zmq.Socket[bytes], prefix: list[bytes], header: bytes, payload: Buffer) -> SendResult:
+    try:
+        for part in prefix:
+            sock.send(part, zmq.DONTWAIT | zmq.SNDMORE)
+        if not len(payload):
+            sock.send(header, zmq.DONTWAIT)
+            return SendResult.SENT
+        sock.send(header, zmq.DONTWAIT | zmq.SNDMORE)
+        sock.send(payload, zmq.DONTWAIT, copy=len(payload) < _COPY_BELOW_BYTES)
+    except zmq.Again:
+        return SendResult.FULL
+    except zmq.ZMQError as error:
+        if error.errno == zmq.EHOSTUNREACH:
+            return SendResult.UNREACHABLE
+        raise
+    return SendResult.SENT
+
+
+def _receive(sock: zmq.Socket[bytes], connection: bytes, *, routed: bool) -> Iterator[Incoming]:
+    while True:
+        try:
+            parts = sock.recv_multipart(zmq.DONTWAIT, copy=False)
+        except zmq.Again:
+            return
+        if routed:
+            connection = parts.pop(0).bytes
+        if not 1 <= len(parts) <= 2:
+            yield Garbage(connection)
+        else:
+            yield Packet(connection, parts[0].buffer, parts[1].buffer if len(parts) == 2 else b"")
+
+
+class ZeroMqListener:
+    """The side that binds.
+
+    Args:
+        address: `tcp://HOST:PORT` (`*` for every interface) or `ipc://PATH`.
+
+    Raises:
+        SettingsError: the address makes no sense.
+        UnavailableError: the port or path is taken.
+    """
+
+    def __init__(self, address: str) -> None:
+        self.kind = address.partition(":")[0]
+        self.dialled: dict[Lane, bytes] = {}
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._socket = self._context.socket(zmq.ROUTER)
+        _configure(self._socket)
+        self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # a vanished host is told of instead of swallowing frames
+        if self.kind == "ipc":
+            _free_path(address.removeprefix("ipc://"))
+        before = os.umask(0o177)  # an ipc path is for its owner only
+        try:
+            self._socket.bind(address)
+        except zmq.ZMQError as error:
+            self._context.destroy(linger=0)
+            raise _explained(address, error, "stop what listens there, or choose another with --link") from None
+        finally:
+            os.umask(before)
+
+    @property
+    def pollables(self) -> Sequence[zmq.Socket[bytes]]:
+        """The one socket."""
+        return (self._socket,)
+
+    def receive(self) -> Iterator[Incoming]:
+        """Give all packets that have come in."""
+        return _receive(self._socket, b"", routed=True)
+
+    def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
+        """Hand a packet over for one connection."""
+        return _send(self._socket, [connection], header, payload)
+
+    def close(self) -> None:
+        """Let what was handed over leave, then close."""
+        self._context.destroy(linger=_LINGER_MS)
+
+
+class ZeroMqDialer:
+    """The side that connects, one socket for each lane; ZeroMQ dials again by itself whenever a connection breaks.
+
+    Args:
+        address: `tcp://HOST:PORT` or `ipc://PATH`.
+
+    Raises:
+        SettingsError: the address makes no sense.
+    """
+
+    def __init__(self, address: str) -> None:
+        self.kind = address.partition(":")[0]
+        self.dialled = {lane: lane.name.encode() for lane in Lane}
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._sockets: dict[bytes, zmq.Socket[bytes]] = {}
+        self._monitors: dict[bytes, zmq.Socket[bytes]] = {}
+        for connection in self.dialled.values():
+            sock = self._context.socket(zmq.DEALER)
+            _configure(sock)
+            self._monitors[connection] = sock.get_monitor_socket(zmq.EVENT_DISCONNECTED)
+            self._sockets[connection] = sock
+            try:
+                sock.connect(address)
+            except zmq.ZMQError as error:
+                self._context.destroy(linger=0)
+                raise _explained(address, error, "give --link tcp://HOST:PORT or ipc://PATH") from None
+
+    @property
+    def pollables(self) -> Sequence[zmq.Socket[bytes]]:
+        """Both sockets and their monitors."""
+        return (*self._sockets.values(), *self._monitors.values())
+
+    def receive(self) -> Iterator[Incoming]:
+        """Give all packets that have come in, control first, and the news of broken connections."""
+        for connection, monitor in self._monitors.items():
+            with suppress(zmq.Again):
+                while True:
+                    monitor.recv_multipart(zmq.DONTWAIT)
+                    yield Broken(connection)
+        for lane in (Lane.CONTROL, Lane.FRAMES):
+            connection = self.dialled[lane]
+            yield from _receive(self._sockets[connection], connection, routed=False)
+
+    def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
+        """Hand a packet over; before the peer is there it is FULL (ZMQ_IMMEDIATE)."""
+        return _send(self._sockets[connection], [], header, payload)
+
+    def close(self) -> None:
+        """Let what was handed over leave, then close."""
+        for sock in self._sockets.values():
+            sock.disable_monitor()
+        self._context.destroy(linger=_LINGER_MS)
+
+
+def _explained(address: str, error: zmq.ZMQError, remedy: str) -> SettingsError | UnavailableError:
+    """Sort ZeroMQ's refusal of an address by whose fault it is."""
+    if error.errno in {zmq.EADDRINUSE, zmq.EADDRNOTAVAIL, zmq.ENODEV} or isinstance(error, zmq.ZMQBindError):
+        return UnavailableError(f"{address} cannot be had ({error.strerror})", remedy)
+    if error.errno in {1, 2, 13}:  # EPERM, ENOENT, EACCES: the folder of an ipc path, or a port below 1024
+        return UnavailableError(
+            f"{address} cannot be opened ({error.strerror})", "check the folder and its permissions"
+        )
+    return SettingsError(f"link {address!r} makes no sense ({error.strerror})", remedy)
+
+
+def _free_path(path: str) -> None:
+    """Remove the socket of a listener that died; ZeroMQ would silently take the path even of one that lives.
+
+    Raises:
+        SettingsError: the path is too long for a Unix socket.
+        UnavailableError: somebody listens there.
+    """
+    if len(os.fsencode(path)) > _UNIX_PATH_MAX:
+        raise SettingsError(
+            f"ipc path of {len(os.fsencode(path))} bytes",
+            f"use one of at most {_UNIX_PATH_MAX} bytes, for example ipc:///tmp/board",
+        )
+    with socket.socket(socket.AF_UNIX) as probe:
+        try:
+            probe.connect(path)
+        except (FileNotFoundError, ConnectionRefusedError):
+            return  # ZeroMQ itself unlinks a dead socket
+        except OSError as error:
+            raise UnavailableError(
+                f"ipc://{path} cannot be opened ({error.strerror})", "choose another path with --link"
+            ) from None
+    raise UnavailableError(f"ipc://{path} is taken", "stop what listens there, or choose another path with --link")

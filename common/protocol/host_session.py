@@ -1,0 +1,226 @@
+"""The host's side of a session: finds the board, grants credit, echoes clocks, tells fresh frames from stale. Sans-I/O, `now_ns` passed in."""
+
+from enum import Enum
+from typing import Final, assert_never
+
+from common.protocol.message import (
+    BoardHello,
+    Bye,
+    Credit,
+    End,
+    FrameMessage,
+    HostHello,
+    Knock,
+    Lane,
+    Message,
+    Ping,
+    Pong,
+    Refusal,
+    Status,
+)
+from common.protocol.session import (
+    HELLO_RETRY_NS,
+    MS,
+    SILENCE_NS,
+    TAKEOVER_NS,
+    Accepted,
+    Arrived,
+    Counted,
+    Echo,
+    Outgoing,
+    Output,
+    Refused,
+    Stale,
+    Vanished,
+)
+
+WAVE_ECHOES: Final = 5
+"""Echoes back to back: the first wakes both sides up, the others measure without that bias (study of links, 3d)."""
+
+WAVE_NS: Final = 250 * MS
+WAVE_EARLY_NS: Final = 50 * MS
+"""Between two waves, and in the first second of a session, when the estimate is still young."""
+
+EARLY_NS: Final = 1000 * MS
+
+
+class _State(Enum):
+    SEEKING = 0
+    OPEN = 1
+
+
+class HostSession:
+    """A host's view of one link.
+
+    Args:
+        host_id: random id of this process's life.
+        dialled: the connections that this side opened; empty when the board dials (`?bind=1`), then its knocks tell them.
+    """
+
+    def __init__(self, host_id: str, dialled: dict[Lane, bytes]) -> None:
+        self._host_id = host_id
+        self._lanes = dict(dialled)
+        self._state = _State.SEEKING
+        self._greeted: set[Lane] = set()
+        self._hello: BoardHello | None = None
+        self._opened_ns = 0
+        self._heard_ns = 0
+        self._hello_due_ns = 0
+        self._wave_due_ns = 0
+        self._wave = 0
+        self._echoes_left = 0
+        self._next_index = 0
+        self._below_index = 0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a board talks to us now."""
+        return self._state is _State.OPEN
+
+    @property
+    def outstanding(self) -> int:
+        """Frames that the board may still send against credit already granted."""
+        return max(0, self._below_index - self._next_index) if self.is_open else 0
+
+    @property
+    def due_ns(self) -> int:
+        """When `tick` wants to be called next, host's clock, ns."""
+        if self._state is _State.OPEN:
+            return min(self._wave_due_ns, self._heard_ns + SILENCE_NS)
+        return self._hello_due_ns
+
+    def receive(self, connection: bytes, message: Message, now_ns: int) -> list[Output]:
+        """Take one message from a connection.
+
+        Args:
+            connection: where it came from.
+            message: what came.
+            now_ns: arrival of its last byte on the host's clock, ns.
+
+        Returns:
+            What to send, and what happened.
+        """
+        match message:
+            case Knock(lane):
+                return self._answer_knock(connection, lane, now_ns)
+            case Refusal(reason):
+                return [Refused(reason)]
+            case BoardHello():
+                return self._accept(connection, message, now_ns)
+            case FrameMessage():
+                return self._take_frame(message, now_ns)
+            case HostHello() | Ping() | Credit():
+                return []  # a host's words from a board: nothing a sound board sends
+            case Pong() | Status() | End() | Bye():
+                return self._attend(connection, message, now_ns)
+            case _:
+                assert_never(message)
+
+    def tick(self, now_ns: int) -> list[Output]:
+        """Do what time demands: hello again while unanswered, the next clock wave, give up a silent board."""
+        if self._state is _State.OPEN and now_ns - self._heard_ns >= SILENCE_NS:
+            return [Vanished(orderly=False), *self._seek(now_ns)]
+        if self._state is _State.SEEKING and now_ns >= self._hello_due_ns:
+            return self._say_hello(now_ns)
+        if self._state is _State.OPEN and now_ns >= self._wave_due_ns:
+            early = now_ns - self._opened_ns < EARLY_NS
+            self._wave_due_ns = now_ns + (WAVE_EARLY_NS if early else WAVE_NS)
+            self._wave += 1
+            self._echoes_left = WAVE_ECHOES
+            # Credit is granted up to an index, so repeating it is harmless and mends one that a broken connection swallowed.
+            credit: list[Output] = (
+                [Outgoing(self._lanes[Lane.CONTROL], Credit(self._below_index))] if self._below_index else []
+            )
+            return [*self._ping(), *credit]
+        return []
+
+    def grant(self, slots: int) -> list[Output]:
+        """Let the board have credit for this many frames beyond the last one that came; credit is never taken back.
+
+        Args:
+            slots: free places for frames now.
+        """
+        below_index = self._next_index + slots
+        if self._state is not _State.OPEN or below_index <= self._below_index:
+            return []
+        self._below_index = below_index
+        return [Outgoing(self._lanes[Lane.CONTROL], Credit(below_index))]
+
+    def interrupted(self, now_ns: int) -> list[Output]:
+        """Take note that a connection broke: what was under way on it is gone, so both lanes are greeted anew."""
+        was_open = self.is_open
+        return [*([Vanished(orderly=False)] if was_open else []), *self._seek(now_ns)]
+
+    def leave(self) -> list[Output]:
+        """Say goodbye, so that the board is free for another host at once."""
+        return [Outgoing(self._lanes[Lane.CONTROL], Bye())] if self._state is _State.OPEN else []
+
+    def _answer_knock(self, connection: bytes, lane: Lane, now_ns: int) -> list[Output]:
+        if connection not in self._lanes.values():  # a board that dials
+            if self._state is _State.OPEN and now_ns - self._heard_ns < TAKEOVER_NS:
+                return []  # a second board; the first is alive
+            self._lanes[lane] = connection
+        return self.interrupted(now_ns)
+
+    def _seek(self, now_ns: int) -> list[Output]:
+        self._state = _State.SEEKING
+        self._greeted.clear()
+        return self._say_hello(now_ns)
+
+    def _say_hello(self, now_ns: int) -> list[Output]:
+        self._hello_due_ns = now_ns + HELLO_RETRY_NS
+        return [
+            Outgoing(connection, HostHello(self._host_id, lane))
+            for lane, connection in self._lanes.items()
+            if lane not in self._greeted
+        ]
+
+    def _accept(self, connection: bytes, hello: BoardHello, now_ns: int) -> list[Output]:
+        if self._state is _State.OPEN:
+            return []  # the answer to a hello that was said twice
+        self._greeted |= {lane for lane, known in self._lanes.items() if known == connection}
+        if self._greeted != set(Lane):
+            return []
+        resumed = self._hello is not None and self._hello.session == hello.session
+        lost = hello.counts.sent - self._next_index if resumed else 0
+        self._next_index = hello.counts.sent
+        self._below_index = 0
+        self._hello = hello
+        self._state = _State.OPEN
+        self._opened_ns = self._heard_ns = self._wave_due_ns = now_ns
+        return [Accepted(hello, resumed, lost)]
+
+    def _take_frame(self, frame: FrameMessage, now_ns: int) -> list[Output]:
+        if self._hello is None or frame.session != self._hello.session:
+            return [Stale(frame, old_session=True)]
+        if frame.sent_index < self._next_index:
+            return [Stale(frame, old_session=False)]
+        lost = frame.sent_index - self._next_index
+        self._next_index = frame.sent_index + 1
+        self._heard_ns = now_ns
+        return [Arrived(frame, lost)]
+
+    def _attend(self, connection: bytes, message: Pong | Status | End | Bye, now_ns: int) -> list[Output]:
+        if self._state is not _State.OPEN or self._hello is None or connection not in self._lanes.values():
+            return []
+        self._heard_ns = now_ns
+        match message:
+            case Pong(wave, t0_ns, t1_ns, t2_ns):
+                if wave != self._wave:
+                    return []
+                return [Echo(wave, t0_ns, t1_ns, t2_ns, now_ns), *self._ping()]
+            case Status(session, counts) | End(session, counts):
+                return [Counted(counts, ended=isinstance(message, End))] if session == self._hello.session else []
+            case Bye(counts):
+                self._state = _State.SEEKING
+                self._greeted.clear()
+                self._hello_due_ns = now_ns + HELLO_RETRY_NS
+                return [Counted(counts, ended=False), Vanished(orderly=True)]
+            case _:
+                assert_never(message)
+
+    def _ping(self) -> list[Output]:
+        if not self._echoes_left:
+            return []
+        self._echoes_left -= 1
+        return [Outgoing(self._lanes[Lane.CONTROL], Ping(self._wave, 0))]

@@ -1,0 +1,298 @@
+"""Messages to bytes and back: a msgpack array [version, kind, fields…] as header, and for frames the image beside it.
+
+Rules: every field is checked for type and range before it is believed; a header has at most MAX_HEADER_BYTES and no nesting beyond what a
+message needs; anything else raises ProtocolError and nothing more. The first two elements keep their place in every future version, so
+that two versions can at least tell each other so.
+"""
+
+from enum import Enum
+from typing import Any, Final, TypeVar, assert_never
+
+import msgpack
+
+from common.errors import ProtocolError
+from common.frame import Buffer, PixelFormat
+from common.ledger import BoardMarks
+from common.protocol.message import (
+    PROTOCOL_VERSION,
+    BoardCounts,
+    BoardHello,
+    Bye,
+    CameraDescription,
+    Credit,
+    DropReason,
+    End,
+    FrameMessage,
+    HostHello,
+    Knock,
+    Lane,
+    Message,
+    Pacing,
+    Ping,
+    Pong,
+    Refusal,
+    RefusalReason,
+    Status,
+)
+
+MAX_HEADER_BYTES: Final = 2048
+"""The longest honest header, a board's hello with all its texts at full length, stays below 600 bytes."""
+
+MAX_PAYLOAD_BYTES: Final = 16 * 1024 * 1024
+"""Largest frame on any link (DESIGN's contract suite): 4096 x 2048 raw YUYV fits."""
+
+_MAX_TEXT: Final = 96
+_MAX_SIZE_PX: Final = 16384
+_MAX_COUNT: Final = 2**53
+_NS: Final = 2**62
+"""146 years in ns: no honest clock is further from its zero; keeps sums inside 64 bits."""
+
+_KINDS: Final[tuple[type, ...]] = (
+    HostHello,
+    BoardHello,
+    Knock,
+    Refusal,
+    Credit,
+    FrameMessage,
+    Ping,
+    Pong,
+    Status,
+    End,
+    Bye,
+)
+_PIXEL_FORMATS: Final = tuple(PixelFormat)
+_DROP_REASONS: Final = tuple(DropReason)
+
+E = TypeVar("E", bound=Enum)
+
+
+class VersionError(ProtocolError):
+    """Raised for a header of another protocol version. Nobody's fault: one of the two needs an update.
+
+    Args:
+        theirs: the peer's version.
+    """
+
+    def __init__(self, theirs: int) -> None:
+        super().__init__(
+            f"the peer speaks protocol version {theirs}, this side {PROTOCOL_VERSION}", "update the older of the two"
+        )
+        self.theirs = theirs
+
+
+def encode(message: Message) -> tuple[bytes, Buffer]:
+    """Give a message's header and payload; the payload is the frame's own buffer, not a copy.
+
+    Args:
+        message: any message.
+
+    Returns:
+        Header bytes and payload (empty for all but frames).
+    """
+    header: bytes = msgpack.packb([PROTOCOL_VERSION, _KINDS.index(type(message)), *_fields(message)])
+    return header, message.payload if isinstance(message, FrameMessage) else b""
+
+
+def decode(header: Buffer, payload: Buffer = b"") -> Message:
+    """Read one message.
+
+    Args:
+        header: the header's bytes, from anybody.
+        payload: the bytes that came with it; kept, not copied.
+
+    Returns:
+        The message.
+
+    Raises:
+        VersionError: the peer speaks another version.
+        ProtocolError: these bytes are no message.
+    """
+    if len(header) > MAX_HEADER_BYTES:
+        raise _bad(f"header of {len(header)} bytes")
+    try:
+        items = msgpack.unpackb(
+            header,
+            strict_map_key=True,
+            max_array_len=64,
+            max_map_len=0,
+            max_ext_len=0,
+            max_bin_len=0,
+            max_str_len=4 * _MAX_TEXT,
+        )
+    except (ValueError, RecursionError, msgpack.exceptions.UnpackException) as error:
+        raise _bad(f"header is not msgpack ({error})") from None
+    if not isinstance(items, list) or len(items) < 2:
+        raise _bad("header is not [version, kind, …]")
+    reader = _Reader(items)
+    version = reader.count()
+    if version != PROTOCOL_VERSION:
+        raise VersionError(version)
+    kind = reader.count()
+    if kind >= len(_KINDS):
+        raise _bad(f"unknown kind {kind}")
+    message = _read(_KINDS[kind], reader, payload)
+    reader.finish()
+    if len(payload) and not isinstance(message, FrameMessage):
+        raise _bad(f"{type(message).__name__} with a payload")
+    return message
+
+
+def encode_for_any_version(version: int, refusal: Refusal) -> bytes:
+    """Give a refusal's header in the envelope of another version, so that an older or newer peer can read why.
+
+    Args:
+        version: the peer's version.
+        refusal: what to say.
+    """
+    header: bytes = msgpack.packb([version, _KINDS.index(Refusal), *_fields(refusal)])
+    return header
+
+
+def _bad(problem: str) -> ProtocolError:
+    return ProtocolError(problem, "the packet is dropped; check what else talks to this address")
+
+
+def _fields(message: Message) -> list[Any]:  # noqa: PLR0911 - one line for each kind of message
+    match message:
+        case HostHello(host_id, lane):
+            return [host_id, lane.value]
+        case BoardHello(session, boot_id, camera, counts):
+            return [session, boot_id, *_camera_fields(camera), *_counts_fields(counts)]
+        case Knock(lane):
+            return [lane.value]
+        case Refusal(reason):
+            return [reason.value]
+        case Credit(below_index):
+            return [below_index]
+        case FrameMessage():
+            marks = message.marks
+            size = [message.width_px, message.height_px, _PIXEL_FORMATS.index(message.pixel_format)]
+            times = [message.exposure_ns, marks.exposed_ns, marks.grabbed_ns, marks.sent_ns]
+            return [message.session, message.sent_index, message.sequence, *size, *times]
+        case Ping(wave, t0_ns):
+            return [wave, t0_ns]
+        case Pong(wave, t0_ns, t1_ns, t2_ns):
+            return [wave, t0_ns, t1_ns, t2_ns]
+        case Status(session, counts) | End(session, counts):
+            return [session, *_counts_fields(counts)]
+        case Bye(counts):
+            return _counts_fields(counts)
+        case _:
+            assert_never(message)
+
+
+def _camera_fields(camera: CameraDescription) -> list[Any]:
+    encoding = _PIXEL_FORMATS.index(camera.pixel_format)
+    return [camera.name[:_MAX_TEXT], camera.width_px, camera.height_px, encoding, camera.period_ns, camera.pacing.value]
+
+
+def _counts_fields(counts: BoardCounts) -> list[Any]:
+    return [
+        counts.grabbed,
+        counts.sent,
+        [n for reason, count in counts.dropped for n in (_DROP_REASONS.index(reason), count)],
+    ]
+
+
+def _read(kind: type, reader: "_Reader", payload: Buffer) -> Message:  # noqa: PLR0911 - one line for each kind of message
+    if kind is FrameMessage:
+        return _read_frame(reader, payload)
+    if kind is Ping:
+        return Ping(reader.count(), reader.time_ns())
+    if kind is Pong:
+        return Pong(reader.count(), reader.time_ns(), reader.time_ns(), reader.time_ns())
+    if kind is Credit:
+        return Credit(reader.count())
+    if kind is HostHello:
+        return HostHello(reader.text(), reader.enum(Lane))
+    if kind is BoardHello:
+        return BoardHello(reader.text(), reader.text(), reader.camera(), reader.counts())
+    if kind is Knock:
+        return Knock(reader.enum(Lane))
+    if kind is Refusal:
+        return Refusal(reader.enum(RefusalReason))
+    if kind is Status:
+        return Status(reader.text(), reader.counts())
+    if kind is End:
+        return End(reader.text(), reader.counts())
+    return Bye(reader.counts())
+
+
+def _read_frame(reader: "_Reader", payload: Buffer) -> FrameMessage:
+    if len(payload) > MAX_PAYLOAD_BYTES:
+        raise _bad(f"payload of {len(payload)} bytes")
+    session, sent_index, sequence = reader.text(), reader.count(), reader.count()
+    width_px, height_px, pixel_format = reader.size_px(), reader.size_px(), reader.choice(_PIXEL_FORMATS)
+    exposure_ns = reader.optional_duration_ns()
+    marks = BoardMarks(reader.time_ns(), reader.time_ns(), reader.time_ns())
+    return FrameMessage(session, sent_index, sequence, width_px, height_px, pixel_format, exposure_ns, marks, payload)
+
+
+class _Reader:
+    """Takes checked fields off a header, front to back."""
+
+    def __init__(self, items: list[Any]) -> None:
+        self._items = items
+        self._at = 0
+
+    def finish(self) -> None:
+        """Check that nothing is left over."""
+        if self._at != len(self._items):
+            raise _bad(f"{len(self._items) - self._at} fields too many")
+
+    def count(self) -> int:
+        return self._integer(0, _MAX_COUNT)
+
+    def time_ns(self) -> int:
+        return self._integer(-_NS, _NS)
+
+    def size_px(self) -> int:
+        return self._integer(1, _MAX_SIZE_PX)
+
+    def optional_duration_ns(self) -> int | None:
+        if self._at < len(self._items) and self._items[self._at] is None:
+            self._at += 1
+            return None
+        return self._integer(0, _NS)
+
+    def text(self) -> str:
+        value = self._next()
+        if type(value) is not str or len(value) > _MAX_TEXT:
+            raise _bad(f"field {self._at} is not a short text")
+        return value
+
+    def enum(self, kind: type[E]) -> E:
+        try:
+            return kind(self._integer(0, _MAX_COUNT))
+        except ValueError:
+            raise _bad(f"field {self._at} is no {kind.__name__}") from None
+
+    def choice(self, options: tuple[E, ...]) -> E:
+        return options[self._integer(0, len(options) - 1)]
+
+    def camera(self) -> CameraDescription:
+        name, width_px, height_px = self.text(), self.size_px(), self.size_px()
+        return CameraDescription(
+            name, width_px, height_px, self.choice(_PIXEL_FORMATS), self._integer(1, _NS), self.enum(Pacing)
+        )
+
+    def counts(self) -> BoardCounts:
+        grabbed, sent, flat = self.count(), self.count(), self._next()
+        if not isinstance(flat, list) or len(flat) % 2:
+            raise _bad(f"field {self._at} is no list of drops")
+        inner = _Reader(flat)
+        return BoardCounts(
+            grabbed, sent, tuple((inner.choice(_DROP_REASONS), inner.count()) for _ in range(len(flat) // 2))
+        )
+
+    def _next(self) -> Any:  # noqa: ANN401 - whatever msgpack found; every caller checks it
+        if self._at >= len(self._items):
+            raise _bad("fields are missing")
+        self._at += 1
+        return self._items[self._at - 1]
+
+    def _integer(self, low: int, high: int) -> int:
+        value = self._next()
+        if type(value) is not int or not low <= value <= high:  # bool is an int to isinstance
+            raise _bad(f"field {self._at} is no integer in {low}..{high}")
+        return value
