@@ -1,0 +1,246 @@
+"""What a rendered scene is made of: shapes, textures, paths, light, camera poses. No images here.
+
+Scene axes are the axes of the rig's left camera: x right, y down, z forward, metres. Bodies move, cameras stand still.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.model import Rig, StereoGeometry
+
+Vector = tuple[float, float, float]
+Rotation = NDArray[np.float64]
+"""(3, 3) float64 rotation."""
+
+Floats = NDArray[np.floating[Any]]
+"""Real numbers; images are made in float32, truth in float64, by the same code."""
+
+
+def rotation(axis: Vector, angle_rad: float) -> Rotation:
+    """Rotation about an axis, Rodrigues' formula.
+
+    Args:
+        axis: direction, any length but zero.
+        angle_rad: right-handed angle.
+
+    Returns:
+        (3, 3) float64.
+    """
+    x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    turn: Rotation = np.eye(3) + math.sin(angle_rad) * cross + (1.0 - math.cos(angle_rad)) * (cross @ cross)
+    return turn
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """A flat rectangle at z = 0 of the body's axes, seen from both sides. Infinite sides are allowed."""
+
+    width_m: float = math.inf
+    height_m: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A cuboid around the body's origin with its edges along the body's axes."""
+
+    size_m: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """A ball around the body's origin."""
+
+    radius_m: float
+
+
+Shape = Plane | Box | Sphere
+
+
+@dataclass(frozen=True, slots=True)
+class Texture:
+    """A solid texture: band-limited noise of several octaves, a function of the point in the body's axes.
+
+    Attributes:
+        seed: chooses the pattern.
+        light_bgr: reflectance (0..1, linear) where the coarse noise is high.
+        dark_bgr: reflectance where it is low.
+        contrast: how strongly the octaves modulate the brightness, 0..1.
+        shortest_m: wavelength of the finest octave.
+        longest_m: wavelengths double from `shortest_m` up to this.
+        stretch: at least 1 per axis of the body; 6 along an axis draws a grain along it.
+    """
+
+    seed: int = 0
+    light_bgr: Vector = (0.75, 0.75, 0.75)
+    dark_bgr: Vector = (0.25, 0.25, 0.25)
+    contrast: float = 0.6
+    shortest_m: float = 0.004
+    longest_m: float = 0.26
+    stretch: Vector = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """A periodic motion about the body's rest pose: each coordinate swings as amplitude * sin(2 pi t / period + phase).
+
+    Attributes:
+        amplitude_m: swing along the scene's axes.
+        phase_rad: phase per axis; (0, 0, pi / 2) makes a circle over x and z.
+        period_s: one swing.
+        spin_axis: axis of the body's own turning, in the body's axes.
+        spin_rad_s: its rate.
+    """
+
+    amplitude_m: Vector = (0.0, 0.0, 0.0)
+    phase_rad: Vector = (0.0, 0.0, 0.0)
+    period_s: float = 4.0
+    spin_axis: Vector = (0.0, 1.0, 0.0)
+    spin_rad_s: float = 0.0
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything changes with time."""
+        return any(self.amplitude_m) or self.spin_rad_s != 0.0
+
+    def shift_m(self, t_s: float) -> NDArray[np.float64]:
+        """Displacement from the rest position at time `t_s`, (3,) m in the scene's axes."""
+        angle = 2.0 * math.pi * t_s / self.period_s + np.asarray(self.phase_rad)
+        return np.asarray(self.amplitude_m) * np.sin(angle)
+
+
+STILL = Path()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """A textured shape at a place.
+
+    Attributes:
+        name: for reports and tests.
+        shape: what it is.
+        position_m: its origin in the scene's axes.
+        R_scene_body: (3, 3) float64, takes body coordinates to the scene's axes.
+        texture: what covers it.
+        path: how it moves.
+    """
+
+    name: str
+    shape: Shape
+    position_m: Vector
+    texture: Texture = field(default_factory=Texture)
+    R_scene_body: Rotation = field(default_factory=lambda: np.eye(3))
+    path: Path = STILL
+
+    @property
+    def bounding_radius_m(self) -> float:
+        """Radius of a ball around the origin that holds the shape; infinite for an infinite plane."""
+        match self.shape:
+            case Plane(width_m, height_m):
+                return math.hypot(width_m, height_m) / 2.0
+            case Box(size_m):
+                return math.hypot(*size_m) / 2.0
+            case Sphere(radius_m):
+                return radius_m
+
+    def at(self, t_s: float) -> "Body":
+        """The same body where its path has taken it at time `t_s`, standing still."""
+        if not self.path.moves:
+            return self
+        x, y, z = (np.asarray(self.position_m) + self.path.shift_m(t_s)).tolist()
+        turn = rotation(self.path.spin_axis, self.path.spin_rad_s * t_s)
+        return replace(self, position_m=(x, y, z), R_scene_body=self.R_scene_body @ turn, path=STILL)
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """One far lamp and a sky.
+
+    Attributes:
+        towards: direction from the scene to the lamp, any length (y down: a lamp above has a negative y).
+        lamp_bgr: its strength per channel on a surface that faces it.
+        sky_bgr: strength of the light from everywhere.
+    """
+
+    towards: Vector = (-0.45, -1.0, -0.65)
+    lamp_bgr: Vector = (0.62, 0.68, 0.74)
+    sky_bgr: Vector = (0.36, 0.33, 0.30)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """Bodies under a light.
+
+    Attributes:
+        bodies: in any order; the nearest surface wins.
+        light: the lamp and the sky.
+        void_bgr: brightness (0..1, linear) where a ray meets nothing.
+    """
+
+    bodies: tuple[Body, ...]
+    light: Light = field(default_factory=Light)
+    void_bgr: Vector = (0.02, 0.02, 0.02)
+
+    def at(self, t_s: float) -> "Scene":
+        """The scene frozen at time `t_s` (seconds)."""
+        return replace(self, bodies=tuple(body.at(t_s) for body in self.bodies))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """Where a camera stands.
+
+    Attributes:
+        R_camera_scene: (3, 3) float64, takes the scene's axes to the camera's.
+        centre_m: (3,) float64, the camera's centre in the scene's axes.
+    """
+
+    R_camera_scene: Rotation = field(default_factory=lambda: np.eye(3))
+    centre_m: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+
+
+def rig_poses(rig: Rig) -> tuple[Pose, Pose]:
+    """Poses of a rig's left camera (the scene's origin) and of its right one."""
+    return Pose(), Pose(rig.R_right_left, -rig.R_right_left.T @ rig.t_right_left_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a sensor turns light into grey levels: 255 * gain * (light * vignette) ** (1 / gamma) + offset + noise.
+
+    Attributes:
+        gain_bgr: per channel (exposure and white balance).
+        offset: black level, grey levels.
+        gamma: of the transfer curve.
+        vignetting: fraction of the light lost in the corners, 0..1.
+        noise_sigma: of the sensor's noise, grey levels.
+        seed: of that noise.
+    """
+
+    gain_bgr: Vector = (1.0, 1.0, 1.0)
+    offset: float = 0.0
+    gamma: float = 2.0
+    vignetting: float = 0.0
+    noise_sigma: float = 0.0
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RectifiedView:
+    """The rectified left camera that truth is asked for: an ideal pinhole at the left camera's centre.
+
+    Attributes:
+        geometry: focal length, baseline, principal point, doffs.
+        width_px: image width.
+        height_px: image height.
+        R_rectified_left: (3, 3) float64, takes the left camera's axes to the rectified ones (OpenCV's R1).
+    """
+
+    geometry: StereoGeometry
+    width_px: int
+    height_px: int
+    R_rectified_left: Rotation = field(default_factory=lambda: np.eye(3))
