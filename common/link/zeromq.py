@@ -4,6 +4,7 @@ Frames and control thus travel on TCP connections of their own and a clock echo 
 anything is accepted. A high-water mark does not bound the age of frames; credit does (session), so the marks here are only a fence.
 """
 
+import errno
 import os
 import socket
 from collections.abc import Iterator, Sequence
@@ -192,9 +193,9 @@ class ZeroMqDialer:
 
 def _explained(address: str, error: zmq.ZMQError, remedy: str) -> SettingsError | UnavailableError:
     """Sort ZeroMQ's refusal of an address by whose fault it is."""
-    if error.errno in {zmq.EADDRINUSE, zmq.EADDRNOTAVAIL, zmq.ENODEV} or isinstance(error, zmq.ZMQBindError):
+    if error.errno in {zmq.EADDRINUSE, zmq.EADDRNOTAVAIL, errno.ENODEV} or isinstance(error, zmq.ZMQBindError):
         return UnavailableError(f"{address} cannot be had ({error.strerror})", remedy)
-    if error.errno in {1, 2, 13}:  # EPERM, ENOENT, EACCES: the folder of an ipc path, or a port below 1024
+    if error.errno in {errno.EPERM, errno.ENOENT, errno.EACCES}:  # the folder of an ipc path, or a port below 1024
         return UnavailableError(
             f"{address} cannot be opened ({error.strerror})", "check the folder and its permissions"
         )

@@ -49,7 +49,9 @@ class BoardSession:
         dialled: the connections that this side opened itself (`?connect=1`); empty when the host dials.
     """
 
-    def __init__(self, session: str, boot_id: str, camera: CameraDescription, dialled: dict[Lane, bytes]) -> None:
+    def __init__(
+        self, session: str, boot_id: str, camera: CameraDescription, dialled: tuple[tuple[Lane, bytes], ...] = ()
+    ) -> None:
         self.session = session
         self._boot_id = boot_id
         self._camera = camera
@@ -113,9 +115,7 @@ class BoardSession:
             outgoing.append(Outgoing(host.lanes[Lane.CONTROL], Status(self.session, counts)))
         if self._dialled and now_ns >= self._knock_due_ns:
             known = {} if host is None else host.lanes
-            outgoing += [
-                Outgoing(connection, Knock(lane)) for lane, connection in self._dialled.items() if lane not in known
-            ]
+            outgoing += [Outgoing(connection, Knock(lane)) for lane, connection in self._dialled if lane not in known]
             self._knock_due_ns = now_ns + HELLO_RETRY_NS
         return outgoing
 
@@ -128,7 +128,7 @@ class BoardSession:
         return due
 
     def send(self, frame: Frame) -> Outgoing:
-        """Spend one credit on a frame; its `sent` mark is set when the shell stamps it.
+        """Put a frame into words; its `sent` mark is set when the shell stamps it, the credit is spent by `sent`.
 
         Args:
             frame: a sound frame; only to be called while `has_credit`.
@@ -137,8 +137,11 @@ class BoardSession:
         marks = BoardMarks(frame.exposed.ns, frame.grabbed.ns, frame.grabbed.ns)
         size = (frame.width_px, frame.height_px, frame.pixel_format)
         message = FrameMessage(self.session, self._sent, frame.sequence, *size, frame.exposure_ns, marks, frame.payload)
-        self._sent += 1
         return Outgoing(self._host.lanes[Lane.FRAMES], message)
+
+    def sent(self) -> None:
+        """Take note that the link took the frame."""
+        self._sent += 1
 
     def unreachable(self, connection: bytes) -> list[Outgoing]:
         """Take note that a connection is gone; a host that is still heard on the other one is asked to say hello anew."""

@@ -1,0 +1,199 @@
+"""The board's composition root: camera -> outbox -> session -> links, in one poll loop."""
+
+import logging
+import socket
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import zmq
+
+from board_agent.outbox import Outbox
+from common import now
+from common.camera.base import Camera, Ended, Spoiled
+from common.errors import ProtocolError
+from common.frame import Frame
+from common.link.base import Broken, Garbage, Link, Packet, SendResult
+from common.logs import event
+from common.protocol.board_session import BoardSession
+from common.protocol.message import PROTOCOL_VERSION, BoardCounts, DropReason, Pacing, Refusal, RefusalReason
+from common.protocol.session import Outgoing, stamped
+from common.protocol.wire import VersionError, decode, encode, encode_for_any_version
+
+_LOG = logging.getLogger(__name__)
+
+_DRAIN_NS: Final = 5_000_000_000
+"""After the last frame the host gets this long to say goodbye: longer than any pipeline keeps a pair."""
+
+_LONGEST_WAIT_MS: Final = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """One life of the agent.
+
+    Attributes:
+        session: its id.
+        counts: what became of its frames.
+        garbage: packets that were none of ours.
+        ended: whether the camera came to its end (a replay without loop).
+    """
+
+    session: str
+    counts: BoardCounts
+    garbage: int
+    ended: bool
+
+
+class Agent:
+    """Serves a camera's frames over links until stopped.
+
+    Args:
+        camera: open camera.
+        links: open links; one host at a time over all of them.
+        session: random id of this process's life.
+        boot_id: id of the machine's boot.
+        wake: readable end of a socket that is written to by signals.
+    """
+
+    def __init__(self, camera: Camera, links: Sequence[Link], session: str, boot_id: str, wake: socket.socket) -> None:
+        self._camera = camera
+        self._links = links
+        self._wake = wake
+        self._on_demand = camera.description.pacing is Pacing.DEMAND
+        self._outbox = Outbox()
+        dialled = tuple(
+            (lane, _address(i, path)) for i, link in enumerate(links) for lane, path in link.dialled.items()
+        )
+        self._session = BoardSession(session, boot_id, camera.description, dialled)
+        self._had_host = False
+        self._camera_ended = False
+        self._garbage = 0
+        self._stopping = False
+        self._poller = zmq.Poller()
+        for pollable in (wake, *(item for link in links for item in link.pollables)):
+            self._poller.register(pollable, zmq.POLLIN)
+        if camera.pollable is not None:
+            self._poller.register(camera.pollable, zmq.POLLIN)
+
+    def run(self) -> Summary:
+        """Serve until a signal comes or the camera ends; then say goodbye.
+
+        Raises:
+            DataError: the camera's images have become unreadable.
+        """
+        now_ns = now.monotonic_ns()
+        while not self._stopping and not (self._camera_ended and self._outbox.waiting is None):
+            self._poll(self._due_ns(now_ns), now_ns)
+            self._grab(now.monotonic_ns())
+            self._flush()
+            now_ns = now.monotonic_ns()
+            if now_ns >= self._session.due_ns:
+                self._send_all(self._session.tick(now_ns, self._outbox.counts))
+            self._watch_host()
+        if self._camera_ended and not self._stopping:
+            self._drain()
+        self._outbox.discard(DropReason.STOPPED)
+        self._send_all(self._session.leave(self._outbox.counts))
+        return Summary(self._session.session, self._outbox.counts, self._garbage, self._camera_ended)
+
+    def _due_ns(self, now_ns: int) -> int:
+        if self._on_demand:
+            return now_ns if self._session.has_credit else self._session.due_ns
+        return min(self._session.due_ns, self._camera.due_ns(now_ns))
+
+    def _poll(self, due_ns: int, now_ns: int) -> None:
+        """Wait for whatever comes first and take all packets; rounded up, because waking early would only spin."""
+        wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
+        ready = self._poller.poll(wait_ms)
+        if not ready:
+            return
+        if any(item == self._wake.fileno() for item, _ in ready):
+            self._stopping = True
+        for index, link in enumerate(self._links):
+            for incoming in link.receive():
+                self._take(index, incoming)
+
+    def _take(self, index: int, incoming: Packet | Broken | Garbage) -> None:
+        arrived_ns = now.monotonic_ns()
+        connection = _address(index, incoming.connection)
+        match incoming:
+            case Broken():
+                self._send_all(self._session.unreachable(connection))
+            case Garbage():
+                self._refuse_garbage(connection, "not a packet")
+            case Packet(_, header, payload):
+                try:
+                    message = decode(header, payload)
+                except VersionError as error:
+                    _LOG.warning(event("host_refused", reason="version", theirs=error.theirs, ours=PROTOCOL_VERSION))
+                    refusal = encode_for_any_version(error.theirs, Refusal(RefusalReason.VERSION))
+                    self._links[index].send(incoming.connection, refusal, b"")
+                except ProtocolError as error:
+                    self._refuse_garbage(connection, error.problem)
+                else:
+                    self._send_all(self._session.receive(connection, message, arrived_ns, self._outbox.counts))
+
+    def _refuse_garbage(self, connection: bytes, problem: str) -> None:
+        self._garbage += 1
+        if self._garbage.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: a hostile peer must not fill the log
+            _LOG.warning(event("garbage", connection=connection.hex(), count=self._garbage, problem=problem))
+
+    def _grab(self, now_ns: int) -> None:
+        if self._on_demand and not (self._session.has_credit and self._outbox.waiting is None):
+            return
+        for grab in self._camera.read(now_ns):
+            match grab:
+                case Frame():
+                    self._outbox.put(grab, has_host=self._session.has_host)
+                case Spoiled(sequence, fault):
+                    self._outbox.spoiled()
+                    _LOG.debug(event("frame_spoiled", sequence=sequence, fault=fault.value))
+                case Ended():
+                    self._camera_ended = True
+
+    def _flush(self) -> None:
+        """Send the waiting frame if there is credit for it."""
+        frame = self._outbox.waiting
+        if frame is None or not self._session.has_credit:
+            return
+        match self._send(self._session.send(frame)):
+            case SendResult.SENT:
+                self._session.sent()
+                self._outbox.sent()
+            case SendResult.FULL if not self._on_demand:
+                self._outbox.discard(DropReason.LINK_FULL)
+            case _:
+                pass  # unreachable: the frame waits for the host to come back, or for a newer one
+
+    def _send_all(self, outgoing: list[Outgoing]) -> None:
+        for item in outgoing:
+            self._send(item)
+
+    def _send(self, outgoing: Outgoing) -> SendResult:
+        link = self._links[outgoing.connection[0]]
+        header, payload = encode(stamped(outgoing.message, now.monotonic_ns()))
+        result = link.send(outgoing.connection[1:], header, payload)
+        if result is SendResult.UNREACHABLE:
+            self._send_all(self._session.unreachable(outgoing.connection))
+        return result
+
+    def _watch_host(self) -> None:
+        if self._session.has_host != self._had_host:
+            self._had_host = self._session.has_host
+            _LOG.info(event("host_connected" if self._had_host else "host_gone", session=self._session.session))
+
+    def _drain(self) -> None:
+        """Tell the host that this was all, and give it the time to take it in."""
+        _LOG.info(event("camera_ended", session=self._session.session))
+        deadline_ns = now.monotonic_ns() + _DRAIN_NS
+        unsaid = self._session.end(self._outbox.counts)
+        while not self._stopping and self._session.has_host and (now_ns := now.monotonic_ns()) < deadline_ns:
+            unsaid = [item for item in unsaid if self._send(item) is not SendResult.SENT]
+            self._send_all(self._session.tick(now_ns, self._outbox.counts))
+            self._poll(min(self._session.due_ns, deadline_ns), now_ns)
+
+
+def _address(link_index: int, connection: bytes) -> bytes:
+    """Make a connection's name unique over all links."""
+    return bytes((link_index,)) + connection

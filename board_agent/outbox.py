@@ -1,0 +1,53 @@
+"""The one frame that waits for the link, and the account of every frame: grabbed = sent + dropped + waiting."""
+
+from common.frame import Frame
+from common.protocol.message import BoardCounts, DropReason
+
+
+class Outbox:
+    """Keeps the newest frame, never a backlog; counts what becomes of each."""
+
+    def __init__(self) -> None:
+        self._waiting: Frame | None = None
+        self._grabbed = 0
+        self._sent = 0
+        self._dropped: dict[DropReason, int] = {}
+
+    @property
+    def waiting(self) -> Frame | None:
+        """The frame that could be sent now."""
+        return self._waiting
+
+    @property
+    def counts(self) -> BoardCounts:
+        """What became of all frames so far."""
+        return BoardCounts(self._grabbed, self._sent, tuple(self._dropped.items()))
+
+    def put(self, frame: Frame, *, has_host: bool) -> None:
+        """Take a fresh frame; the one that still waits was not wanted in time."""
+        self._grabbed += 1
+        if self._waiting is not None:
+            self._drop(DropReason.REPLACED)
+        self._waiting = frame
+        if not has_host:
+            self.discard(DropReason.NO_HOST)
+
+    def spoiled(self) -> None:
+        """Count a grab whose bytes are no whole image."""
+        self._grabbed += 1
+        self._drop(DropReason.SPOILED)
+
+    def sent(self) -> None:
+        """Take note that the link took the waiting frame."""
+        assert self._waiting is not None
+        self._waiting = None
+        self._sent += 1
+
+    def discard(self, reason: DropReason) -> None:
+        """Drop the waiting frame, if there is one."""
+        if self._waiting is not None:
+            self._waiting = None
+            self._drop(reason)
+
+    def _drop(self, reason: DropReason) -> None:
+        self._dropped[reason] = self._dropped.get(reason, 0) + 1

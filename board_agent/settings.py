@@ -1,0 +1,16 @@
+"""What the board's owner may set."""
+
+from dataclasses import dataclass
+
+from common.settings import setting
+
+ENVIRONMENT_PREFIX = "BOARD_AGENT"
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSettings:
+    """Settings of board-agent, from /etc/tandemscan/board-agent.toml or another file, the environment and options."""
+
+    camera: str = setting("", "camera URI, for example replay:PATH?fps=30&loop=1")
+    link: tuple[str, ...] = setting(("tcp://127.0.0.1:5555",), "links to serve; loopback unless told otherwise")
+    log_level: str = setting("info", "debug, info, warning or error")

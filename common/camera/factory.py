@@ -1,0 +1,59 @@
+"""Camera URI to camera."""
+
+from fractions import Fraction
+from urllib.parse import parse_qsl
+
+from common.camera.base import Camera
+from common.camera.replay import ReplayCamera, ReplaySettings
+from common.errors import SettingsError
+from common.protocol.message import Pacing
+
+EXAMPLE = "replay:PATH[?fps=30&loop=1&pace=clock|demand]"
+
+
+def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
+    """Open the camera that a URI names.
+
+    Args:
+        uri: see EXAMPLE.
+        clock: name of this machine's clock, for the stamps.
+        now_ns: CLOCK_MONOTONIC now, ns.
+
+    Returns:
+        The open camera.
+
+    Raises:
+        SettingsError: the URI makes no sense.
+        UnavailableError: there is no such device or folder.
+        DataError: a replay's images are bad.
+    """
+    scheme, found, rest = uri.partition(":")
+    if not found or scheme != "replay" or not rest:
+        raise SettingsError(f"camera {uri!r} is of no known kind", f"give {EXAMPLE}")
+    path, options = _split(uri, rest)
+    return ReplayCamera(_replay_settings(uri, path, options, clock), now_ns)
+
+
+def _split(uri: str, rest: str) -> tuple[str, dict[str, str]]:
+    """Part path and options; a `?` without `=` behind it belongs to a glob."""
+    path, mark, query = rest.rpartition("?")
+    if not mark or "=" not in query:
+        return rest, {}
+    try:
+        return path, dict(parse_qsl(query, keep_blank_values=True, strict_parsing=True))
+    except ValueError:
+        raise SettingsError(f"camera {uri!r} has options {query!r}", f"give {EXAMPLE}") from None
+
+
+def _replay_settings(uri: str, path: str, options: dict[str, str], clock: str) -> ReplaySettings:
+    if unknown := set(options) - {"fps", "loop", "pace"}:
+        raise SettingsError(f"camera {uri!r} has an unknown option {min(unknown)!r}", f"give {EXAMPLE}")
+    try:
+        fps = Fraction(options.get("fps", "30"))
+        loop = {"0": False, "1": True}[options.get("loop", "0")]
+        pacing = Pacing[options.get("pace", "clock").upper()]
+    except (ValueError, ZeroDivisionError, KeyError):
+        raise SettingsError(f"camera {uri!r} has an option of no use", f"give {EXAMPLE}") from None
+    if not Fraction(1, 100) <= fps <= 1000:
+        raise SettingsError(f"camera {uri!r} has fps={options.get('fps')}", "give a rate between 0.01 and 1000")
+    return ReplaySettings(path, fps, loop, pacing, clock)

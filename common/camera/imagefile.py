@@ -1,0 +1,94 @@
+"""Just enough of image files to replay them without an image library: size and encoding, and lossless PNG for simple raw formats."""
+
+import re
+import struct
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from common.errors import DataError
+from common.frame import PixelFormat
+
+
+@dataclass(frozen=True, slots=True)
+class ImageFile:
+    """An image file's bytes as they are sent, and what their header says.
+
+    Attributes:
+        pixel_format: encoding of `payload`.
+        width_px: width, px.
+        height_px: height, px.
+        payload: JPEG and PNG files untouched, others as lossless PNG.
+    """
+
+    pixel_format: PixelFormat
+    width_px: int
+    height_px: int
+    payload: bytes
+
+
+SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".pgm", ".ppm", ".pnm"})
+"""File names that a replay folder is searched for."""
+
+_PNM = re.compile(rb"P([56])(?:\s+|#[^\n]*\n)+(\d+)(?:\s+|#[^\n]*\n)+(\d+)(?:\s+|#[^\n]*\n)+(\d+)\s")
+"""Binary grey- and pixmap header (netpbm's pgm(5) and ppm(5)): magic, width, height, maximum value, one white space."""
+
+
+def load(path: Path) -> ImageFile:
+    """Read an image file as it is sent over a link.
+
+    Args:
+        path: a JPEG, PNG, binary PGM or PPM file.
+
+    Returns:
+        Its bytes and header.
+
+    Raises:
+        DataError: the file cannot be read or its header is none of these.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{path} cannot be read ({error.strerror})", "check the file and its permissions") from None
+    if data[:2] == b"\xff\xd8":
+        return ImageFile(PixelFormat.MJPEG, *_jpeg_size(path, data), data)
+    if data[:8] == b"\x89PNG\r\n\x1a\n" and len(data) >= 24:
+        width_px, height_px = struct.unpack(">II", data[16:24])
+        return ImageFile(PixelFormat.PNG, width_px, height_px, data)
+    if header := _PNM.match(data):
+        return _from_pnm(path, header, data)
+    raise DataError(
+        f"{path} is no image that can be replayed",
+        "use JPEG, PNG or binary PGM/PPM files, or remove it from the folder",
+    )
+
+
+def _jpeg_size(path: Path, data: bytes) -> tuple[int, int]:
+    """Width and height from the frame header (ITU-T T.81, B.2.2)."""
+    at = 2
+    while at + 9 <= len(data) and data[at] == 0xFF:
+        marker, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4], "big")
+        if 0xC0 <= marker <= 0xCF and marker not in {0xC4, 0xC8, 0xCC}:  # SOF0..15 without DHT, JPG, DAC
+            height_px, width_px = struct.unpack(">HH", data[at + 5 : at + 9])
+            return width_px, height_px
+        at += 2 + length
+    raise DataError(f"{path} is a JPEG without a frame header", "replace the file or remove it from the folder")
+
+
+def _from_pnm(path: Path, header: re.Match[bytes], data: bytes) -> ImageFile:
+    kind, width_px, height_px, maximum = (int(group) for group in header.groups())
+    channels, depth = (1 if kind == 5 else 3), (1 if maximum < 256 else 2)
+    row = width_px * channels * depth
+    body = data[header.end() : header.end() + row * height_px]
+    if maximum not in {255, 65535} or len(body) < row * height_px:
+        raise DataError(
+            f"{path} is cut short or has maximum value {maximum}", "write it again with 8 or 16 bit, or remove it"
+        )
+    lines = b"".join(b"\0" + body[y * row : (y + 1) * row] for y in range(height_px))  # filter type 0, PNG 1.2, 6.2
+    ihdr = struct.pack(">IIBBBBB", width_px, height_px, 8 * depth, 0 if channels == 1 else 2, 0, 0, 0)
+    png = b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", ihdr) + _chunk(b"IDAT", zlib.compress(lines, 1)) + _chunk(b"IEND", b"")
+    return ImageFile(PixelFormat.PNG, width_px, height_px, png)
+
+
+def _chunk(kind: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))

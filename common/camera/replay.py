@@ -1,0 +1,208 @@
+"""A camera that shows a folder of images, in name order, on a clock or on demand.
+
+pace=clock: at any moment the image is number floor(t * fps) of CLOCK_MONOTONIC, exposed exactly at k / fps; so two replays on one machine
+agree whenever they were started. pace=demand: one image for each read, nothing dropped, stamps first + k / fps.
+"""
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Final
+
+from common.camera.base import Ended, Grab, Spoiled
+from common.camera.imagefile import SUFFIXES, ImageFile, load
+from common.errors import DataError, UnavailableError
+from common.frame import Frame, find_fault
+from common.protocol.message import CameraDescription, Pacing
+from common.stamp import Stamp
+
+_FAR_FUTURE: Final = 2**63 - 1
+_CACHE_BYTES: Final = 64 * 1024 * 1024
+"""Files are kept in memory up to here: a tenth of a BeagleBone's RAM, and no disk delay in the measured path for short clips."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReplaySettings:
+    """What to show, and when.
+
+    Attributes:
+        path: a folder, or a glob.
+        fps: images per second.
+        loop: begin again after the last.
+        pacing: by the clock or on demand.
+        clock: name of the clock of the stamps.
+    """
+
+    path: str
+    fps: Fraction = Fraction(30)
+    loop: bool = False
+    pacing: Pacing = Pacing.CLOCK
+    clock: str = "host"
+
+
+def name_order(path: Path) -> tuple[list[tuple[int, int | str]], str]:
+    """Sort key that takes numbers in names as numbers: frame2 before frame10."""
+    parts = [(0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"(\d+)", path.name) if part]
+    return parts, path.name
+
+
+def find_images(pattern: str) -> list[Path]:
+    """List the images that a folder or glob names, in name order.
+
+    Args:
+        pattern: folder or glob.
+
+    Returns:
+        At least one path.
+
+    Raises:
+        UnavailableError: there is no such folder, or it can't be read.
+        DataError: it holds no image.
+    """
+    folder = Path(pattern)
+    try:
+        if folder.is_dir():
+            found = [path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES]
+        elif any(letter in pattern for letter in "*?["):
+            anchor = Path(folder.anchor or ".")
+            found = [
+                path
+                for path in anchor.glob(str(folder.relative_to(anchor) if folder.anchor else folder))
+                if path.is_file()
+            ]
+        elif folder.is_file():
+            found = [folder]
+        else:
+            raise UnavailableError(
+                f"replay {pattern!r} does not exist", "give a folder of images, an image or a quoted glob"
+            )
+    except OSError as error:
+        raise UnavailableError(
+            f"replay {pattern!r} cannot be read ({error.strerror})", "check its permissions"
+        ) from None
+    if not found:
+        raise DataError(
+            f"replay {pattern!r} holds no image",
+            f"put {', '.join(sorted(SUFFIXES))} files there or give another folder",
+        )
+    return sorted(found, key=name_order)
+
+
+class ReplayCamera:
+    """A folder of images as a camera.
+
+    Args:
+        settings: what to show.
+        now_ns: CLOCK_MONOTONIC now, ns; images before it are not shown.
+
+    Raises:
+        UnavailableError: there is no such folder.
+        DataError: no image, an unreadable one, or images of different size or encoding.
+    """
+
+    def __init__(self, settings: ReplaySettings, now_ns: int) -> None:
+        self._settings = settings
+        self._paths = find_images(settings.path)
+        self._cache: dict[Path, ImageFile] = {}
+        self._cached_bytes = 0
+        first = self._check_alike()
+        self._period_ns = int(Fraction(1_000_000_000) / settings.fps)
+        name = Path(settings.path).name
+        size = (first.width_px, first.height_px, first.pixel_format)
+        self.description = CameraDescription(f"replay {name}", *size, self._period_ns, settings.pacing)
+        self.pollable: int | None = None
+        self._next = self._index_at(now_ns) + 1 if settings.pacing is Pacing.CLOCK else 0
+        self._first_shown = self._next
+        self._first_ns: int | None = None
+        self._sequence = 0
+
+    def due_ns(self, now_ns: int) -> int:
+        """When the next image is exposed; on demand never by itself."""
+        del now_ns
+        return self._time_of(self._next) if self._settings.pacing is Pacing.CLOCK else _FAR_FUTURE
+
+    def anchor(self, first_ns: int) -> None:
+        """Set the stamp of a demand-paced camera's first image, ns; without it that is the time of the first read."""
+        if self._first_ns is None:
+            self._first_ns = first_ns
+
+    def read(self, now_ns: int) -> list[Grab]:
+        """Give the images that have become due; of several missed ones all, so that each is accounted for.
+
+        Raises:
+            DataError: a file has become unreadable.
+        """
+        if self._settings.pacing is Pacing.DEMAND:
+            self.anchor(now_ns)
+            return [self._grab(now_ns)]
+        grabs: list[Grab] = []
+        newest = self._index_at(now_ns)
+        # After a long stall (a stopped process) only the newest images matter, and their number must stay bounded.
+        skipped = max(0, newest - self._next + 1 - _BACKLOG)
+        self._sequence += skipped
+        self._next += skipped
+        while self._next <= newest and not (grabs and isinstance(grabs[-1], Ended)):
+            grabs.append(self._grab(now_ns))
+        return grabs
+
+    def close(self) -> None:
+        """Forget the files."""
+        self._cache.clear()
+
+    def _grab(self, now_ns: int) -> Grab:
+        index = self._next
+        shown = index - self._first_shown
+        if not self._settings.loop and shown >= len(self._paths):
+            return Ended()
+        self._next += 1
+        sequence = self._sequence
+        self._sequence += 1
+        # On the clock the image follows from the time alone, so that two replays agree; without loop it is the first one first.
+        position = index if self._settings.loop else shown
+        image = self._load(self._paths[position % len(self._paths)])
+        if fault := find_fault(image.pixel_format, image.payload):
+            return Spoiled(sequence, fault)
+        exposed = Stamp(self._time_of(index), self._settings.clock)
+        grabbed = Stamp(max(now_ns, exposed.ns), self._settings.clock)
+        return Frame(
+            sequence, exposed, grabbed, image.width_px, image.height_px, image.pixel_format, None, image.payload
+        )
+
+    def _time_of(self, index: int) -> int:
+        start = 0 if self._settings.pacing is Pacing.CLOCK else self._first_ns or 0
+        return start + round(Fraction(index * 1_000_000_000) / self._settings.fps)
+
+    def _index_at(self, now_ns: int) -> int:
+        index = int(now_ns * self._settings.fps / 1_000_000_000)
+        return index if self._time_of(index) <= now_ns else index - 1  # rounding to ns may put an exposure just after
+
+    def _load(self, path: Path) -> ImageFile:
+        image = self._cache.get(path)
+        if image is None:
+            image = load(path)
+            if self._cached_bytes + len(image.payload) <= _CACHE_BYTES:
+                self._cache[path] = image
+                self._cached_bytes += len(image.payload)
+        return image
+
+    def _check_alike(self) -> ImageFile:
+        first = self._load(self._paths[0])
+        for path in self._paths[1:]:
+            other = self._load(path)
+            if (other.width_px, other.height_px) != (first.width_px, first.height_px):
+                theirs, ours = f"{other.width_px}x{other.height_px}", f"{first.width_px}x{first.height_px}"
+                raise DataError(
+                    f"{path} is {theirs}, {self._paths[0].name} is {ours}",
+                    "one camera has one size: give images of one size",
+                )
+            if other.pixel_format is not first.pixel_format:
+                raise DataError(
+                    f"{path} is {other.pixel_format.value}, {self._paths[0].name} is {first.pixel_format.value}",
+                    "give images of one kind",
+                )
+        return first
+
+
+_BACKLOG: Final = 64
+"""Most images given by one read: two seconds of video, as much as a driver's ring could ever hold and more."""

@@ -1,0 +1,112 @@
+"""Settings with their origin: defaults, a TOML file, the environment and options, each stronger than the one before.
+
+A daemon declares its settings as one frozen dataclass whose fields are texts, numbers, truth values or tuples of texts, each with a
+`doc` in its metadata. Keys in the file are the field names; in the environment PREFIX_FIELD.
+"""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Generic, TypeVar, get_args, get_origin, get_type_hints
+
+from common.errors import SettingsError
+
+T = TypeVar("T")
+
+
+def setting(default: Any, doc: str) -> Any:  # noqa: ANN401 - stands in a dataclass field of any type, as dataclasses.field does
+    """Declare one setting of a settings dataclass.
+
+    Args:
+        default: its value where nothing else is said.
+        doc: one sentence for people.
+    """
+    return field(default=default, metadata={"doc": doc})
+
+
+@dataclass(frozen=True, slots=True)
+class Resolved(Generic[T]):
+    """Settings and where each came from.
+
+    Attributes:
+        values: the settings dataclass.
+        origins: (field, origin) in the order of the fields; origin is `default`, a file, a variable or an option.
+    """
+
+    values: T
+    origins: tuple[tuple[str, str], ...]
+
+
+def resolve(kind: type[T], prefix: str, file: Path | None, options: Mapping[str, object]) -> Resolved[T]:
+    """Work out the settings.
+
+    Args:
+        kind: the settings dataclass.
+        prefix: of the environment variables, for example `BOARD_AGENT`.
+        file: a TOML file, or None.
+        options: by field name, from the command line; None values are those not given.
+
+    Returns:
+        The settings with their origins.
+
+    Raises:
+        SettingsError: the file cannot be read, or a key or value makes no sense.
+    """
+    hints = get_type_hints(kind)
+    in_file = {} if file is None else _read(file, set(hints))
+    values: dict[str, Any] = {}
+    origins = []
+    for item in fields(kind):  # type: ignore[arg-type]  # T is always a dataclass
+        origin, variable = "default", f"{prefix}_{item.name.upper()}"
+        value: Any = item.default
+        if item.name in in_file:
+            origin, value = str(file), _checked(in_file[item.name], hints[item.name], f"{item.name} in {file}")
+        if variable in os.environ:
+            origin, value = variable, _parsed(os.environ[variable], hints[item.name], variable)
+        if options.get(item.name) is not None:
+            origin, value = f"--{item.name.replace('_', '-')}", options[item.name]
+        values[item.name] = value
+        origins.append((item.name, origin))
+    return Resolved(kind(**values), tuple(origins))
+
+
+def _read(file: Path, known: set[str]) -> dict[str, Any]:
+    try:
+        content = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SettingsError(f"settings file {file} cannot be read ({error.strerror})", "check --config") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SettingsError(f"settings file {file} is not TOML ({error})", "mend that line") from None
+    if unknown := set(content) - known:
+        raise SettingsError(f"unknown key {min(unknown)!r} in {file}", f"the keys are {', '.join(sorted(known))}")
+    return content
+
+
+def _checked(value: object, hint: Any, where: str) -> object:  # noqa: ANN401 - a type hint
+    if get_origin(hint) is tuple:
+        if isinstance(value, list) and all(isinstance(item, get_args(hint)[0]) for item in value):
+            return tuple(value)
+    elif hint is float and type(value) in {int, float}:
+        return float(value)  # type: ignore[arg-type]  # int or float, as just checked
+    elif type(value) is hint:
+        return value
+    raise SettingsError(f"{where} is {value!r}", f"give {_name(hint)}")
+
+
+def _parsed(text: str, hint: Any, where: str) -> object:  # noqa: ANN401 - a type hint
+    try:
+        if get_origin(hint) is tuple:
+            return tuple(text.split())
+        if hint is bool:
+            return {"0": False, "1": True, "false": False, "true": True}[text.lower()]
+        return hint(text)
+    except (ValueError, KeyError):
+        raise SettingsError(f"{where} is {text!r}", f"give {_name(hint)}") from None
+
+
+def _name(hint: Any) -> str:  # noqa: ANN401 - a type hint
+    if get_origin(hint) is tuple:
+        return "a list of texts"
+    return {str: "a text", int: "a whole number", float: "a number", bool: "true or false"}[hint]
