@@ -1,0 +1,77 @@
+"""The stereo core: rectify or pass, match, reproject. One class for files and for live streams: both give the same bits.
+
+No I/O and no clocks here: the caller times the stages.
+"""
+
+from phone_host.model import CloudImage, Disparity, Image, RectifiedPair, StereoGeometry
+from phone_host.stereo.images import require_same_size
+from phone_host.stereo.match import Matcher
+from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.reproject import reproject
+
+
+class StereoCore:
+    """From two images to a point cloud image, stage by stage.
+
+    Attributes:
+        geometry: what turns disparity into metres; None when the images come rectified and nobody said.
+
+    Args:
+        matcher: finds the disparity.
+        rectifier: for unrectified images; None when they come rectified.
+        geometry: for images that come rectified; must be None with a rectifier, which knows its own.
+    """
+
+    def __init__(
+        self, matcher: Matcher, rectifier: Rectifier | None = None, geometry: StereoGeometry | None = None
+    ) -> None:
+        if rectifier is not None and geometry is not None:
+            raise ValueError("the rectifier brings its own geometry")
+        self._matcher = matcher
+        self._rectifier = rectifier
+        self.geometry = geometry if rectifier is None else rectifier.geometry
+
+    def rectify(self, left: Image, right: Image) -> RectifiedPair:
+        """Rectify, or pass images that come rectified.
+
+        Args:
+            left: (H, W) grey or (H, W, 3) BGR, uint8.
+            right: the same; another size is possible with a rectifier only.
+
+        Returns:
+            The rectified pair.
+
+        Raises:
+            DataError: a size that does not fit the rig, or two sizes without a rig.
+        """
+        if self._rectifier is not None:
+            return self._rectifier.rectify(left, right)
+        require_same_size(left, right, "the left image", "the right image")
+        return RectifiedPair(left, right)
+
+    def match(self, pair: RectifiedPair) -> Disparity:
+        """Match a rectified pair.
+
+        Args:
+            pair: what `rectify` gave.
+
+        Returns:
+            (H, W) float32, px, NaN = none.
+        """
+        return self._matcher.match(pair)
+
+    def reproject(self, disparity: Disparity) -> CloudImage:
+        """Turn disparity into metres.
+
+        Args:
+            disparity: what `match` gave.
+
+        Returns:
+            (H, W, 3) float32, m, in the rectified left camera's axes; NaN = none.
+
+        Raises:
+            ValueError: there is no geometry; look at `geometry` before.
+        """
+        if self.geometry is None:
+            raise ValueError("no geometry: focal length and baseline are unknown")
+        return reproject(disparity, self.geometry)

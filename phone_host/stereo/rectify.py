@@ -1,0 +1,292 @@
+"""Rectification of two unlike cameras: other resolution, focal length, distortion.
+
+`cv2.stereoRectify` takes one image size for both cameras: it judges both fields of view, both focal lengths and both principal
+points by that one size, so it does not hold for two. Here each camera's field of view is followed through its own model:
+
+- rotation: Bouguet's. Each camera turns by half of the rotation between them, then both together so that the baseline becomes
+  the x axis; neither image is bent more than the other.
+- focal length: that of the coarser camera. The finer camera's extra pixels find no partner, and work grows with the square.
+- window: the largest rectangle that both cameras fill with measured pixels, the same slopes in both. So both images share the
+  principal point (doffs = 0, infinity has disparity 0) and hold no black border that a matcher would take for texture.
+
+Source: J.-Y. Bouguet, Camera Calibration Toolbox, 2000; A. Fusiello et al., "A compact algorithm for rectification of stereo
+pairs", 2000; OpenCV's calib3d documentation for P1, P2 and Q.
+"""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import DataError
+from phone_host.model import Camera, Image, RectifiedPair, Rig, Side, StereoGeometry
+from phone_host.stereo.images import size_text
+
+Matrix = NDArray[np.float64]
+
+_RECALIBRATE = "calibrate the rig again"
+# Undistortion is iterative; 5 iterations (OpenCV's default) leave 0.1 px in the corners of a wide lens.
+_UNDISTORT = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
+_ROUND_TRIP_LIMIT_PX = 0.01
+_SAMPLES_PER_EDGE = 65  # the outline bends slowly: between 65 samples it moves by less than 0.01 px
+# A polynomial fitted to points in the middle may fold back near the corners; the usable field of view then ends before.
+_FIELD_SHARES = (1.0, 0.97, 0.94, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5)
+_LEAST_SIZE_PX = 32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rectification:
+    """How both cameras are turned and cut; the values `rig.yaml` holds beside the rig itself.
+
+    Attributes:
+        geometry: what turns disparity into metres; its axes are those of the *rectified* left camera.
+        width_px: width of both rectified images, px.
+        height_px: height of both rectified images, px.
+        R_left: (3, 3) float64, takes the left camera's axes to the rectified ones (OpenCV's R1).
+        R_right: (3, 3) float64, the same for the right camera (R2).
+        P_left: (3, 4) float64 projection of rectified points into the left rectified image (P1).
+        P_right: (3, 4) float64 into the right rectified image (P2), metres.
+        Q: (4, 4) float64, takes (u, v, d, 1) to homogeneous metres.
+    """
+
+    geometry: StereoGeometry
+    width_px: int
+    height_px: int
+    R_left: Matrix
+    R_right: Matrix
+    P_left: Matrix
+    P_right: Matrix
+    Q: Matrix
+
+
+def rectify_rig(rig: Rig) -> Rectification:
+    """Find the common rotation, focal length and window of a rig.
+
+    Args:
+        rig: two calibrated cameras.
+
+    Returns:
+        The rectification.
+
+    Raises:
+        DataError: left and right are swapped, the cameras do not stand side by side, their fields of view do not overlap, or a
+            distortion model cannot be inverted.
+    """
+    left_rotation, right_rotation, baseline_m = _rotations(rig)
+    focal_px = min(_mean_focal_px(rig.left), _mean_focal_px(rig.right))
+    windows = (
+        _filled_window(rig.left, left_rotation, Side.LEFT),
+        _filled_window(rig.right, right_rotation, Side.RIGHT),
+    )
+    x0, y0 = np.max([window[:2] for window in windows], axis=0)
+    x1, y1 = np.min([window[2:] for window in windows], axis=0)
+    width_px = math.floor(focal_px * (x1 - x0)) + 1
+    height_px = math.floor(focal_px * (y1 - y0)) + 1
+    if width_px < _LEAST_SIZE_PX or height_px < _LEAST_SIZE_PX:
+        raise DataError(
+            f"the two cameras' fields of view overlap by {max(width_px, 0)}x{max(height_px, 0)} px only",
+            f"turn the cameras towards the same scene and {_RECALIBRATE}",
+        )
+    geometry = StereoGeometry(focal_px, baseline_m, cx_px=float(-focal_px * x0), cy_px=float(-focal_px * y0))
+    camera = np.array([[focal_px, 0, geometry.cx_px, 0], [0, focal_px, geometry.cy_px, 0], [0, 0, 1, 0]])
+    shift = np.zeros((3, 4))
+    shift[0, 3] = -focal_px * baseline_m
+    to_metres = np.array(
+        [
+            [1, 0, 0, -geometry.cx_px],
+            [0, 1, 0, -geometry.cy_px],
+            [0, 0, 0, focal_px],
+            [0, 0, 1 / baseline_m, geometry.doffs_px / baseline_m],
+        ]
+    )
+    return Rectification(
+        geometry,
+        width_px,
+        height_px,
+        R_left=left_rotation,
+        R_right=right_rotation,
+        P_left=camera,
+        P_right=camera + shift,
+        Q=to_metres,
+    )
+
+
+def rectify_points(
+    points_px: NDArray[np.floating], camera: Camera, rotation: Matrix, geometry: StereoGeometry
+) -> NDArray[np.float64]:
+    """Where measured points of one camera stand in its rectified image.
+
+    Args:
+        points_px: (N, 2), px, in the camera's own image.
+        camera: its model.
+        rotation: (3, 3) from the camera's axes to the rectified ones (`R_left` or `R_right`).
+        geometry: of the rectified pair.
+
+    Returns:
+        (N, 2) float64, px.
+    """
+    slopes = _rectified_slopes(points_px, camera, rotation)
+    points: NDArray[np.float64] = slopes * geometry.focal_px + np.array([geometry.cx_px, geometry.cy_px])
+    return points
+
+
+class Rectifier:
+    """Remaps the images of a rig to a rectified pair; the maps are made once.
+
+    Attributes:
+        rig: the rig it was made for.
+        rectification: rotations, projections and size.
+        geometry: of the rectified pair.
+
+    Args:
+        rig: two calibrated cameras.
+
+    Raises:
+        DataError: as `rectify_rig`.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        self.rectification = rectify_rig(rig)
+        self.geometry = self.rectification.geometry
+        self._left = _Remap(rig.left, self.rectification.R_left, self.rectification)
+        self._right = _Remap(rig.right, self.rectification.R_right, self.rectification)
+
+    def rectify(self, left: Image, right: Image) -> RectifiedPair:
+        """Rectify a pair of images as the cameras gave them.
+
+        Args:
+            left: (H, W) grey or (H, W, 3) BGR, uint8, of the left camera's size.
+            right: the same of the right camera's size.
+
+        Returns:
+            The pair, both of the rectification's size, every pixel filled.
+
+        Raises:
+            DataError: an image has another size than its camera in the rig.
+        """
+        _check_size(left, self.rig.left, Side.LEFT)
+        _check_size(right, self.rig.right, Side.RIGHT)
+        return RectifiedPair(self._left.apply(left), self._right.apply(right))
+
+
+class _Remap:
+    """One camera's way from its own image to the rectified one."""
+
+    def __init__(self, camera: Camera, rotation: Matrix, rectification: Rectification) -> None:
+        size = (rectification.width_px, rectification.height_px)
+        projection = rectification.P_left[:, :3]  # P_right's first three columns are the same
+        x, y = cv2.initUndistortRectifyMap(camera.matrix, camera.distortion, rotation, projection, size, cv2.CV_32FC1)
+        # Bilinear interpolation reads 2 x 2 pixels; a camera twice as fine as the result would alias: average it down first.
+        self._shrink = max(1, int(_mean_focal_px(camera) / rectification.geometry.focal_px + 1e-6))
+        if self._shrink > 1:
+            x, y = ((axis + 0.5) / self._shrink - 0.5 for axis in (x, y))
+        self._whole, self._fraction = cv2.convertMaps(
+            x, y, cv2.CV_16SC2
+        )  # half the time of float maps, the same 1/32 px
+
+    def apply(self, image: Image) -> Image:
+        if self._shrink > 1:
+            height, width = (length // self._shrink for length in image.shape[:2])
+            whole_blocks = image[: height * self._shrink, : width * self._shrink]
+            image = np.asarray(cv2.resize(whole_blocks, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        # Replicate: the maps stay inside, but the last half block of a shrunk image may lie 0.5 px outside.
+        remapped = cv2.remap(image, self._whole, self._fraction, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(remapped, dtype=np.uint8)
+
+
+def _rotations(rig: Rig) -> tuple[Matrix, Matrix, float]:
+    """R_left, R_right and the baseline in metres; refuses rigs whose right camera is not to the right."""
+    half = np.asarray(cv2.Rodrigues(rig.R_right_left)[0], dtype=np.float64) / 2
+    left_to_middle = np.asarray(cv2.Rodrigues(half)[0], dtype=np.float64)
+    right_to_middle = left_to_middle.T
+    # The right camera's centre, seen from the left one, in the middle's axes.
+    to_right_m = -right_to_middle @ rig.t_right_left_m.reshape(3)
+    baseline_m = float(np.linalg.norm(to_right_m))
+    if not baseline_m > 0:
+        raise DataError("the rig has no baseline (T is 0)", _RECALIBRATE)
+    x, y, z = to_right_m / baseline_m
+    if abs(x) < max(abs(y), abs(z)):
+        where = "above or below" if abs(y) > abs(z) else "in front of or behind"
+        raise DataError(
+            f"the right camera stands {where} the left one", "mount the two cameras side by side, looking the same way"
+        )
+    if x < 0:
+        raise DataError(
+            f"the right camera stands to the left of the left one (by {-x * baseline_m * 1e3:.1f} mm)",
+            "swap LEFT and RIGHT",
+        )
+    turn = _shortest_turn(np.array([x, y, z]), np.array([1.0, 0.0, 0.0]))
+    return turn @ left_to_middle, turn @ right_to_middle, baseline_m
+
+
+def _shortest_turn(source: Matrix, target: Matrix) -> Matrix:
+    """The rotation by the smallest angle that takes unit vector `source` to `target`."""
+    axis = np.cross(source, target)
+    sine = float(np.linalg.norm(axis))
+    angle = math.atan2(sine, float(source @ target))
+    vector = axis * (angle / sine) if sine > 0 else np.zeros(3)
+    return np.asarray(cv2.Rodrigues(vector)[0], dtype=np.float64)
+
+
+def _mean_focal_px(camera: Camera) -> float:
+    return float(camera.matrix[0, 0] + camera.matrix[1, 1]) / 2
+
+
+def _rectified_slopes(points_px: NDArray[np.floating], camera: Camera, rotation: Matrix) -> NDArray[np.float64]:
+    """(N, 2) slopes x / z and y / z in the rectified axes."""
+    points = np.asarray(points_px, dtype=np.float64).reshape(-1, 1, 2)
+    slopes = cv2.undistortPointsIter(points, camera.matrix, camera.distortion, rotation, np.eye(3), _UNDISTORT)
+    return np.asarray(slopes, dtype=np.float64).reshape(-1, 2)
+
+
+def _filled_window(camera: Camera, rotation: Matrix, side: Side) -> tuple[float, float, float, float]:
+    """x0, y0, x1, y1 in slopes: a rectangle in the rectified view that the camera's image fills wholly.
+
+    The four edges of the image, followed through the model, bound the view; the rectangle takes the innermost point of each.
+    """
+    for share in _FIELD_SHARES:
+        edges = _edges_px(camera, share)
+        slopes = _rectified_slopes(edges.reshape(-1, 2), camera, rotation)
+        if _round_trip_error_px(slopes, edges.reshape(-1, 2), camera, rotation) > _ROUND_TRIP_LIMIT_PX:
+            continue
+        top, right, bottom, left = slopes.reshape(4, -1, 2)
+        return (
+            float(left[:, 0].max()), float(top[:, 1].max()), float(right[:, 0].min()), float(bottom[:, 1].min())
+        )  # fmt: skip
+    raise DataError(
+        f"the {side.value} camera's distortion folds back inside its image",
+        f"{_RECALIBRATE}, with views that also cover the corners",
+    )
+
+
+def _edges_px(camera: Camera, share: float) -> NDArray[np.float64]:
+    """(4, N, 2): points along the top, right, bottom and left edge of the image, drawn in to `share` of it."""
+    ends = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64) - 0.5
+    along = np.linspace(0, 1, _SAMPLES_PER_EDGE)[:, np.newaxis]
+    extent = np.array([camera.width_px - 1, camera.height_px - 1], dtype=np.float64)
+    edges = [a * (1 - along) + b * along for a, b in zip(ends, np.roll(ends, -1, axis=0), strict=True)]
+    return (np.array(edges) * share + 0.5) * extent
+
+
+def _round_trip_error_px(
+    slopes: NDArray[np.float64], points_px: NDArray[np.float64], camera: Camera, rotation: Matrix
+) -> float:
+    """Largest distance between points and their slopes projected back; NaN-safe (NaN gives infinity)."""
+    rays = np.column_stack([slopes, np.ones(len(slopes))]) @ rotation  # rows: rotation.T @ ray
+    if not np.all(rays[:, 2] > 0):
+        return math.inf
+    back, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)
+    error = np.abs(np.asarray(back).reshape(-1, 2) - points_px).max()
+    return float(error) if math.isfinite(error) else math.inf
+
+
+def _check_size(image: Image, camera: Camera, side: Side) -> None:
+    if image.shape[:2] != (camera.height_px, camera.width_px):
+        raise DataError(
+            f"the {side.value} image is {size_text(image)} px, rig.yaml was calibrated for"
+            f" {camera.width_px}x{camera.height_px}",
+            "use the resolution of the calibration, or calibrate again at this one",
+        )

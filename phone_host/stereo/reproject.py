@@ -1,0 +1,96 @@
+"""Disparity to metres and back, for a rectified pair.
+
+z = f b / (d + doffs), x = (u - cx) z / f, y = (v - cy) z / f: Hartley and Zisserman, "Multiple View Geometry", chapter 11;
+`doffs` as on https://vision.middlebury.edu/stereo/data/scenes2014/. OpenCV's `reprojectImageTo3D` does not mark missing values.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.model import CloudImage, Disparity, StereoGeometry
+
+DEFAULT_NEAR_M = 0.3
+"""Nearest depth looked for where nobody says otherwise, m: the near end of hand-held scanners (Structure Sensor 0.35 m,
+RealSense D435 0.28 m). Nearer costs time: the number of disparities goes with 1 / z."""
+
+_DISPARITY_STEP = 16  # StereoSGBM wants multiples of 16; vector registers of 8-bit costs do as well.
+
+# Depths above this would overflow float32 in x and y; no such disparity is a measurement.
+_FARTHEST_M = 1e30
+
+
+@lru_cache(maxsize=8)
+def _rays(geometry: StereoGeometry, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Slopes (u - cx) / f of the columns, (W,), and (v - cy) / f of the rows, (H, 1)."""
+    columns = (np.arange(width) - geometry.cx_px) / geometry.focal_px
+    rows = (np.arange(height) - geometry.cy_px) / geometry.focal_px
+    return columns.astype(np.float32), rows.astype(np.float32)[:, np.newaxis]
+
+
+def reproject(disparity: Disparity, geometry: StereoGeometry) -> CloudImage:
+    """Give every pixel its point in the left camera's axes.
+
+    Args:
+        disparity: (H, W) float32, px, NaN = none.
+        geometry: of the rectified pair.
+
+    Returns:
+        (H, W, 3) float32, m; NaN in all three where there is no disparity or d + doffs <= 0 (behind infinity).
+    """
+    height, width = disparity.shape
+    columns, rows = _rays(geometry, width, height)
+    product = geometry.focal_px * geometry.baseline_m
+    shifted = disparity + np.float32(geometry.doffs_px) if geometry.doffs_px else disparity
+    in_front = shifted > product / _FARTHEST_M
+    depth = np.full(disparity.shape, np.nan, dtype=np.float32)
+    np.divide(np.float32(product), shifted, out=depth, where=in_front)
+    cloud = np.empty((height, width, 3), dtype=np.float32)
+    np.multiply(depth, columns, out=cloud[..., 0])
+    np.multiply(depth, rows, out=cloud[..., 1])
+    cloud[..., 2] = depth
+    return cloud
+
+
+def project(points_m: NDArray[np.floating], geometry: StereoGeometry) -> NDArray[np.float64]:
+    """The inverse of `reproject`: where points stand in the left image, and with which disparity.
+
+    Args:
+        points_m: (..., 3), m, z > 0, in the left camera's axes.
+        geometry: of the rectified pair.
+
+    Returns:
+        (..., 3) float64: u, v, d, px.
+    """
+    points = np.asarray(points_m, dtype=np.float64)
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    u = geometry.focal_px * x / z + geometry.cx_px
+    v = geometry.focal_px * y / z + geometry.cy_px
+    d = geometry.focal_px * geometry.baseline_m / z - geometry.doffs_px
+    return np.stack((u, v, d), axis=-1)
+
+
+def disparities_for_near(geometry: StereoGeometry, near_m: float, width_px: int) -> int:
+    """The number N of disparities 0 <= d < N that reaches from infinity to `near_m`.
+
+    Args:
+        geometry: of the rectified pair.
+        near_m: nearest depth wanted, m, > 0.
+        width_px: width of the rectified images; N stays below half of it: nearer than that, less than half of the left
+            image is seen by the right camera at all.
+
+    Returns:
+        N, a multiple of 16, at least 16.
+    """
+    nearest_px = geometry.focal_px * geometry.baseline_m / near_m - geometry.doffs_px
+    wanted = math.ceil(max(nearest_px, 1.0) / _DISPARITY_STEP) * _DISPARITY_STEP
+    most = max(width_px // 2 // _DISPARITY_STEP, 1) * _DISPARITY_STEP
+    return min(wanted, most)
+
+
+def nearest_depth_m(geometry: StereoGeometry, disparities: int) -> float:
+    """The nearest depth that N = `disparities` can give, m; NaN when d + doffs cannot be positive."""
+    largest_px = disparities + geometry.doffs_px
+    return geometry.focal_px * geometry.baseline_m / largest_px if largest_px > 0 else math.nan

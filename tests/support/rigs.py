@@ -1,0 +1,65 @@
+"""Two unlike cameras with known geometry, and points seen by both through their full models."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.model import Camera, Rig
+
+
+def unlike_rig(right_centre_m: tuple[float, float, float] = (0.1, 0.004, -0.006), turn: float = 1.0) -> Rig:
+    """A 640x480 camera on the left and a finer, longer 1280x720 one, turned by some degrees, on the right.
+
+    Args:
+        right_centre_m: the right camera's centre in the left one's axes, m.
+        turn: factor on the rotation between the two.
+    """
+    left = Camera(
+        640,
+        480,
+        np.array([[525.0, 0, 315], [0, 527, 243], [0, 0, 1]]),
+        np.array([-0.25, 0.08, 0.001, -0.0005, 0.01]),
+    )
+    right = Camera(
+        1280,
+        720,
+        np.array([[1130.0, 0, 652], [0, 1128, 351], [0, 0, 1]]),
+        np.array([0.12, -0.3, -0.001, 0.0008, 0.1]),
+    )
+    rotation = np.asarray(cv2.Rodrigues(np.array([0.02, -0.05, 0.03]) * turn)[0], dtype=np.float64)
+    return Rig(left, right, rotation, -rotation @ np.array(right_centre_m))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenPoints:
+    """Points inside both images: (N, 3) m in the left camera's axes, (N, 2) px left and right."""
+
+    points_m: NDArray[np.float64]
+    left_px: NDArray[np.float64]
+    right_px: NDArray[np.float64]
+
+
+def project_points(points_m: NDArray[np.float64], rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where both cameras see points of the left camera's axes, (N, 2) px each, through the full distortion."""
+    turn = cv2.Rodrigues(rig.R_right_left)[0]
+    left, _ = cv2.projectPoints(points_m, np.zeros(3), np.zeros(3), rig.left.matrix, rig.left.distortion)
+    right, _ = cv2.projectPoints(points_m, turn, rig.t_right_left_m, rig.right.matrix, rig.right.distortion)
+    return np.asarray(left, np.float64).reshape(-1, 2), np.asarray(right, np.float64).reshape(-1, 2)
+
+
+def points_seen_by_both(rig: Rig, count: int, seed: int) -> SeenPoints:
+    """Random points 0.4 m to 3 m away that lie inside both images."""
+    random = np.random.default_rng(seed)
+    depth = random.uniform(0.4, 3.0, count)
+    # Slopes up to 0.45: both models are invertible there, farther out none of their pixels lies.
+    points = np.column_stack([random.uniform(-0.45, 0.45, (count, 2)) * depth[:, np.newaxis], depth])
+    left, right = project_points(points, rig)
+    seen = _inside(left, rig.left) & _inside(right, rig.right)
+    return SeenPoints(points[seen], left[seen], right[seen])
+
+
+def _inside(points_px: NDArray[np.float64], camera: Camera) -> NDArray[np.bool_]:
+    limit = np.array([camera.width_px - 1, camera.height_px - 1])
+    return np.asarray(((points_px >= 0) & (points_px <= limit)).all(axis=1))

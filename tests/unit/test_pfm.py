@@ -1,0 +1,79 @@
+"""PFM files, against Middlebury's description of them."""
+
+import resource
+import struct
+from pathlib import Path
+
+import hypothesis.extra.numpy as hnp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.errors import DataError
+from phone_host.formats.pfm import read_pfm, write_pfm
+from phone_host.model import Disparity
+
+
+def test_file_holds_header_bottom_row_first_little_endian_and_infinity(tmp_path: Path) -> None:
+    """The bytes of a 2x2 map are exactly those of Middlebury's convention."""
+    path = tmp_path / "d.pfm"
+    write_pfm(path, np.array([[1.5, np.nan], [3.0, 4.0]], dtype=np.float32))
+    assert path.read_bytes() == b"Pf\n2 2\n-1\n" + struct.pack("<4f", 3.0, 4.0, 1.5, float("inf"))
+
+
+@given(
+    hnp.arrays(
+        np.float32,
+        hnp.array_shapes(min_dims=2, max_dims=2, max_side=20),
+        elements=st.floats(0, 4096, width=32) | st.just(float("nan")),
+    )
+)
+@settings(deadline=None, max_examples=50)
+def test_round_trip(tmp_path_factory: pytest.TempPathFactory, disparity: Disparity) -> None:
+    """What is written is read back to the bit, NaN included."""
+    path = tmp_path_factory.mktemp("pfm") / "d.pfm"
+    write_pfm(path, disparity)
+    np.testing.assert_array_equal(read_pfm(path), disparity)
+
+
+def test_big_endian_is_read(tmp_path: Path) -> None:
+    """A positive scale means big endian."""
+    path = tmp_path / "d.pfm"
+    path.write_bytes(b"Pf\n1 2\n1.0\n" + struct.pack(">2f", 7.0, float("inf")))
+    np.testing.assert_array_equal(read_pfm(path), np.array([[np.nan], [7.0]], dtype=np.float32))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"P5\n2 2\n255\n", b"PF\n1 1\n-1\n" + bytes(12), b"Pf\n2 2\n-1\n" + bytes(15), b"Pf\n2 2\n0\n" + bytes(16)],
+)
+def test_bad_files_are_named(tmp_path: Path, content: bytes) -> None:
+    """A file that is no whole one-channel PFM is refused by name."""
+    path = tmp_path / "bad.pfm"
+    path.write_bytes(content)
+    with pytest.raises(DataError, match=r"bad\.pfm"):
+        read_pfm(path)
+
+
+def test_missing_file_is_named(tmp_path: Path) -> None:
+    """A missing file is a DataError, not an OSError."""
+    with pytest.raises(DataError, match=r"none\.pfm"):
+        read_pfm(tmp_path / "none.pfm")
+
+
+def test_a_write_that_fails_half_way_leaves_the_old_file_and_no_other(tmp_path: Path) -> None:
+    """When the operating system refuses more bytes, the caller gets its OSError and no half file stays."""
+    path = tmp_path / "d.pfm"
+    write_pfm(path, np.zeros((1, 1), dtype=np.float32))
+    before = path.read_bytes()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    # A real limit of the kernel (EFBIG), which fails as a full disk (ENOSPC) does.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2**20, hard))
+    try:
+        with pytest.raises(OSError, match="too large"):
+            write_pfm(path, np.zeros((1024, 1024), dtype=np.float32))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert path.read_bytes() == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["d.pfm"]

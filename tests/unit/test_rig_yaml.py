@@ -1,0 +1,114 @@
+"""rig.yaml: round trip, other readers, and every kind of bad file."""
+
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from common.errors import DataError
+from phone_host.formats.rig_yaml import read_rig, write_rig
+from phone_host.model import Rig, Side
+from phone_host.stereo.rectify import rectify_rig
+from tests.support.rigs import unlike_rig
+
+_MATRICES = ("M1", "D1", "M2", "D2", "R", "T", "R1", "R2", "P1", "P2", "Q")
+
+
+def _written(tmp_path: Path, **changes: object) -> Path:
+    rig = unlike_rig()
+    fields = {name: getattr(rig, name) for name in Rig.__slots__} | changes
+    path = tmp_path / "rig.yaml"
+    write_rig(path, Rig(**fields), rectify_rig(rig))
+    return path
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    """Every number of the rig comes back to the bit."""
+    rig = unlike_rig()
+    back = read_rig(_written(tmp_path, board_side=Side.RIGHT, rms_left_px=0.125, rms_stereo_px=0.25))
+    for camera, expected in ((back.left, rig.left), (back.right, rig.right)):
+        assert (camera.width_px, camera.height_px) == (expected.width_px, expected.height_px)
+        np.testing.assert_array_equal(camera.matrix, expected.matrix)
+        np.testing.assert_array_equal(camera.distortion, expected.distortion)
+    np.testing.assert_array_equal(back.R_right_left, rig.R_right_left)
+    np.testing.assert_array_equal(back.t_right_left_m, rig.t_right_left_m)
+    assert back.board_side is Side.RIGHT
+    assert (back.rms_left_px, back.rms_stereo_px) == (0.125, 0.25)
+    assert np.isnan(back.rms_right_px)
+
+
+def test_opencv_reads_the_keys_of_the_contract(tmp_path: Path) -> None:
+    """A plain cv2.FileStorage finds every key, and its own projection with P2 agrees with the rig's."""
+    storage = cv2.FileStorage(str(_written(tmp_path)), cv2.FILE_STORAGE_READ)
+    sizes = {key: int(storage.getNode(key).real()) for key in ("left_image_width", "right_image_height")}
+    assert sizes == {"left_image_width": 640, "right_image_height": 720}
+    shapes = {key: storage.getNode(key).mat().shape for key in _MATRICES}
+    assert shapes == {
+        "M1": (3, 3), "D1": (1, 5), "M2": (3, 3), "D2": (1, 5), "R": (3, 3), "T": (3, 1),
+        "R1": (3, 3), "R2": (3, 3), "P1": (3, 4), "P2": (3, 4), "Q": (4, 4),
+    }  # fmt: skip
+    P2 = storage.getNode("P2").mat()  # noqa: N806
+    assert -P2[0, 3] / P2[0, 0] == pytest.approx(np.linalg.norm([0.1, 0.004, -0.006]))
+
+
+@pytest.mark.parametrize("key", ["M1", "D2", "R", "T", "left_image_width", "right_image_height"])
+def test_a_missing_key_is_named(tmp_path: Path, key: str) -> None:
+    """A file without a key is refused with the key and the file in the message."""
+    path = _written(tmp_path)
+    path.write_text(re.sub(rf"^{key}:", f"no_{key}:", path.read_text(), flags=re.MULTILINE))
+    with pytest.raises(DataError, match=rf"rig\.yaml: {key} is missing"):
+        read_rig(path)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("R_right_left", np.eye(3) * 1.1, "R is no rotation"),
+        ("R_right_left", np.diag([1.0, 1.0, -1.0]), "R is no rotation"),
+        ("R_right_left", np.eye(2), "R is 2x2"),
+        ("R_right_left", np.full((3, 3), np.nan), "R holds values that are not finite"),
+        ("t_right_left_m", np.array([-80.0, 0, 0]), "T is 80 m long: T is in metres"),
+        ("t_right_left_m", np.zeros(3), "T is 0"),
+    ],
+)
+def test_a_value_that_makes_no_sense_is_named(tmp_path: Path, field: str, value: np.ndarray, message: str) -> None:
+    """A matrix of the wrong shape, with NaN, or of the wrong kind is refused by key."""
+    with pytest.raises(DataError, match=message):
+        read_rig(_written(tmp_path, **{field: value}))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("left_image_width: 640", "left_image_width: 0", "left_image_width is no image size"),
+        ("left_image_width: 640", "left_image_width: wide", "left_image_width is no image size"),
+        ("board_side: left", "board_side: top", "board_side is 'top'"),
+        ("525., 0., 315.", "-525., 0., 315.", "M1 is no camera matrix"),
+        ("525., 0., 315.,", "", "M1 is no matrix"),
+    ],
+)
+def test_an_edited_file_is_checked(tmp_path: Path, old: str, new: str, message: str) -> None:
+    """What a text editor can break is named by key."""
+    path = _written(tmp_path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(DataError, match=message):
+        read_rig(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b'{"M1": 1}', b"%YAML:1.0\nM1: [", b"\xff\xfe\x00"])
+def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
+    """What is no FileStorage YAML is refused in one line, by name."""
+    path = tmp_path / "rig.yaml"
+    path.write_bytes(content)
+    with pytest.raises(DataError, match=r"rig\.yaml is no OpenCV FileStorage YAML"):
+        read_rig(path)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    """A missing file is a DataError with the command that makes one."""
+    with pytest.raises(DataError, match="phone-host calibrate"):
+        read_rig(tmp_path / "rig.yaml")
