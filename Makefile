@@ -37,7 +37,7 @@ $(PARTS:%=test-%): test-%: $(READY) # one part alone: make test-unit
 lint: $(READY) ## ruff (rules and format) and the layers of the packages
 	@$(BIN)/ruff check --quiet .
 	@$(BIN)/ruff format --check --quiet . || { echo "error: not formatted; run: $(BIN)/ruff format ." >&2; exit 1; }
-	@$(BIN)/lint-imports
+	@$(BIN)/lint-imports --no-logo
 
 types: $(READY) ## mypy --strict
 	@$(BIN)/mypy
