@@ -22,6 +22,10 @@ FACES = 8
 NOTHING = -1
 """Surface number of a ray that meets nothing."""
 
+PART = 8192
+"""Rays handled at a time: a dozen arrays of (3, 8192) float32 stay in a second-level cache, and products of this size
+are too small for the linear algebra library to wake its threads."""
+
 # OpenCV's fixed-point inversion gains about a digit per step at the edge of a webcam's image; its default of 5 steps
 # leaves tenths of a pixel there. 1e-13 of the unit plane is far below 1e-6 px.
 _UNDISTORT_UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-13)
@@ -100,7 +104,7 @@ def intersect(shape: Shape, origin: Floats, rays: Floats) -> Floats:
                 depth, leave = box_interval(size_m, origin[:, None], rays)
                 hit = (depth <= leave) & (depth > 0.0)
             case Sphere(radius_m):
-                square = np.einsum("in,in->n", rays, rays)
+                square = dot(rays, rays)
                 half = origin @ rays
                 root = half * half - square * (origin @ origin - radius_m * radius_m)
                 depth = (-half - np.sqrt(root)) / square
@@ -170,6 +174,12 @@ def faces_and_normals(shape: Shape, points: Floats) -> tuple[NDArray[np.int16], 
             return (2 * axis + (side > 0)).astype(np.int16), normals
 
 
+def dot(a: Floats, b: Floats) -> Floats:
+    """Inner products (N,) of vectors (3, N); written out, it is three times as fast as einsum."""
+    product: Floats = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return product
+
+
 def column(vector: Vector | NDArray[np.float64], like: Floats) -> Floats:
     """A vector as a (3, 1) column of another array's dtype."""
     values: Floats = np.array(vector, dtype=np.float64).astype(like.dtype)
@@ -210,10 +220,13 @@ def cast_one(index: int, body: Body, origin: Floats, rays: Floats, hits: Hits) -
         hits: N depths and surfaces so far.
     """
     local_origin = to_body(body, origin.astype(rays.dtype)[:, None])
-    local_rays: Floats = body.R_scene_body.T.astype(rays.dtype) @ rays
-    depth = intersect(body.shape, local_origin[:, 0], local_rays)
-    first = np.flatnonzero(depth < hits.depth)
-    if first.size:
-        points = local_origin + depth[first] * local_rays[:, first]
-        hits.depth[first] = depth[first]
-        hits.surface[first] = faces_and_normals(body.shape, points)[0] + index * FACES
+    turn = body.R_scene_body.T.astype(rays.dtype)
+    for start in range(0, rays.shape[1], PART):
+        part = slice(start, start + PART)
+        local_rays: Floats = turn @ rays[:, part]
+        depth = intersect(body.shape, local_origin[:, 0], local_rays)
+        first = np.flatnonzero(depth < hits.depth[part])
+        if first.size:
+            points = local_origin + depth[first] * local_rays[:, first]
+            hits.depth[part][first] = depth[first]
+            hits.surface[part][first] = faces_and_normals(body.shape, points)[0] + index * FACES

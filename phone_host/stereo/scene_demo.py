@@ -86,37 +86,31 @@ def demo_scene() -> Scene:
     It repeats every `DEMO_PERIOD_S`.
     """
     flat = rotation((1.0, 0.0, 0.0), math.radians(-90.0))
-    table_y = 0.33
-    wall = Texture(11, (0.60, 0.66, 0.68), (0.47, 0.50, 0.46), contrast=0.5, shortest_m=0.008, longest_m=0.26)
-    wood = Texture(12, (0.20, 0.38, 0.62), (0.10, 0.20, 0.38), 0.5, longest_m=0.13, stretch=(1.0, 3.0, 1.0))
-    red = Texture(13, (0.16, 0.22, 0.80), (0.05, 0.08, 0.45), contrast=0.55, longest_m=0.13)
-    blue = Texture(14, (0.75, 0.48, 0.16), (0.42, 0.20, 0.06), contrast=0.55, longest_m=0.13)
-    yellow = Texture(15, (0.15, 0.66, 0.86), (0.08, 0.38, 0.62), contrast=0.5, longest_m=0.13)
-    green = Texture(16, (0.30, 0.62, 0.28), (0.12, 0.34, 0.10), contrast=0.55, longest_m=0.13)
+    upright = (0.0, 1.0, 0.0)
+    table_y = 0.32
     turn = 2.0 * math.pi / DEMO_PERIOD_S
     quarter = math.pi / 2.0
-    roll = Path((0.22, 0.0, 0.16), (0.0, 0.0, quarter), DEMO_PERIOD_S, (0.3, 1.0, 0.2), turn)
-    hover = Path((0.03, 0.05, 0.06), (1.0, 0.0, 2.0), DEMO_PERIOD_S, (0.4, 1.0, 0.2), -turn)
+    roll = Path((0.20, 0.0, 0.14), (0.0, 0.0, quarter), DEMO_PERIOD_S, (0.3, 1.0, 0.2), turn)
+    hover = Path((0.03, 0.04, 0.06), (1.0, 0.0, 2.0), DEMO_PERIOD_S, (0.4, 1.0, 0.2), -turn)
+    sway = Path((0.05, 0.0, 0.0), (0.5, 0.0, 0.0), DEMO_PERIOD_S, upright, turn)
+    wall = Texture(11, (0.58, 0.62, 0.63), (0.50, 0.53, 0.51), 0.36, shortest_m=0.008)
+    wood = Texture(12, (0.24, 0.42, 0.64), (0.12, 0.24, 0.42), 0.45, longest_m=0.13, stretch=(1.0, 2.5, 1.0))
+    poster = Texture(17, (0.50, 0.44, 0.22), (0.34, 0.26, 0.10), 0.45, shortest_m=0.008)
+    red = Texture(13, (0.16, 0.22, 0.80), (0.06, 0.08, 0.45), longest_m=0.13)
+    blue = Texture(14, (0.72, 0.46, 0.16), (0.44, 0.20, 0.06), longest_m=0.13)
+    green = Texture(16, (0.28, 0.60, 0.30), (0.12, 0.36, 0.12), longest_m=0.13)
+    yellow = Texture(15, (0.14, 0.62, 0.84), (0.08, 0.36, 0.60), longest_m=0.13)
+    violet = Texture(18, (0.62, 0.34, 0.52), (0.34, 0.14, 0.28), longest_m=0.06)
     return Scene(
         (
-            Body("wall", Plane(), (0.0, 0.0, 2.6), wall),
+            Body("wall", Plane(), (0.0, 0.0, 2.5), wall),
             Body("table", Plane(), (0.0, table_y, 1.5), wood, flat),
-            Body("ball", Sphere(0.13), (0.05, table_y - 0.13, 1.25), red, path=roll),
-            Body("cube", Box((0.2, 0.2, 0.2)), (-0.38, -0.08, 1.15), blue, path=hover),
-            Body(
-                "tower",
-                Box((0.22, 0.52, 0.22)),
-                (0.50, table_y - 0.26, 1.75),
-                green,
-                path=Path(period_s=DEMO_PERIOD_S, spin_rad_s=turn),
-            ),
-            Body(
-                "brick",
-                Box((0.34, 0.12, 0.18)),
-                (-0.62, table_y - 0.06, 2.0),
-                yellow,
-                rotation((0.0, 1.0, 0.0), 0.5),
-            ),
+            Body("poster", Plane(0.9, 0.62), (-0.52, -0.42, 2.30), poster, rotation(upright, -0.35)),
+            Body("brick", Box((0.34, 0.12, 0.18)), (-0.60, table_y - 0.06, 1.9), yellow, rotation(upright, 0.5)),
+            Body("marble", Sphere(0.05), (0.27, table_y - 0.05, 0.86), violet),
+            Body("ball", Sphere(0.12), (0.02, table_y - 0.12, 1.15), red, path=roll),
+            Body("cube", Box((0.19, 0.19, 0.19)), (-0.27, -0.08, 1.1), blue, path=hover),
+            Body("tower", Box((0.22, 0.50, 0.22)), (0.50, table_y - 0.25, 1.65), green, path=sway),
         ),
         Light(),
     )

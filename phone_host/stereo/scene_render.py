@@ -6,6 +6,7 @@ is band-limited; pixels at the border of two surfaces are averaged over 3 x 3 sa
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import Camera, Image
-from phone_host.stereo.scene_cast import FACES, NOTHING, Hits, cast, cast_one, pixel_rays, to_body
+from phone_host.stereo.scene_cast import FACES, NOTHING, PART, Hits, cast, cast_one, dot, pixel_rays, to_body
 from phone_host.stereo.scene_model import Body, Floats, Look, Plane, Pose, Scene
 from phone_host.stereo.scene_shade import albedo, shadow_balls, surface_light, surface_normals
 
@@ -149,7 +150,7 @@ class Renderer:
         points = self._centre[:, None] + depth * rays
         normals = surface_normals(body, points, -rays)
         if reflectance is None:
-            cosine = np.abs(np.einsum("in,in->n", normals, rays)) / np.sqrt(np.einsum("in,in->n", rays, rays))
+            cosine = np.abs(dot(normals, rays)) / np.sqrt(dot(rays, rays))
             footprint = depth / (np.float32(self._focal_px) * np.maximum(cosine, np.float32(_LEAST_COSINE)))
             reflectance = albedo(body, to_body(body, points), footprint)
         casters = tuple(other for other in bodies if other is not body and not isinstance(other.shape, Plane))
@@ -232,10 +233,13 @@ def render(scene: Scene, camera: Camera, pose: Pose | None = None, look: Look | 
     return Renderer(scene.at(t_s), camera, Pose() if pose is None else pose, look).frame(t_s)
 
 
-def _by_body(surface: NDArray[np.int16], at: Flat) -> list[tuple[int, Flat]]:
-    """Splits flat indices by the body that is seen there; those that see nothing are left out."""
+def _by_body(surface: NDArray[np.int16], at: Flat) -> Iterator[tuple[int, Flat]]:
+    """Splits flat indices by the body that is seen there, in parts that fit a cache; those that see nothing are left out."""
     owner = surface[at] // FACES
-    return [(int(index), at[owner == index]) for index in np.unique(owner) if index >= 0]
+    for index in range(int(owner.max(initial=NOTHING)) + 1):
+        mine = at[owner == index]
+        for start in range(0, mine.size, PART):
+            yield index, mine[start : start + PART]
 
 
 def _borders(surface: NDArray[np.int16]) -> NDArray[np.bool_]:

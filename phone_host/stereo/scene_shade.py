@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.stereo.scene_cast import box_interval, column, faces_and_normals, to_body
+from phone_host.stereo.scene_cast import box_interval, column, dot, faces_and_normals, to_body
 from phone_host.stereo.scene_model import Body, Box, Floats, Light, Plane, Sphere, Texture
 
 _TILE = 512
@@ -139,7 +139,7 @@ def albedo(body: Body, points: Floats, footprint_m: Floats) -> Floats:
         total += value
         if octave >= len(waves) - 3:
             coarse += value
-    mix = _smooth(-1.6, 1.6, coarse)
+    mix = _smooth(-2.5, 2.5, coarse)
     shade = 1.0 + np.float32(texture.contrast) * np.tanh(total * np.float32(0.45))
     light, dark = (column(colour, points) for colour in (texture.light_bgr, texture.dark_bgr))
     bgr: Floats = np.clip((dark + (light - dark) * mix) * shade, 0.0, 1.0)
@@ -159,7 +159,7 @@ def lamp_reaching(body: Body, points: Floats, towards: Floats) -> Floats:
     match body.shape:
         case Sphere(radius_m):
             ahead = -(ray @ local)
-            miss = np.sqrt(np.maximum(np.einsum("in,in->n", local, local) - ahead * ahead, 0.0))
+            miss = np.sqrt(np.maximum(dot(local, local) - ahead * ahead, 0.0))
             through = _smooth(0.8 * radius_m, 1.2 * radius_m, miss)
             return np.where(ahead > 0.0, through, np.float32(1.0))
         case Box(size_m):
@@ -215,8 +215,8 @@ def sky_blocked(body: Body, points: Floats, normals: Floats) -> Floats:
         return np.zeros(points.shape[1], dtype=np.float32)
     radius = _ball_radius_m(body)
     to_centre = column(body.position_m, points) - points
-    square = np.maximum(np.einsum("in,in->n", to_centre, to_centre), np.float32(radius * radius))
-    cosine = np.maximum(np.einsum("in,in->n", to_centre, normals), 0.0) / np.sqrt(square)
+    square = np.maximum(dot(to_centre, to_centre), np.float32(radius * radius))
+    cosine = np.maximum(dot(to_centre, normals), 0.0) / np.sqrt(square)
     hidden: Floats = np.maximum(cosine * np.float32(radius * radius) / square - np.float32(_LEAST_SKY), 0.0)
     return hidden
 
@@ -256,5 +256,5 @@ def surface_normals(body: Body, points: Floats, towards_eye: Floats) -> Floats:
     """
     normals: Floats = body.R_scene_body.astype(np.float32) @ faces_and_normals(body.shape, to_body(body, points))[1]
     if isinstance(body.shape, Plane):
-        return np.where(np.einsum("in,in->n", normals, towards_eye) < 0.0, -normals, normals)
+        return np.where(dot(normals, towards_eye) < 0.0, -normals, normals)
     return normals
