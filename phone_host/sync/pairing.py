@@ -1,0 +1,182 @@
+"""Who belongs to whom: frames of two free-running cameras, by their stamps on one clock. Pure, `now_ns` passed in.
+
+Invariants: both queues are sorted by stamp; after every call no two heads could still be paired or given up; each frame leaves exactly once,
+as half of a pair or as an orphan with its reason; pairs leave in the order of their stamps.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from enum import Enum
+from typing import Generic, TypeVar
+
+B = TypeVar("B")
+H = TypeVar("H")
+
+
+class OrphanReason(Enum):
+    """Why a frame found no partner."""
+
+    NO_PARTNER = "no_partner"
+    OUT_OF_ORDER = "out_of_order"
+    EVICTED = "evicted"
+    STREAM_ENDED = "stream_ended"
+
+
+@dataclass(frozen=True, slots=True)
+class PairingSettings:
+    """What makes a pair.
+
+    Attributes:
+        tolerance_ns: greatest time skew of a pair, ns.
+        board_period_ns: time between two frames of the board's camera, ns.
+        host_period_ns: the same of the host's.
+    """
+
+    tolerance_ns: int
+    board_period_ns: int
+    host_period_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Paired(Generic[B, H]):
+    """Two frames that belong together; `time_skew_ns` = board's stamp - host's stamp."""
+
+    board: B
+    host: H
+    time_skew_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class BoardOrphan(Generic[B]):
+    """A frame of the board without partner."""
+
+    frame: B
+    reason: OrphanReason
+
+
+@dataclass(frozen=True, slots=True)
+class HostOrphan(Generic[H]):
+    """A frame of the host without partner."""
+
+    frame: H
+    reason: OrphanReason
+
+
+Outcome = Paired[B, H] | BoardOrphan[B] | HostOrphan[H]
+
+
+class Pairing(Generic[B, H]):
+    """Pairs the nearest frames of two streams, in order.
+
+    Args:
+        settings: tolerance and periods.
+    """
+
+    def __init__(self, settings: PairingSettings) -> None:
+        self._settings = settings
+        self._board: deque[tuple[int, B]] = deque()
+        self._host: deque[tuple[int, H]] = deque()
+        self._last_board_ns = self._last_host_ns = -(2**63)
+        self._undecided_since_ns: int | None = None
+
+    @property
+    def held_board(self) -> int:
+        """Board frames that wait for a partner."""
+        return len(self._board)
+
+    @property
+    def held_host(self) -> int:
+        """Host frames that wait for a partner."""
+        return len(self._host)
+
+    def add_board(self, stamp_ns: int, frame: B, now_ns: int) -> list[Outcome[B, H]]:
+        """Take a board frame with its stamp on the host's clock, ns."""
+        if stamp_ns <= self._last_board_ns:
+            return [BoardOrphan(frame, OrphanReason.OUT_OF_ORDER)]
+        self._last_board_ns = stamp_ns
+        self._board.append((stamp_ns, frame))
+        return self.decide(now_ns)
+
+    def add_host(self, stamp_ns: int, frame: H, now_ns: int) -> list[Outcome[B, H]]:
+        """Take a host frame with its stamp, ns."""
+        if stamp_ns <= self._last_host_ns:
+            return [HostOrphan(frame, OrphanReason.OUT_OF_ORDER)]
+        self._last_host_ns = stamp_ns
+        self._host.append((stamp_ns, frame))
+        return self.decide(now_ns)
+
+    def decide(self, now_ns: int) -> list[Outcome[B, H]]:
+        """Settle all that can be settled; also to be called when time has passed without a frame."""
+        outcomes: list[Outcome[B, H]] = []
+        while self._board and self._host:
+            skew_ns = self._board[0][0] - self._host[0][0]
+            if abs(skew_ns) > self._settings.tolerance_ns:
+                # Both streams only go on in time: the earlier head has been passed by.
+                outcomes.append(self._pop_earlier(skew_ns))
+            elif self._better_known(skew_ns):
+                outcomes.append(self._pop_earlier(skew_ns))
+            elif self._better_expected(skew_ns) and not self._waited(now_ns):
+                return outcomes
+            else:
+                outcomes.append(Paired(self._board.popleft()[1], self._host.popleft()[1], skew_ns))
+            self._undecided_since_ns = None
+        return outcomes
+
+    def evict_host(self, before_ns: int) -> list[Outcome[B, H]]:
+        """Give up host frames older than this; no board frame that old can still come."""
+        outcomes: list[Outcome[B, H]] = []
+        while self._host and self._host[0][0] < before_ns:
+            outcomes.append(HostOrphan(self._host.popleft()[1], OrphanReason.NO_PARTNER))
+        return outcomes
+
+    def evict_board(self, before_ns: int) -> list[Outcome[B, H]]:
+        """Give up board frames older than this; no host frame that old can still come."""
+        outcomes: list[Outcome[B, H]] = []
+        while self._board and self._board[0][0] < before_ns:
+            outcomes.append(BoardOrphan(self._board.popleft()[1], OrphanReason.NO_PARTNER))
+        return outcomes
+
+    def evict_oldest_host(self) -> list[Outcome[B, H]]:
+        """Give up the oldest host frame because memory is short."""
+        return [HostOrphan(self._host.popleft()[1], OrphanReason.EVICTED)] if self._host else []
+
+    def restart(self, reason: OrphanReason) -> list[Outcome[B, H]]:
+        """Give up all board frames and forget their last stamp: another board clock or session follows."""
+        outcomes: list[Outcome[B, H]] = [BoardOrphan(frame, reason) for _, frame in self._board]
+        self._board.clear()
+        self._last_board_ns = -(2**63)
+        return outcomes
+
+    def finish(self) -> list[Outcome[B, H]]:
+        """Pair what can be paired without waiting for better, then give up the rest: no frame will follow."""
+        outcomes = self.decide(2**63 - 1)
+        outcomes += self.restart(OrphanReason.STREAM_ENDED)
+        outcomes += [HostOrphan(frame, OrphanReason.STREAM_ENDED) for _, frame in self._host]
+        self._host.clear()
+        return outcomes
+
+    def _pop_earlier(self, skew_ns: int) -> Outcome[B, H]:
+        if skew_ns < 0:
+            return BoardOrphan(self._board.popleft()[1], OrphanReason.NO_PARTNER)
+        return HostOrphan(self._host.popleft()[1], OrphanReason.NO_PARTNER)
+
+    def _better_known(self, skew_ns: int) -> bool:
+        """Whether the earlier head's successor has come and is nearer to the other head."""
+        earlier = self._board if skew_ns < 0 else self._host
+        later_ns = (self._host if skew_ns < 0 else self._board)[0][0]
+        return len(earlier) > 1 and abs(earlier[1][0] - later_ns) < abs(skew_ns)
+
+    def _better_expected(self, skew_ns: int) -> bool:
+        """Whether the earlier head's successor has not come yet and should be nearer to the other head."""
+        earlier, period_ns = (
+            (self._board, self._settings.board_period_ns)
+            if skew_ns < 0
+            else (self._host, self._settings.host_period_ns)
+        )
+        return len(earlier) == 1 and 2 * abs(skew_ns) > period_ns
+
+    def _waited(self, now_ns: int) -> bool:
+        """Whether the better partner has had its time: one period of the slower camera."""
+        if self._undecided_since_ns is None:
+            self._undecided_since_ns = now_ns
+        return now_ns - self._undecided_since_ns >= max(self._settings.board_period_ns, self._settings.host_period_ns)
