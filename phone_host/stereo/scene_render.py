@@ -21,8 +21,14 @@ from phone_host.stereo.scene_shade import albedo, shadow_balls, surface_light, s
 _BLOCK_PX = 16
 _SUB_PIXELS = (-1.0 / 3.0, 0.0, 1.0 / 3.0)
 _NOISE_MARGIN_PX = 64
+_SLANTED = 1.6
+"""A footprint this many times longer than wide is sampled along its length."""
+
+_ALONG_PIXEL = (-0.375, -0.125, 0.125, 0.375)
+"""Where a slanted pixel is sampled along its footprint, px."""
+
 _LEAST_COSINE = 0.04
-"""Surfaces seen more edge-on than this keep the footprint of this cosine."""
+"""Surfaces seen more edge-on than this keep the footprint of this cosine: beyond, they cover few pixels."""
 
 Window = tuple[slice, slice]
 Flat = NDArray[np.intp]
@@ -97,8 +103,11 @@ class Renderer:
         void = np.asarray(self._scene.void_bgr, dtype=np.float32)[:, None]
         levels = self._develop(np.repeat(void, self._rays.shape[1], axis=1), np.arange(self._rays.shape[1]))
         for index, at in _by_body(hits.surface, np.arange(self._rays.shape[1])):
-            reflectance[:, at], light = self._shade(bodies[index], still, hits.depth[at], self._rays[:, at])
-            levels[at] = self._develop(reflectance[:, at] * light, at)
+            rays, depth = self._rays[:, at], hits.depth[at]
+            points = self._centre[:, None] + depth * rays
+            normals = surface_normals(bodies[index], points, -rays)
+            reflectance[:, at] = self._reflectance(bodies[index], depth, rays, normals, at)
+            levels[at] = self._develop(reflectance[:, at] * self._light(bodies[index], still, points, normals), at)
         self._smooth_edges(still, hits.surface, None, levels)
         return _Still(hits, reflectance, levels)
 
@@ -133,28 +142,61 @@ class Renderer:
     def _paint(self, bodies: tuple[Body, ...], hits: Hits, touched: NDArray[np.bool_], levels: Floats) -> None:
         """Shades all marked pixels, then the borders among them."""
         for index, at in _by_body(hits.surface, np.flatnonzero(touched)):
-            known = None if index in self._moving else self._still.reflectance[:, at]
-            reflectance, light = self._shade(bodies[index], bodies, hits.depth[at], self._rays[:, at], known)
-            levels[at] = self._develop(reflectance * light, at)
+            rays, depth = self._rays[:, at], hits.depth[at]
+            points = self._centre[:, None] + depth * rays
+            normals = surface_normals(bodies[index], points, -rays)
+            if index in self._moving:
+                reflectance = self._reflectance(bodies[index], depth, rays, normals, at)
+            else:
+                reflectance = self._still.reflectance[:, at]
+            levels[at] = self._develop(reflectance * self._light(bodies[index], bodies, points, normals), at)
         self._smooth_edges(bodies, hits.surface, touched, levels)
 
-    def _shade(
-        self,
-        body: Body,
-        bodies: tuple[Body, ...],
-        depth: Floats,
-        rays: Floats,
-        reflectance: Floats | None = None,
-    ) -> tuple[Floats, Floats]:
-        """Reflectance and light, (3, N) each, where rays meet a body at given depths."""
-        points = self._centre[:, None] + depth * rays
-        normals = surface_normals(body, points, -rays)
-        if reflectance is None:
-            cosine = np.abs(dot(normals, rays)) / np.sqrt(dot(rays, rays))
-            footprint = depth / (np.float32(self._focal_px) * np.maximum(cosine, np.float32(_LEAST_COSINE)))
-            reflectance = albedo(body, to_body(body, points), footprint)
+    def _light(self, body: Body, bodies: tuple[Body, ...], points: Floats, normals: Floats) -> Floats:
+        """Light (3, N) on points of a body."""
         casters = tuple(other for other in bodies if other is not body and not isinstance(other.shape, Plane))
-        return reflectance, surface_light(self._scene.light, casters, points, normals)
+        return surface_light(self._scene.light, casters, points, normals)
+
+    def _reflectance(self, body: Body, depth: Floats, rays: Floats, normals: Floats, pixels: Flat) -> Floats:
+        """Reflectance (3, N) as a pixel averages it.
+
+        A pixel's footprint on a slanted surface is long and narrow. A round filter as wide as it is long would wash a table
+        top out; so a slanted pixel takes the mean of several samples along its footprint, each filtered for its share.
+        """
+        across, along = self._footprint_m(depth, rays, normals)
+        colour = np.empty_like(rays)
+        slanted = along > np.float32(_SLANTED) * across
+        at = np.flatnonzero(~slanted)
+        if at.size:
+            points = self._centre[:, None] + depth[at] * rays[:, at]
+            colour[:, at] = albedo(body, to_body(body, points), along[at])
+        at = np.flatnonzero(slanted)
+        if at.size:
+            normal, ray = normals[:, at], rays[:, at]
+            step = self._steepest_step(normal, pixels[at])
+            height = depth[at] * dot(normal, ray)
+            footprint = np.maximum(across[at], along[at] / np.float32(len(_ALONG_PIXEL)))
+            total = np.zeros_like(ray)
+            for share in _ALONG_PIXEL:
+                # The samples lie on the tangent plane.
+                aside = ray + np.float32(share) * step
+                points = self._centre[:, None] + height / dot(normal, aside) * aside
+                total += albedo(body, to_body(body, points), footprint)
+            colour[:, at] = total / np.float32(len(_ALONG_PIXEL))
+        return colour
+
+    def _footprint_m(self, depth: Floats, rays: Floats, normals: Floats) -> tuple[Floats, Floats]:
+        """Width and length (N,) of what a pixel covers on a surface, m."""
+        across = depth / np.float32(self._focal_px)
+        cosine = np.abs(dot(normals, rays)) / np.sqrt(dot(rays, rays))
+        return across, across / np.maximum(cosine, np.float32(_LEAST_COSINE))
+
+    def _steepest_step(self, normals: Floats, pixels: Flat) -> Floats:
+        """Change of the ray (3, N) over one pixel in the image direction in which a surface recedes fastest."""
+        step_x, step_y = (step[:, pixels] for step in self._steps)
+        x, y = dot(normals, step_x), dot(normals, step_y)
+        length = np.hypot(x, y) + np.float32(1e-12)
+        return (x / length) * step_x + (y / length) * step_y
 
     def _smooth_edges(
         self,
@@ -180,8 +222,13 @@ class Renderer:
         hits = cast(bodies, self._centre, samples)
         colour = np.repeat(np.asarray(self._scene.void_bgr, dtype=np.float32)[:, None], samples.shape[1], axis=1)
         for index, part in _by_body(hits.surface, np.arange(samples.shape[1])):
-            reflectance, light = self._shade(bodies[index], bodies, hits.depth[part], samples[:, part])
-            colour[:, part] = reflectance * light
+            ray, depth = samples[:, part], hits.depth[part]
+            points = self._centre[:, None] + depth * ray
+            normals = surface_normals(bodies[index], points, -ray)
+            across, along = self._footprint_m(depth, ray, normals)
+            local = to_body(bodies[index], points)
+            reflectance = albedo(bodies[index], local, np.maximum(across, along / np.float32(len(_SUB_PIXELS))))
+            colour[:, part] = reflectance * self._light(bodies[index], bodies, points, normals)
         levels[at] = self._develop(colour.reshape(3, -1, at.size).mean(axis=1), at)
 
     def _develop(self, colour: Floats, at: Flat) -> Floats:
