@@ -1,0 +1,142 @@
+"""What turns a raw disparity map into a trusted one: checks that take values away, and three steps that better what is left.
+
+Pure functions on (H, W) arrays. Two forms of disparity occur and are never mixed: *steps*, int16 in sixteenths of a pixel with
+NO_STEPS for none (OpenCV's form), and px, float32 with NaN for none (everybody else's).
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.model import Disparity
+
+Steps = NDArray[np.int16]
+"""(H, W) int16, sixteenths of a pixel, NO_STEPS = none."""
+
+STEPS_PER_PX = 16
+"""OpenCV's fixed point (StereoMatcher::DISP_SCALE)."""
+
+NO_STEPS = -STEPS_PER_PX
+"""OpenCV's mark for no value when the search starts at 0: one pixel below the least disparity."""
+
+
+def confirmed(left: Steps, right: Steps, tolerance_px: float) -> NDArray[np.bool_]:
+    """The left-right check: which left pixels the right pixel they point to points back to.
+
+    A left pixel that points out of the right image is not confirmed: nobody can have seen it there.
+
+    Args:
+        left: disparities of the left pixels; the pixel at x points to x - d.
+        right: disparities of the right pixels; the pixel at x points to x + d.
+        tolerance_px: how far the two may differ, px.
+
+    Returns:
+        (H, W) bool.
+    """
+    height, width = left.shape
+    column, row = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    column -= left / np.float32(STEPS_PER_PX)
+    never = np.iinfo(np.int16).min
+    back = cv2.remap(right, column, row, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=(never,))
+    apart = np.abs(np.asarray(back, np.int32) - left)
+    return np.asarray((left >= 0) & (apart <= tolerance_px * STEPS_PER_PX), np.bool_)
+
+
+def without_speckles(steps: Steps, area_px: int, step_px: float) -> Steps:
+    """Drop small islands: connected areas, with less than step_px between neighbours, that are too small to be a thing.
+
+    Args:
+        steps: disparities.
+        area_px: the largest area that is dropped, px.
+        step_px: the largest difference between neighbours of one area, px.
+
+    Returns:
+        A new array.
+    """
+    kept = steps.copy()
+    cv2.filterSpeckles(kept, NO_STEPS, area_px, round(step_px * STEPS_PER_PX))
+    return kept
+
+
+def to_px(steps: Steps) -> Disparity:
+    """Steps as px.
+
+    Args:
+        steps: disparities; every negative value counts as none.
+
+    Returns:
+        (H, W) float32, px, NaN = none.
+    """
+    return np.where(steps >= 0, steps / np.float32(STEPS_PER_PX), np.float32(np.nan))
+
+
+def bridged(disparity: Disparity, gap_px: int, step_px: float) -> Disparity:
+    """Close narrow gaps whose two ends agree by the straight line between them, along rows first, then along columns.
+
+    Ends that agree belong to one surface, and a plane seen in stereo has a disparity linear in x and y. Gaps between a near
+    and a far surface stay open: nothing says which of the two goes on behind the other.
+
+    Args:
+        disparity: (H, W) float32, px, NaN = none.
+        gap_px: the widest gap that is closed, px.
+        step_px: the largest difference between the two ends, px.
+
+    Returns:
+        A new array.
+    """
+    rows = _bridged_rows(disparity, gap_px, step_px)
+    return np.ascontiguousarray(_bridged_rows(np.ascontiguousarray(rows.T), gap_px, step_px).T)
+
+
+def _bridged_rows(disparity: Disparity, gap_px: int, step_px: float) -> Disparity:
+    width = disparity.shape[1]
+    column = np.arange(width, dtype=np.int32)
+    known = np.isfinite(disparity)
+    before = np.maximum.accumulate(np.where(known, column, np.int32(-1)), axis=1)
+    after = np.minimum.accumulate(np.where(known, column, np.int32(width))[:, ::-1], axis=1)[:, ::-1]
+    ys, xs = np.nonzero(~known & (before >= 0) & (after < width) & (after - before <= gap_px + 1))
+    start, end = before[ys, xs], after[ys, xs]
+    first, last = disparity[ys, start], disparity[ys, end]
+    share = (xs - start).astype(np.float32) / (end - start)
+    result = disparity.copy()
+    result[ys, xs] = np.where(np.abs(last - first) <= step_px, first + (last - first) * share, np.float32(np.nan))
+    return result
+
+
+def unlocked(disparity: Disparity, amplitude_px: float) -> Disparity:
+    """Undo pixel locking: d + amplitude * sin(2 pi d).
+
+    A parabola through costs that are not parabolic pulls every value towards the nearest whole pixel; the error is a wave of
+    one pixel's period, to first order a sine (Shimizu and Okutomi, IJCV 63(3), 2005, figure 4). Whole and half pixels stay
+    where they are.
+
+    Args:
+        disparity: (H, W) float32, px, NaN = none.
+        amplitude_px: 0 to 0.15 px: beyond 1 / (2 pi) the order of values would change.
+
+    Returns:
+        A new array of the same order of values.
+    """
+    wave = np.sin(disparity * np.float32(2 * np.pi))
+    return np.asarray(disparity + np.float32(amplitude_px) * wave, np.float32)
+
+
+def smoothed(disparity: Disparity, window_px: int, step_px: float, reach_px: float) -> Disparity:
+    """Average each value with its neighbours of similar disparity (bilateral filter: Tomasi and Manduchi, ICCV 1998).
+
+    Pixels without a value neither give nor get one.
+
+    Args:
+        disparity: (H, W) float32, px, >= 0, NaN = none.
+        window_px: edge of the square of neighbours, px, odd.
+        step_px: sigma of the weight over the difference in disparity, px.
+        reach_px: sigma of the weight over the distance in the image, px.
+
+    Returns:
+        A new array.
+    """
+    known = np.isfinite(disparity)
+    # 16 sigma below the least value the weight is exp(-128): none. Not lower, because OpenCV tabulates the weights over the range.
+    outside = np.float32(-16 * step_px)
+    averaged = cv2.bilateralFilter(np.where(known, disparity, outside), window_px, step_px, reach_px)
+    return np.where(known, averaged, np.float32(np.nan))
