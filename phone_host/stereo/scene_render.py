@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from phone_host.model import Camera, Image
 from phone_host.stereo.scene_cast import FACES, NOTHING, PART, Hits, cast, cast_one, dot, pixel_rays, to_body
 from phone_host.stereo.scene_model import Body, Floats, Look, Plane, Pose, Scene
-from phone_host.stereo.scene_shade import albedo, shadow_balls, surface_light, surface_normals
+from phone_host.stereo.scene_shade import albedo, may_darken, shadow_balls, surface_light, surface_normals
 
 _BLOCK_PX = 16
 _SUB_PIXELS = (-1.0 / 3.0, 0.0, 1.0 / 3.0)
@@ -133,8 +133,10 @@ class Renderer:
                 balls: tuple[tuple[NDArray[np.float64], float], ...]
                 if isinstance(body.shape, Plane):
                     balls = shadow_balls(self._scene.light, caster, body)
-                else:
+                elif may_darken(self._scene.light, caster, body):
                     balls = ((np.asarray(body.position_m), body.bounding_radius_m),)
+                else:
+                    balls = ()
                 for centre, radius in balls:
                     at = self._inside(centre, radius)
                     touched[at[hits.surface[at] // FACES == index]] = True
@@ -154,7 +156,10 @@ class Renderer:
 
     def _light(self, body: Body, bodies: tuple[Body, ...], points: Floats, normals: Floats) -> Floats:
         """Light (3, N) on points of a body."""
-        casters = tuple(other for other in bodies if other is not body and not isinstance(other.shape, Plane))
+        solid = (other for other in bodies if other is not body and not isinstance(other.shape, Plane))
+        casters = tuple(
+            other for other in solid if isinstance(body.shape, Plane) or may_darken(self._scene.light, other, body)
+        )
         return surface_light(self._scene.light, casters, points, normals)
 
     def _reflectance(self, body: Body, depth: Floats, rays: Floats, normals: Floats, pixels: Flat) -> Floats:

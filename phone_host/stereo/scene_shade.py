@@ -33,8 +33,8 @@ _REMAP_COLUMNS = 4096
 _UP_WEIGHT = 0.3
 """Share of the sky's light that depends on how far a surface looks up."""
 
-_LEAST_SKY = 0.015
-"""Less of the sky than this is not counted as hidden, so that a body's influence ends somewhere (about one grey level)."""
+_LEAST_SKY = 0.04
+"""This much of the sky is taken off what a body hides, so that its influence ends somewhere and frames stay cheap."""
 
 _WRAP = 0.15
 """The lamp reaches this far around a ball: the terminator of a lamp of finite size."""
@@ -207,6 +207,17 @@ def shadow_balls(light: Light, caster: Body, plane: Body) -> tuple[tuple[NDArray
     if distance > abs(height):
         balls.append((centre - normal * height, math.sqrt(distance**2 - height**2)))
     return tuple(balls)
+
+
+def may_darken(light: Light, caster: Body, other: Body) -> bool:
+    """Whether one solid body may throw its shadow on another or hide sky from it, judged by the balls around them."""
+    apart = np.asarray(other.position_m) - np.asarray(caster.position_m)
+    towards = np.asarray(light.towards) / np.linalg.norm(light.towards)
+    behind = -float(apart @ towards)
+    aside = float(np.linalg.norm(apart + behind * towards))
+    shadow_reach = other.bounding_radius_m + 1.3 * caster.bounding_radius_m
+    sky_reach = other.bounding_radius_m + _ball_radius_m(caster) / math.sqrt(_LEAST_SKY)
+    return (behind > 0.0 and aside < shadow_reach) or float(np.linalg.norm(apart)) < sky_reach
 
 
 def sky_blocked(body: Body, points: Floats, normals: Floats) -> Floats:
