@@ -9,6 +9,10 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from common.frame import Frame
+from common.ledger import BoardMarks
+from common.protocol.message import FrameMessage
+
 Image = NDArray[np.uint8]
 """(H, W) grey or (H, W, 3) BGR, dtype uint8."""
 
@@ -101,3 +105,43 @@ class Rig:
     rms_left_px: float = float("nan")
     rms_right_px: float = float("nan")
     rms_stereo_px: float = float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class BoardFrame:
+    """A frame that came over a link, with its marks on the host's clock.
+
+    Attributes:
+        message: what came.
+        link: kind of the link.
+        marks: exposed, grabbed and sent, on the host's clock; frozen on receipt.
+        received_ns: last byte arrived.
+        offset_ns: host clock minus board clock as estimated then.
+        uncertainty_ns: of that offset.
+    """
+
+    message: FrameMessage
+    link: str
+    marks: BoardMarks
+    received_ns: int
+    offset_ns: int
+    uncertainty_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class FramePair:
+    """Two frames that belong together, on their way to the stereo pipeline.
+
+    Attributes:
+        board: the board's frame.
+        host: the host's own frame.
+        time_skew_ns: exposure of the board's frame minus that of the host's.
+        paired_ns: when the partner was found.
+        queued_ns: when the pair entered the FIFO.
+    """
+
+    board: BoardFrame
+    host: Frame
+    time_skew_ns: int
+    paired_ns: int
+    queued_ns: int

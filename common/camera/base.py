@@ -52,5 +52,8 @@ class Camera(Protocol):
             now_ns: CLOCK_MONOTONIC now, ns. A demand-paced camera gives one image for each call.
         """
 
+    def anchor(self, first_ns: int) -> None:
+        """Set the stamp of a demand-paced camera's first image, ns; later calls and other cameras take no notice."""
+
     def close(self) -> None:
         """Let go of the device."""

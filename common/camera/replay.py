@@ -164,7 +164,7 @@ class ReplayCamera:
         if fault := find_fault(image.pixel_format, image.payload):
             return Spoiled(sequence, fault)
         exposed = Stamp(self._time_of(index), self._settings.clock)
-        grabbed = Stamp(max(now_ns, exposed.ns), self._settings.clock)
+        grabbed = Stamp(now_ns, self._settings.clock)
         return Frame(
             sequence, exposed, grabbed, image.width_px, image.height_px, image.pixel_format, None, image.payload
         )

@@ -1,0 +1,92 @@
+"""Ledgers to percentiles: what a run's delays were, in bounded memory. Pure."""
+
+from dataclasses import dataclass, fields
+from typing import Final
+
+import numpy as np
+
+from common.ledger import PairLedger, StageTimes
+
+EXACT: Final = 65536
+"""Up to this many pairs (36 minutes at 30 per second) percentiles are exact; beyond, every 2nd, 4th, … pair is kept."""
+
+DELAYS: Final = ("capture", "outbox", "propagation", "pairing", "queuing", "processing", "end_to_end", "starvation")
+STAGES: Final = tuple(stage.name for stage in fields(StageTimes))
+OTHERS: Final = ("time_skew", "uncertainty")
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """How a quantity was distributed; all in ns, NaN where nothing was measured.
+
+    Attributes:
+        count: values seen.
+        p50_ns: median.
+        p95_ns: 95th percentile.
+        p99_ns: 99th percentile.
+        max_ns: greatest, exact for any number of values.
+        mean_ns: mean, exact for any number of values.
+    """
+
+    count: int
+    p50_ns: float
+    p95_ns: float
+    p99_ns: float
+    max_ns: float
+    mean_ns: float
+
+
+class Series:
+    """A growing list of integers, thinned evenly when it gets long."""
+
+    def __init__(self) -> None:
+        self._values: list[int] = []
+        self._stride = 1
+        self._count = 0
+        self._sum = 0
+        self._max: int | None = None
+
+    def add(self, value: int) -> None:
+        """Take one value."""
+        if self._count % self._stride == 0:
+            self._values.append(value)
+            if len(self._values) > EXACT:
+                self._values = self._values[::2]
+                self._stride *= 2
+        self._count += 1
+        self._sum += value
+        self._max = value if self._max is None else max(self._max, value)
+
+    def spread(self, last: int | None = None) -> Spread:
+        """Summarise all values, or the percentiles of the last ones only.
+
+        Args:
+            last: how many of the newest values; None for all.
+        """
+        values = self._values if last is None else self._values[-last:]
+        if not values or self._max is None:
+            nan = float("nan")
+            return Spread(0, nan, nan, nan, nan, nan)
+        p50, p95, p99 = (float(p) for p in np.percentile(values, (50, 95, 99)))
+        greatest = float(self._max if last is None else max(values))
+        return Spread(self._count, p50, p95, p99, greatest, self._sum / self._count)
+
+
+class DelayStatistics:
+    """The delays of a run, pair by pair."""
+
+    def __init__(self) -> None:
+        self._series = {name: Series() for name in (*DELAYS, *STAGES, *OTHERS)}
+
+    def add(self, ledger: PairLedger) -> None:
+        """Take one pair's ledger."""
+        for name in DELAYS:
+            self._series[name].add(getattr(ledger, f"{name}_ns"))
+        for name in STAGES:
+            self._series[name].add(getattr(ledger.stages, name))
+        self._series["time_skew"].add(abs(ledger.time_skew_ns))
+        self._series["uncertainty"].add(ledger.uncertainty_ns)
+
+    def spread(self, name: str, last: int | None = None) -> Spread:
+        """Summarise one of DELAYS, STAGES or OTHERS (time skews without their sign)."""
+        return self._series[name].spread(last)

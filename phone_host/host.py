@@ -1,0 +1,262 @@
+"""The host's composition root: receiver and own camera -> pair queue -> worker -> results, each in its thread."""
+
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Final
+
+from common import now
+from common.camera.base import Camera
+from common.errors import DataError, UnavailableError
+from common.ledger import PairLedger
+from common.link.base import Link
+from common.logs import event
+from common.protocol.message import RefusalReason
+from phone_host.delays import DelayStatistics
+from phone_host.model import FramePair, Side
+from phone_host.pairqueue import PairQueue
+from phone_host.pipeline import Pipeline, Processed
+from phone_host.receiver import Receiver, refusal_text
+from phone_host.report import RunFacts
+from phone_host.results import Results
+from phone_host.source import Source
+from phone_host.stereo.core import StereoCore
+from phone_host.sync.fifo import FifoSettings
+
+_LOG = logging.getLogger(__name__)
+
+_STEP_S: Final = 0.05
+_LAST_PARTNER_NS: Final = 1_000_000_000
+"""After a stream's end the other one gets this long to deliver the last partners."""
+
+_BUSY_NS: Final = 4_000_000_000
+"""A board may take a host that crashed for alive for a moment; only after this long `busy` is believed."""
+
+_HOPELESS: Final = 10
+"""This many pairs in a row that cannot be processed, and none that could: it is not a spoiled frame now and then."""
+
+
+class EndReason(Enum):
+    """Why a run ended."""
+
+    PAIRS_REACHED = "pairs_reached"
+    STREAM_ENDED = "stream_ended"
+    STOPPED = "stopped"
+
+
+@dataclass(frozen=True, slots=True)
+class HostSettings:
+    """What a run does, beside its camera, link and core.
+
+    Attributes:
+        board_side: which view the board's camera is.
+        tolerance_ns: greatest time skew of a pair; None for half of the longer frame period.
+        fifo: depth and overflow policy.
+        pairs: end after this many processed pairs; 0 for no limit.
+        wait_ns: an absent board is waited for this long; None for ever.
+        out: folder for results; None to write none.
+        save_every: every which pair is saved; 0 for none.
+    """
+
+    board_side: Side = Side.LEFT
+    tolerance_ns: int | None = None
+    fifo: FifoSettings = field(default_factory=FifoSettings)
+    pairs: int = 0
+    wait_ns: int | None = None
+    out: Path | None = None
+    save_every: int = 30
+
+
+class Host:
+    """One run of the host.
+
+    Args:
+        settings: what to do.
+        camera: the own camera, open.
+        link: open link to the board.
+        core: the stereo core; None to measure pairs and delays only.
+        on_pair: told of each processed pair and its ledger, in the worker's thread; for live views and for checks against truth.
+    """
+
+    def __init__(
+        self,
+        settings: HostSettings,
+        camera: Camera,
+        link: Link,
+        core: StereoCore | None,
+        on_pair: Callable[[Processed, PairLedger], None] | None = None,
+    ) -> None:
+        self.settings = settings
+        self.delays = DelayStatistics()
+        self.results = Results(settings.out, settings.save_every)
+        self.queue = PairQueue(settings.fifo, settings.tolerance_ns, camera.description.period_ns)
+        self.source = Source(camera, self.queue.add_host)
+        self.receiver = Receiver(link, now.random_id(), self.queue, self._frame_arrived)
+        self._pipeline = Pipeline(core, settings.board_side, now.monotonic_ns)
+        self._on_pair = on_pair
+        self._worker = threading.Thread(target=self._work, name="worker", daemon=True)
+        self._finished = threading.Event()
+        self._failure: Exception | None = None
+        self.processed = 0
+        self.undecodable = 0
+        self.started_ns = now.monotonic_ns()
+        self.first_done_ns = self.last_done_ns = 0
+
+    def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
+        """Run until the pairs are reached, a stream ends or `stop` says so.
+
+        Args:
+            stop: asked several times a second.
+            watch: called as often, for a live view.
+
+        Returns:
+            Why it ended.
+
+        Raises:
+            UnavailableError: no board within the time, or it does not talk to this host.
+            DataError: the streams' images do not fit the rig.
+        """
+        self._worker.start()
+        self.receiver.start()
+        self.source.start()
+        try:
+            return self._watch(stop, watch)
+        finally:
+            self.source.stop()
+            self.receiver.stop()
+            self.queue.finish()
+            self._worker.join()
+
+    def facts(self, ended: str) -> RunFacts:
+        """Give everything a report is made of, now.
+
+        Args:
+            ended: why the run ended, or how it stands.
+        """
+        return RunFacts(
+            ended=ended,
+            processed=self.processed,
+            undecodable=self.undecodable,
+            seconds=(self.last_done_ns - self.first_done_ns) / 1e9,
+            delays=self.delays,
+            counts=self.queue.counts,
+            link=self.receiver.account,
+            estimate=self.receiver.estimate,
+            tolerance_ns=self.queue.tolerance_ns,
+            fifo=self.settings.fifo,
+            unwritten=self.results.unwritten,
+            spoiled=self.source.spoiled,
+        )
+
+    def _watch(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
+        absent_since_ns = now.monotonic_ns()
+        ending_since_ns: int | None = None
+        while not self._finished.wait(_STEP_S):
+            now_ns = now.monotonic_ns()
+            self._raise_failures()
+            if watch is not None:
+                watch()
+            if stop():
+                return EndReason.STOPPED
+            if self.receiver.connected or self.receiver.ended:
+                absent_since_ns = now_ns
+            self._check_presence(now_ns - absent_since_ns)
+            if self.receiver.ended or self.source.ended:
+                ending_since_ns = now_ns if ending_since_ns is None else ending_since_ns
+                if self._all_paired() or now_ns - ending_since_ns > _LAST_PARTNER_NS:
+                    self.queue.finish()
+                    self._worker.join()
+                    self._raise_failures()
+                    reached = self.settings.pairs and self.processed >= self.settings.pairs
+                    return EndReason.PAIRS_REACHED if reached else EndReason.STREAM_ENDED
+        self._raise_failures()
+        return EndReason.PAIRS_REACHED
+
+    def _all_paired(self) -> bool:
+        counts = self.queue.counts
+        return self.receiver.ended and (counts.held_board == 0 or (self.source.ended and counts.held_host == 0))
+
+    def _check_presence(self, absent_ns: int) -> None:
+        refused = self.receiver.refused
+        patience_ns = self.settings.wait_ns
+        if refused is not None:
+            patience_ns = max(patience_ns or 0, _BUSY_NS) if refused is RefusalReason.BUSY else 0
+        if patience_ns is None or absent_ns <= patience_ns:
+            return
+        if refused is not None:
+            raise UnavailableError(*refusal_text(refused))
+        raise UnavailableError(
+            f"no board within {patience_ns / 1e9:g} s",
+            "start board-agent there, check --link, or give --wait more seconds",
+        )
+
+    def _raise_failures(self) -> None:
+        for failure in (self._failure, self.receiver.failure, self.source.failure):
+            if failure is not None:
+                raise failure
+
+    def _frame_arrived(self, exposed_ns: int) -> None:
+        if self.source.on_demand:
+            self.source.want(exposed_ns)
+
+    def _work(self) -> None:
+        try:
+            while (pair := self.queue.take()) is not None:
+                dequeued_ns = now.monotonic_ns()
+                self.receiver.wake()  # a place is free
+                if not self._finished.is_set():
+                    self._process(pair, dequeued_ns)
+        except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
+            self._failure = error
+            self._finished.set()
+
+    def _process(self, pair: FramePair, dequeued_ns: int) -> None:
+        try:
+            processed = self._pipeline.process(pair)
+        except DataError as error:
+            if self.processed == 0 and self.undecodable >= _HOPELESS:
+                raise  # not one pair fits: wrong rig, wrong camera
+            self.undecodable += 1
+            _LOG.warning(event("pair_failed", sequence=pair.board.message.sequence, problem=error.problem))
+            return
+        before_write_ns = now.monotonic_ns()
+        self.results.save_pair(self.processed, processed)
+        done_ns = now.monotonic_ns()
+        ledger = self._ledger(pair, processed, dequeued_ns, before_write_ns, done_ns)
+        self.results.append(ledger)
+        self.delays.add(ledger)
+        self.first_done_ns = self.first_done_ns or done_ns
+        self.last_done_ns = done_ns
+        self.processed += 1
+        if self._on_pair is not None:
+            self._on_pair(processed, ledger)
+        if self.settings.pairs and self.processed >= self.settings.pairs:
+            self._finished.set()
+
+    def _ledger(
+        self, pair: FramePair, processed: Processed, dequeued_ns: int, before_write_ns: int, done_ns: int
+    ) -> PairLedger:
+        board, stages = pair.board, processed.stages
+        return PairLedger(
+            session=board.message.session,
+            sequence=board.message.sequence,
+            host_sequence=pair.host.sequence,
+            bytes=len(board.message.payload),
+            link=board.link,
+            board=board.marks,
+            received_ns=board.received_ns,
+            paired_ns=pair.paired_ns,
+            queued_ns=pair.queued_ns,
+            dequeued_ns=dequeued_ns,
+            done_ns=done_ns,
+            previous_done_ns=self.last_done_ns or pair.queued_ns,
+            stages=type(stages)(
+                stages.decode, stages.rectify, stages.match, stages.reproject, done_ns - before_write_ns
+            ),
+            time_skew_ns=pair.time_skew_ns,
+            offset_ns=board.offset_ns,
+            uncertainty_ns=board.uncertainty_ns,
+        )

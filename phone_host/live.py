@@ -1,0 +1,98 @@
+"""The live table of a run in a terminal."""
+
+import time
+from types import TracebackType
+from typing import Final, Self
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.table import Table
+from rich.text import Text
+
+from phone_host.delays import DELAYS, Spread
+from phone_host.host import Host
+
+_REFRESH_S: Final = 0.25
+_RECENT: Final = 300
+"""Percentiles are over this many newest pairs: ten seconds at 30 per second."""
+
+
+class LiveTable:
+    """Shows a host's delays while it runs; a context manager.
+
+    Args:
+        host: the run to show.
+        console: where; stderr by default, so that stdout stays for results.
+        seconds: the run's planned length for the progress bar, s; 0 when it is counted in pairs or open.
+    """
+
+    def __init__(self, host: Host, console: Console | None = None, seconds: float = 0.0) -> None:
+        self._host = host
+        self._live = Live(console=console or Console(stderr=True), auto_refresh=False, transient=True)
+        self._seconds = seconds
+        self._started_s = time.monotonic()
+        self._shown_s = 0.0
+        self._last = (0, self._started_s)
+        self._rate = 0.0
+        self._progress = Progress(
+            TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f}")
+        )
+        total = seconds or host.settings.pairs
+        self._task = self._progress.add_task("seconds" if seconds else "pairs", total=total) if total else None
+
+    def __enter__(self) -> Self:
+        self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._live.stop()
+
+    def refresh(self) -> None:
+        """Show the present state, at most a few times a second."""
+        now_s = time.monotonic()
+        if now_s - self._shown_s < _REFRESH_S:
+            return
+        self._shown_s = now_s
+        pairs, since_s = self._last
+        if now_s - since_s >= 1.0:
+            self._rate = (self._host.processed - pairs) / (now_s - since_s)
+            self._last = (self._host.processed, now_s)
+        if self._task is not None:
+            done = now_s - self._started_s if self._seconds else self._host.processed
+            self._progress.update(self._task, completed=done)
+        bar = [self._progress] if self._task is not None else []
+        self._live.update(Group(self._table(), self._state(), *bar), refresh=True)
+
+    def _table(self) -> Table:
+        table = Table(title=f"{self._host.processed} pairs, {self._rate:.1f} /s", title_justify="left")
+        table.add_column("delay, ms")
+        for name in ("p50", "p95", "p99"):
+            table.add_column(name, justify="right")
+        for name in (*DELAYS, "time_skew"):
+            spread = self._host.delays.spread(name, _RECENT)
+            table.add_row(name.replace("_", "-"), *_values_ms(spread))
+        return table
+
+    def _state(self) -> Text:
+        receiver, counts = self._host.receiver, self._host.queue.counts
+        estimate = receiver.estimate
+        clock = f"clock +-{estimate.uncertainty_ns / 1000:.0f} us" if estimate else "clock unknown"
+        board = "board connected" if receiver.connected else "waiting for the board"
+        drops: dict[str, int] = {}
+        for account in receiver.account.sessions:
+            for reason, count in account.latest.dropped:
+                drops[f"{reason.value} (board)"] = drops.get(f"{reason.value} (board)", 0) + count
+            drops["lost on the link"] = drops.get("lost on the link", 0) + account.lost
+        drops |= {f"{reason} (host)": count for reason, count in counts.board_orphans}
+        drops["full FIFO"] = counts.dropped
+        shown = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in drops.items() if count) or "none"
+        return Text(f"{board} · {clock} · drops: {shown}")
+
+
+def _values_ms(spread: Spread) -> list[str]:
+    if not spread.count:
+        return ["-"] * 3
+    return [f"{value / 1e6:.3f}" for value in (spread.p50_ns, spread.p95_ns, spread.p99_ns)]

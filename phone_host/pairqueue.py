@@ -1,0 +1,194 @@
+"""Where the threads meet: frames of both cameras go in, pairs come out for the worker. Adds a lock and an account to the pure cores.
+
+Conservation: received = paired + orphaned(by reason) + held; paired = taken + dropped(overflow) + waiting. Both hold after every call.
+"""
+
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final, assert_never
+
+from common import now
+from common.frame import Frame
+from phone_host.model import BoardFrame, FramePair
+from phone_host.sync.fifo import Fifo, FifoSettings, Overflow
+from phone_host.sync.pairing import BoardOrphan, HostOrphan, OrphanReason, Outcome, Paired, Pairing, PairingSettings
+
+_HOST_BYTES: Final = 64 * 1024 * 1024
+"""Host frames wait, still encoded, in at most this much memory: 40 s of 50 KB JPEGs at 30 fps, more than any link delays."""
+
+_FIRST_WAIT_NS: Final = 2_000_000_000
+"""Before a delay has been measured a host frame waits this long for its partner."""
+
+_SLOWEST_NS: Final = 60_000_000_000
+"""No link is waited for longer than this."""
+
+
+@dataclass(frozen=True, slots=True)
+class PairCounts:
+    """What became of the frames that reached the host, and of the pairs.
+
+    Attributes:
+        received: board frames.
+        host_frames: own frames.
+        paired: pairs formed.
+        dropped: pairs that gave way in a full FIFO.
+        taken: pairs given to the worker.
+        waiting: pairs in the FIFO now.
+        held_board: board frames without partner yet.
+        held_host: own frames without partner yet.
+        board_orphans: board frames that found none, by reason.
+        host_orphans: own frames that found none, by reason.
+    """
+
+    received: int = 0
+    host_frames: int = 0
+    paired: int = 0
+    dropped: int = 0
+    taken: int = 0
+    waiting: int = 0
+    held_board: int = 0
+    held_host: int = 0
+    board_orphans: tuple[tuple[str, int], ...] = ()
+    host_orphans: tuple[tuple[str, int], ...] = ()
+
+
+class PairQueue:
+    """Pairing and FIFO behind one lock.
+
+    Args:
+        fifo: depth and overflow policy.
+        tolerance_ns: greatest time skew; None for half of the longer frame period.
+        host_period_ns: time between two frames of the own camera.
+    """
+
+    def __init__(self, fifo: FifoSettings, tolerance_ns: int | None, host_period_ns: int) -> None:
+        self._settings = fifo
+        self._fifo: Fifo[FramePair] = Fifo(fifo)
+        self._tolerance_ns = tolerance_ns
+        self._host_period_ns = host_period_ns
+        self._board_period_ns = 0
+        self._pairing: Pairing[BoardFrame, Frame] | None = None
+        self._changed = threading.Condition()
+        self._closed = False
+        self._received = self._host_frames = self._paired = self._dropped = self._taken = 0
+        self._board_orphans: dict[str, int] = {}
+        self._host_orphans: dict[str, int] = {}
+        self._host_bytes = 0
+        self._host_wait_ns = _FIRST_WAIT_NS
+
+    @property
+    def tolerance_ns(self) -> int:
+        """Greatest time skew of a pair, ns; 0 before the board's period is known."""
+        longer_ns = max(self._board_period_ns, self._host_period_ns)
+        return self._tolerance_ns if self._tolerance_ns is not None else longer_ns // 2
+
+    @property
+    def counts(self) -> PairCounts:
+        """The account now."""
+        with self._changed:
+            held = (self._pairing.held_board, self._pairing.held_host) if self._pairing else (0, 0)
+            orphans = (tuple(self._board_orphans.items()), tuple(self._host_orphans.items()))
+            pairs = (self._paired, self._dropped, self._taken, len(self._fifo))
+            return PairCounts(self._received, self._host_frames, *pairs, *held, *orphans)
+
+    def free_slots(self) -> int:
+        """How many more board frames have a place, counting those that wait for their partner."""
+        with self._changed:
+            return max(0, self._fifo.free - (self._pairing.held_board if self._pairing else 0))
+
+    def begin(self, board_period_ns: int) -> None:
+        """A board session begins: frames of an earlier one find no partner any more."""
+        with self._changed:
+            if self._pairing is not None:
+                self._settle(self._pairing.restart(OrphanReason.STREAM_ENDED))
+            if self._pairing is None or board_period_ns != self._board_period_ns:
+                self._board_period_ns = board_period_ns
+                if self._pairing is not None:
+                    self._settle(self._pairing.finish())
+                self._pairing = Pairing(PairingSettings(self.tolerance_ns, board_period_ns, self._host_period_ns))
+
+    def add_board(self, frame: BoardFrame) -> None:
+        """Take a frame of the board."""
+        with self._changed:
+            assert self._pairing is not None
+            self._received += 1
+            delay_ns = frame.received_ns - frame.marks.exposed_ns
+            # The study of links found bursts up to twice the usual delay; the slow decay follows a link that gets faster.
+            self._host_wait_ns = min(_SLOWEST_NS, max(delay_ns, self._host_wait_ns * 63 // 64))
+            self._settle(self._pairing.add_board(frame.marks.exposed_ns, frame, now.monotonic_ns()))
+
+    def add_host(self, frame: Frame) -> None:
+        """Take a frame of the own camera."""
+        with self._changed:
+            self._host_frames += 1
+            if self._pairing is None:
+                self._count(self._host_orphans, "no_board")
+                return
+            now_ns = now.monotonic_ns()
+            self._host_bytes += len(frame.payload)
+            self._settle(self._pairing.add_host(frame.exposed.ns, frame, now_ns))
+            self._evict(now_ns)
+
+    def tick(self) -> None:
+        """Let time pass: settle what has waited long enough."""
+        with self._changed:
+            if self._pairing is not None:
+                now_ns = now.monotonic_ns()
+                self._settle(self._pairing.decide(now_ns))
+                self._evict(now_ns)
+
+    def finish(self) -> None:
+        """No frame will follow: settle all, let the worker take what waits, then tell it to end."""
+        with self._changed:
+            if self._pairing is not None:
+                self._settle(self._pairing.finish())
+            self._closed = True
+            self._changed.notify_all()
+
+    def take(self) -> FramePair | None:
+        """Wait for the oldest pair; None when there will be none any more."""
+        with self._changed:
+            while not len(self._fifo) and not self._closed:
+                self._changed.wait()
+            if not len(self._fifo):
+                return None
+            self._taken += 1
+            return self._fifo.take()
+
+    def _evict(self, now_ns: int) -> None:
+        assert self._pairing is not None
+        longer_ns = max(self._board_period_ns, self._host_period_ns)
+        patience_ns = self._host_wait_ns + 2 * longer_ns
+        self._settle(self._pairing.evict_host(now_ns - patience_ns))
+        # A host frame is here as soon as its camera gave it; a board frame without one after this time never gets one.
+        self._settle(self._pairing.evict_board(now_ns - patience_ns - self.tolerance_ns))
+        while self._host_bytes > _HOST_BYTES:
+            self._settle(self._pairing.evict_oldest_host())
+
+    def _settle(self, outcomes: Iterable[Outcome[BoardFrame, Frame]]) -> None:
+        for outcome in outcomes:
+            match outcome:
+                case Paired(board, host, time_skew_ns):
+                    self._host_bytes -= len(host.payload)
+                    paired_ns = now.monotonic_ns()
+                    self._paired += 1
+                    pair = FramePair(board, host, time_skew_ns, paired_ns, now.monotonic_ns())
+                    self._dropped += len(self._fifo.put(pair))
+                    self._changed.notify()
+                case BoardOrphan(_, reason):
+                    self._count(self._board_orphans, reason.value)
+                case HostOrphan(frame, reason):
+                    self._host_bytes -= len(frame.payload)
+                    self._count(self._host_orphans, reason.value)
+                case _:
+                    assert_never(outcome)
+
+    @staticmethod
+    def _count(account: dict[str, int], reason: str) -> None:
+        account[reason] = account.get(reason, 0) + 1
+
+    @property
+    def held_back_by_credit(self) -> bool:
+        """Whether a full FIFO holds the board back instead of dropping pairs."""
+        return self._settings.overflow is Overflow.BLOCK

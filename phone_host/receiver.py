@@ -1,0 +1,274 @@
+"""The host's end of the link in a thread of its own: session, clock estimate, credit. Frames go to the pair queue with all marks set."""
+
+import logging
+import math
+import os
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Final
+
+import zmq
+
+from common import now
+from common.errors import ProtocolError
+from common.link.base import Broken, Garbage, Incoming, Link, Packet
+from common.logs import event
+from common.protocol.host_session import HostSession
+from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Pacing, RefusalReason
+from common.protocol.session import (
+    Accepted,
+    Arrived,
+    Counted,
+    Echo,
+    Outgoing,
+    Output,
+    Refused,
+    Stale,
+    Vanished,
+    stamped,
+)
+from common.protocol.wire import VersionError, decode, encode
+from phone_host.model import BoardFrame
+from phone_host.pairqueue import PairQueue
+from phone_host.sync.clock import ClockEstimate, ClockEstimator
+
+_LOG = logging.getLogger(__name__)
+
+_LONGEST_WAIT_MS: Final = 50
+"""The pair queue's patience is checked at least this often."""
+
+_MOST_UNDER_WAY: Final = 4
+"""Frames under way at most, however long the link: more would only be older."""
+
+
+@dataclass(slots=True)
+class SessionAccount:
+    """One life of a board as the host saw it; closed accounts are kept for the report.
+
+    Attributes:
+        session: the board's session id.
+        first: the board's account when this host was accepted.
+        latest: the board's newest account.
+        received: frames that came.
+        lost: frames that were sent and never came (gaps).
+        stale: frames delivered again or of an older session, dropped.
+        ended: whether the board said that no frame follows.
+        vanished: whether the board went without a word: what it sent after `latest` is unknown.
+    """
+
+    session: str
+    first: BoardCounts
+    latest: BoardCounts
+    received: int = 0
+    lost: int = 0
+    stale: int = 0
+    ended: bool = False
+    vanished: bool = False
+
+
+@dataclass(slots=True)
+class LinkAccount:
+    """What the receiver has seen so far; written by its thread only, read by others at leisure."""
+
+    sessions: list[SessionAccount] = field(default_factory=list)
+    connects: int = 0
+    garbage: int = 0
+    no_clock: int = 0
+
+
+class Receiver:
+    """Owns the link and speaks the host's role over it.
+
+    Args:
+        link: open link; closed by this.
+        host_id: random id of this process's life.
+        queue: where frames go.
+        arrived: told the exposure (host's clock, ns) of each frame that came.
+    """
+
+    def __init__(self, link: Link, host_id: str, queue: PairQueue, arrived: Callable[[int], None]) -> None:
+        self._link = link
+        self._queue = queue
+        self._arrived = arrived
+        self._session = HostSession(host_id, link.dialled)
+        self._clock = ClockEstimator()
+        self._hello: BoardHello | None = None
+        self._poller = zmq.Poller()
+        self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        for pollable in (*link.pollables, self._wake_read):
+            self._poller.register(pollable, zmq.POLLIN)
+        self._stopping = False
+        self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
+        self.account = LinkAccount()
+        self.failure: Exception | None = None
+        self.refused: RefusalReason | None = None
+
+    @property
+    def connected(self) -> bool:
+        """Whether a board talks to us now."""
+        return self._session.is_open
+
+    @property
+    def hello(self) -> BoardHello | None:
+        """What the board said of itself; None before the first contact."""
+        return self._hello
+
+    @property
+    def estimate(self) -> ClockEstimate | None:
+        """The clock estimate now."""
+        return self._clock.estimate
+
+    @property
+    def ended(self) -> bool:
+        """Whether the board's camera has come to its end."""
+        return bool(self.account.sessions) and self.account.sessions[-1].ended
+
+    def start(self) -> None:
+        """Begin to look for the board."""
+        self._thread.start()
+
+    def wake(self) -> None:
+        """Let the thread look at the queue's free places now; safe from any thread."""
+        with suppress(BlockingIOError):  # then it has been told often enough
+            os.write(self._wake_write, b"\0")
+
+    def stop(self) -> None:
+        """Say goodbye and close the link."""
+        self._stopping = True
+        self.wake()
+        self._thread.join()
+        os.close(self._wake_read)
+        os.close(self._wake_write)
+
+    def _run(self) -> None:
+        try:
+            while not self._stopping:
+                self._step()
+            self._handle(self._session.leave(), now.monotonic_ns())
+        except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
+            self.failure = error
+        finally:
+            self._link.close()
+
+    def _step(self) -> None:
+        now_ns = now.monotonic_ns()
+        wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - self._session.due_ns) // 1_000_000)))
+        if self._poller.poll(wait_ms):
+            self._drain_wake()
+            for incoming in self._link.receive():
+                self._take(incoming, now.monotonic_ns())
+        now_ns = now.monotonic_ns()
+        if now_ns >= self._session.due_ns:
+            self._handle(self._session.tick(now_ns), now_ns)
+        self._queue.tick()
+        self._grant(now_ns)
+
+    def _drain_wake(self) -> None:
+        with suppress(BlockingIOError):
+            os.read(self._wake_read, 4096)
+
+    def _take(self, incoming: Incoming, now_ns: int) -> None:
+        match incoming:
+            case Broken():
+                self._handle(self._session.interrupted(now_ns), now_ns)
+            case Garbage():
+                self._count_garbage("not a packet")
+            case Packet(connection, header, payload):
+                try:
+                    message = decode(header, payload)
+                except VersionError as error:
+                    self.refused = RefusalReason.VERSION
+                    self._count_garbage(error.problem)
+                except ProtocolError as error:
+                    self._count_garbage(error.problem)
+                else:
+                    self._handle(self._session.receive(connection, message, now_ns), now_ns)
+
+    def _count_garbage(self, problem: str) -> None:
+        self.account.garbage += 1
+        if self.account.garbage.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: a hostile peer must not fill the log
+            _LOG.warning(event("garbage", count=self.account.garbage, problem=problem))
+
+    def _grant(self, now_ns: int) -> None:
+        estimate, hello = self._clock.estimate, self._hello
+        if estimate is None or hello is None:
+            return  # without a clock a frame could not be paired
+        if hello.camera.pacing is Pacing.DEMAND or self._queue.held_back_by_credit:
+            slots = self._queue.free_slots()
+        else:
+            # One frame under way, more only where the link is longer than a period: each further one would be older when used.
+            slots = min(_MOST_UNDER_WAY, 1 + math.floor(estimate.round_trip_ns / hello.camera.period_ns))
+        self._handle(self._session.grant(slots), now_ns)
+
+    def _handle(self, outputs: list[Output], now_ns: int) -> None:
+        for output in outputs:
+            match output:
+                case Outgoing(connection, message):
+                    header, payload = encode(stamped(message, now.monotonic_ns()))
+                    self._link.send(connection, header, payload)
+                case Arrived(frame, lost):
+                    self._accept_frame(frame, lost, now_ns)
+                case Echo():
+                    self._clock.add(output)
+                case Stale():
+                    self._current.stale += 1
+                case Accepted():
+                    self._begin(output)
+                case Counted(counts, ended):
+                    self._current.latest = counts
+                    self._current.ended |= ended
+                case Refused(reason):
+                    self.refused = reason
+                case Vanished(orderly):
+                    self._current.vanished |= not orderly
+                    _LOG.info(event("board_gone", session=self._current.session, orderly=orderly))
+
+    @property
+    def _current(self) -> SessionAccount:
+        if not self.account.sessions:
+            self.account.sessions.append(SessionAccount("", BoardCounts(), BoardCounts()))
+        return self.account.sessions[-1]
+
+    def _begin(self, accepted: Accepted) -> None:
+        hello = accepted.hello
+        self.refused = None
+        self.account.connects += 1
+        if self._hello is None or self._hello.boot_id != hello.boot_id:
+            self._clock = ClockEstimator()  # another boot is another clock
+        self._hello = hello
+        if accepted.resumed:
+            self._current.lost += accepted.lost
+            self._current.vanished = False
+        else:
+            self.account.sessions.append(SessionAccount(hello.session, hello.counts, hello.counts))
+            self._queue.begin(hello.camera.period_ns)
+        camera = hello.camera
+        size = f"{camera.width_px}x{camera.height_px}"
+        _LOG.info(event("board_found", session=hello.session, resumed=accepted.resumed, camera=camera.name, size=size))
+
+    def _accept_frame(self, frame: FrameMessage, lost: int, now_ns: int) -> None:
+        account = self._current
+        account.received += 1
+        account.lost += lost
+        estimate = self._clock.estimate
+        if estimate is None:
+            self.account.no_clock += 1
+            return
+        # Only `sent` is mapped to the host's clock, once, here; the other marks keep their distance to it.
+        sent_ns = frame.marks.sent_ns
+        offset_ns = estimate.offset_at(sent_ns)
+        marks = frame.marks.moved_to(sent_ns + offset_ns)
+        uncertainty_ns = estimate.uncertainty_at(sent_ns)
+        self._queue.add_board(BoardFrame(frame, self._link.kind, marks, now_ns, offset_ns, uncertainty_ns))
+        self._arrived(marks.exposed_ns)
+
+
+def refusal_text(reason: RefusalReason) -> tuple[str, str]:
+    """What a refusal means, and its remedy."""
+    match reason:
+        case RefusalReason.BUSY:
+            return "the board is busy with another host", "stop the other one first"
+        case RefusalReason.VERSION:
+            return "the board speaks another protocol version", "update the older of the two"

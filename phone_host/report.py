@@ -1,0 +1,208 @@
+"""A run in figures: the report.json object and the summary for people. Pure."""
+
+from dataclasses import asdict, dataclass
+from typing import Final
+
+from phone_host.delays import DELAYS, STAGES, DelayStatistics, Spread
+from phone_host.pairqueue import PairCounts
+from phone_host.receiver import LinkAccount
+from phone_host.results import Unwritten
+from phone_host.sync.clock import ClockEstimate
+from phone_host.sync.fifo import FifoSettings, Overflow
+
+_MS: Final = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class RunFacts:
+    """Everything a report is made of.
+
+    Attributes:
+        ended: why the run ended.
+        processed: pairs whose results were written.
+        undecodable: pairs whose bytes were no images.
+        seconds: from the first to the last result, s.
+        delays: of the processed pairs.
+        counts: of frames and pairs on the host.
+        link: the link's account.
+        estimate: the last clock estimate, if there was one.
+        tolerance_ns: greatest time skew of a pair.
+        fifo: depth and policy.
+        unwritten: what the disk did not take.
+        spoiled: own frames that were no whole images.
+    """
+
+    ended: str
+    processed: int
+    undecodable: int
+    seconds: float
+    delays: DelayStatistics
+    counts: PairCounts
+    link: LinkAccount
+    estimate: ClockEstimate | None
+    tolerance_ns: int
+    fifo: FifoSettings
+    unwritten: Unwritten
+    spoiled: int
+
+    @property
+    def pairs_per_second(self) -> float:
+        """Rate of results, 1/s; NaN with fewer than two."""
+        return (self.processed - 1) / self.seconds if self.processed > 1 and self.seconds > 0 else float("nan")
+
+
+def build(facts: RunFacts) -> dict[str, object]:
+    """Make the report.json object; times in ms, None where nothing was measured.
+
+    Args:
+        facts: the run.
+    """
+    return {
+        "ended": facts.ended,
+        "pairs": facts.processed,
+        "pairs_per_second": _number(facts.pairs_per_second),
+        "delays_ms": {name: spread_ms(facts.delays.spread(name)) for name in DELAYS},
+        "stages_ms": {name: spread_ms(facts.delays.spread(name)) for name in STAGES},
+        "time_skew_ms": spread_ms(facts.delays.spread("time_skew")),
+        "clock": _clock(facts),
+        "fifo": {"depth": facts.fifo.depth, "overflow": facts.fifo.overflow.value, "age_bound": age_bound(facts)},
+        "tolerance_ms": facts.tolerance_ns / _MS,
+        "sessions": [_session(facts, index) for index in range(len(facts.link.sessions))],
+        "connects": facts.link.connects,
+        "garbage": facts.link.garbage,
+        "frames": {
+            "received": facts.counts.received,
+            "paired": facts.counts.paired,
+            "held": facts.counts.held_board,
+            "orphaned": dict(facts.counts.board_orphans),
+            "before_clock": facts.link.no_clock,
+        },
+        "host_frames": {
+            "grabbed": facts.counts.host_frames + facts.spoiled,
+            "spoiled": facts.spoiled,
+            "paired": facts.counts.paired,
+            "held": facts.counts.held_host,
+            "orphaned": dict(facts.counts.host_orphans),
+        },
+        "pairs_account": {
+            "paired": facts.counts.paired,
+            "processed": facts.processed,
+            "undecodable": facts.undecodable,
+            "dropped_fifo": facts.counts.dropped,
+            "not_processed": facts.counts.paired - facts.processed - facts.undecodable - facts.counts.dropped,
+        },
+        "unwritten": asdict(facts.unwritten),
+    }
+
+
+def spread_ms(spread: Spread) -> dict[str, float | int | None]:
+    """Give a spread in ms, rounded to the ns."""
+    values = {
+        "p50": spread.p50_ns,
+        "p95": spread.p95_ns,
+        "p99": spread.p99_ns,
+        "max": spread.max_ns,
+        "mean": spread.mean_ns,
+    }
+    return {"count": spread.count} | {name: _number(value / _MS) for name, value in values.items()}
+
+
+def age_bound(facts: RunFacts) -> str:
+    """Say how old a pair can get in the FIFO, from its depth and policy and the rates of this run."""
+    depth, processing = facts.fifo.depth, facts.delays.spread("processing")
+    if facts.fifo.overflow is Overflow.DROP_OLDEST:
+        return f"{depth} frame period(s): newer pairs push older ones out"
+    how = (
+        "pairs that are in stay in"
+        if facts.fifo.overflow is Overflow.DROP_NEWEST
+        else "a pair is fetched when a place is free"
+    )
+    measured = f", here {depth * processing.p95_ns / _MS:.1f} ms (p95)" if processing.count else ""
+    return f"{depth} processing time(s): {how}{measured}"
+
+
+def summary(facts: RunFacts) -> str:
+    """Say in a few lines what the run was."""
+    lines = [
+        f"{facts.processed} pairs in {facts.seconds:.1f} s ({facts.pairs_per_second:.1f} /s), ended: {facts.ended.replace('_', ' ')}"
+    ]
+    if facts.processed:
+        lines.append(f"{'delay, ms':14} {'p50':>9} {'p95':>9} {'p99':>9} {'max':>9}")
+        for name in DELAYS:
+            spread = facts.delays.spread(name)
+            values = (spread.p50_ns, spread.p95_ns, spread.p99_ns, spread.max_ns)
+            lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value / _MS:9.3f}" for value in values))
+    if facts.estimate is not None:
+        lines.append(
+            f"clock known to +-{facts.estimate.uncertainty_ns / 1000:.0f} us, skew {facts.estimate.skew * 1e6:+.1f} ppm"
+        )
+    lines += _losses(facts)
+    return "\n".join(lines)
+
+
+def _losses(facts: RunFacts) -> list[str]:
+    lost = sum(account.lost for account in facts.link.sessions)
+    stale = sum(account.stale for account in facts.link.sessions)
+    board = {reason: n for reason, n in _board_drops(facts).items() if n}
+    parts = [
+        *(f"{n} {reason} on the board" for reason, n in board.items()),
+        *([f"{lost} lost on the link"] if lost else []),
+        *([f"{stale} stale"] if stale else []),
+        *(f"{n} board frames {reason}" for reason, n in facts.counts.board_orphans),
+        *(f"{n} host frames {reason}" for reason, n in facts.counts.host_orphans),
+        *([f"{facts.counts.dropped} pairs in a full FIFO"] if facts.counts.dropped else []),
+        *([f"{facts.undecodable} pairs undecodable"] if facts.undecodable else []),
+    ]
+    lines = ["dropped: " + (", ".join(parts).replace("_", " ") or "nothing")]
+    if facts.unwritten.lines or facts.unwritten.pairs:
+        lines.append(
+            f"not written: {facts.unwritten.lines} lines, {facts.unwritten.pairs} pairs ({facts.unwritten.cause})"
+        )
+    return lines
+
+
+def _board_drops(facts: RunFacts) -> dict[str, int]:
+    drops: dict[str, int] = {}
+    for account in facts.link.sessions:
+        before = dict(account.first.dropped)
+        for reason, count in account.latest.dropped:
+            drops[reason.value] = drops.get(reason.value, 0) + count - before.get(reason, 0)
+    return drops
+
+
+def _clock(facts: RunFacts) -> dict[str, object]:
+    estimate = facts.estimate
+    if estimate is None:
+        return {"known": False}
+    return {
+        "known": True,
+        "offset_ns": estimate.offset_ns,
+        "skew_ppm": estimate.skew * 1e6,
+        "uncertainty_us": estimate.uncertainty_ns / 1e3,
+        "round_trip_us": estimate.round_trip_ns / 1e3,
+        "uncertainty_at_pairs_us": {
+            k: None if v is None else v * 1e3
+            for k, v in spread_ms(facts.delays.spread("uncertainty")).items()
+            if k != "count"
+        },
+    }
+
+
+def _session(facts: RunFacts, index: int) -> dict[str, object]:
+    account = facts.link.sessions[index]
+    before = dict(account.first.dropped)
+    return {
+        "session": account.session,
+        "grabbed": account.latest.grabbed - account.first.grabbed,
+        "sent": max(account.latest.sent - account.first.sent, account.received + account.lost),
+        "dropped": {reason.value: count - before.get(reason, 0) for reason, count in account.latest.dropped},
+        "received": account.received,
+        "lost": account.lost,
+        "stale": account.stale,
+        "ended": account.ended,
+        "tail": "unknown" if account.vanished else "known",
+    }
+
+
+def _number(value: float) -> float | None:
+    return None if value != value else round(value, 6)  # noqa: PLR0124 - NaN is the only value unlike itself; JSON has none

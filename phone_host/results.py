@@ -1,0 +1,162 @@
+"""A run's results on disk: delays.jsonl, pair folders, report.json. A full disk loses nothing that memory can keep, and never stops the run.
+
+While writing fails, lines of delays.jsonl wait in memory (bounded) and pairs are counted as unsaved; when there is room again the lines
+follow in order. What is still missing at the end is said with the exit code.
+"""
+
+import json
+import logging
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from common.errors import UnavailableError
+from common.ledger import PairLedger
+from common.logs import event
+from phone_host.formats.atomic import write_text
+from phone_host.formats.pfm import write_pfm
+from phone_host.formats.ply import write_ply
+from phone_host.formats.preview import write_png
+from phone_host.pipeline import Processed
+
+_LOG = logging.getLogger(__name__)
+
+_PENDING_BYTES: Final = 16 * 1024 * 1024
+"""Lines kept while the disk is full: about ten minutes at 30 pairs per second."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unwritten:
+    """What could not be written.
+
+    Attributes:
+        lines: lines of delays.jsonl that are lost.
+        pairs: pair folders that were due and could not be written.
+        cause: the operating system's word for it; empty when all was written.
+    """
+
+    lines: int = 0
+    pairs: int = 0
+    cause: str = ""
+
+
+class Results:
+    """Writes into one folder, or nowhere.
+
+    Args:
+        folder: made if missing; None to write nothing.
+        save_every: every which pair is saved, from the first on; 0 for none.
+
+    Raises:
+        UnavailableError: the folder cannot be made or written to.
+    """
+
+    def __init__(self, folder: Path | None, save_every: int) -> None:
+        self._folder = folder
+        self._save_every = save_every
+        self._pending: list[bytes] = []
+        self._pending_bytes = 0
+        self._lost_lines = self._unsaved_pairs = 0
+        self._cause = ""
+        self._file = -1
+        self._written_bytes = 0
+        if folder is not None:
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                self._file = os.open(
+                    folder / "delays.jsonl", os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644
+                )
+            except OSError as error:
+                raise UnavailableError(
+                    f"results folder {folder} cannot be used ({error.strerror})", "give another with --out"
+                ) from None
+
+    @property
+    def unwritten(self) -> Unwritten:
+        """What has not been written so far."""
+        return Unwritten(self._lost_lines + len(self._pending), self._unsaved_pairs, self._cause)
+
+    def save_pair(self, number: int, processed: Processed) -> None:
+        """Write a pair's folder if it is its turn; all of it or nothing.
+
+        Args:
+            number: the pair's number in this run, from 0.
+            processed: its images and depth.
+        """
+        if self._folder is None or not self._save_every or number % self._save_every:
+            return
+        final = self._folder / f"pair-{number:06d}"
+        part = final.with_suffix(".part")
+        try:
+            shutil.rmtree(part, ignore_errors=True)
+            part.mkdir()
+            write_png(part / "left.png", processed.pair.left)
+            write_png(part / "right.png", processed.pair.right)
+            if processed.disparity is not None:
+                write_pfm(part / "disparity.pfm", processed.disparity)
+            if processed.cloud is not None:
+                write_ply(part / "cloud.ply", processed.cloud, processed.pair.left)
+            shutil.rmtree(final, ignore_errors=True)
+            part.rename(final)
+        except OSError as error:
+            shutil.rmtree(part, ignore_errors=True)
+            self._unsaved_pairs += 1
+            self._failed(error)
+
+    def append(self, ledger: PairLedger) -> None:
+        """Add a line to delays.jsonl."""
+        if self._folder is None:
+            return
+        line = ledger.to_json().encode() + b"\n"
+        self._pending.append(line)
+        self._pending_bytes += len(line)
+        self._flush()
+        while self._pending_bytes > _PENDING_BYTES:
+            self._pending_bytes -= len(self._pending.pop(0))
+            self._lost_lines += 1
+
+    def finish(self, report: dict[str, object]) -> None:
+        """Write report.json and close.
+
+        Args:
+            report: the JSON object to write.
+        """
+        if self._folder is None:
+            return
+        self._flush()
+        try:
+            write_text(self._folder / "report.json", json.dumps(report, indent=1) + "\n")
+        except OSError as error:
+            self._failed(error)
+        os.close(self._file)
+
+    def _flush(self) -> None:
+        data = b"".join(self._pending)
+        try:
+            done = os.pwrite(self._file, data, self._written_bytes)
+        except OSError as error:
+            self._failed(error)
+            return
+        if done < len(data):  # the disk filled up in the middle of a line: the next try writes over the torn part
+            os.ftruncate(self._file, self._written_bytes)
+            return
+        self._written_bytes += done
+        self._pending.clear()
+        self._pending_bytes = 0
+        if self._cause and not self._unsaved_pairs:
+            _LOG.info(event("results_written_again", folder=self._folder))
+            self._cause = ""
+
+    def _failed(self, error: OSError) -> None:
+        if not self._cause:
+            _LOG.error(
+                event(
+                    "results_not_written",
+                    folder=self._folder,
+                    cause=error.strerror,
+                    remedy="make room; the run goes on",
+                )
+            )
+        self._cause = error.strerror or str(error)

@@ -1,0 +1,145 @@
+"""phone-host run: pair a board's frames with the own camera's, compute depth, measure every delay."""
+
+import argparse
+import json
+import logging
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+
+from common import logs, now
+from common.camera.factory import EXAMPLE, open_camera
+from common.errors import SettingsError
+from common.link.factory import open_link, parse_link
+from common.settings import Resolved, resolve
+from common.signals import StopSignals
+from common.stamp import HOST_CLOCK
+from phone_host.settings import ENVIRONMENT_PREFIX, PhoneHostSettings
+
+EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --calibration rig.yaml --out scan
+  phone-host run --link ipc:///tmp/board --camera 'replay:right?pace=demand' --rectified --disparities 64 --pairs 20 --out scan
+  phone-host run --camera 'replay:right?loop=1' --pairs 300 --json        (no depth: pairs and delays only)
+"""
+
+_CHECK_FAILED = 4
+_INTERRUPTED = 130
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's options."""
+    from phone_host.verbs.stereo_options import add_stereo_arguments  # noqa: PLC0415 - brings OpenCV in with its use
+
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
+    parser.add_argument(
+        "--link", metavar="URI", help="the board: tcp://HOST:PORT or ipc://PATH (default tcp://127.0.0.1:5555)"
+    )
+    parser.add_argument("--camera", metavar="URI", help=f"the own camera: {EXAMPLE}")
+    add_stereo_arguments(parser)
+    parser.add_argument(
+        "--board-side", choices=("left", "right"), help="which view the board's camera is (default left, or the rig's)"
+    )
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        metavar="MS",
+        help="greatest time skew of a pair (default: half of the longer frame period)",
+    )
+    parser.add_argument(
+        "--fifo", metavar="DEPTH:POLICY", help="drop-oldest, drop-newest or block (default 1:drop-oldest)"
+    )
+    parser.add_argument(
+        "--pairs", type=int, default=0, metavar="N", help="end after N pairs; fewer when the stream ends: exit 4"
+    )
+    parser.add_argument(
+        "--wait", type=float, metavar="S", help="wait this long for an absent board, then exit 3 (default: for ever)"
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for delays.jsonl, report.json and saved pairs")
+    parser.add_argument(
+        "--save-every",
+        type=int,
+        default=30,
+        metavar="N",
+        help="save every Nth pair from the first on; 0: none (default 30)",
+    )
+    parser.add_argument("--log-level", choices=("debug", "info", "warning", "error"), help="how much to log to stderr")
+
+
+def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
+    """Work out the settings from file, environment and options."""
+    names = ("link", "camera", "calibration", "matcher", "tolerance", "fifo", "log_level")
+    given = {name: getattr(options, name, None) for name in names}
+    return resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run until stopped, the pairs are reached or a stream ends."""
+    from phone_host.host import EndReason, Host, HostSettings  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.live import LiveTable  # noqa: PLC0415
+    from phone_host.model import Side  # noqa: PLC0415
+    from phone_host.report import build, summary  # noqa: PLC0415
+    from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
+    from phone_host.verbs.stereo_options import build_core  # noqa: PLC0415
+
+    settings = resolve_settings(options).values
+    logs.set_up(_level(settings.log_level))
+    if not settings.camera:
+        raise SettingsError("no own camera is given", f"use --camera {EXAMPLE}")
+    _check_numbers(options, settings)
+    fifo = FifoSettings.parse(settings.fifo)
+    camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns())
+    size_px = (camera.description.width_px, camera.description.height_px)
+    core, rig_side = build_core(options, settings.calibration, settings.matcher, size_px)
+    board_side = Side(options.board_side) if options.board_side else rig_side or Side.LEFT
+    if rig_side not in {None, board_side}:
+        raise SettingsError(
+            f"--board-side {board_side.value} contradicts {settings.calibration}",
+            "leave it out, or calibrate with the board there",
+        )
+    if core is None:
+        print("phone-host: no --calibration and not --rectified: pairs and delays only, no depth", file=sys.stderr)
+    host_settings = HostSettings(
+        board_side=board_side,
+        tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
+        fifo=fifo,
+        pairs=options.pairs,
+        wait_ns=None if options.wait is None else round(options.wait * 1e9),
+        out=options.out,
+        save_every=options.save_every,
+    )
+    link = open_link(parse_link(settings.link, listens_by_default=False))
+    signals = StopSignals()
+    host = Host(host_settings, camera, link, core)
+    live = LiveTable(host) if sys.stderr.isatty() else None
+    with live or nullcontext():
+        try:
+            ended = host.run(lambda: signals.stop, live.refresh if live else None)
+        except BaseException:
+            host.results.finish(build(host.facts("failed")))
+            raise
+    facts = host.facts(ended.value)
+    report = build(facts)
+    host.results.finish(report)
+    print(json.dumps(report) if options.json else summary(facts))
+    if ended is EndReason.STOPPED:
+        return _INTERRUPTED if signals.interrupted else 0
+    if host.results.unwritten.cause or (options.pairs and ended is not EndReason.PAIRS_REACHED):
+        return _CHECK_FAILED
+    return 0
+
+
+def _level(name: str) -> int:
+    if name.upper() not in logging.getLevelNamesMapping():
+        raise SettingsError(f"log_level is {name!r}", "give debug, info, warning or error")
+    return logging.getLevelNamesMapping()[name.upper()]
+
+
+def _check_numbers(options: argparse.Namespace, settings: PhoneHostSettings) -> None:
+    for name, value in (
+        ("--pairs", options.pairs),
+        ("--save-every", options.save_every),
+        ("--tolerance", settings.tolerance),
+    ):
+        if value < 0:
+            raise SettingsError(f"{name} {value} is negative", "give 0 or more")
+    if options.wait is not None and options.wait < 0:
+        raise SettingsError(f"--wait {options.wait} is negative", "give seconds, 0 or more")
