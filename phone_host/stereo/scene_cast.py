@@ -27,8 +27,8 @@ PART = 16384
 linear algebra library to wake its threads. Measured best among 8192 to all at once."""
 
 # OpenCV's fixed-point inversion gains about a digit per step at the edge of a webcam's image; its default of 5 steps
-# leaves tenths of a pixel there. 1e-13 of the unit plane is far below 1e-6 px.
-_UNDISTORT_UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-13)
+# leaves tenths of a pixel there. The second number is the distance in px between a pixel and its ray's projection.
+_UNDISTORT_UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-9)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,13 +54,27 @@ def pixel_rays(camera: Camera) -> NDArray[np.float64]:
         (3, H, W) float64 with z = 1.
     """
     x, y = np.meshgrid(np.arange(camera.width_px, dtype=np.float64), np.arange(camera.height_px, dtype=np.float64))
+    return rays_through(camera, x.ravel(), y.ravel()).reshape(3, *x.shape)
+
+
+def rays_through(camera: Camera, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Directions in the camera's axes through given places of its image.
+
+    Args:
+        camera: intrinsics.
+        x: (N,) px.
+        y: (N,) px.
+
+    Returns:
+        (3, N) float64 with z = 1.
+    """
+    k = camera.matrix
     if not np.any(camera.distortion):
-        k = camera.matrix
         y_unit = (y - k[1, 2]) / k[1, 1]
         return np.stack([(x - k[0, 2] - k[0, 1] * y_unit) / k[0, 0], y_unit, np.ones_like(x)])
-    pixels = np.stack([x.ravel(), y.ravel()], axis=1)[:, None, :]
-    unit = cv2.undistortPointsIter(pixels, camera.matrix, camera.distortion, np.eye(3), np.eye(3), _UNDISTORT_UNTIL)
-    return np.stack([unit[:, 0, 0].reshape(x.shape), unit[:, 0, 1].reshape(x.shape), np.ones_like(x)])
+    pixels = np.stack([x, y], axis=1)[:, None, :]
+    unit = cv2.undistortPointsIter(pixels, k, camera.distortion, np.eye(3), np.eye(3), _UNDISTORT_UNTIL)[:, 0]
+    return np.stack([unit[:, 0], unit[:, 1], np.ones_like(x)])
 
 
 def project(points_m: Floats, camera: Camera, pose: Pose) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import Camera
-from phone_host.stereo.scene_cast import FACES, cast, pixel_rays, project
+from phone_host.stereo.scene_cast import FACES, cast, pixel_rays, project, rays_through
 from phone_host.stereo.scene_model import Floats, Pose, RectifiedView, Scene
 
 # A point seen from the other camera is the nearest hit on its own ray up to rounding: 1e-9 of the distance is nanometres,
@@ -111,7 +111,9 @@ def _inside(points: Floats, camera: Camera, pose: Pose) -> NDArray[np.bool_]:
     # Far outside the image the distortion polynomial folds back into it; no such point is farther from the axis than
     # the farthest corner.
     local = pose.R_camera_scene @ (points - pose.centre_m[:, None])
-    edge = np.hypot(*pixel_rays(camera)[:2, (0, 0, -1, -1), (0, -1, 0, -1)]).max()
+    right, bottom = camera.width_px - 1.0, camera.height_px - 1.0
+    corners = rays_through(camera, np.array([0.0, right, 0.0, right]), np.array([0.0, 0.0, bottom, bottom]))
+    edge = np.hypot(corners[0], corners[1]).max()
     near_axis = np.hypot(local[0], local[1]) <= edge * local[2]
     with np.errstate(invalid="ignore"):
         inside: NDArray[np.bool_] = (
