@@ -107,6 +107,31 @@ class Rig:
     rms_stereo_px: float = float("nan")
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Rectification:
+    """How both cameras are turned and cut; the values `rig.yaml` holds beside the rig itself.
+
+    Attributes:
+        geometry: what turns disparity into metres; its axes are those of the *rectified* left camera.
+        width_px: width of both rectified images, px.
+        height_px: height of both rectified images, px.
+        R_left: (3, 3) float64, takes the left camera's axes to the rectified ones (OpenCV's R1).
+        R_right: (3, 3) float64, the same for the right camera (R2).
+        P_left: (3, 4) float64 projection of rectified points into the left rectified image (P1).
+        P_right: (3, 4) float64 into the right rectified image (P2), metres.
+        Q: (4, 4) float64, takes (u, v, d, 1) to homogeneous metres.
+    """
+
+    geometry: StereoGeometry
+    width_px: int
+    height_px: int
+    R_left: NDArray[np.float64]
+    R_right: NDArray[np.float64]
+    P_left: NDArray[np.float64]
+    P_right: NDArray[np.float64]
+    Q: NDArray[np.float64]
+
+
 @dataclass(frozen=True, slots=True)
 class BoardFrame:
     """A frame that came over a link, with its marks on the host's clock.

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.formats.atomic import write_text
-from phone_host.model import Camera, Rig, Side
-from phone_host.stereo.rectify import Rectification
+from phone_host.model import Camera, Rectification, Rig, Side
 
 _DISTORTION_LENGTHS = (4, 5, 8, 12, 14)  # those OpenCV's model defines
 _LARGEST_IMAGE_PX = 100_000

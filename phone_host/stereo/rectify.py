@@ -14,14 +14,13 @@ pairs", 2000; OpenCV's calib3d documentation for P1, P2 and Q.
 """
 
 import math
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.model import Camera, Image, RectifiedPair, Rig, Side, StereoGeometry
+from phone_host.model import Camera, Image, Rectification, RectifiedPair, Rig, Side, StereoGeometry
 from phone_host.stereo.images import size_text
 
 Matrix = NDArray[np.float64]
@@ -34,31 +33,6 @@ _SAMPLES_PER_EDGE = 65  # the outline bends slowly: between 65 samples it moves 
 # A polynomial fitted to points in the middle may fold back near the corners; the usable field of view then ends before.
 _FIELD_SHARES = (1.0, 0.97, 0.94, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5)
 _LEAST_SIZE_PX = 32
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Rectification:
-    """How both cameras are turned and cut; the values `rig.yaml` holds beside the rig itself.
-
-    Attributes:
-        geometry: what turns disparity into metres; its axes are those of the *rectified* left camera.
-        width_px: width of both rectified images, px.
-        height_px: height of both rectified images, px.
-        R_left: (3, 3) float64, takes the left camera's axes to the rectified ones (OpenCV's R1).
-        R_right: (3, 3) float64, the same for the right camera (R2).
-        P_left: (3, 4) float64 projection of rectified points into the left rectified image (P1).
-        P_right: (3, 4) float64 into the right rectified image (P2), metres.
-        Q: (4, 4) float64, takes (u, v, d, 1) to homogeneous metres.
-    """
-
-    geometry: StereoGeometry
-    width_px: int
-    height_px: int
-    R_left: Matrix
-    R_right: Matrix
-    P_left: Matrix
-    P_right: Matrix
-    Q: Matrix
 
 
 def rectify_rig(rig: Rig) -> Rectification:

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
-from phone_host.model import Camera, Image, Rig, Side
-from phone_host.stereo.rectify import Rectification, Rectifier, rectify_points, rectify_rig
+from phone_host.model import Camera, Image, Rectification, Rig, Side
+from phone_host.stereo.rectify import Rectifier, rectify_points, rectify_rig
 from tests.support.rigs import points_seen_by_both, unlike_rig
 
 
