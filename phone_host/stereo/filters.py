@@ -89,18 +89,24 @@ def bridged(disparity: Disparity, gap_px: int, step_px: float) -> Disparity:
 
 
 def _bridged_rows(disparity: Disparity, gap_px: int, step_px: float) -> Disparity:
-    width = disparity.shape[1]
-    column = np.arange(width, dtype=np.int32)
-    known = np.isfinite(disparity)
-    before = np.maximum.accumulate(np.where(known, column, np.int32(-1)), axis=1)
-    after = np.minimum.accumulate(np.where(known, column, np.int32(width))[:, ::-1], axis=1)[:, ::-1]
-    ys, xs = np.nonzero(~known & (before >= 0) & (after < width) & (after - before <= gap_px + 1))
-    start, end = before[ys, xs], after[ys, xs]
-    first, last = disparity[ys, start], disparity[ys, end]
-    share = (xs - start).astype(np.float32) / (end - start)
-    result = disparity.copy()
-    result[ys, xs] = np.where(np.abs(last - first) <= step_px, first + (last - first) * share, np.float32(np.nan))
-    return result
+    height, width = disparity.shape
+    # A fence on both sides of each row counts as known but has no value: it ends a gap, and no gap that it ends is bridged.
+    fenced = np.full((height, width + 2), np.nan, np.float32)
+    fenced[:, 1:-1] = disparity
+    known = np.isfinite(fenced)
+    known[:, [0, -1]] = True
+    values, known = fenced.reshape(-1), known.reshape(-1)
+    before = np.flatnonzero(known[:-1] & ~known[1:])
+    after = np.flatnonzero(~known[:-1] & known[1:]) + 1
+    rise = values[after] - values[before]
+    close = (after - before <= gap_px + 1) & (np.abs(rise) <= step_px)
+    before, after, rise = before[close], after[close], rise[close]
+    for step in range(1, gap_px + 1):
+        open_still = before + step < after
+        start = before[open_still]
+        share = np.float32(step) / (after[open_still] - start).astype(np.float32)
+        values[start + step] = values[start] + rise[open_still] * share
+    return fenced[:, 1:-1]
 
 
 def unlocked(disparity: Disparity, amplitude_px: float) -> Disparity:

@@ -95,10 +95,10 @@ def _search_strip(left: Image, right: Image, count: int) -> Winners:
         np.minimum(best_left[:, d:], keys, out=best_left[:, d:])
         np.minimum(best_right[:, : width - d], keys, out=best_right[:, : width - d])
     best = best_left & 0xFFFF
-    return Winners(best, best_right & 0xFFFF, _equiangular_offset(costs, best))
+    return Winners(best, best_right & 0xFFFF, equiangular_offset(costs, best))
 
 
-def _equiangular_offset(costs: NDArray[np.int32], best: NDArray[np.int32]) -> NDArray[np.float32]:
+def equiangular_offset(costs: NDArray[np.int32], best: NDArray[np.int32]) -> NDArray[np.float32]:
     """Refine below one pixel: two lines of equal and opposite slope through the costs at d - 1, d, d + 1 (a V, not a parabola).
 
     A sum of absolute differences grows linearly, not quadratically, away from its minimum, so the V is the fit whose model

@@ -36,8 +36,8 @@ SPECKLE_AREA_PX, SPECKLE_STEP_PX = 60, 1.0
 GAP_PX, GAP_STEP_PX = 16, 1.0
 """Gaps to bridge: at 16 px three of four bridged pixels are right within 2 px; wider ones fall below."""
 
-LOCKING_PX = 0.1
-"""Amplitude of the pixel locking that this cost and OpenCV's parabola leave: 0.05 to 0.14 on real and rendered planes."""
+LOCKING_PX = 0.12
+"""Amplitude of the pixel locking that this cost and OpenCV's parabola leave: 0.05 to 0.15 on real and rendered surfaces."""
 
 SMOOTH_WINDOW_PX, SMOOTH_STEP_PX, SMOOTH_REACH_PX = 9, 1.0, 4.0
 """The finishing average: neighbours within about one pixel of disparity."""
