@@ -1,0 +1,97 @@
+"""phone-host demo: both programs on this machine, a rendered scene with known truth, a full report."""
+
+import argparse
+import json
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from common import logs
+from common.errors import SettingsError, UnavailableError
+from common.signals import StopSignals
+
+if TYPE_CHECKING:
+    from phone_host.demo import DepthErrors
+    from phone_host.film import Film
+
+EXAMPLES = """  phone-host demo
+  phone-host demo --seconds 30 --out scan-demo
+"""
+
+_INTERRUPTED = 130
+_CHECK_FAILED = 4
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's options."""
+    parser.add_argument("--seconds", type=float, default=12.0, metavar="S", help="how long to stream (default 12)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/demo"), metavar="DIR", help="folder for results (default out/demo)"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Render, stream, measure, compare with the truth."""
+    from rich.console import Console  # noqa: PLC0415 - OpenCV and rich, only now
+    from rich.progress import Progress  # noqa: PLC0415
+
+    from phone_host.demo import FPS, DemoRun, truth_json  # noqa: PLC0415
+    from phone_host.film import render_film  # noqa: PLC0415
+    from phone_host.formats.rig_yaml import write_rig  # noqa: PLC0415
+    from phone_host.live import LiveTable  # noqa: PLC0415
+    from phone_host.report import build, summary  # noqa: PLC0415
+    from phone_host.stereo.rectify import rectify_rig  # noqa: PLC0415
+    from phone_host.stereo.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, demo_scene, unlike_rig  # noqa: PLC0415
+
+    if not 1 <= options.seconds <= 3600:
+        raise SettingsError(f"--seconds {options.seconds:g}", "give 1 to 3600")
+    logs.set_up(30)
+    signals = StopSignals()
+    console = Console(stderr=True)
+    out: Path = options.out
+    rig, scene = unlike_rig(), demo_scene()
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+            task = progress.add_task("rendering a moving scene for two cameras", total=2 * FPS * DEMO_PERIOD_S)
+            film = render_film(
+                scene,
+                rig,
+                (WEBCAM_LOOK, PHONE_LOOK),
+                out / "film",
+                fps=FPS,
+                seconds=DEMO_PERIOD_S,
+                advance=lambda: progress.advance(task),
+            )
+        write_rig(out / "rig.yaml", rig, rectify_rig(rig))
+    except OSError as error:
+        raise UnavailableError(
+            f"{error.filename or out} cannot be written ({error.strerror})", "give another folder with --out"
+        ) from None
+    demo = DemoRun(film, rig, out)
+    live = LiveTable(demo.host, console, options.seconds) if console.is_terminal else None
+    with live or nullcontext():
+        demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
+    facts = demo.host.facts("stopped" if signals.stop else "time_over")
+    errors = demo.check(scene)
+    report = build(facts) | {"truth": truth_json(errors)}
+    demo.host.results.finish(report)
+    demo.write_pictures(out)
+    print(json.dumps(report) if options.json else summary(facts))
+    print(_closing(out, film, errors), file=sys.stderr)
+    if signals.interrupted:
+        return _INTERRUPTED
+    return 0 if errors.pairs and not errors.wrong_pairs else _CHECK_FAILED
+
+
+def _closing(out: Path, film: "Film", errors: "DepthErrors") -> str:
+    board = f"board-agent run --camera '{film.replay_uri(film.left)}'"
+    host = f"phone-host run --camera '{film.replay_uri(film.right)}' --calibration {out}/rig.yaml --out scan"
+    return f"""depth against the known scene: {errors.depth_mm:.1f} mm median error ({errors.depth_percent:.2f} %), {errors.at_1_m_mm:.1f} mm at 1 m, {errors.at_2_m_mm:.1f} mm at 2 m, {errors.density:.0%} of the pixels
+
+look at   {out}/index.html       the scene, its depth and every delay
+          {out}/cloud.ply        the point cloud, in any 3D viewer
+          {out}/report.json, {out}/delays.jsonl
+try next  {board}
+          {host}      (in two terminals: the same, by hand)"""
