@@ -1,0 +1,122 @@
+"""Numbers of a plot: round tick marks, durations in words, scales from values to pixels. Pure."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Values = NDArray[np.float64]
+"""(N,) float64; NaN = no measurement."""
+
+_UNITS: Final = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"), (1.0, "ns"))
+
+
+def duration_unit(ns: float) -> tuple[float, str]:
+    """The unit in which a duration has one to three digits before its point.
+
+    Args:
+        ns: the duration, ns; its sign does not matter.
+
+    Returns:
+        The unit in ns, and its symbol.
+    """
+    return next(((unit, name) for unit, name in _UNITS if abs(ns) >= unit), _UNITS[-1])
+
+
+def duration_text(ns: float) -> str:
+    """A duration with three significant digits and its unit; a dash for NaN, 0 for zero."""
+    if math.isnan(ns):
+        return "\u2013"
+    if ns == 0.0:
+        return "0"
+    # 999.6 µs rounds to four digits: it is a millisecond.
+    unit, name = duration_unit(float(f"{ns:.3g}"))
+    value = ns / unit
+    digits = max(0, 2 - math.floor(math.log10(max(1.0, abs(float(f"{value:.3g}"))))))
+    return f"{value:.{digits}f}\u202f{name}"
+
+
+def ticks(low: float, high: float, count: int) -> list[float]:
+    """Round numbers (1, 2 or 5 times a power of ten apart) inside an interval.
+
+    Args:
+        low: its lower end.
+        high: its upper end, above `low`.
+        count: about how many are wanted.
+
+    Returns:
+        Ascending; never more than `count` + 2.
+    """
+    rough = (high - low) / max(1, count)
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= rough * 0.999)
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [index * step for index in range(first, last + 1)]
+
+
+def number_text(value: float) -> str:
+    """A tick's number without needless digits."""
+    return f"{value:.6g}".replace("-", "\u2212")
+
+
+@dataclass(frozen=True, slots=True)
+class Linear:
+    """A straight scale: `low` stands at `start_px`, `high` at `end_px`."""
+
+    low: float
+    high: float
+    start_px: float
+    end_px: float
+
+    def px(self, value: float) -> float:
+        """Where a value stands; values outside stand at the nearer end."""
+        share = (min(max(value, self.low), self.high) - self.low) / (self.high - self.low)
+        return self.start_px + share * (self.end_px - self.start_px)
+
+
+@dataclass(frozen=True, slots=True)
+class Log:
+    """A logarithmic scale over whole decades of positive numbers; zero and less stand at its start."""
+
+    low: float
+    high: float
+    start_px: float
+    end_px: float
+
+    def px(self, value: float) -> float:
+        """Where a value stands; values outside stand at the nearer end."""
+        inside = min(max(value, self.low), self.high)
+        share = math.log(inside / self.low) / math.log(self.high / self.low)
+        return self.start_px + share * (self.end_px - self.start_px)
+
+    def decades(self) -> list[float]:
+        """The powers of ten on the scale."""
+        first, last = round(math.log10(self.low)), round(math.log10(self.high))
+        return [10.0**power for power in range(first, last + 1)]
+
+
+def log_scale(values: Values, start_px: float, end_px: float) -> Log:
+    """A logarithmic scale that holds all positive values, in whole decades; 1 µs to 1 ms where there are none.
+
+    Args:
+        values: ns.
+        start_px: where it begins.
+        end_px: where it ends.
+    """
+    positive = values[np.isfinite(values) & (values > 0.0)]
+    if not positive.size:
+        return Log(1e3, 1e6, start_px, end_px)
+    low = math.floor(math.log10(float(positive.min())))
+    high = max(low + 1, math.ceil(math.log10(float(positive.max()))))
+    return Log(10.0**low, 10.0**high, start_px, end_px)
+
+
+def span(values: Values) -> tuple[float, float]:
+    """Least and greatest finite value; (0, 1) where there is none, one apart where all are equal."""
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return 0.0, 1.0
+    low, high = float(finite.min()), float(finite.max())
+    return (low, high) if high > low else (low, low + 1.0)
