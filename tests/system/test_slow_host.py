@@ -1,0 +1,62 @@
+"""A host ten times slower than the camera: the age of pairs stays bounded, the camera is never throttled, each drop is counted."""
+
+from pathlib import Path
+
+import pytest
+
+from common import now
+from common.camera.factory import open_camera
+from common.ledger import PairLedger
+from common.link.factory import open_link, parse_link
+from common.stamp import HOST_CLOCK
+from phone_host.host import EndReason, Host, HostSettings
+from phone_host.pipeline import Processed
+from phone_host.stereo.core import StereoCore
+from phone_host.sync.fifo import FifoSettings
+from tests.support.numbered import write_film
+from tests.support.programs import board
+from tests.support.slow import SlowMatcher
+
+FPS = 30
+PERIOD_NS = 1_000_000_000 // FPS
+
+
+@pytest.mark.parametrize("fifo", ["1:drop-oldest", "1:drop-newest", "1:block", "3:drop-oldest"])
+def test_pairs_do_not_get_older_on_a_slow_host(fifo: str, tmp_path: Path) -> None:
+    """Pairs are as fresh at the end as at the beginning, the board grabs every image of the film, and the account closes."""
+    film, link = write_film(tmp_path / "film", 60), f"ipc://{tmp_path}/link"
+    uri, policy = f"replay:{film}?fps={FPS}&loop=1", FifoSettings.parse(fifo)
+    kept: list[PairLedger] = []
+
+    def keep(_: Processed, ledger: PairLedger) -> None:
+        kept.append(ledger)
+
+    slow_ns = 10 * PERIOD_NS
+    with board(["run", "--camera", uri, "--link", link, "--json"], tmp_path) as sender:
+        camera = open_camera(uri, HOST_CLOCK, now.monotonic_ns())
+        core = StereoCore(SlowMatcher(slow_ns / 1e9))
+        host = Host(
+            HostSettings(fifo=policy, pairs=12),
+            camera,
+            open_link(parse_link(link, listens_by_default=False)),
+            core,
+            keep,
+        )
+        assert host.run(lambda: False) is EndReason.PAIRS_REACHED
+        assert sender.stop() == 0
+        account = sender.json()
+    # A queue without bound would be 12 x 9 periods = 3.6 s behind by now; the policies allow their depth of pairs or processing times
+    # and one pair in the hands of each thread. Half a second on top is for a busy machine.
+    worst_ns = max(ledger.dequeued_ns - ledger.board.exposed_ns for ledger in kept[1:])
+    assert worst_ns < (policy.depth + 1) * slow_ns + 500_000_000
+    assert account["grabbed"] == account["sent"] + sum(account["dropped"].values())
+    shown = (kept[-1].board.exposed_ns - kept[0].board.exposed_ns) / PERIOD_NS
+    assert kept[-1].sequence - kept[0].sequence == round(shown)  # every image of the film was grabbed in its time
+    counts = host.queue.counts
+    assert counts.received == counts.paired + counts.held_board + sum(n for _, n in counts.board_orphans)
+    assert counts.paired == counts.taken + counts.dropped + counts.waiting
+    if fifo.endswith("block"):
+        assert counts.dropped == 0  # credit holds the board back: it drops at the source
+        assert account["dropped"]["replaced"] > 0
+    else:
+        assert counts.dropped > 0
