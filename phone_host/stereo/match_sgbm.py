@@ -19,10 +19,10 @@ from phone_host.stereo.match_align import LEAST_OFFSET_PX, moved_up, vertical_of
 from phone_host.stereo.match_input import check_pair, grey
 
 COST_STEP, COST_JUMP = 12, 26
-"""P1 and P2, the cost of a change of disparity by one and by more, for a single pixel's cost of 0 .. 126."""
+"""P1 and P2, the cost of a change of disparity by one and by more, for a single pixel's cost of 0 .. 125."""
 
 COST_CAP = 31
-"""preFilterCap: horizontal gradients are cut off at this. 15 to 63 were within 2 % of each other."""
+"""preFilterCap: horizontal gradients are cut off at this. 15 to 63 came within 4 % of each other."""
 
 MEDIAN_PX = 5
 """Edge of the median window, px: the largest OpenCV has for int16."""
