@@ -81,7 +81,7 @@ def plane_scene(depth_m: float, tilt_rad: float = 0.0, seed: int = 0) -> Scene:
 
 
 def demo_scene() -> Scene:
-    """A still life at 0.7 to 2.6 m that moves: a table before a wall, a ball that rolls round, boxes that turn.
+    """A still life at 0.7 to 2.5 m that moves: a table before a wall, a ball that rolls round, boxes that turn.
 
     It repeats every `DEMO_PERIOD_S`.
     """
