@@ -1,5 +1,6 @@
 """The demo: a rendered moving scene, a real board-agent process and the host on this machine, checked against the scene's truth."""
 
+import math
 import socket
 import subprocess
 import sys
@@ -237,8 +238,10 @@ def free_port() -> int:
 def truth_json(errors: DepthErrors) -> dict[str, float | int | None]:
     """The comparison as a JSON object; None where nothing was measured."""
     return {
-        name: None if value != value else value for name in DepthErrors.__slots__ for value in (getattr(errors, name),)
-    }  # noqa: PLR0124
+        name: None if math.isnan(value) else value
+        for name in DepthErrors.__slots__
+        for value in (getattr(errors, name),)
+    }
 
 
 def _errors(

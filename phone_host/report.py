@@ -143,7 +143,7 @@ def summary(facts: RunFacts) -> str:
 def _losses(facts: RunFacts) -> list[str]:
     lost = sum(account.lost for account in facts.link.sessions)
     stale = sum(account.stale for account in facts.link.sessions)
-    board = {reason: n for reason, n in _board_drops(facts).items() if n}
+    board = {reason: n for reason, n in board_drops(facts).items() if n}
     parts = [
         *(f"{n} {reason} on the board" for reason, n in board.items()),
         *([f"{lost} lost on the link"] if lost else []),
@@ -161,7 +161,8 @@ def _losses(facts: RunFacts) -> list[str]:
     return lines
 
 
-def _board_drops(facts: RunFacts) -> dict[str, int]:
+def board_drops(facts: RunFacts) -> dict[str, int]:
+    """Frames that the board dropped while this host was connected, by reason."""
     drops: dict[str, int] = {}
     for account in facts.link.sessions:
         before = dict(account.first.dropped)

@@ -37,7 +37,9 @@ def run(options: argparse.Namespace) -> int:
     from rich.progress import Progress  # noqa: PLC0415
 
     from phone_host.demo import FPS, DemoRun, truth_json  # noqa: PLC0415
+    from phone_host.demo_page import demo_page  # noqa: PLC0415
     from phone_host.film import render_film  # noqa: PLC0415
+    from phone_host.formats.atomic import write_text  # noqa: PLC0415
     from phone_host.formats.rig_yaml import write_rig  # noqa: PLC0415
     from phone_host.live import LiveTable  # noqa: PLC0415
     from phone_host.report import build, summary  # noqa: PLC0415
@@ -78,6 +80,7 @@ def run(options: argparse.Namespace) -> int:
     report = build(facts) | {"truth": truth_json(errors)}
     demo.host.results.finish(report)
     demo.write_pictures(out)
+    write_text(out / "index.html", demo_page(facts, errors, demo.last, demo.ledgers))
     print(json.dumps(report) if options.json else summary(facts))
     print(_closing(out, film, errors), file=sys.stderr)
     if signals.interrupted:
