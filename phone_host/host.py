@@ -220,7 +220,8 @@ class Host:
             if self.processed == 0 and self.undecodable >= _HOPELESS:
                 raise  # not one pair fits: wrong rig, wrong camera
             self.undecodable += 1
-            _LOG.warning(event("pair_failed", sequence=pair.board.message.sequence, problem=error.problem))
+            if self.undecodable.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: one bad camera must not fill the log
+                _LOG.warning(event("pair_failed", count=self.undecodable, problem=error.problem))
             return
         before_write_ns = now.monotonic_ns()
         self.results.save_pair(self.processed, processed)
