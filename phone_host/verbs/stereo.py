@@ -1,0 +1,181 @@
+"""phone-host stereo: disparity and point cloud of one pair of images."""
+
+import argparse
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from common import now
+from common.errors import SettingsError, UnavailableError
+
+if TYPE_CHECKING:
+    from phone_host.model import CloudImage, Disparity, RectifiedPair
+    from phone_host.stereo.core import StereoCore
+
+EXAMPLES = """  phone-host stereo left.png right.png --calibration rig.yaml --out scan
+  phone-host stereo im0.png im1.png --rectified --disparities 64 --out scan          (no focal length: no cloud.ply)
+  phone-host stereo im0.png im1.png --rectified --disparities 80 --focal 994.978 --baseline 193.001 \\
+      --doffs 31.086 --center 311.193,254.877 --out scan
+"""
+
+_DEFAULT_MATCHER = "sgbm"
+# Of a textured scene both cameras see more than 90 % is matched; below a third the pair itself is wrong far more often than
+# the scene is bare.
+_LOW_DENSITY = 0.33
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's options."""
+    from phone_host.verbs.stereo_options import add_stereo_arguments  # noqa: PLC0415 - brings OpenCV in with its use
+
+    parser.add_argument("left", type=Path, metavar="LEFT", help="image of the left camera, any format, 8 or 16 bit")
+    parser.add_argument("right", type=Path, metavar="RIGHT", help="image of the right camera")
+    add_stereo_arguments(parser)
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="folder for the results, made if missing"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Read, rectify or pass, match, reproject, write."""
+    from phone_host.stereo.images import read_pair, require_same_size, size_text  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.verbs.stereo_options import build_core  # noqa: PLC0415
+
+    if not options.calibration and not options.rectified:
+        raise SettingsError(
+            "neither --calibration nor --rectified is given",
+            "give the rig.yaml of `phone-host calibrate`, or --rectified --disparities N",
+        )
+    if not (math.isfinite(options.near) and options.near > 0):
+        raise SettingsError(f"--near {options.near:g}", "give millimetres above 0")
+    watch = _StopWatch()
+    left, right = read_pair(options.left, options.right)
+    if options.rectified:
+        require_same_size(left, right, str(options.left), str(options.right))
+    watch.lap("read")
+    matcher = options.matcher or _DEFAULT_MATCHER
+    core, _ = build_core(options, options.calibration or "", matcher, (left.shape[1], left.shape[0]))
+    if core is None:  # cannot be: one of the two ways to a core was checked above
+        raise SettingsError("no stereo core", "give --calibration or --rectified")
+    watch.lap("prepare")
+    pair = core.rectify(left, right)
+    watch.lap("rectify")
+    disparity = core.match(pair)
+    watch.lap("match")
+    cloud = core.reproject(disparity) if core.geometry is not None else None
+    watch.lap("reproject")
+    points = _write(options.out, pair, disparity, cloud)
+    watch.lap("write")
+    report: dict[str, Any] = {
+        "left": {"file": str(options.left), "size": size_text(left)},
+        "right": {"file": str(options.right), "size": size_text(right)},
+        "size": size_text(pair.left),
+        "matcher": matcher,
+        **_figures(options, core, disparity),
+        "points": points,
+        "times_ms": watch.times_ms(),
+        "files": ["disparity.pfm", "disparity.png", *(["cloud.ply"] if cloud is not None else []), "report.json"],
+    }
+    _write_report(options.out, report)
+    print(json.dumps(report) if options.json else _summary(report, options.out))
+    return 0
+
+
+class _StopWatch:
+    """Times of the stages, one after the other."""
+
+    def __init__(self) -> None:
+        self._laps_ns: list[tuple[str, int]] = []
+        self._start_ns = self._last_ns = now.monotonic_ns()
+
+    def lap(self, stage: str) -> None:
+        at_ns = now.monotonic_ns()
+        self._laps_ns.append((stage, at_ns - self._last_ns))
+        self._last_ns = at_ns
+
+    def times_ms(self) -> dict[str, float]:
+        laps = [*self._laps_ns, ("total", self._last_ns - self._start_ns)]
+        return {stage: round(ns / 1e6, 3) for stage, ns in laps}
+
+
+def _figures(options: argparse.Namespace, core: "StereoCore", disparity: "Disparity") -> dict[str, Any]:
+    """Geometry, number of disparities, density and what the user should know about them."""
+    import numpy as np  # noqa: PLC0415
+
+    from phone_host.stereo.reproject import disparities_for_near, nearest_depth_m  # noqa: PLC0415
+
+    geometry, width_px = core.geometry, disparity.shape[1]
+    count = options.disparities
+    warnings = []
+    if count is None and geometry is not None:
+        count = disparities_for_near(geometry, options.near / 1000, width_px)
+        nearest_mm = nearest_depth_m(geometry, count) * 1000
+        if nearest_mm > options.near:
+            warnings.append(
+                f"nothing nearer than {nearest_mm:.0f} mm is found: at {options.near:g} mm the two views of this rig"
+                " share less than half of their width"
+            )
+    density = float(np.isfinite(disparity).mean())
+    if density < _LOW_DENSITY:
+        warnings.append(
+            f"only {density:.0%} of the pixels found a partner: are LEFT and RIGHT swapped, is the pair not rectified,"
+            " or the scene without texture or nearer than the search reaches?"
+        )
+    if geometry is None:
+        warnings.append("no cloud.ply: focal length and baseline are unknown; give --focal PX --baseline MM")
+    return {
+        "disparities": count,
+        "geometry": None if geometry is None else asdict(geometry),
+        "density": round(density, 5),
+        "warnings": warnings,
+    }
+
+
+def _write(out: Path, pair: "RectifiedPair", disparity: "Disparity", cloud: "CloudImage | None") -> int | None:
+    """Write all but the report; the number of points, or None without a cloud."""
+    from phone_host.formats.pfm import write_pfm  # noqa: PLC0415
+    from phone_host.formats.ply import write_ply  # noqa: PLC0415
+    from phone_host.formats.preview import write_preview  # noqa: PLC0415
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        write_pfm(out / "disparity.pfm", disparity)
+        write_preview(out / "disparity.png", disparity)
+        if cloud is None:
+            (out / "cloud.ply").unlink(missing_ok=True)  # one of an earlier run would be taken for this one's
+            return None
+        return write_ply(out / "cloud.ply", cloud, pair.left)
+    except OSError as error:
+        raise _unwritable(out, error) from error
+
+
+def _write_report(out: Path, report: dict[str, Any]) -> None:
+    from phone_host.formats.atomic import write_text  # noqa: PLC0415
+
+    try:
+        write_text(out / "report.json", json.dumps(report, indent=2) + "\n")
+    except OSError as error:
+        raise _unwritable(out, error) from error
+
+
+def _unwritable(out: Path, error: OSError) -> UnavailableError:
+    return UnavailableError(
+        f"results cannot be written to {out} ({error.strerror})", "free the disk, or name another --out"
+    )
+
+
+def _summary(report: dict[str, Any], out: Path) -> str:
+    geometry = report["geometry"]
+    found = f"{report['density']:.1%} of the pixels have one ({report['times_ms']['total']:.0f} ms)"
+    lines = [
+        f"{report['size']} px, {report['matcher']}, {report['disparities']} disparities: {found}",
+        *(f"warning: {warning}" for warning in report["warnings"]),
+    ]
+    if geometry is not None:
+        lines.insert(
+            1,
+            f"{report['points']} points; f = {geometry['focal_px']:.1f} px, b = {geometry['baseline_m'] * 1e3:.2f} mm",
+        )
+    return "\n".join([*lines, f"written to {out}: {', '.join(report['files'])}"])
