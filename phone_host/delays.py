@@ -63,7 +63,8 @@ class Series:
         Args:
             last: how many of the newest values; None for all.
         """
-        values = self._values if last is None else self._values[-last:]
+        kept = len(self._values) if last is None else -(-last // self._stride)
+        values = self._values[max(0, len(self._values) - kept) :]
         if not values or self._max is None:
             nan = float("nan")
             return Spread(0, nan, nan, nan, nan, nan)

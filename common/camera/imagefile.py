@@ -8,6 +8,7 @@ from pathlib import Path
 
 from common.errors import DataError
 from common.frame import PixelFormat
+from common.protocol.wire import MAX_PAYLOAD_BYTES, MAX_SIZE_PX
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +31,10 @@ class ImageFile:
 SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".pgm", ".ppm", ".pnm"})
 """File names that a replay folder is searched for."""
 
-_PNM = re.compile(rb"P([56])(?:\s+|#[^\n]*\n)+(\d+)(?:\s+|#[^\n]*\n)+(\d+)(?:\s+|#[^\n]*\n)+(\d+)\s")
-"""Binary grey- and pixmap header (netpbm's pgm(5) and ppm(5)): magic, width, height, maximum value, one white space."""
+_PNM = re.compile(rb"P([56])(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})\s")
+"""Binary grey- and pixmap header (netpbm's pgm(5) and ppm(5)): magic, width, height, maximum value, one white space.
+
+Each blank can match in one way only: a nested quantifier took seconds for 30 blanks without a number behind them."""
 
 
 def load(path: Path) -> ImageFile:
@@ -44,8 +47,22 @@ def load(path: Path) -> ImageFile:
         Its bytes and header.
 
     Raises:
-        DataError: the file cannot be read or its header is none of these.
+        DataError: the file cannot be read, its header is none of these, or no link takes an image of that size.
     """
+    image = _parse(path)
+    if not (1 <= image.width_px <= MAX_SIZE_PX and 1 <= image.height_px <= MAX_SIZE_PX):
+        raise DataError(
+            f"{path} is {image.width_px}x{image.height_px}", f"give images of 1 to {MAX_SIZE_PX} px in width and height"
+        )
+    if len(image.payload) > MAX_PAYLOAD_BYTES:
+        raise DataError(
+            f"{path} has {len(image.payload)} bytes as it is sent",
+            f"give images of at most {MAX_PAYLOAD_BYTES // 2**20} MB",
+        )
+    return image
+
+
+def _parse(path: Path) -> ImageFile:
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -67,6 +84,9 @@ def _jpeg_size(path: Path, data: bytes) -> tuple[int, int]:
     """Width and height from the frame header (ITU-T T.81, B.2.2)."""
     at = 2
     while at + 9 <= len(data) and data[at] == 0xFF:
+        if data[at + 1] == 0xFF:  # a fill byte before a marker (B.1.1.2)
+            at += 1
+            continue
         marker, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4], "big")
         if 0xC0 <= marker <= 0xCF and marker not in {0xC4, 0xC8, 0xCC}:  # SOF0..15 without DHT, JPG, DAC
             height_px, width_px = struct.unpack(">HH", data[at + 5 : at + 9])

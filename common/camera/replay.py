@@ -12,7 +12,7 @@ from typing import Final
 
 from common.camera.base import Ended, Grab, Spoiled
 from common.camera.imagefile import SUFFIXES, ImageFile, load
-from common.errors import DataError, UnavailableError
+from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import Frame, find_fault
 from common.protocol.message import CameraDescription, Pacing
 from common.stamp import Stamp
@@ -43,7 +43,7 @@ class ReplaySettings:
 
 def name_order(path: Path) -> tuple[list[tuple[int, int | str]], str]:
     """Sort key that takes numbers in names as numbers: frame2 before frame10."""
-    parts = [(0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"(\d+)", path.name) if part]
+    parts = [(0, int(part)) if part.isdecimal() else (1, part) for part in re.split(r"(\d+)", path.name) if part]
     return parts, path.name
 
 
@@ -57,11 +57,14 @@ def find_images(pattern: str) -> list[Path]:
         At least one path.
 
     Raises:
+        SettingsError: it is empty or no glob.
         UnavailableError: there is no such folder, or it can't be read.
         DataError: it holds no image.
     """
     folder = Path(pattern)
     try:
+        if not pattern:
+            raise SettingsError("replay names no folder", "give a folder of images, an image or a quoted glob")
         if folder.is_dir():
             found = [path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES]
         elif any(letter in pattern for letter in "*?["):
@@ -81,6 +84,8 @@ def find_images(pattern: str) -> list[Path]:
         raise UnavailableError(
             f"replay {pattern!r} cannot be read ({error.strerror})", "check its permissions"
         ) from None
+    except ValueError as error:  # pathlib's word on a pattern such as a**b
+        raise SettingsError(f"replay {pattern!r} is no glob ({error})", "give a folder or another glob") from None
     if not found:
         raise DataError(
             f"replay {pattern!r} holds no image",
@@ -104,10 +109,12 @@ class ReplayCamera:
     def __init__(self, settings: ReplaySettings, now_ns: int) -> None:
         self._settings = settings
         self._paths = find_images(settings.path)
-        self._cache: dict[Path, ImageFile] = {}
+        self._cache: list[ImageFile | None] = [None] * len(self._paths)
         self._cached_bytes = 0
+        # Image k is exposed k * _step / _rate ns after the start. Integers: a Fraction costs 0.1 ms a frame where caches are cold.
+        self._step, self._rate = settings.fps.denominator * 1_000_000_000, settings.fps.numerator
         first = self._check_alike()
-        self._period_ns = int(Fraction(1_000_000_000) / settings.fps)
+        self._period_ns = self._step // self._rate
         name = Path(settings.path).name
         size = (first.width_px, first.height_px, first.pixel_format)
         self.description = CameraDescription(f"replay {name}", *size, self._period_ns, settings.pacing)
@@ -115,12 +122,13 @@ class ReplayCamera:
         self._next = self._index_at(now_ns) + 1 if settings.pacing is Pacing.CLOCK else 0
         self._first_shown = self._next
         self._first_ns: int | None = None
+        self._due_ns = self._time_of(self._next) if settings.pacing is Pacing.CLOCK else _FAR_FUTURE
         self._sequence = 0
 
     def due_ns(self, now_ns: int) -> int:
         """When the next image is exposed; on demand never by itself."""
         del now_ns
-        return self._time_of(self._next) if self._settings.pacing is Pacing.CLOCK else _FAR_FUTURE
+        return self._due_ns
 
     def anchor(self, first_ns: int) -> None:
         """Set the stamp of a demand-paced camera's first image, ns; without it that is the time of the first read."""
@@ -137,6 +145,8 @@ class ReplayCamera:
             self.anchor(now_ns)
             return [self._grab(now_ns)]
         grabs: list[Grab] = []
+        if now_ns < self._due_ns:
+            return grabs
         newest = self._index_at(now_ns)
         # After a long stall (a stopped process) only the newest images matter, and their number must stay bounded.
         skipped = max(0, newest - self._next + 1 - _BACKLOG)
@@ -144,11 +154,12 @@ class ReplayCamera:
         self._next += skipped
         while self._next <= newest and not (grabs and isinstance(grabs[-1], Ended)):
             grabs.append(self._grab(now_ns))
+        self._due_ns = self._time_of(self._next)
         return grabs
 
     def close(self) -> None:
         """Forget the files."""
-        self._cache.clear()
+        self._cache = [None] * len(self._paths)
 
     def _grab(self, now_ns: int) -> Grab:
         index = self._next
@@ -160,7 +171,7 @@ class ReplayCamera:
         self._sequence += 1
         # On the clock the image follows from the time alone, so that two replays agree; without loop it is the first one first.
         position = index if self._settings.loop else shown
-        image = self._load(self._paths[position % len(self._paths)])
+        image = self._load(position % len(self._paths))
         if fault := find_fault(image.pixel_format, image.payload):
             return Spoiled(sequence, fault)
         exposed = Stamp(self._time_of(index), self._settings.clock)
@@ -171,25 +182,25 @@ class ReplayCamera:
 
     def _time_of(self, index: int) -> int:
         start = 0 if self._settings.pacing is Pacing.CLOCK else self._first_ns or 0
-        return start + round(Fraction(index * 1_000_000_000) / self._settings.fps)
+        return start + (2 * index * self._step + self._rate) // (2 * self._rate)  # rounded to the nearest ns
 
     def _index_at(self, now_ns: int) -> int:
-        index = int(now_ns * self._settings.fps / 1_000_000_000)
+        index = now_ns * self._rate // self._step
         return index if self._time_of(index) <= now_ns else index - 1  # rounding to ns may put an exposure just after
 
-    def _load(self, path: Path) -> ImageFile:
-        image = self._cache.get(path)
+    def _load(self, position: int) -> ImageFile:
+        image = self._cache[position]
         if image is None:
-            image = load(path)
+            image = load(self._paths[position])
             if self._cached_bytes + len(image.payload) <= _CACHE_BYTES:
-                self._cache[path] = image
+                self._cache[position] = image
                 self._cached_bytes += len(image.payload)
         return image
 
     def _check_alike(self) -> ImageFile:
-        first = self._load(self._paths[0])
-        for path in self._paths[1:]:
-            other = self._load(path)
+        first = self._load(0)
+        for position, path in enumerate(self._paths[1:], start=1):
+            other = self._load(position)
             if (other.width_px, other.height_px) != (first.width_px, first.height_px):
                 theirs, ours = f"{other.width_px}x{other.height_px}", f"{first.width_px}x{first.height_px}"
                 raise DataError(

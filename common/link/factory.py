@@ -79,3 +79,7 @@ def _check_port(uri: str, address: str) -> None:
         port = None
     if port is None or not 1 <= port <= 65535:
         raise SettingsError(f"link {uri!r} names no port", "give one, for example tcp://127.0.0.1:5555")
+    if address.startswith("tcp://:"):
+        raise SettingsError(
+            f"link {uri!r} names no host", "give its name or address, or * to listen on every interface"
+        )

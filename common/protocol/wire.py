@@ -41,8 +41,10 @@ MAX_HEADER_BYTES: Final = 2048
 MAX_PAYLOAD_BYTES: Final = 16 * 1024 * 1024
 """Largest frame on any link (DESIGN's contract suite): 4096 x 2048 raw YUYV fits."""
 
+MAX_SIZE_PX: Final = 16384
+"""Largest width and height of a frame, px: well beyond any camera, and 28 bits for their product."""
+
 _MAX_TEXT: Final = 96
-_MAX_SIZE_PX: Final = 16384
 _MAX_COUNT: Final = 2**53
 _NS: Final = 2**62
 """146 years in ns: no honest clock is further from its zero; keeps sums inside 64 bits."""
@@ -183,7 +185,8 @@ def _fields(message: Message) -> list[Any]:  # noqa: PLR0911 - one line for each
 
 def _camera_fields(camera: CameraDescription) -> list[Any]:
     encoding = _PIXEL_FORMATS.index(camera.pixel_format)
-    return [camera.name[:_MAX_TEXT], camera.width_px, camera.height_px, encoding, camera.period_ns, camera.pacing.value]
+    name = camera.name.encode("utf-8", "replace").decode()[:_MAX_TEXT]  # a folder's name need not be UTF-8
+    return [name, camera.width_px, camera.height_px, encoding, camera.period_ns, camera.pacing.value]
 
 
 def _counts_fields(counts: BoardCounts) -> list[Any]:
@@ -247,7 +250,7 @@ class _Reader:
         return self._integer(-_NS, _NS)
 
     def size_px(self) -> int:
-        return self._integer(1, _MAX_SIZE_PX)
+        return self._integer(1, MAX_SIZE_PX)
 
     def optional_duration_ns(self) -> int | None:
         if self._at < len(self._items) and self._items[self._at] is None:

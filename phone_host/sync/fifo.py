@@ -37,11 +37,12 @@ class FifoSettings:
         Raises:
             SettingsError: it is neither.
         """
-        depth, _, policy = text.partition(":")
-        full = {"": "drop-oldest", "oldest": "drop-oldest", "newest": "drop-newest"}.get(policy, policy)
-        if not (depth.isascii() and depth.isdigit() and 1 <= int(depth) <= 1000) or full not in {
-            item.value for item in Overflow
-        }:
+        depth, colon, policy = text.partition(":")
+        short = {"oldest": "drop-oldest", "newest": "drop-newest"}
+        full = short.get(policy, policy) if colon else Overflow.DROP_OLDEST.value
+        # Four digits at most: int() itself raises for thousands of them.
+        sound_depth = depth.isascii() and depth.isdigit() and len(depth) <= 4 and 1 <= int(depth) <= 1000
+        if not sound_depth or full not in {item.value for item in Overflow}:
             raise SettingsError(
                 f"--fifo {text!r} is no DEPTH:POLICY",
                 "give a depth from 1 to 1000 and drop-oldest, drop-newest or block",

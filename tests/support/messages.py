@@ -1,0 +1,74 @@
+"""Strategies for every message of the protocol, each field over its whole allowed range."""
+
+from hypothesis import strategies as st
+
+from common.frame import PixelFormat
+from common.ledger import BoardMarks
+from common.protocol.message import (
+    BoardCounts,
+    BoardHello,
+    Bye,
+    CameraDescription,
+    Credit,
+    DropReason,
+    End,
+    FrameMessage,
+    HostHello,
+    Knock,
+    Lane,
+    Message,
+    Pacing,
+    Ping,
+    Pong,
+    Refusal,
+    RefusalReason,
+    Status,
+)
+
+NUMBERS = st.integers(0, 2**53)
+TIMES_NS = st.integers(-(2**62), 2**62)
+SIZES_PX = st.integers(1, 16384)
+TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=96)
+
+COUNTS = st.builds(
+    BoardCounts,
+    NUMBERS,
+    NUMBERS,
+    st.lists(st.tuples(st.sampled_from(DropReason), NUMBERS), unique_by=lambda drop: drop[0]).map(tuple),
+)
+CAMERAS = st.builds(
+    CameraDescription,
+    TEXTS,
+    SIZES_PX,
+    SIZES_PX,
+    st.sampled_from(PixelFormat),
+    st.integers(1, 2**62),
+    st.sampled_from(Pacing),
+)
+FRAMES = st.builds(
+    FrameMessage,
+    TEXTS,
+    NUMBERS,
+    NUMBERS,
+    SIZES_PX,
+    SIZES_PX,
+    st.sampled_from(PixelFormat),
+    st.none() | st.integers(0, 2**62),
+    st.builds(BoardMarks, TIMES_NS, TIMES_NS, TIMES_NS),
+    st.binary(max_size=40),
+)
+LANES = st.sampled_from(Lane)
+
+MESSAGES: st.SearchStrategy[Message] = st.one_of(
+    st.builds(HostHello, TEXTS, LANES),
+    st.builds(BoardHello, TEXTS, TEXTS, CAMERAS, COUNTS),
+    st.builds(Knock, LANES),
+    st.builds(Refusal, st.sampled_from(RefusalReason)),
+    st.builds(Credit, NUMBERS),
+    FRAMES,
+    st.builds(Ping, NUMBERS, TIMES_NS),
+    st.builds(Pong, NUMBERS, TIMES_NS, TIMES_NS, TIMES_NS),
+    st.builds(Status, TEXTS, COUNTS),
+    st.builds(End, TEXTS, COUNTS),
+    st.builds(Bye, COUNTS),
+)

@@ -1,0 +1,70 @@
+"""Link URIs: what they mean, and which make no sense."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.errors import SettingsError
+from common.link.factory import LinkUri, open_link, parse_link
+
+
+@given(
+    port=st.integers(1, 65535),
+    host=st.sampled_from(["127.0.0.1", "board.local", "[::1]", "*"]),
+    listens=st.booleans(),
+)
+@settings(deadline=None)
+def test_tcp_addresses(port: int, host: str, *, listens: bool) -> None:
+    """Every port on every kind of host is taken as it stands, and without an option the role's default decides who listens."""
+    address = f"tcp://{host}:{port}"
+    assert parse_link(address, listens_by_default=listens) == LinkUri(address, listens)
+    assert parse_link(f"{address}?bind=1", listens_by_default=listens) == LinkUri(address, listens=True)
+    assert parse_link(f"{address}?connect=1", listens_by_default=listens) == LinkUri(address, listens=False)
+
+
+def test_ipc_addresses() -> None:
+    """The path of an ipc link is everything up to the options."""
+    assert parse_link("ipc:///tmp/a b", listens_by_default=True) == LinkUri("ipc:///tmp/a b", listens=True)
+    assert parse_link("ipc://x?connect=1", listens_by_default=True) == LinkUri("ipc://x", listens=False)
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "",
+        "tcp",
+        "tcp:",
+        "tcp://",
+        "tcp://host",
+        "tcp://:5555",
+        "tcp://host:",
+        "tcp://host:0",
+        "tcp://host:65536",
+        "tcp://host:-1",
+        "tcp://host:http",
+        "tcp://[::1:5555",
+        "ipc://",
+        "ipc://?bind=1",
+        "udp://host:5555",
+        "TCP://host:5555",
+        "tcp//host:5555",
+        "tcp://host:5555?bind=0",
+        "tcp://host:5555?bind",
+        "tcp://host:5555?bind=1&connect=1",
+        "tcp://host:5555?bond=1",
+        "ipc://x?timeout=3",
+    ],
+)
+def test_bad_uris_are_named(uri: str) -> None:
+    """What is no link URI is refused in one line that shows it and a remedy."""
+    with pytest.raises(SettingsError) as caught:
+        parse_link(uri, listens_by_default=True)
+    assert repr(uri) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("address", ["tcp://*:5555", "tcp://127.0.0.1:5555/x", "ipc://" + "x" * 200])
+def test_addresses_that_cannot_be_dialled_are_refused(address: str) -> None:
+    """An address without a host, or one that the transport cannot take, is the user's mistake and told at once."""
+    with pytest.raises(SettingsError):
+        open_link(LinkUri(address, listens=False))

@@ -1,0 +1,170 @@
+"""Replay's own rules: order of names, globs, the image of a moment, options of its URI."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.camera.factory import open_camera
+from common.camera.replay import ReplayCamera, ReplaySettings, find_images, name_order
+from common.errors import DataError, SettingsError, UnavailableError
+from common.frame import Frame
+from common.protocol.message import Pacing
+from tests.support.pictures import jpeg
+
+NAMES = st.text(st.sampled_from("ab019_.²٣é"), min_size=1, max_size=8)
+
+
+def names(pattern: str) -> list[str]:
+    """The names that a replay of this folder or glob shows, in order."""
+    return [path.name for path in find_images(pattern)]
+
+
+def fill(folder: Path, *wanted: str) -> Path:
+    """Put small different JPEGs of these names there."""
+    folder.mkdir(exist_ok=True)
+    for seed, name in enumerate(wanted):
+        (folder / name).write_bytes(jpeg(seed=seed))
+    return folder
+
+
+@given(st.lists(st.integers(0, 10**6), unique=True, max_size=20))
+@settings(deadline=None)
+def test_numbers_in_names_count_as_numbers(numbers: list[int]) -> None:
+    """Names that differ in a number only are in the order of that number."""
+    paths = [Path(f"frame{number}.jpg") for number in numbers]
+    assert sorted(paths, key=name_order) == [Path(f"frame{number}.jpg") for number in sorted(numbers)]
+
+
+@given(st.lists(NAMES, unique=True, max_size=20))
+@settings(deadline=None)
+def test_any_names_have_one_order(texts: list[str]) -> None:
+    """Every set of names can be sorted, and the order does not depend on how the folder lists them."""
+    paths = [Path(text) for text in texts]
+    assert sorted(paths, key=name_order) == sorted(paths[::-1], key=name_order)
+
+
+def test_a_folder_shows_its_images_in_name_order(tmp_path: Path) -> None:
+    """frame2 comes before frame10, and what is no image by its name is left out."""
+    fill(tmp_path, "frame10.jpg", "frame2.JPG", "frame1.png")
+    (tmp_path / "notes.txt").write_text("no image")
+    assert names(str(tmp_path)) == ["frame1.png", "frame2.JPG", "frame10.jpg"]
+
+
+def test_globs_and_single_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A glob shows what it matches, absolute or relative, across folders with **; a file shows itself."""
+    fill(tmp_path, "l1.jpg", "l2.jpg", "r1.jpg")
+    fill(tmp_path / "sub", "l3.jpg")
+    assert names(f"{tmp_path}/l*.jpg") == ["l1.jpg", "l2.jpg"]
+    assert names(f"{tmp_path}/?1.jpg") == ["l1.jpg", "r1.jpg"]
+    assert names(f"{tmp_path}/**/l[23].jpg") == ["l2.jpg", "l3.jpg"]
+    assert names(f"{tmp_path}/r1.jpg") == ["r1.jpg"]
+    monkeypatch.chdir(tmp_path)
+    assert names("sub/*") == ["l3.jpg"]
+
+
+def test_a_folder_with_glob_letters_in_its_name_is_a_folder(tmp_path: Path) -> None:
+    """An existing folder is taken as it is called."""
+    assert names(str(fill(tmp_path / "run[1]", "a.jpg"))) == ["a.jpg"]
+
+
+@pytest.mark.parametrize(
+    ("path", "error"),
+    [
+        ("{}/none", UnavailableError),
+        ("{}/none.jpg", UnavailableError),
+        ("{}/*.jpg", DataError),
+        ("{}", DataError),
+        ("", SettingsError),
+        ("{}/a**b", SettingsError),
+    ],
+)
+def test_nothing_to_show_is_named(tmp_path: Path, path: str, error: type[Exception]) -> None:
+    """A missing folder is unavailable, one without images is bad data, no path or no glob is a wrong setting."""
+    pattern = path.format(tmp_path)
+    with pytest.raises(error, match="replay") as caught:
+        find_images(pattern)
+    assert repr(pattern) in str(caught.value) or not pattern
+
+
+@given(
+    st.fractions(Fraction(1, 100), 1000, max_denominator=1001),
+    st.integers(0, 10**18),
+    st.lists(st.integers(0, 3 * 10**8), min_size=1, max_size=8),
+)
+@settings(deadline=None, max_examples=40)
+def test_the_image_of_a_moment(
+    tmp_path_factory: pytest.TempPathFactory, fps: Fraction, start_ns: int, steps_ns: list[int]
+) -> None:
+    """Image number k is exposed at k / fps and shown from then on: the newest one read is floor(t * fps), never one of the future."""
+    folder = tmp_path_factory.getbasetemp() / "moments"
+    if not folder.exists():
+        fill(folder, "0.jpg", "1.jpg", "2.jpg")
+    images = [path.read_bytes() for path in find_images(str(folder))]
+    camera = ReplayCamera(ReplaySettings(str(folder), fps, loop=True), start_ns)
+    now_ns = start_ns
+    for step_ns in steps_ns:
+        now_ns += step_ns
+        grabs = camera.read(now_ns)
+        for grab in grabs:
+            assert isinstance(grab, Frame)
+            number = round(grab.exposed.ns * fps / 10**9)
+            assert abs(grab.exposed.ns - Fraction(number * 10**9) / fps) <= Fraction(1, 2)
+            assert start_ns < grab.exposed.ns <= now_ns
+            assert grab.grabbed.ns == now_ns
+            assert grab.payload == images[number % 3]
+        assert camera.due_ns(now_ns) >= now_ns
+    camera.close()
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "",
+        "replay",
+        "replay:",
+        "replay:?fps=30",
+        "v4l3:/dev/video0",
+        "REPLAY:x",
+        "replay:{}?fps=0",
+        "replay:{}?fps=-1",
+        "replay:{}?fps=1001",
+        "replay:{}?fps=fast",
+        "replay:{}?fps=nan",
+        "replay:{}?fps=1/0",
+        "replay:{}?fps=",
+        "replay:{}?loop=yes",
+        "replay:{}?pace=slow",
+        "replay:{}?speed=2",
+        "replay:{}?fps=30&&loop=1&x",
+    ],
+)
+def test_bad_camera_uris_are_refused(tmp_path: Path, uri: str) -> None:
+    """A camera URI that makes no sense is a SettingsError in one line, whatever the folder holds."""
+    fill(tmp_path, "a.jpg")
+    with pytest.raises(SettingsError) as caught:
+        open_camera(uri.format(tmp_path), "host", 0)
+    assert "\n" not in str(caught.value)
+
+
+def test_options_reach_the_camera(tmp_path: Path) -> None:
+    """Rate, pacing, size and encoding of a replay stand in its description, and a `?` of a glob is no option."""
+    fill(tmp_path, "a1.jpg", "a2.jpg")
+    camera = open_camera(f"replay:{tmp_path}/a?.jpg?fps=30000/1001&pace=demand", "host", 0)
+    description = camera.description
+    assert (description.width_px, description.height_px) == (32, 24)
+    assert description.period_ns == 1001 * 10**9 // 30000
+    assert description.pacing is Pacing.DEMAND
+    assert open_camera(f"replay:{tmp_path}/a?.jpg", "host", 0).description.period_ns == 10**9 // 30
+
+
+def test_a_long_stall_costs_bounded_work(tmp_path: Path) -> None:
+    """After an hour without a read the newest images come, few of them, and sequence numbers tell how many were passed over."""
+    camera = ReplayCamera(ReplaySettings(str(fill(tmp_path, "a.jpg")), Fraction(30), loop=True), 0)
+    grabs = camera.read(3600 * 10**9)
+    assert len(grabs) <= 64
+    last = grabs[-1]
+    assert isinstance(last, Frame)
+    assert (last.sequence, last.exposed.ns) == (3600 * 30 - 1, 3600 * 10**9)

@@ -1,0 +1,122 @@
+"""Settings: each origin stronger than the one before, and mistakes named with their place."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from common.errors import SettingsError
+from common.settings import resolve, setting
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One setting of each type."""
+
+    name: str = setting("default", "a text")
+    depth: int = setting(1, "a whole number")
+    tolerance: float = setting(0.5, "a number")
+    loop_forever: bool = setting(False, "a truth value")  # noqa: FBT003 - stands for a default
+    links: tuple[str, ...] = setting(("a", "b"), "texts")
+
+
+IN_FILE = {"name": '"file"', "depth": "2", "tolerance": "2", "loop_forever": "true", "links": '["file"]'}
+IN_ENVIRONMENT = {"name": "variable", "depth": "3", "tolerance": "3.5", "loop_forever": "0", "links": "x y"}
+IN_OPTIONS: dict[str, object] = {
+    "name": "option",
+    "depth": 4,
+    "tolerance": 4.5,
+    "loop_forever": True,
+    "links": ("option",),
+}
+VALUES: dict[str, tuple[object, object, object]] = {
+    "name": ("default", "file", "variable"),
+    "depth": (1, 2, 3),
+    "tolerance": (0.5, 2.0, 3.5),
+    "loop_forever": (False, True, False),
+    "links": (("a", "b"), ("file",), ("x", "y")),
+}
+
+
+@pytest.mark.parametrize("field", VALUES)
+@pytest.mark.parametrize("origins", range(8))
+def test_the_strongest_origin_wins_and_is_named(
+    field: str, origins: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Default < file < environment < option, in every combination; the other settings stay at their default."""
+    file = tmp_path / "board.toml"
+    expected, origin = VALUES[field][0], "default"
+    if origins & 1:
+        file.write_text(f"{field} = {IN_FILE[field]}\n", encoding="utf-8")
+        expected, origin = VALUES[field][1], str(file)
+    if origins & 2:
+        monkeypatch.setenv(f"SAMPLE_{field.upper()}", IN_ENVIRONMENT[field])
+        expected, origin = VALUES[field][2], f"SAMPLE_{field.upper()}"
+    options: dict[str, object] = dict.fromkeys(VALUES)
+    if origins & 4:
+        options[field] = expected = IN_OPTIONS[field]
+        origin = f"--{field.replace('_', '-')}"
+    resolved = resolve(Sample, "SAMPLE", file if origins & 1 else None, options)
+    value = getattr(resolved.values, field)
+    assert (value, type(value)) == (expected, type(expected))
+    assert [name for name, _ in resolved.origins] == list(VALUES)
+    assert dict(resolved.origins) == dict.fromkeys(VALUES, "default") | {field: origin}
+
+
+@pytest.mark.parametrize(
+    ("line", "named"),
+    [
+        ("depht = 2", "depht"),
+        ('depth = "2"', "depth"),
+        ("depth = 2.0", "depth"),
+        ("depth = true", "depth"),
+        ("name = 1", "name"),
+        ('tolerance = "1"', "tolerance"),
+        ("tolerance = true", "tolerance"),
+        ("loop_forever = 1", "loop_forever"),
+        ('links = "a"', "links"),
+        ('links = ["a", 1]', "links"),
+        ("[name]\nfirst = 1", "name"),
+        ("depth = ", "line 1"),
+        ("depth = 1\ndepth = 2", "line 2"),
+    ],
+)
+def test_mistakes_in_the_file_name_key_and_file(line: str, named: str, tmp_path: Path) -> None:
+    """An unknown key, a wrong type or broken TOML is one line with the file's name and the key or line in it."""
+    file = tmp_path / "board.toml"
+    file.write_text(line + "\n", encoding="utf-8")
+    with pytest.raises(SettingsError) as caught:
+        resolve(Sample, "SAMPLE", file, {})
+    assert named in str(caught.value)
+    assert "board.toml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_stronger_origin_does_not_hide_a_mistake_in_the_file(tmp_path: Path) -> None:
+    """A wrong value in the file is told even where an option outdoes it."""
+    file = tmp_path / "board.toml"
+    file.write_text('depth = "2"\n', encoding="utf-8")
+    with pytest.raises(SettingsError, match="depth"):
+        resolve(Sample, "SAMPLE", file, {"depth": 3})
+
+
+@pytest.mark.parametrize(
+    ("field", "text"), [("DEPTH", "two"), ("DEPTH", ""), ("DEPTH", "1.5"), ("TOLERANCE", "x"), ("LOOP_FOREVER", "yes!")]
+)
+def test_mistakes_in_the_environment_name_the_variable(field: str, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A value that is not of the setting's type is told with its variable."""
+    monkeypatch.setenv(f"SAMPLE_{field}", text)
+    with pytest.raises(SettingsError, match=f"SAMPLE_{field}"):
+        resolve(Sample, "SAMPLE", None, {})
+
+
+@pytest.mark.parametrize("content", [None, b"\xff\xfe"])
+def test_an_unreadable_file_is_named(content: bytes | None, tmp_path: Path) -> None:
+    """A file that is missing or no UTF-8 is told by name, and so is a folder in its place."""
+    file = tmp_path / "board.toml"
+    if content is not None:
+        file.write_bytes(content)
+    with pytest.raises(SettingsError, match=r"board\.toml"):
+        resolve(Sample, "SAMPLE", file, {})
+    with pytest.raises(SettingsError, match=tmp_path.name):
+        resolve(Sample, "SAMPLE", tmp_path, {})
