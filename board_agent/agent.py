@@ -9,9 +9,12 @@ from typing import Final
 import zmq
 
 from board_agent.outbox import Outbox
+from board_agent.sd_notify import Notifier
+from board_agent.status import StatusLine
 from common import now
 from common.camera.base import Camera, Ended, Spoiled
-from common.errors import ProtocolError
+from common.camera.factory import open_camera
+from common.errors import ProtocolError, UnavailableError
 from common.frame import Frame
 from common.link.base import Broken, Garbage, Link, Packet, SendResult
 from common.logs import event
@@ -26,6 +29,9 @@ _DRAIN_NS: Final = 5_000_000_000
 """After the last frame the host gets this long to say goodbye: longer than any pipeline keeps a pair."""
 
 _LONGEST_WAIT_MS: Final = 1000
+
+_CAMERA_RETRY_MS: Final = 250
+"""A camera that was missing at the start is found within this time: opening a node that is not there costs 20 us."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +51,57 @@ class Summary:
     ended: bool
 
 
+def wait_for_camera(uri: str, clock: str, wake: socket.socket, notifier: Notifier) -> Camera | None:
+    """Open a camera, however long it takes until there is one.
+
+    Args:
+        uri: the camera.
+        clock: name of this machine's clock, for the stamps.
+        wake: readable end of a socket that is written to by signals.
+        notifier: told what is missing.
+
+    Returns:
+        The open camera; None if a signal came first.
+
+    Raises:
+        SettingsError: the URI makes no sense.
+        DataError: a replay's images are bad.
+    """
+    poller = zmq.Poller()
+    poller.register(wake, zmq.POLLIN)
+    known = ""
+    while True:
+        now_ns = now.monotonic_ns()
+        try:
+            return open_camera(uri, clock, now_ns)
+        except UnavailableError as error:
+            if error.problem != known:
+                known = error.problem
+                _LOG.warning(event("camera_missing", problem=known))
+            if notifier.due(now_ns):
+                notifier.alive(now_ns, f"waiting for the camera: {known}")
+        if poller.poll(_CAMERA_RETRY_MS):
+            return None
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """Tells the service manager that the loop goes round, and how the board is doing.
+
+    Attributes:
+        notifier: the way there.
+        status: makes up what is told.
+    """
+
+    notifier: Notifier
+    status: StatusLine
+
+    def alive(self, now_ns: int, counts: BoardCounts, *, has_host: bool) -> None:
+        """Take note of one round of the loop."""
+        if self.notifier.due(now_ns):
+            self.notifier.alive(now_ns, self.status.text(now_ns, counts, has_host=has_host))
+
+
 class Agent:
     """Serves a camera's frames over links until stopped.
 
@@ -54,9 +111,20 @@ class Agent:
         session: random id of this process's life.
         boot_id: id of the machine's boot.
         wake: readable end of a socket that is written to by signals.
+        service: told that the loop goes round; None outside a service.
     """
 
-    def __init__(self, camera: Camera, links: Sequence[Link], session: str, boot_id: str, wake: socket.socket) -> None:
+    def __init__(
+        self,
+        camera: Camera,
+        links: Sequence[Link],
+        session: str,
+        boot_id: str,
+        wake: socket.socket,
+        *,
+        service: Service | None = None,
+    ) -> None:
+        self._service = service
         self._camera = camera
         self._links = links
         self._wake = wake
@@ -91,6 +159,8 @@ class Agent:
             if now_ns >= self._session.due_ns:
                 self._send_all(self._session.tick(now_ns, self._outbox.counts))
             self._watch_host()
+            if self._service is not None:
+                self._service.alive(now_ns, self._outbox.counts, has_host=self._session.has_host)
         if self._camera_ended and not self._stopping:
             self._drain()
         self._outbox.discard(DropReason.STOPPED)

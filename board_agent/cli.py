@@ -3,19 +3,29 @@
 import argparse
 import json
 import logging
+import os
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
+from board_agent.sd_notify import Notifier
 from board_agent.settings import ENVIRONMENT_PREFIX, BoardSettings
+from board_agent.status import StatusLine
 from common import logs, now
 from common.camera.factory import EXAMPLE, open_camera
 from common.errors import SettingsError, TandemError
-from common.link.base import Link
 from common.link.factory import open_link, parse_link
+from common.protocol.message import BoardCounts
 from common.settings import Resolved, resolve
 from common.signals import StopSignals
 from common.stamp import board_clock
+
+if TYPE_CHECKING:
+    from board_agent.agent import Summary
+
+_LOG: Final = logging.getLogger("board_agent")
 
 _EXAMPLES = """examples:
   board-agent run --camera 'replay:frames?fps=30&loop=1'
@@ -86,31 +96,17 @@ def _settings(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from board_agent.agent import Agent  # noqa: PLC0415 - --help and settings need no ZeroMQ
-
     settings = _resolve(options).values
     if settings.log_level.upper() not in logging.getLevelNamesMapping():
         raise SettingsError(f"log_level is {settings.log_level!r}", "give debug, info, warning or error")
     logs.set_up(logging.getLevelNamesMapping()[settings.log_level.upper()])
     if not settings.camera:
         raise SettingsError("no camera is given", f"use --camera {EXAMPLE}")
-    boot_id, session = now.boot_id(), now.random_id()
-    camera = open_camera(settings.camera, board_clock(boot_id), now.monotonic_ns())
-    uris = [parse_link(uri, listens_by_default=True) for uri in settings.link]
-    links: list[Link] = []
     signals = StopSignals()
-    try:
-        links.extend(open_link(uri) for uri in uris)
-        log = logging.getLogger("board_agent")
-        log.info(logs.event("serving", session=session, camera=settings.camera, links=",".join(settings.link)))
-        summary = Agent(camera, links, session, boot_id, signals.reader).run()
-    finally:
-        for link in links:
-            link.close()
-        camera.close()
-    counts = {"grabbed": summary.counts.grabbed, "sent": summary.counts.sent}
+    summary = _serve(settings, signals)
+    session, counts = summary.session, {"grabbed": summary.counts.grabbed, "sent": summary.counts.sent}
     dropped = {reason.value: count for reason, count in summary.counts.dropped}
-    log.info(logs.event("stopped", session=session, **counts, dropped=dropped, garbage=summary.garbage))
+    _LOG.info(logs.event("stopped", session=session, **counts, dropped=dropped, garbage=summary.garbage))
     if options.json:
         print(
             json.dumps(
@@ -121,6 +117,29 @@ def _run(options: argparse.Namespace) -> int:
         drops = "".join(f", {count} {reason}" for reason, count in dropped.items()) or ", none dropped"
         print(f"session {session}: {counts['grabbed']} frames grabbed, {counts['sent']} sent{drops}", file=sys.stderr)
     return INTERRUPTED if signals.interrupted else 0
+
+
+def _serve(settings: BoardSettings, signals: StopSignals) -> "Summary":
+    """Open everything in the order in which it may fail at once, serve, and close it again."""
+    from board_agent.agent import Agent, Service, Summary, wait_for_camera  # noqa: PLC0415 - --help and settings need no ZeroMQ
+
+    boot_id, session = now.boot_id(), now.random_id()
+    clock, uris = board_clock(boot_id), [parse_link(uri, listens_by_default=True) for uri in settings.link]
+    with ExitStack() as opened:
+        notifier = opened.enter_context(closing(Notifier(os.environ)))
+        if settings.wait_for_camera:
+            camera = wait_for_camera(settings.camera, clock, signals.reader, notifier)
+        else:
+            camera = open_camera(settings.camera, clock, now.monotonic_ns())
+        if camera is None:
+            return Summary(session, BoardCounts(), 0, ended=False)
+        opened.enter_context(closing(camera))
+        links = [opened.enter_context(closing(open_link(uri))) for uri in uris]
+        _LOG.info(logs.event("serving", session=session, camera=settings.camera, links=",".join(settings.link)))
+        status = StatusLine(settings.camera, camera.description.pacing, settings.link, now.monotonic_ns())
+        summary = Agent(camera, links, session, boot_id, signals.reader, service=Service(notifier, status)).run()
+        notifier.stopping("stopped")
+        return summary
 
 
 if __name__ == "__main__":

@@ -13,4 +13,7 @@ class BoardSettings:
 
     camera: str = setting("", "camera URI, for example replay:PATH?fps=30&loop=1")
     link: tuple[str, ...] = setting(("tcp://127.0.0.1:5555",), "links to serve; loopback unless told otherwise")
+    wait_for_camera: bool = setting(
+        default=False, doc="whether a missing camera is waited for; else it ends the program with exit 3"
+    )
     log_level: str = setting("info", "debug, info, warning or error")

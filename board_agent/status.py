@@ -1,0 +1,47 @@
+"""One line for people on how the board is doing: its rate, its host, or what is missing. A core, `now_ns` passed in."""
+
+from typing import Final
+
+from common.protocol.message import BoardCounts, Pacing
+
+_SILENT_NS: Final = 3_000_000_000
+"""Without a frame for this long a camera that goes by the clock counts as silent: above the slowest useful rate of 1 fps."""
+
+
+class StatusLine:
+    """Makes up the line from the account of the frames.
+
+    Args:
+        camera: the camera's URI.
+        pacing: whether it gives frames by itself.
+        links: URIs of the links.
+        now_ns: CLOCK_MONOTONIC now, ns.
+    """
+
+    def __init__(self, camera: str, pacing: Pacing, links: tuple[str, ...], now_ns: int) -> None:
+        self._camera = camera
+        self._pacing = pacing
+        self._links = " and ".join(links)
+        self._measured_ns = self._moved_ns = now_ns
+        self._grabbed = 0
+
+    def text(self, now_ns: int, counts: BoardCounts, *, has_host: bool) -> str:
+        """Give the line; the rate is the mean since it was asked for last.
+
+        Args:
+            now_ns: CLOCK_MONOTONIC now, ns.
+            counts: what became of all frames so far.
+            has_host: whether a host is served.
+        """
+        fresh = counts.grabbed - self._grabbed
+        rate_hz = fresh * 1e9 / max(1, now_ns - self._measured_ns)
+        if fresh:
+            self._moved_ns = now_ns
+        self._measured_ns, self._grabbed = now_ns, counts.grabbed
+        silent_ns = now_ns - self._moved_ns
+        if not has_host:
+            return f"waiting for a host on {self._links}"
+        if self._pacing is Pacing.CLOCK and silent_ns >= _SILENT_NS:
+            return f"no frame from {self._camera} for {silent_ns // 1_000_000_000} s: is it plugged in?"
+        dropped = sum(count for _, count in counts.dropped)
+        return f"{rate_hz:.1f} fps, {counts.sent} sent to the host, {dropped} dropped"

@@ -1,0 +1,41 @@
+"""The line that says how the board is doing."""
+
+from board_agent.status import StatusLine
+from common.protocol.message import BoardCounts, DropReason, Pacing
+
+SECOND_NS = 1_000_000_000
+
+
+def line(pacing: Pacing = Pacing.CLOCK) -> StatusLine:
+    return StatusLine("v4l2:/dev/video0", pacing, ("tcp://*:5555", "ipc:///run/x"), 0)
+
+
+def test_without_a_host_it_says_where_one_is_awaited() -> None:
+    """While nobody listens the links are named."""
+    assert (
+        line().text(SECOND_NS, BoardCounts(), has_host=False) == "waiting for a host on tcp://*:5555 and ipc:///run/x"
+    )
+
+
+def test_the_rate_is_that_of_the_time_since_the_last_line() -> None:
+    """60 frames in the first 2 s and 10 in the next give 30 and then 5 frames a second, drops summed over all reasons."""
+    status = line()
+    dropped = ((DropReason.REPLACED, 3), (DropReason.SPOILED, 2))
+    assert status.text(2 * SECOND_NS, BoardCounts(60, 55, dropped), has_host=True).startswith("30.0 fps, 55 sent")
+    text = status.text(4 * SECOND_NS, BoardCounts(70, 65, dropped), has_host=True)
+    assert text == "5.0 fps, 65 sent to the host, 5 dropped"
+
+
+def test_a_silent_camera_is_named_with_its_silence() -> None:
+    """A camera that gives nothing for seconds while a host waits is named; one frame makes it well again."""
+    status = line()
+    status.text(SECOND_NS, BoardCounts(30, 30), has_host=True)
+    assert "fps" in status.text(3 * SECOND_NS, BoardCounts(30, 30), has_host=True)
+    text = status.text(8 * SECOND_NS, BoardCounts(30, 30), has_host=True)
+    assert text == "no frame from v4l2:/dev/video0 for 7 s: is it plugged in?"
+    assert "fps" in status.text(9 * SECOND_NS, BoardCounts(31, 31), has_host=True)
+
+
+def test_a_camera_on_demand_may_be_silent() -> None:
+    """A demand-paced replay gives nothing while the host asks for nothing: that is no fault."""
+    assert line(Pacing.DEMAND).text(60 * SECOND_NS, BoardCounts(1, 1), has_host=True).startswith("0.0 fps, 1 sent")
