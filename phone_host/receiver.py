@@ -216,8 +216,9 @@ class Receiver:
                     self._current.stale += 1
                 case Accepted():
                     self._begin(output)
-                case Counted(counts, ended):
-                    self._current.latest = counts
+                case Counted(counts, ended, lost):
+                    self._current.lost += lost
+                    self._current.latest = max(counts, self._current.latest, key=lambda account: account.grabbed)
                     self._current.ended |= ended
                 case Refused(reason):
                     self.refused = reason

@@ -88,7 +88,7 @@ class BoardSession:
         host = self._host
         if host is None or connection not in host.lanes.values():
             # Somebody from before a restart, or a stranger: a clock echo shows which lane it is.
-            return [] if isinstance(message, Bye) else [Outgoing(connection, Knock(Lane.CONTROL))]
+            return [] if isinstance(message, Bye) else [Outgoing(connection, Knock(Lane.CONTROL, self.session))]
         host.heard_ns = now_ns
         match message:
             case Ping(wave, t0_ns):
@@ -110,12 +110,16 @@ class BoardSession:
         host = self._host
         if host is not None and now_ns - host.heard_ns >= SILENCE_NS:
             self._host = host = None
-        if host is not None and Lane.CONTROL in host.lanes and now_ns >= host.status_due_ns:
+        if host is not None and now_ns >= host.status_due_ns:
             host.status_due_ns = now_ns + STATUS_NS
-            outgoing.append(Outgoing(host.lanes[Lane.CONTROL], Status(self.session, counts)))
+            outgoing += self._account(host, counts)
         if self._dialled and now_ns >= self._knock_due_ns:
             known = {} if host is None else host.lanes
-            outgoing += [Outgoing(connection, Knock(lane)) for lane, connection in self._dialled if lane not in known]
+            outgoing += [
+                Outgoing(connection, Knock(lane, self.session))
+                for lane, connection in self._dialled
+                if lane not in known
+            ]
             self._knock_due_ns = now_ns + HELLO_RETRY_NS
         return outgoing
 
@@ -145,13 +149,18 @@ class BoardSession:
 
     def unreachable(self, connection: bytes) -> list[Outgoing]:
         """Take note that a connection is gone; a host that is still heard on the other one is asked to say hello anew."""
-        if self._host is None:
-            return []
+        if self._host is None or connection not in self._host.lanes.values():
+            return []  # a stranger's end is nothing to the host
         self._host.lanes = {lane: known for lane, known in self._host.lanes.items() if known != connection}
-        return [Outgoing(known, Knock(lane)) for lane, known in self._host.lanes.items() if lane is Lane.CONTROL]
+        return [
+            Outgoing(known, Knock(lane, self.session))
+            for lane, known in self._host.lanes.items()
+            if lane is Lane.CONTROL
+        ]
 
     def end(self, counts: BoardCounts) -> list[Outgoing]:
-        """Tell the host, behind the last frame, that none will follow."""
+        """Tell the host, behind the last frame, that none will follow; from now on `tick` repeats it."""
+        self._ended = True
         return (
             [Outgoing(self._host.lanes[Lane.FRAMES], End(self.session, counts))]
             if self._host is not None and self.has_host
@@ -163,6 +172,23 @@ class BoardSession:
         if self._host is None or Lane.CONTROL not in self._host.lanes:
             return []
         return [Outgoing(self._host.lanes[Lane.CONTROL], Bye(counts))]
+
+    def _account(self, host: _Host, counts: BoardCounts) -> list[Outgoing]:
+        """Give the account of the frames, and mend what a lost packet could have left for ever.
+
+        A frame that is lost without a sound takes its credit with it: behind the last frame on its own lane the account tells so. A knock
+        that is lost leaves a host without its frames' lane.
+        """
+        outgoing: list[Outgoing] = []
+        if Lane.CONTROL in host.lanes:
+            outgoing.append(Outgoing(host.lanes[Lane.CONTROL], Status(self.session, counts)))
+            if Lane.FRAMES not in host.lanes:
+                outgoing.append(Outgoing(host.lanes[Lane.CONTROL], Knock(Lane.CONTROL, self.session)))
+        if self._ended:
+            outgoing += self.end(counts)
+        elif self.has_host and not self.has_credit:
+            outgoing.append(Outgoing(host.lanes[Lane.FRAMES], Status(self.session, counts)))
+        return outgoing
 
     def _greet(self, connection: bytes, hello: HostHello, now_ns: int, counts: BoardCounts) -> list[Outgoing]:
         host = self._host

@@ -61,7 +61,7 @@ class HostSession:
         self._host_id = host_id
         self._lanes = dict(dialled)
         self._state = _State.SEEKING
-        self._greeted: set[Lane] = set()
+        self._greeted: dict[Lane, BoardHello] = {}
         self._hello: BoardHello | None = None
         self._opened_ns = 0
         self._heard_ns = 0
@@ -101,8 +101,8 @@ class HostSession:
             What to send, and what happened.
         """
         match message:
-            case Knock(lane):
-                return self._answer_knock(connection, lane, now_ns)
+            case Knock():
+                return self._answer_knock(connection, message, now_ns)
             case Refusal(reason):
                 return [Refused(reason)]
             case BoardHello():
@@ -155,11 +155,12 @@ class HostSession:
         """Say goodbye, so that the board is free for another host at once."""
         return [Outgoing(self._lanes[Lane.CONTROL], Bye())] if self._state is _State.OPEN else []
 
-    def _answer_knock(self, connection: bytes, lane: Lane, now_ns: int) -> list[Output]:
+    def _answer_knock(self, connection: bytes, knock: Knock, now_ns: int) -> list[Output]:
         if connection not in self._lanes.values():  # a board that dials
-            if self._state is _State.OPEN and now_ns - self._heard_ns < TAKEOVER_NS:
+            ours = self._hello is not None and knock.session == self._hello.session
+            if self._state is _State.OPEN and not ours and now_ns - self._heard_ns < TAKEOVER_NS:
                 return []  # a second board; the first is alive
-            self._lanes[lane] = connection
+            self._lanes[knock.lane] = connection
         return self.interrupted(now_ns)
 
     def _seek(self, now_ns: int) -> list[Output]:
@@ -178,13 +179,18 @@ class HostSession:
     def _accept(self, connection: bytes, hello: BoardHello, now_ns: int) -> list[Output]:
         if self._state is _State.OPEN:
             return []  # the answer to a hello that was said twice
-        self._greeted |= {lane for lane, known in self._lanes.items() if known == connection}
-        if self._greeted != set(Lane):
+        # Both lanes must lead to the same life of the board: an answer from before its restart may still be under way on one of them.
+        self._greeted = {lane: said for lane, said in self._greeted.items() if said.session == hello.session}
+        self._greeted |= {lane: hello for lane, known in self._lanes.items() if known == connection}
+        if set(self._greeted) != set(Lane):
             return []
+        hello = self._greeted[Lane.FRAMES]  # stands in line with the frames: what it counts and has not come is lost
         resumed = self._hello is not None and self._hello.session == hello.session
-        lost = hello.counts.sent - self._next_index if resumed else 0
-        self._next_index = hello.counts.sent
+        lost = max(0, hello.counts.sent - self._next_index) if resumed else 0
+        self._next_index = self._next_index + lost if resumed else hello.counts.sent
         self._below_index = 0
+        self._wave += 1  # echoes under way are of an earlier connection, perhaps of another clock
+        self._echoes_left = 0
         self._hello = hello
         self._state = _State.OPEN
         self._opened_ns = self._heard_ns = self._wave_due_ns = now_ns
@@ -210,7 +216,11 @@ class HostSession:
                     return []
                 return [Echo(wave, t0_ns, t1_ns, t2_ns, now_ns), *self._ping()]
             case Status(session, counts) | End(session, counts):
-                return [Counted(counts, ended=isinstance(message, End))] if session == self._hello.session else []
+                if session != self._hello.session:
+                    return []
+                lost = max(0, counts.sent - self._next_index) if connection == self._lanes[Lane.FRAMES] else 0
+                self._next_index += lost
+                return [Counted(counts, isinstance(message, End), lost)]
             case Bye(counts):
                 self._state = _State.SEEKING
                 self._greeted.clear()

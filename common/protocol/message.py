@@ -95,9 +95,13 @@ class BoardHello:
 
 @dataclass(frozen=True, slots=True)
 class Knock:
-    """Board: I don't know you (or I have just dialled you); say hello on this connection for that lane."""
+    """Board: I don't know you (or I have just dialled you); say hello on this connection for that lane.
+
+    `session` tells a host at once that a board's new connection is not a second board's.
+    """
 
     lane: Lane
+    session: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -75,10 +75,11 @@ class Echo:
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """Host: the board's account of the running session; `ended` when no frame will follow."""
+    """Host: the board's account of the running session; `ended` when no frame will follow; `lost` frames that it tells of never came."""
 
     counts: BoardCounts
     ended: bool
+    lost: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -160,8 +160,8 @@ def _fields(message: Message) -> list[Any]:  # noqa: PLR0911 - one line for each
             return [host_id, lane.value]
         case BoardHello(session, boot_id, camera, counts):
             return [session, boot_id, *_camera_fields(camera), *_counts_fields(counts)]
-        case Knock(lane):
-            return [lane.value]
+        case Knock(lane, session):
+            return [lane.value, session]
         case Refusal(reason):
             return [reason.value]
         case Credit(below_index):
@@ -211,7 +211,7 @@ def _read(kind: type, reader: "_Reader", payload: Buffer) -> Message:  # noqa: P
     if kind is BoardHello:
         return BoardHello(reader.text(), reader.text(), reader.camera(), reader.counts())
     if kind is Knock:
-        return Knock(reader.enum(Lane))
+        return Knock(reader.enum(Lane), reader.text())
     if kind is Refusal:
         return Refusal(reader.enum(RefusalReason))
     if kind is Status:

@@ -62,7 +62,7 @@ LANES = st.sampled_from(Lane)
 MESSAGES: st.SearchStrategy[Message] = st.one_of(
     st.builds(HostHello, TEXTS, LANES),
     st.builds(BoardHello, TEXTS, TEXTS, CAMERAS, COUNTS),
-    st.builds(Knock, LANES),
+    st.builds(Knock, LANES, TEXTS),
     st.builds(Refusal, st.sampled_from(RefusalReason)),
     st.builds(Credit, NUMBERS),
     FRAMES,

@@ -240,9 +240,9 @@ def test_a_refusal_can_be_said_in_any_version(reason: RefusalReason) -> None:
 
 
 def test_kinds_keep_their_numbers() -> None:
-    """The bytes of version 1 are fixed: a hello is kind 0 with id and lane, a knock kind 2, a refusal kind 3."""
+    """The bytes of version 1 are fixed: a hello is kind 0 with id and lane, a knock kind 2 with lane and session, a refusal kind 3."""
     assert msgpack.unpackb(encode(HostHello("h", Lane.CONTROL))[0]) == [1, 0, "h", 1]
-    assert msgpack.unpackb(encode(Knock(Lane.FRAMES))[0]) == [1, 2, 0]
+    assert msgpack.unpackb(encode(Knock(Lane.FRAMES, "s"))[0]) == [1, 2, 0, "s"]
     assert msgpack.unpackb(encode(Refusal(RefusalReason.VERSION))[0]) == [1, 3, 1]
 
 

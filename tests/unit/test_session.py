@@ -1,0 +1,343 @@
+"""Board and host sessions talking to each other through every misfortune of a link, on simulated time."""
+
+from dataclasses import dataclass
+from enum import Enum, auto
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.frame import PixelFormat
+from common.ledger import BoardMarks
+from common.protocol.message import (
+    BoardCounts,
+    BoardHello,
+    Bye,
+    Credit,
+    End,
+    FrameMessage,
+    HostHello,
+    Knock,
+    Lane,
+    Ping,
+    Pong,
+    Refusal,
+    RefusalReason,
+    Status,
+)
+from common.protocol.session import (
+    MS,
+    SILENCE_NS,
+    STATUS_NS,
+    TAKEOVER_NS,
+    Counted,
+    Echo,
+    Outgoing,
+    Refused,
+    Vanished,
+    stamped,
+)
+from tests.support.session_world import World
+
+
+class What(Enum):
+    """What may happen to a link."""
+
+    DELIVER = auto()
+    DROP = auto()
+    REPEAT = auto()
+    BREAK = auto()
+    RESTART_BOARD = auto()
+    RESTART_HOST = auto()
+    RETURN_FRAME = auto()
+    WAIT = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One misfortune, or some luck."""
+
+    what: What
+    lane: Lane
+    to_board: bool
+    amount: int
+
+
+EVENTS = st.lists(
+    st.builds(
+        Event,
+        st.sampled_from([What.DELIVER] * 8 + [What.WAIT] * 6 + list(What)),
+        st.sampled_from(Lane),
+        st.booleans(),
+        st.integers(1, 700),
+    ),
+    max_size=60,
+)
+
+
+def happen(world: World, event: Event, seen: list[FrameMessage]) -> None:
+    """Let an event happen to the first host's link."""
+    host = world.hosts[0]
+    match event.what:
+        case What.DELIVER:
+            for _ in range(event.amount % 7 + 1):
+                world.deliver(host, event.lane, to_board=event.to_board)
+        case What.DROP:
+            world.drop(host, event.lane, to_board=event.to_board)
+        case What.REPEAT:
+            world.deliver(host, event.lane, to_board=event.to_board, keep=True)
+        case What.BREAK:
+            world.break_lane(host, event.lane)
+        case What.RESTART_BOARD:
+            world.restart_board()
+        case What.RESTART_HOST:
+            world.restart_host(host)
+        case What.RETURN_FRAME:
+            if seen:
+                world.inject(host, seen[event.amount % len(seen)])
+        case What.WAIT:
+            world.pass_time(event.amount * MS)
+    under_way = world.hosts[0].wires[Lane.FRAMES].to_host
+    seen += [message for message in under_way if isinstance(message, FrameMessage)]
+
+
+def chaos(events: list[Event], *, board_dials: bool, slots: int = 1, settled: bool = False) -> World:
+    """A world after these events."""
+    world = World(board_dials=board_dials)
+    world.hosts[0].slots = slots
+    if settled:
+        world.settle(500 * MS)
+    seen: list[FrameMessage] = []
+    for event in events:
+        happen(world, event, seen)
+    return world
+
+
+@given(events=EVENTS, board_dials=st.booleans(), slots=st.integers(1, 4), settled=st.booleans())
+@settings(deadline=None, max_examples=150)
+def test_frames_flow_again_and_every_one_is_accounted_for(
+    *, events: list[Event], board_dials: bool, slots: int, settled: bool
+) -> None:
+    """Two seconds after any misfortune frames flow; then each sent frame of the session was received or is counted as lost."""
+    world = chaos(events, board_dials=board_dials, slots=slots, settled=settled)
+    world.settle()
+    host = world.hosts[0]
+    host.slots = slots
+    before = len(host.arrived)
+    world.settle(200 * MS)
+    assert len(host.arrived) >= before + 4
+    assert host.board_session == world.board.session
+    world.camera_runs = False
+    world.settle(2 * STATUS_NS)
+    assert world.sent[host.board_session] == host.base_sent + host.received + host.lost
+
+
+@given(events=EVENTS, board_dials=st.booleans(), slots=st.integers(1, 4))
+@settings(deadline=None, max_examples=100)
+def test_frames_that_come_back_are_never_taken(*, events: list[Event], board_dials: bool, slots: int) -> None:
+    """A frame that a transport delivers again, of this session or one before, is told as stale, and the world's own rules hold."""
+    world = chaos(events, board_dials=board_dials, slots=slots, settled=True)
+    host = world.hosts[0]
+    for session, index in list(host.arrived)[-20:]:
+        stale = len(host.stale)
+        world.inject(host, frame(session, index))
+        assert len(host.stale) == stale + 1
+        assert host.stale[-1].old_session == (session != host.board_session)
+
+
+def frame(session: str, sent_index: int) -> FrameMessage:
+    """A frame as it was once sent."""
+    return FrameMessage(session, sent_index, 0, 1, 1, PixelFormat.MJPEG, None, BoardMarks(0, 0, 0), b"")
+
+
+@pytest.mark.parametrize("board_dials", [False, True])
+@pytest.mark.parametrize("lane", Lane)
+@pytest.mark.parametrize("lost_words", range(6))
+def test_one_broken_lane_and_the_words_about_it_lost(lane: Lane, lost_words: int, *, board_dials: bool) -> None:
+    """When one lane alone breaks and the next words on the other one, knocks among them, are lost, frames flow again within 2 s."""
+    world = World(board_dials=board_dials)
+    world.settle(1000 * MS)
+    host = world.hosts[0]
+    world.break_lane(host, lane)
+    other = Lane.CONTROL if lane is Lane.FRAMES else Lane.FRAMES
+    for _ in range(lost_words):
+        world.deliver(host, lane, to_board=board_dials)
+        world.pass_time(20 * MS)
+        for to_board in (True, False):
+            world.drop(host, other, to_board=to_board)
+    before = len(host.arrived)
+    world.settle()
+    assert len(host.arrived) > before + 20
+
+
+@pytest.mark.parametrize("board_dials", [False, True])
+def test_a_lost_frame_does_not_take_its_credit_along(*, board_dials: bool) -> None:
+    """When the only frame for which there was credit is lost without a sound, more credit follows and the loss is counted."""
+    world = World(board_dials=board_dials)
+    world.settle(1000 * MS)
+    host = world.hosts[0]
+    world.shoot()
+    world.drop(host, Lane.FRAMES, to_board=False)
+    before = len(host.arrived)
+    world.settle(1000 * MS)
+    assert len(host.arrived) > before
+    assert host.lost == 1
+
+
+def test_an_answer_of_a_dead_board_opens_nothing() -> None:
+    """A hello of the board's old life on one lane and of its new life on the other do not make a session."""
+    world = World()
+    world.pass_time(20 * MS)
+    host = world.hosts[0]
+    world.deliver(host, Lane.FRAMES, to_board=True)
+    late = host.wires[Lane.FRAMES].to_host[-1]
+    assert isinstance(late, BoardHello)
+    world.restart_board()
+    for lane in Lane:
+        host.wires[lane].to_board.clear()
+        world.deliver(host, lane, to_board=False)
+    host.session.receive(host.names[Lane.FRAMES], late, world.now_ns)
+    world.drop(host, Lane.FRAMES, to_board=True)
+    world.drop(host, Lane.FRAMES, to_board=True)
+    world.settle(1000 * MS)
+    assert host.board_session == world.board.session
+    assert host.arrived
+
+
+def test_a_second_host_waits_until_the_first_is_silent() -> None:
+    """While the first host is alive a second one is told busy; one second after its last word the second one gets in."""
+    world = World()
+    world.settle(500 * MS)
+    first, second = world.hosts[0], world.add_host()
+    world.settle(3000 * MS)
+    assert not second.arrived
+    assert Refused(RefusalReason.BUSY) in second.others
+    assert len(first.arrived) > 60
+    for lane in Lane:  # the first one falls silent
+        world.wires = {name: held for name, held in world.wires.items() if held[2] is not first.wires[lane]}
+    silent_ns = world.now_ns
+    world.hosts.remove(first)
+    while not second.arrived:
+        world.settle(20 * MS)
+        assert world.now_ns - silent_ns < TAKEOVER_NS + 1000 * MS
+    assert world.now_ns - silent_ns >= TAKEOVER_NS - 250 * MS  # its last word was a clock echo
+
+
+def test_a_goodbye_makes_room_at_once() -> None:
+    """After a host's goodbye the next one gets in with its next hello, long before the first would count as silent."""
+    world = World()
+    world.settle(500 * MS)
+    first, second = world.hosts[0], world.add_host()
+    world.settle(500 * MS)
+    assert first.arrived
+    assert not second.arrived
+    world._host_does(first, first.session.leave())
+    world.deliver_all()
+    world.hosts.remove(first)
+    world.settle(300 * MS)
+    assert second.arrived
+
+
+def test_a_strangers_end_is_nothing_to_the_host() -> None:
+    """A connection that was never the host's may vanish without a word to the host."""
+    world = World()
+    world.settle(300 * MS)
+    assert world.board.unreachable(b"a stranger") == []
+    assert world.board.has_host
+
+
+def test_a_silent_board_is_given_up() -> None:
+    """A host that hears nothing for SILENCE_NS says that the board has vanished, and not a moment before."""
+    world = World()
+    world.settle(300 * MS)
+    host = world.hosts[0]
+    heard_ns = world.now_ns
+    host.session.receive(host.names[Lane.CONTROL], Status(world.board.session, BoardCounts()), heard_ns)
+    assert Vanished(orderly=False) not in host.session.tick(heard_ns + SILENCE_NS - 1)
+    assert host.session.is_open
+    assert Vanished(orderly=False) in host.session.tick(heard_ns + SILENCE_NS)
+
+
+def test_a_boards_goodbye_gives_its_last_account() -> None:
+    """A board that leaves on purpose is known as such, with its final counts, and is sought again."""
+    world = World()
+    world.settle(300 * MS)
+    host = world.hosts[0]
+    counts = BoardCounts(100, 90)
+    [goodbye] = world.board.leave(counts)
+    assert goodbye.message == Bye(counts)
+    outputs = host.session.receive(host.names[Lane.CONTROL], goodbye.message, world.now_ns)
+    assert outputs == [Counted(counts, ended=False), Vanished(orderly=True)]
+    assert not host.session.is_open
+    world.settle(1000 * MS)
+    assert host.session.is_open
+
+
+def test_the_end_is_said_until_it_is_heard() -> None:
+    """The word that no frame follows is repeated, so that a host that lost it, or comes back later, hears it, too."""
+    world = World()
+    world.settle(300 * MS)
+    host = world.hosts[0]
+    world.camera_runs = False
+    world.board.end(world.counts)  # these words are lost
+    heard: list[object] = []
+    for _ in range(50):
+        world.pass_time(20 * MS)
+        heard += [message for message in host.wires[Lane.FRAMES].to_host if isinstance(message, End)]
+        world.deliver_all()
+    assert End(world.board.session, world.counts) in heard
+
+
+def test_echoes_of_an_old_wave_are_ignored() -> None:
+    """Only answers to the wave that is under way are clock echoes; late ones and those of another life are not."""
+    world = World()
+    world.settle(300 * MS)
+    host = world.hosts[0]
+    control = host.names[Lane.CONTROL]
+    [ping] = [
+        output.message
+        for output in host.session.tick(host.session.due_ns)
+        if isinstance(output, Outgoing) and isinstance(output.message, Ping)
+    ]
+    sound = Pong(ping.wave, 1, 2, 3)
+    assert Echo(ping.wave, 1, 2, 3, world.now_ns) in host.session.receive(control, sound, world.now_ns)
+    assert host.session.receive(control, Pong(ping.wave - 1, 1, 2, 3), world.now_ns) == []
+    world.restart_board()
+    world.settle(20 * MS)
+    assert host.session.is_open
+    assert not any(isinstance(o, Echo) for o in host.session.receive(control, sound, world.now_ns))
+
+
+def test_a_refusal_for_the_version_reaches_the_host() -> None:
+    """A host that is refused, busy or for its version, is told the reason and goes on asking."""
+    for reason in RefusalReason:
+        world = World()
+        host = world.hosts[0]
+        assert host.session.receive(host.names[Lane.CONTROL], Refusal(reason), world.now_ns) == [Refused(reason)]
+        assert not host.session.is_open
+        assert any(
+            isinstance(output, Outgoing) and isinstance(output.message, HostHello)
+            for output in host.session.tick(host.session.due_ns)
+        )
+
+
+def test_strangers_are_asked_who_they_are() -> None:
+    """Words of a host from before a restart are answered with a knock, except its goodbye; no word of it counts."""
+    world = World()
+    knock = [Outgoing(b"x", Knock(Lane.CONTROL, world.board.session))]
+    for message in (Ping(1, 2), Credit(10**6), Pong(1, 2, 3, 4)):
+        assert world.board.receive(b"x", message, world.now_ns, BoardCounts()) == knock
+    assert world.board.receive(b"x", Bye(), world.now_ns, BoardCounts()) == []
+    assert not world.board.has_credit
+
+
+@given(st.integers(0, 2**62), st.integers(0, 2**62))
+@settings(deadline=None)
+def test_send_times_are_set_at_the_last_moment(then_ns: int, now_ns: int) -> None:
+    """Stamping sets a ping's t0, a pong's t2 and a frame's `sent` to now, keeps all else, and leaves other messages alone."""
+    assert stamped(Ping(3, then_ns), now_ns) == Ping(3, now_ns)
+    assert stamped(Pong(3, 1, 2, then_ns), now_ns) == Pong(3, 1, 2, now_ns)
+    stamped_frame = stamped(frame("s", 5), now_ns)
+    assert isinstance(stamped_frame, FrameMessage)
+    assert stamped_frame.marks == BoardMarks(0, 0, now_ns)
+    assert stamped(Credit(9), now_ns) == Credit(9)
