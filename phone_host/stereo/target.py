@@ -1,0 +1,209 @@
+"""The calibration target: a chessboard, its corners in an image, and their order.
+
+Corners come as (N, 2), row by row, the same order as `Board.points_m`. Two views of one board must agree on which corner is the
+first; `order_by_colour` and `agree` see to that.
+"""
+
+import re
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import SettingsError
+from phone_host.model import Image
+from phone_host.stereo.images import to_grey
+
+Corners = NDArray[np.float64]
+"""(N, 2) float64, px; N = 0: the board was not found."""
+
+_UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "": 1e-3}
+_LENGTH = re.compile(r"\A\s*(\d+(?:\.\d*)?|\.\d+)\s*(mm|cm|m|)\s*\Z")
+_LEAST_CORNERS, _MOST_CORNERS = 3, 100
+_LARGEST_SQUARE_M = 2.0
+
+# Sector-based detection (Duda and Frese, BMVC 2018), with and without contrast normalisation: glare on paper defeats the one,
+# weak contrast the other; EXHAUSTIVE finds a few more and misses a few others. Measured on 174 images of four real rigs: the
+# first way finds 164, all ways together 174.
+_NORMALISED = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
+_WAYS = (_NORMALISED, cv2.CALIB_CB_ACCURACY, _NORMALISED | cv2.CALIB_CB_EXHAUSTIVE)
+# Noise and moire hide squares at full size that half the size shows.
+_SMALLER = 0.5
+# Photographs of 12 MPx take seconds and gain nothing: the refinement works at full size in any case.
+_LARGEST_SEARCHED_PX = 1600
+# Refinement window: beyond a third of the distance to the next corner it would see that one's edges.
+_WINDOW_SHARE = 0.3
+_REFINE = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-4)
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """A chessboard.
+
+    Attributes:
+        columns: inner corners of a row.
+        rows: inner corners of a column.
+        square_m: side of a square, m.
+
+    Raises:
+        SettingsError: a size that no board has.
+    """
+
+    columns: int
+    rows: int
+    square_m: float
+
+    def __post_init__(self) -> None:
+        if not all(_LEAST_CORNERS <= count <= _MOST_CORNERS for count in (self.columns, self.rows)):
+            raise SettingsError(
+                f"--board {self.columns}x{self.rows} is no chessboard",
+                "give its inner corners, such as 9x6 (3 to 100 each)",
+            )
+        if not 0 < self.square_m <= _LARGEST_SQUARE_M:
+            raise SettingsError(f"--square {self.square_m:g} m", "give the side of a square, such as 25mm")
+
+    def points_m(self) -> NDArray[np.float64]:
+        """(N, 3) float64, m: the inner corners, row by row, in the board's own plane z = 0."""
+        rows, columns = np.mgrid[0 : self.rows, 0 : self.columns]
+        return np.column_stack([columns.ravel(), rows.ravel(), np.zeros(rows.size)]) * self.square_m
+
+
+def parse_board(corners: str, square: str) -> Board:
+    """Read a board as people write it.
+
+    Args:
+        corners: inner corners, such as "9x6".
+        square: side of a square with its unit, such as "25mm", "2.5cm", "0.025m"; a bare number is millimetres.
+
+    Returns:
+        The board.
+
+    Raises:
+        SettingsError: one of the two makes no sense.
+    """
+    counts = re.fullmatch(r"\s*(\d{1,3})\s*[xX]\s*(\d{1,3})\s*", corners)
+    if counts is None:
+        raise SettingsError(f"--board {corners!r} is no size", "give columns x rows of inner corners, such as 9x6")
+    length = _LENGTH.match(square.lower())
+    if length is None:
+        raise SettingsError(f"--square {square!r} is no length", "give it with its unit, such as 25mm, 2.5cm or 0.025m")
+    return Board(int(counts[1]), int(counts[2]), float(length[1]) * _UNITS_M[length[2]])
+
+
+def find_corners(image: Image, board: Board) -> Corners:
+    """Find the inner corners of a board in an image.
+
+    Where the detector works at full size, its corners are averaged with those of a gradient refinement: their errors are
+    independent enough that the mean lowered the reprojection error on three of four real rigs by a sixth to a quarter below
+    the better of the two, and on none raised it by more than a twelfth.
+
+    Args:
+        image: (H, W) grey or (H, W, 3) BGR, uint8.
+        board: what to look for.
+
+    Returns:
+        The corners in the order of `Board.points_m`, the first inner square white where the board's parity tells; empty when
+        the board was not found.
+    """
+    grey = to_grey(image)
+    found, scale = _search(grey, board)
+    if len(found) == 0:
+        return found
+    refined = _refine(grey, found, board)
+    corners = (found + refined) / 2 if scale == 1.0 else refined
+    return order_by_colour(corners, grey, board)
+
+
+def order_by_colour(corners: Corners, grey: Image, board: Board) -> Corners:
+    """Give corners the board's own order, as far as its colours tell.
+
+    Rows run so that the grid is not mirrored. Where one count is even and the other odd, half a turn swaps black and white:
+    then the square inside the first four corners is the white one. Other boards look the same after half a turn.
+
+    Args:
+        corners: (N, 2), in any of the orders a detector may give.
+        grey: (H, W) uint8, the image they were found in.
+        board: the board.
+
+    Returns:
+        The same corners, reordered.
+    """
+    grid = corners.reshape(board.rows, board.columns, 2)
+    along, down = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
+    if along[0] * down[1] - along[1] * down[0] < 0:
+        grid = grid[:, ::-1]
+    if (board.columns + board.rows) % 2 == 1 and _brightness(grid, 0, grey) < _brightness(grid, 1, grey):
+        grid = grid[::-1, ::-1]
+    return np.ascontiguousarray(grid.reshape(-1, 2))
+
+
+def agree(left: Corners, right: Corners, board: Board) -> Corners:
+    """Give the right view's corners the left view's order, where the colours cannot tell.
+
+    Of the turns under which the board looks the same (half a turn; quarter turns of a square board), the one whose rows and
+    columns point most nearly the same way in both images is taken: the cameras do not stand on their heads to each other.
+
+    Args:
+        left: (N, 2) corners of the left view.
+        right: (N, 2) corners of the right view.
+        board: the board.
+
+    Returns:
+        The right corners, reordered.
+    """
+    if (board.columns + board.rows) % 2 == 1:
+        return right  # the colours have told
+    reference = left.reshape(board.rows, board.columns, 2)
+    grid = right.reshape(board.rows, board.columns, 2)
+    turns = (0, 1, 2, 3) if board.rows == board.columns else (0, 2)
+    best = max((np.rot90(grid, turn) for turn in turns), key=lambda turned: _same_way(reference, turned))
+    return np.ascontiguousarray(best.reshape(-1, 2))
+
+
+def _search(grey: Image, board: Board) -> tuple[Corners, float]:
+    """Corners in the full image's pixels, and the scale they were found at."""
+    largest = max(grey.shape)
+    first = min(1.0, _LARGEST_SEARCHED_PX / largest)
+    for scale in (first, first * _SMALLER):
+        searched = grey
+        if scale != 1.0:
+            size = (round(grey.shape[1] * scale), round(grey.shape[0] * scale))
+            searched = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        for way in _WAYS:
+            found, corners = cv2.findChessboardCornersSB(searched, (board.columns, board.rows), flags=way)
+            if found:
+                factors = np.array([searched.shape[1] / grey.shape[1], searched.shape[0] / grey.shape[0]])
+                # Pixel centres are integers: the scale is about the corner of the image at (-0.5, -0.5).
+                return (np.asarray(corners, dtype=np.float64).reshape(-1, 2) + 0.5) / factors - 0.5, scale
+    return np.empty((0, 2)), first
+
+
+def _refine(grey: Image, corners: Corners, board: Board) -> Corners:
+    grid = corners.reshape(board.rows, board.columns, 2)
+    spacings = [np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1)]
+    window = max(2, int(min(spacings) * _WINDOW_SHARE))
+    # A light blur takes the noise out of the gradients: a tenth less reprojection error on real rigs.
+    smooth = cv2.GaussianBlur(grey, (0, 0), 1.0)
+    refined = cv2.cornerSubPix(
+        smooth, corners.astype(np.float32).reshape(-1, 1, 2), (window, window), (-1, -1), _REFINE
+    )
+    return np.asarray(refined, dtype=np.float64).reshape(-1, 2)
+
+
+def _brightness(grid: Corners, column: int, grey: Image) -> float:
+    """Mean of the middle of the square right of corner `column` in the first row."""
+    middle = grid[:2, column : column + 2].reshape(-1, 2).mean(axis=0)
+    reach = max(1, int(np.linalg.norm(grid[0, column + 1] - grid[0, column]) / 6))
+    x, y = (int(v) for v in np.rint(middle))
+    patch = grey[max(y - reach, 0) : y + reach + 1, max(x - reach, 0) : x + reach + 1]
+    return float(patch.mean()) if patch.size else 0.0
+
+
+def _same_way(first: Corners, second: Corners) -> float:
+    """How much rows and columns of two (rows, columns, 2) grids point the same way: 2 = exactly, -2 = the opposite way."""
+    total = 0.0
+    for grid_end in (np.s_[0, -1], np.s_[-1, 0]):
+        a, b = first[grid_end] - first[0, 0], second[grid_end] - second[0, 0]
+        total += float(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)))
+    return total

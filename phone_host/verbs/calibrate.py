@@ -1,0 +1,205 @@
+"""phone-host calibrate: calibrate two cameras from pictures of a chessboard."""
+
+import argparse
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from common.errors import DataError, UnavailableError
+
+if TYPE_CHECKING:
+    from phone_host.stereo.board_views import BoardViews
+    from phone_host.stereo.calibration import Calibration, Rejected
+    from phone_host.stereo.target import Board
+    from phone_host.stereo.view_files import ViewFiles
+
+EXAMPLES = """  phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml
+  phone-host calibrate 'views/left*.png' 'views/right*.png' --board 9x6 --square 25mm --out rig.yaml --json
+"""
+
+_CHECK_FAILED = 4
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's options."""
+    parser.add_argument("left", metavar="LEFT", help="images of the left camera: a folder or a quoted glob")
+    parser.add_argument("right", metavar="RIGHT", help="images of the right camera, paired by the number in the name")
+    parser.add_argument("--board", required=True, metavar="9x6", help="inner corners of the chessboard: columns x rows")
+    parser.add_argument(
+        "--square", required=True, metavar="25mm", help="side of a square: 25mm, 2.5cm, 0.025m (bare number: mm)"
+    )
+    parser.add_argument(
+        "--board-side", choices=("left", "right"), default="left", help="which camera hangs on the board (default left)"
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="rig.yaml", help="the calibration; report.json goes beside it"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Find the board in all pairs, calibrate, judge, write."""
+    from phone_host.model import Side  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.stereo.calibrate import calibrate  # noqa: PLC0415
+    from phone_host.stereo.target import parse_board  # noqa: PLC0415
+    from phone_host.stereo.verdict import Verdict, judge  # noqa: PLC0415
+    from phone_host.stereo.view_files import pair_files  # noqa: PLC0415
+
+    board = parse_board(options.board, options.square)
+    files = pair_files(options.left, options.right)
+    views = _look(files, board)
+    try:
+        calibration = calibrate(list(views.pairs), board, views.sizes_px, Side(options.board_side))
+    except DataError as error:
+        report = _failed(files, views, error)
+        _write_report(options.out, report)
+        if options.json:
+            print(json.dumps(report))
+        else:
+            print(_rejections(views.rejected))
+        raise
+    rejected = (*views.rejected, *calibration.rejected)
+    judgement = judge(calibration, rejected)
+    report = {
+        "pairs": _pairs(files, rejected, len(calibration.used)),
+        **_figures(calibration),
+        "verdict": judgement.verdict.value,
+        "remedy": "; ".join(judgement.remedies),
+    }
+    _write_rig(options.out, calibration)
+    _write_report(options.out, report)
+    print(json.dumps(report) if options.json else _summary(report, calibration, rejected, options.out))
+    return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
+
+
+def _look(files: "ViewFiles", board: "Board") -> "BoardViews":
+    """Search all images, with a progress bar when someone watches."""
+    from rich.console import Console  # noqa: PLC0415
+    from rich.progress import Progress  # noqa: PLC0415
+
+    from phone_host.stereo.board_views import look_for_boards  # noqa: PLC0415
+
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("looking for the board", total=len(files.pairs))
+        return look_for_boards(files, board, lambda: progress.advance(task))
+
+
+def _pairs(files: "ViewFiles", rejected: tuple["Rejected", ...], used: int) -> dict[str, Any]:
+    return {
+        "found": len(files.pairs),
+        "used": used,
+        "paired_by": "number" if files.by_number else "name order",
+        "rejected": [{"pair": each.name, "reason": each.reason.value, "detail": each.detail} for each in rejected],
+    }
+
+
+def _failed(files: "ViewFiles", views: "BoardViews", error: DataError) -> dict[str, Any]:
+    """The report when there is no rig at all."""
+    return {
+        "pairs": _pairs(files, views.rejected, 0),
+        "verdict": "reject",
+        "problem": error.problem,
+        "remedy": error.remedy,
+    }
+
+
+def _figures(calibration: "Calibration") -> dict[str, Any]:
+    import numpy as np  # noqa: PLC0415
+
+    rig, vertical = calibration.rig, calibration.vertical_px
+    known = calibration.obstacle is None
+    return {
+        "views": [
+            {
+                "pair": used.name,
+                "left_px": round(used.left_px, 4),
+                "right_px": round(used.right_px, 4),
+                "vertical_px": round(used.vertical_px, 4) if known else None,
+            }
+            for used in calibration.used
+        ],
+        "rms_px": {
+            "left": round(rig.rms_left_px, 4),
+            "right": round(rig.rms_right_px, 4),
+            "stereo": round(rig.rms_stereo_px, 4),
+        },
+        "vertical_error_px": {
+            "mean": round(float(vertical.mean()), 4) if known else None,
+            "p95": round(float(np.percentile(vertical, 95)), 4) if known else None,
+            "max": round(float(vertical.max()), 4) if known else None,
+        },
+        "baseline_mm": round(float(np.linalg.norm(rig.t_right_left_m)) * 1e3, 4),
+        "baseline_sigma_mm": round(calibration.baseline_sigma_m * 1e3, 4)
+        if math.isfinite(calibration.baseline_sigma_m)
+        else None,
+        "focal_px": {
+            "left": [round(float(rig.left.matrix[i, i]), 3) for i in (0, 1)],
+            "right": [round(float(rig.right.matrix[i, i]), 3) for i in (0, 1)],
+        },
+        "sizes": {
+            "left": f"{rig.left.width_px}x{rig.left.height_px}",
+            "right": f"{rig.right.width_px}x{rig.right.height_px}",
+            "rectified": None
+            if calibration.rectification is None
+            else f"{calibration.rectification.width_px}x{calibration.rectification.height_px}",
+        },
+        "board_side": rig.board_side.value,
+        "distortion_coefficients": calibration.distortion_terms,
+        "board_spread": round(calibration.spread, 3),
+        "largest_tilt_deg": round(float(calibration.tilts_deg.max()), 1),
+    }
+
+
+def _write_rig(out: Path, calibration: "Calibration") -> None:
+    """Write rig.yaml; a rig that cannot be rectified has none, and one of an earlier run must not be taken for it."""
+    from phone_host.formats.rig_yaml import write_rig  # noqa: PLC0415
+
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        if calibration.rectification is None:
+            out.unlink(missing_ok=True)
+        else:
+            write_rig(out, calibration.rig, calibration.rectification)
+    except OSError as error:
+        raise _unwritable(out, error) from error
+
+
+def _write_report(out: Path, report: dict[str, Any]) -> None:
+    from phone_host.formats.atomic import write_text  # noqa: PLC0415
+
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_text(out.with_name("report.json"), json.dumps(report, indent=2) + "\n")
+    except OSError as error:
+        raise _unwritable(out, error) from error
+
+
+def _unwritable(out: Path, error: OSError) -> UnavailableError:
+    return UnavailableError(f"{out} cannot be written ({error.strerror})", "free the disk, or name another --out")
+
+
+def _rejections(rejected: tuple["Rejected", ...]) -> str:
+    return "\n".join(f"{each.name:>8}  rejected: {each.reason.value} ({each.detail})" for each in rejected)
+
+
+def _summary(report: dict[str, Any], calibration: "Calibration", rejected: tuple["Rejected", ...], out: Path) -> str:
+    rows = [f"{'pair':>8}  {'left px':>8} {'right px':>8} {'vertical px':>11}"]
+    rows += [f"{u.name:>8}  {u.left_px:8.3f} {u.right_px:8.3f} {u.vertical_px:11.3f}" for u in calibration.used]
+    if rejected:
+        rows.append(_rejections(rejected))
+    rms, vertical = report["rms_px"], report["vertical_error_px"]
+    rows += [
+        f"{report['pairs']['used']} pairs used, {len(rejected)} rejected",
+        f"RMS      left {rms['left']:.3f}, right {rms['right']:.3f}, stereo {rms['stereo']:.3f} px",
+    ]
+    if vertical["p95"] is not None:
+        rows.append(f"vertical mean {vertical['mean']:.3f}, 95 % {vertical['p95']:.3f}, max {vertical['max']:.3f} px")
+    rows += [
+        f"baseline {report['baseline_mm']:.2f} +- {calibration.baseline_sigma_m * 1e3:.2f} mm",
+        f"verdict  {report['verdict']}",
+        *(f"remedy   {remedy}" for remedy in report["remedy"].split("; ") if remedy),
+    ]
+    if calibration.rectification is not None:
+        rows.append(f"written to {out} and {out.with_name('report.json')}")
+    return "\n".join(rows)
