@@ -8,7 +8,6 @@ import errno
 import os
 import socket
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from typing import Final
 
 import zmq
@@ -37,6 +36,11 @@ _COPY_BELOW_BYTES: Final = 256 * 1024
 
 _UNIX_PATH_MAX: Final = 107
 
+# As plain integers: pyzmq's flags are enums, whose operators cost more than the call that takes them.
+_NOW: Final = int(zmq.DONTWAIT)
+_NOW_AND_MORE: Final = int(zmq.DONTWAIT | zmq.SNDMORE)
+_READABLE: Final = int(zmq.POLLIN)
+
 
 def _configure(sock: zmq.Socket[bytes]) -> None:
     for option, value in (
@@ -61,12 +65,12 @@ def _configure(sock: zmq.Socket[bytes]) -> None:
 def _send(sock: zmq.Socket[bytes], prefix: list[bytes], header: bytes, payload: Buffer) -> SendResult:
     try:
         for part in prefix:
-            sock.send(part, zmq.DONTWAIT | zmq.SNDMORE)
+            sock.send(part, _NOW_AND_MORE)
         if not len(payload):
-            sock.send(header, zmq.DONTWAIT)
+            sock.send(header, _NOW)
             return SendResult.SENT
-        sock.send(header, zmq.DONTWAIT | zmq.SNDMORE)
-        sock.send(payload, zmq.DONTWAIT, copy=len(payload) < _COPY_BELOW_BYTES)
+        sock.send(header, _NOW_AND_MORE)
+        sock.send(payload, _NOW, copy=len(payload) < _COPY_BELOW_BYTES)
     except zmq.Again:
         return SendResult.FULL
     except zmq.ZMQError as error:
@@ -76,18 +80,26 @@ def _send(sock: zmq.Socket[bytes], prefix: list[bytes], header: bytes, payload: 
     return SendResult.SENT
 
 
+def _has_something(sock: zmq.Socket[bytes]) -> bool:
+    """Whether there is something to receive; asking is cheaper than the exception for having nothing, which would come once a wake-up."""
+    return bool(int(sock.getsockopt(zmq.EVENTS)) & _READABLE)
+
+
 def _receive(sock: zmq.Socket[bytes], connection: bytes, *, routed: bool) -> Iterator[Incoming]:
-    while True:
-        try:
-            parts = sock.recv_multipart(zmq.DONTWAIT, copy=False)
-        except zmq.Again:
-            return
+    while _has_something(sock):
         if routed:
-            connection = parts.pop(0).bytes
-        if not 1 <= len(parts) <= 2:
-            yield Garbage(connection)
-        else:
-            yield Packet(connection, parts[0].buffer, parts[1].buffer if len(parts) == 2 else b"")
+            connection = sock.recv(_NOW)
+        header = sock.recv(_NOW, copy=False)
+        if not header.more:
+            yield Packet(connection, header.bytes, b"")
+            continue
+        payload = sock.recv(_NOW, copy=False)
+        if not payload.more:
+            yield Packet(connection, header.bytes, payload.buffer)
+            continue
+        while sock.recv(_NOW, copy=False).more:
+            pass
+        yield Garbage(connection)
 
 
 class ZeroMqListener:
@@ -170,15 +182,14 @@ class ZeroMqDialer:
         return (*self._sockets.values(), *self._monitors.values())
 
     def receive(self) -> Iterator[Incoming]:
-        """Give all packets that have come in, control first, and the news of broken connections."""
-        for connection, monitor in self._monitors.items():
-            with suppress(zmq.Again):
-                while True:
-                    monitor.recv_multipart(zmq.DONTWAIT)
-                    yield Broken(connection)
-        for lane in (Lane.CONTROL, Lane.FRAMES):
+        """Give all packets that have come in, frames first, then the news of broken connections: a peer's last words come before its end."""
+        for lane in (Lane.FRAMES, Lane.CONTROL):
             connection = self.dialled[lane]
             yield from _receive(self._sockets[connection], connection, routed=False)
+        for connection, monitor in self._monitors.items():
+            while _has_something(monitor):
+                monitor.recv_multipart(_NOW)
+                yield Broken(connection)
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Hand a packet over; before the peer is there it is FULL (ZMQ_IMMEDIATE)."""
