@@ -4,9 +4,10 @@ The state machines (`board_session`, `host_session`) are sans-I/O: messages and 
 sockets and clocks; they send an `Outgoing` as it is, except that `stamped` sets its send time at the last moment.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
+from common.ledger import BoardMarks
 from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Message, Ping, Pong, RefusalReason
 
 MS: Final = 1_000_000
@@ -15,7 +16,7 @@ HELLO_RETRY_NS: Final = 200 * MS
 """Between two attempts to be heard; a peer that appears is met within this time."""
 
 TAKEOVER_NS: Final = 1000 * MS
-"""A host unheard for this long gives way to another one that knocks: four missed clock waves."""
+"""A host unheard for this long gives way to another one that knocks: two missed clock waves."""
 
 SILENCE_NS: Final = 3000 * MS
 """A peer unheard for this long is taken as gone: longer than any stall seen on Wi-Fi or of a swapping phone."""
@@ -112,6 +113,9 @@ def stamped(message: Message, now_ns: int) -> Message:
         case Pong(wave, t0_ns, t1_ns):
             return Pong(wave, t0_ns, t1_ns, now_ns)
         case FrameMessage():
-            return replace(message, marks=replace(message.marks, sent_ns=now_ns))
+            marks = BoardMarks(message.marks.exposed_ns, message.marks.grabbed_ns, now_ns)
+            numbers = (message.session, message.sent_index, message.sequence)
+            size = (message.width_px, message.height_px, message.pixel_format)
+            return FrameMessage(*numbers, *size, message.exposure_ns, marks, message.payload)
         case _:
             return message

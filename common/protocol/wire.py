@@ -62,6 +62,7 @@ _KINDS: Final[tuple[type, ...]] = (
     End,
     Bye,
 )
+_KIND_OF: Final = {kind: index for index, kind in enumerate(_KINDS)}
 _PIXEL_FORMATS: Final = tuple(PixelFormat)
 _DROP_REASONS: Final = tuple(DropReason)
 
@@ -91,7 +92,7 @@ def encode(message: Message) -> tuple[bytes, Buffer]:
     Returns:
         Header bytes and payload (empty for all but frames).
     """
-    header: bytes = msgpack.packb([PROTOCOL_VERSION, _KINDS.index(type(message)), *_fields(message)])
+    header: bytes = msgpack.packb([PROTOCOL_VERSION, _KIND_OF[type(message)], *_fields(message)])
     return header, message.payload if isinstance(message, FrameMessage) else b""
 
 
