@@ -34,12 +34,14 @@ from common.protocol.session import (
     Vanished,
 )
 
-WAVE_ECHOES: Final = 5
+WAVE_ECHOES: Final = 3
+WAVE_ECHOES_EARLY: Final = 5
 """Echoes back to back: the first wakes both sides up, the others measure without that bias (study of links, 3d)."""
 
-WAVE_NS: Final = 250 * MS
+WAVE_NS: Final = 500 * MS
 WAVE_EARLY_NS: Final = 50 * MS
-"""Between two waves, and in the first second of a session, when the estimate is still young."""
+"""Between two waves, and in the first second of a session, when the estimate is still young. An echo costs the board as much as half a frame
+(bench_link), so 6 a second are enough for a clock whose skew is known."""
 
 EARLY_NS: Final = 1000 * MS
 
@@ -126,7 +128,7 @@ class HostSession:
             early = now_ns - self._opened_ns < EARLY_NS
             self._wave_due_ns = now_ns + (WAVE_EARLY_NS if early else WAVE_NS)
             self._wave += 1
-            self._echoes_left = WAVE_ECHOES
+            self._echoes_left = WAVE_ECHOES_EARLY if early else WAVE_ECHOES
             # Credit is granted up to an index, so repeating it is harmless and mends one that a broken connection swallowed.
             credit: list[Output] = (
                 [Outgoing(self._lanes[Lane.CONTROL], Credit(self._below_index))] if self._below_index else []
