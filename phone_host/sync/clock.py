@@ -104,8 +104,19 @@ class ClockEstimator:
         while newest_ns - self._waves[0].lower[0] > SKEW_WINDOW_NS:
             self._waves.popleft()
 
+    def _jumped(self) -> bool:
+        """Whether no two crystals could have got from the wave before to the newest one: a phone slept, however long ago that wave is."""
+        if len(self._waves) < 2:
+            return False
+        before, newest = self._waves[-2], self._waves[-1]
+        low = _carried(before.lower, newest.upper[0], 0.0, -MAX_SKEW)
+        high = _carried(before.upper, newest.lower[0], 0.0, MAX_SKEW)
+        return low > newest.upper[1] or high < newest.lower[1]
+
     def _solve(self) -> ClockEstimate:
         newest = self._waves[-1]
+        if self._jumped():
+            self._waves = deque([newest])
         reference_ns = newest.upper[0]
         skew, skew_uncertainty = self._skew()
         recent = [wave for wave in self._waves if reference_ns - wave.lower[0] <= WINDOW_NS]
@@ -152,4 +163,4 @@ class ClockEstimator:
 def _carried(fact: tuple[int, int], reference_ns: int, skew: float, margin: float) -> int:
     """Move a one-way fact to the reference time along the skew, widened by what the skew is not known by."""
     age_ns = reference_ns - fact[0]
-    return fact[1] + round(skew * age_ns + margin * age_ns)
+    return fact[1] + round(skew * age_ns + margin * abs(age_ns))

@@ -107,6 +107,47 @@ class Pairing(Generic[B, H]):
 
     def decide(self, now_ns: int) -> list[Outcome[B, H]]:
         """Settle all that can be settled; also to be called when time has passed without a frame."""
+        return self._settle(now_ns)
+
+    def evict_host(self, before_ns: int) -> list[Outcome[B, H]]:
+        """Give up host frames older than this; no board frame that old can still come."""
+        outcomes: list[Outcome[B, H]] = []
+        while self._host and self._host[0][0] < before_ns:
+            outcomes.append(HostOrphan(self._host.popleft()[1], OrphanReason.NO_PARTNER))
+            self._undecided_since_ns = None
+        return outcomes
+
+    def evict_board(self, before_ns: int) -> list[Outcome[B, H]]:
+        """Give up board frames older than this; no host frame that old can still come."""
+        outcomes: list[Outcome[B, H]] = []
+        while self._board and self._board[0][0] < before_ns:
+            outcomes.append(BoardOrphan(self._board.popleft()[1], OrphanReason.NO_PARTNER))
+            self._undecided_since_ns = None
+        return outcomes
+
+    def evict_oldest_host(self) -> list[Outcome[B, H]]:
+        """Give up the oldest host frame because memory is short."""
+        self._undecided_since_ns = None
+        return [HostOrphan(self._host.popleft()[1], OrphanReason.EVICTED)] if self._host else []
+
+    def restart(self, reason: OrphanReason) -> list[Outcome[B, H]]:
+        """Give up all board frames and forget their last stamp: another board clock or session follows."""
+        outcomes: list[Outcome[B, H]] = [BoardOrphan(frame, reason) for _, frame in self._board]
+        self._board.clear()
+        self._last_board_ns = -(2**63)
+        self._undecided_since_ns = None
+        return outcomes
+
+    def finish(self) -> list[Outcome[B, H]]:
+        """Pair what can be paired without waiting for better, then give up the rest: no frame will follow."""
+        outcomes = self._settle(None)
+        outcomes += self.restart(OrphanReason.STREAM_ENDED)
+        outcomes += [HostOrphan(frame, OrphanReason.STREAM_ENDED) for _, frame in self._host]
+        self._host.clear()
+        return outcomes
+
+    def _settle(self, now_ns: int | None) -> list[Outcome[B, H]]:
+        """Settle the heads as long as that is possible; without a time nothing better is waited for."""
         outcomes: list[Outcome[B, H]] = []
         while self._board and self._host:
             skew_ns = self._board[0][0] - self._host[0][0]
@@ -115,44 +156,11 @@ class Pairing(Generic[B, H]):
                 outcomes.append(self._pop_earlier(skew_ns))
             elif self._better_known(skew_ns):
                 outcomes.append(self._pop_earlier(skew_ns))
-            elif self._better_expected(skew_ns) and not self._waited(now_ns):
+            elif now_ns is not None and self._better_expected(skew_ns) and not self._waited(now_ns):
                 return outcomes
             else:
                 outcomes.append(Paired(self._board.popleft()[1], self._host.popleft()[1], skew_ns))
             self._undecided_since_ns = None
-        return outcomes
-
-    def evict_host(self, before_ns: int) -> list[Outcome[B, H]]:
-        """Give up host frames older than this; no board frame that old can still come."""
-        outcomes: list[Outcome[B, H]] = []
-        while self._host and self._host[0][0] < before_ns:
-            outcomes.append(HostOrphan(self._host.popleft()[1], OrphanReason.NO_PARTNER))
-        return outcomes
-
-    def evict_board(self, before_ns: int) -> list[Outcome[B, H]]:
-        """Give up board frames older than this; no host frame that old can still come."""
-        outcomes: list[Outcome[B, H]] = []
-        while self._board and self._board[0][0] < before_ns:
-            outcomes.append(BoardOrphan(self._board.popleft()[1], OrphanReason.NO_PARTNER))
-        return outcomes
-
-    def evict_oldest_host(self) -> list[Outcome[B, H]]:
-        """Give up the oldest host frame because memory is short."""
-        return [HostOrphan(self._host.popleft()[1], OrphanReason.EVICTED)] if self._host else []
-
-    def restart(self, reason: OrphanReason) -> list[Outcome[B, H]]:
-        """Give up all board frames and forget their last stamp: another board clock or session follows."""
-        outcomes: list[Outcome[B, H]] = [BoardOrphan(frame, reason) for _, frame in self._board]
-        self._board.clear()
-        self._last_board_ns = -(2**63)
-        return outcomes
-
-    def finish(self) -> list[Outcome[B, H]]:
-        """Pair what can be paired without waiting for better, then give up the rest: no frame will follow."""
-        outcomes = self.decide(2**63 - 1)
-        outcomes += self.restart(OrphanReason.STREAM_ENDED)
-        outcomes += [HostOrphan(frame, OrphanReason.STREAM_ENDED) for _, frame in self._host]
-        self._host.clear()
         return outcomes
 
     def _pop_earlier(self, skew_ns: int) -> Outcome[B, H]:
