@@ -1,0 +1,215 @@
+"""The meeting point of the host's threads: nothing is lost from its account, whoever is faster."""
+
+import threading
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common import now
+from common.frame import Frame, PixelFormat
+from common.ledger import BoardMarks
+from common.protocol.message import FrameMessage
+from common.stamp import HOST_CLOCK, Stamp
+from phone_host.model import BoardFrame, FramePair
+from phone_host.pairqueue import PairCounts, PairQueue
+from phone_host.sync.fifo import FifoSettings, Overflow
+
+MS = 1_000_000
+PERIOD_NS = 33 * MS
+
+
+def board_frame(sequence: int, exposed_ns: int, received_ns: int | None = None) -> BoardFrame:
+    """A frame that the board exposed at this time of the host's clock."""
+    marks = BoardMarks(exposed_ns, exposed_ns, exposed_ns)
+    message = FrameMessage("s", sequence, sequence, 1, 1, PixelFormat.MJPEG, None, marks, b"")
+    return BoardFrame(message, "tcp", marks, exposed_ns if received_ns is None else received_ns, 0, 0)
+
+
+def host_frame(sequence: int, exposed_ns: int, payload: bytes = b"") -> Frame:
+    """A frame of the own camera."""
+    stamp = Stamp(exposed_ns, HOST_CLOCK)
+    return Frame(sequence, stamp, stamp, 1, 1, PixelFormat.MJPEG, None, payload)
+
+
+def queue_of(depth: int = 1, overflow: Overflow = Overflow.DROP_OLDEST) -> PairQueue:
+    """A queue whose board session has begun."""
+    queue = PairQueue(FifoSettings(depth, overflow), None, PERIOD_NS)
+    queue.begin(PERIOD_NS)
+    return queue
+
+
+def check(counts: PairCounts) -> None:
+    """Both laws of conservation, and that of the host's own frames."""
+    assert counts.received == counts.paired + sum(n for _, n in counts.board_orphans) + counts.held_board
+    assert counts.host_frames == counts.paired + sum(n for _, n in counts.host_orphans) + counts.held_host
+    assert counts.paired == counts.taken + counts.dropped + counts.waiting
+
+
+@given(
+    st.integers(1, 4),
+    st.sampled_from(Overflow),
+    st.lists(st.tuples(st.sampled_from("bhhbbttB"), st.integers(-1, 3)), max_size=60),
+)
+@settings(deadline=None, max_examples=100)
+def test_account_holds_after_every_call(depth: int, overflow: Overflow, acts: list[tuple[str, int]]) -> None:
+    """After any call, also for doubled, late and missing frames and new sessions, every frame and pair is accounted for."""
+    queue = queue_of(depth, overflow)
+    start_ns = now.monotonic_ns()
+    board = host = 0
+    for act, step in acts:
+        match act:
+            case "b":
+                board += step
+                queue.add_board(board_frame(board, start_ns + board * PERIOD_NS))
+            case "h":
+                host += step
+                queue.add_host(host_frame(host, start_ns + host * PERIOD_NS, b"x" * 100))
+            case "t":
+                queue.tick()
+            case _:
+                queue.begin(PERIOD_NS + step)
+        counts = queue.counts
+        check(counts)
+        assert counts.waiting <= depth
+        assert 0 <= queue.free_slots() <= depth
+    queue.finish()
+    check(queue.counts)
+    assert queue.counts.held_board == queue.counts.held_host == 0
+    while queue.take() is not None:
+        check(queue.counts)
+    assert queue.counts.waiting == 0
+
+
+@pytest.mark.parametrize("overflow", Overflow)
+def test_account_holds_between_real_threads(overflow: Overflow) -> None:
+    """Two threads feed, one takes, one reads the account: it holds at every look, and pairs come out in order, right and once."""
+    queue = queue_of(3, overflow)
+    start_ns = now.monotonic_ns()
+    taken: list[FramePair] = []
+    failures: list[BaseException] = []
+    fed = threading.Event()
+
+    def thread(work: Callable[[], None]) -> threading.Thread:
+        def guarded() -> None:
+            try:
+                work()
+            except BaseException as error:  # noqa: BLE001 - handed to the test's own thread
+                failures.append(error)
+
+        return threading.Thread(target=guarded)
+
+    def feed_board() -> None:
+        for i in range(400):
+            if i % 7:  # the link loses some
+                queue.add_board(board_frame(i, start_ns + i * PERIOD_NS + 2 * MS))
+
+    def feed_host() -> None:
+        for i in range(400):
+            if i % 11:
+                queue.add_host(host_frame(i, start_ns + i * PERIOD_NS))
+
+    def take() -> None:
+        while (pair := queue.take()) is not None:
+            taken.append(pair)
+
+    def look() -> None:
+        while not fed.is_set():
+            check(queue.counts)
+            queue.tick()
+
+    feeders = [thread(feed_board), thread(feed_host)]
+    others = [thread(take), thread(look)]
+    for item in feeders + others:
+        item.start()
+    for item in feeders:
+        item.join()
+    fed.set()
+    queue.finish()
+    for item in others:
+        item.join()
+    assert not failures
+    counts = queue.counts
+    check(counts)
+    assert counts.paired == sum(1 for i in range(400) if i % 7 and i % 11)
+    assert len(taken) == counts.taken
+    numbers = [pair.board.message.sequence for pair in taken]
+    assert numbers == sorted(set(numbers))
+    for pair in taken:
+        assert pair.host.sequence == pair.board.message.sequence
+        assert pair.time_skew_ns == 2 * MS
+        assert pair.paired_ns <= pair.queued_ns
+
+
+def test_host_frames_are_bounded_in_bytes() -> None:
+    """Own frames that wait for a slow link take at most 64 MB; the oldest ones give way, with that reason."""
+    queue = queue_of()
+    start_ns = now.monotonic_ns()
+    payload = bytes(5 * 2**20)
+    for i in range(20):
+        queue.add_host(host_frame(i, start_ns + i * PERIOD_NS, payload))
+        assert queue.counts.held_host * len(payload) <= 64 * 2**20
+    assert queue.counts.held_host == 12  # floor(64 / 5)
+    assert dict(queue.counts.host_orphans) == {"evicted": 8}
+    queue.add_board(board_frame(19, start_ns + 19 * PERIOD_NS))
+    assert queue.counts.paired == 1
+
+
+def test_host_frames_wait_as_long_as_the_link_delays() -> None:
+    """A host frame is kept for two seconds at first; once a delay of 10 s has been measured, for that long."""
+    queue = queue_of()
+    now_ns = now.monotonic_ns()
+    queue.add_host(host_frame(0, now_ns - 3000 * MS))
+    assert dict(queue.counts.host_orphans) == {"no_partner": 1}
+    queue.add_board(board_frame(0, now_ns - 10_000 * MS, now_ns))
+    queue.add_host(host_frame(1, now_ns - 2900 * MS))
+    assert queue.counts.held_host == 1
+
+
+def test_a_new_session_orphans_what_the_old_one_left() -> None:
+    """Board frames held from an earlier session end as orphans with that reason; own frames stay for the new one."""
+    queue = queue_of()
+    start_ns = now.monotonic_ns()
+    queue.add_board(board_frame(5, start_ns + 5 * PERIOD_NS))
+    queue.begin(PERIOD_NS)
+    assert queue.counts.held_board == 0
+    assert dict(queue.counts.board_orphans) == {"stream_ended": 1}
+    queue.add_host(host_frame(5, start_ns + 5 * PERIOD_NS))
+    assert queue.counts.held_host == 1
+    queue.begin(PERIOD_NS)
+    queue.add_board(board_frame(0, start_ns + 5 * PERIOD_NS))  # older than the last one of the session before
+    assert queue.counts.paired == 1
+
+
+def test_own_frames_before_any_board_are_counted_not_kept() -> None:
+    """Without a board nothing is kept: own frames are orphans with that reason."""
+    queue = PairQueue(FifoSettings(), None, PERIOD_NS)
+    queue.add_host(host_frame(0, 0, bytes(100)))
+    assert dict(queue.counts.host_orphans) == {"no_board": 1}
+    assert queue.tolerance_ns == PERIOD_NS // 2
+
+
+def test_places_held_by_frames_without_partner_are_not_free() -> None:
+    """With blocking overflow a place that a held board frame will need is not granted again."""
+    queue = queue_of(2, Overflow.BLOCK)
+    start_ns = now.monotonic_ns()
+    assert queue.free_slots() == 2
+    queue.add_board(board_frame(0, start_ns))
+    assert queue.free_slots() == 1
+    queue.add_host(host_frame(0, start_ns))
+    assert queue.free_slots() == 1
+    assert queue.take() is not None
+    assert queue.free_slots() == 2
+
+
+def test_the_end_releases_a_waiting_worker() -> None:
+    """A worker that waits for a pair is let go when there will be none any more."""
+    queue = queue_of()
+    ended: list[FramePair | None] = []
+    worker = threading.Thread(target=lambda: ended.append(queue.take()))
+    worker.start()
+    queue.finish()
+    worker.join(60)
+    assert ended == [None]
+    assert queue.take() is None
