@@ -7,6 +7,7 @@ anything is accepted. A high-water mark does not bound the age of frames; credit
 import errno
 import os
 import socket
+import stat
 from collections.abc import Iterator, Sequence
 from typing import Final
 
@@ -213,6 +214,20 @@ def _explained(address: str, error: zmq.ZMQError, remedy: str) -> SettingsError 
     return SettingsError(f"link {address!r} makes no sense ({error.strerror})", remedy)
 
 
+def _check_replaceable(path: str) -> None:
+    """Refuse a path that holds something else than a socket: ZeroMQ unlinks whatever is there.
+
+    Raises:
+        UnavailableError: it does.
+    """
+    try:
+        mode = os.lstat(path).st_mode
+    except OSError:
+        return
+    if not stat.S_ISSOCK(mode):
+        raise UnavailableError(f"ipc://{path} is a file that is no socket", "choose another path with --link")
+
+
 def _free_path(path: str) -> None:
     """Remove the socket of a listener that died; ZeroMQ would silently take the path even of one that lives.
 
@@ -229,6 +244,7 @@ def _free_path(path: str) -> None:
         try:
             probe.connect(path)
         except (FileNotFoundError, ConnectionRefusedError):
+            _check_replaceable(path)
             return  # ZeroMQ itself unlinks a dead socket
         except OSError as error:
             raise UnavailableError(
