@@ -82,62 +82,62 @@ def test_account_holds_after_every_call(depth: int, overflow: Overflow, acts: li
     assert queue.counts.waiting == 0
 
 
+def in_threads(*works: Callable[[], None]) -> Callable[[], None]:
+    """Start each work in a thread of its own; what is given waits for all of them and raises the first failure."""
+    failures: list[BaseException] = []
+
+    def guarded(work: Callable[[], None]) -> None:
+        try:
+            work()
+        except BaseException as error:  # noqa: BLE001 - handed to the test's own thread
+            failures.append(error)
+
+    threads = [threading.Thread(target=guarded, args=(work,)) for work in works]
+    for thread in threads:
+        thread.start()
+
+    def join() -> None:
+        for thread in threads:
+            thread.join()
+        assert failures == []
+
+    return join
+
+
 @pytest.mark.parametrize("overflow", Overflow)
 def test_account_holds_between_real_threads(overflow: Overflow) -> None:
     """Two threads feed, one takes, one reads the account: it holds at every look, and pairs come out in order, right and once."""
     queue = queue_of(3, overflow)
     start_ns = now.monotonic_ns()
     taken: list[FramePair] = []
-    failures: list[BaseException] = []
     fed = threading.Event()
-
-    def thread(work: Callable[[], None]) -> threading.Thread:
-        def guarded() -> None:
-            try:
-                work()
-            except BaseException as error:  # noqa: BLE001 - handed to the test's own thread
-                failures.append(error)
-
-        return threading.Thread(target=guarded)
+    of_board, of_host = ([i for i in range(400) if i % lost] for lost in (7, 11))  # each side loses some
 
     def feed_board() -> None:
-        for i in range(400):
-            if i % 7:  # the link loses some
-                queue.add_board(board_frame(i, start_ns + i * PERIOD_NS + 2 * MS))
+        for i in of_board:
+            queue.add_board(board_frame(i, start_ns + i * PERIOD_NS + 2 * MS))
 
     def feed_host() -> None:
-        for i in range(400):
-            if i % 11:
-                queue.add_host(host_frame(i, start_ns + i * PERIOD_NS))
-
-    def take() -> None:
-        while (pair := queue.take()) is not None:
-            taken.append(pair)
+        for i in of_host:
+            queue.add_host(host_frame(i, start_ns + i * PERIOD_NS))
 
     def look() -> None:
         while not fed.is_set():
             check(queue.counts)
             queue.tick()
 
-    feeders = [thread(feed_board), thread(feed_host)]
-    others = [thread(take), thread(look)]
-    for item in feeders + others:
-        item.start()
-    for item in feeders:
-        item.join()
+    feeders = in_threads(feed_board, feed_host)
+    others = in_threads(lambda: taken.extend(iter(queue.take, None)), look)
+    feeders()
     fed.set()
     queue.finish()
-    for item in others:
-        item.join()
-    assert not failures
-    counts = queue.counts
-    check(counts)
-    assert counts.paired == sum(1 for i in range(400) if i % 7 and i % 11)
-    assert len(taken) == counts.taken
+    others()
+    check(queue.counts)
+    assert queue.counts.paired == len(set(of_board) & set(of_host))
+    assert queue.counts.taken == len(taken)
     numbers = [pair.board.message.sequence for pair in taken]
-    assert numbers == sorted(set(numbers))
+    assert numbers == sorted(set(numbers)) == [pair.host.sequence for pair in taken]
     for pair in taken:
-        assert pair.host.sequence == pair.board.message.sequence
         assert pair.time_skew_ns == 2 * MS
         assert pair.paired_ns <= pair.queued_ns
 
