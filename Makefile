@@ -15,10 +15,10 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test $(PARTS:%=test-%) lint types bench lock clean
+.PHONY: help venv demo test $(PARTS:%=test-%) test-board deb lint types bench lock clean
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 venv: $(READY) ## create or update the virtual environment .venv (the targets below do so by themselves)
 
@@ -33,6 +33,13 @@ test: $(READY) ## unit, contract and system tests, with the minutes of each part
 
 $(PARTS:%=test-%): test-%: $(READY) # one part alone: make test-unit
 	@.ci/test $*
+
+test-board: $(READY) ## tests on a booted virtual board (the first time builds its image: apt and root)
+	@.ci/board
+	@.ci/test vm
+
+deb: ## the board's Debian package, into dist
+	@deploy/board/build-deb dist
 
 lint: $(READY) ## ruff (rules and format) and the layers of the packages
 	@$(BIN)/ruff check --quiet .

@@ -1,0 +1,229 @@
+"""A booted board: Debian with its own kernel and systemd in QEMU, reached over ssh, its link's port on this machine.
+
+Two network cards: eth0 for the test's orders and the webcam, eth1 for the board's link alone, so that a test can make the link bad and
+nothing else. The disk image is never changed; what a test writes is gone when the guest stops.
+"""
+
+import shlex
+import subprocess
+import tarfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from tests.support.programs import PATIENCE_S, free_port
+
+LINK_PORT: Final = 5555
+UNIT: Final = "board-agent"
+
+_BOOT_S: Final = 180.0
+"""Boot takes 11 s on an idle machine, 56 s were seen on a busy one."""
+
+_COMMAND_LINE: Final = (
+    # The HPET counts this machine's nanoseconds. The emulated TSC would be measured against it at boot, wrongly on a busy machine.
+    "console=ttyS0 quiet loglevel=4 panic=-1 mitigations=off nokaslr selinux=0 apparmor=0 audit=0 clocksource=hpet tsc=unstable "
+    "random.trust_cpu=on net.ifnames=0 systemd.show_status=0"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """A guest's files as build-guest leaves them.
+
+    Attributes:
+        folder: rootfs.ext4, vmlinuz, initrd.img and key.
+    """
+
+    folder: Path
+
+    @property
+    def built(self) -> bool:
+        """Whether all of them are there."""
+        return all((self.folder / name).is_file() for name in ("rootfs.ext4", "vmlinuz", "initrd.img", "key"))
+
+
+class Guest:
+    """A virtual board.
+
+    Args:
+        image: what to boot.
+        folder: for console, pid and ssh's socket.
+    """
+
+    def __init__(self, image: Image, folder: Path) -> None:
+        self._image = image
+        self._folder = folder
+        self._ssh_port, self.link_port = free_port(), free_port()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._key = folder / "key"
+
+    @property
+    def link(self) -> str:
+        """Where a host on this machine reaches the board's link."""
+        return f"tcp://127.0.0.1:{self.link_port}"
+
+    def start(self) -> None:
+        """Boot, and wait until it takes orders."""
+        self._key.write_bytes((self._image.folder / "key").read_bytes())
+        self._key.chmod(0o600)
+        network = [
+            *("-netdev", f"user,id=orders,net=10.0.2.0/24,hostfwd=tcp:127.0.0.1:{self._ssh_port}-10.0.2.15:22"),
+            *("-device", "virtio-net-pci,netdev=orders,romfile="),
+            *("-netdev", f"user,id=link,net=10.0.3.0/24,hostfwd=tcp:127.0.0.1:{self.link_port}-10.0.3.15:{LINK_PORT}"),
+            *("-device", "virtio-net-pci,netdev=link,romfile="),
+        ]
+        disk = f"id=disk,if=none,format=raw,file={self._image.folder / 'rootfs.ext4'},snapshot=on,cache=unsafe"
+        command = [
+            *("qemu-system-x86_64", "-M", "q35", "-accel", "tcg,thread=multi,tb-size=512", "-cpu", "max"),
+            *("-smp", "2", "-m", "512", "-nodefaults", "-no-user-config", "-vga", "none", "-display", "none"),
+            *("-kernel", str(self._image.folder / "vmlinuz"), "-initrd", str(self._image.folder / "initrd.img")),
+            *("-append", _COMMAND_LINE, "-serial", f"file:{self._folder / 'console'}", "-device", "virtio-rng-pci"),
+            *("-drive", disk, "-device", "virtio-blk-pci,drive=disk", *network),
+        ]
+        with (self._folder / "qemu.log").open("wb") as log:
+            self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+        self.await_boot()
+
+    def await_boot(self) -> None:
+        """Wait until systemd has started everything."""
+        deadline = time.monotonic() + _BOOT_S
+        while self._ssh("systemctl is-system-running --wait").returncode == _SSH_FAILED:
+            assert self._process is not None
+            assert self._process.poll() is None, (self._folder / "qemu.log").read_text()
+            assert time.monotonic() < deadline, f"no boot within {_BOOT_S:.0f} s: {self.console[-2000:]}"
+            time.sleep(0.3)
+
+    @property
+    def console(self) -> str:
+        """What the guest's kernel has said so far."""
+        return (self._folder / "console").read_text(errors="replace")
+
+    def stop(self) -> None:
+        """Pull the plug."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+
+    def sh(self, command: str) -> str:
+        """Run a shell command as root; gives its output, fails if it fails."""
+        done = self._ssh(command)
+        assert done.returncode == 0, f"{command}: exit {done.returncode}\n{done.stdout}{done.stderr}"
+        return done.stdout
+
+    def code(self, command: str) -> int:
+        """Run a shell command as root; gives its exit code."""
+        return self._ssh(command).returncode
+
+    def put(self, source: Path, folder: str) -> None:
+        """Copy a file or folder into a folder of the guest."""
+        receiving = self._ssh_command(f"mkdir -p {shlex.quote(folder)} && tar -x -C {shlex.quote(folder)}")
+        with subprocess.Popen(receiving, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as receiver:
+            assert receiver.stdin is not None
+            with tarfile.open(fileobj=receiver.stdin, mode="w|") as archive:
+                archive.add(source, arcname=source.name, filter=_as_root)
+            receiver.stdin.close()
+            assert receiver.wait(PATIENCE_S) == 0
+
+    def show(self, name: str, unit: str = UNIT) -> str:
+        """Give one property of a unit, such as ActiveState or StatusText."""
+        return self.sh(f"systemctl show {unit} -p {name} --value").strip()
+
+    def journal(self, unit: str = UNIT) -> str:
+        """Everything a unit has logged, this boot."""
+        return self.sh(f"journalctl -b -u {unit} -o cat --no-pager")
+
+    def until(self, name: str, wanted: str, what: str) -> None:
+        """Wait until a property of the service holds a text."""
+        deadline = time.monotonic() + PATIENCE_S
+        while wanted not in (found := self.show(name)):
+            late = (
+                f"not within {PATIENCE_S:.0f} s: {what}; {name} is {found!r}, not {wanted!r}\n{self.journal()[-2000:]}"
+            )
+            assert time.monotonic() < deadline, late
+            time.sleep(0.1)
+
+    def write(self, path: str, text: str) -> None:
+        """Write a text file in the guest."""
+        self.sh(f"printf %s {shlex.quote(text)} > {shlex.quote(path)}")
+
+    def clock(self) -> "GuestClock":
+        """Open an echo of the guest's CLOCK_MONOTONIC."""
+        return GuestClock(self._ssh_command(f"python3 -u -c {shlex.quote(_ECHO)}"))
+
+    def popen(self, command: str) -> "subprocess.Popen[bytes]":
+        """Start a command that goes on; the caller ends it."""
+        return subprocess.Popen(self._ssh_command(command), stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+    def _ssh(self, command: str) -> "subprocess.CompletedProcess[str]":
+        return subprocess.run(
+            self._ssh_command(command),
+            capture_output=True,
+            text=True,
+            check=False,
+            stdin=subprocess.DEVNULL,
+            timeout=180,
+        )
+
+    def _ssh_command(self, command: str) -> list[str]:
+        options = (
+            "StrictHostKeyChecking=no",
+            "UserKnownHostsFile=/dev/null",
+            "ConnectTimeout=5",
+            "LogLevel=ERROR",
+            "ControlMaster=auto",
+            f"ControlPath={self._folder}/ssh",
+            "ControlPersist=60",
+        )
+        flags = [word for option in options for word in ("-o", option)]
+        return ["ssh", "-F", "none", "-i", str(self._key), "-p", str(self._ssh_port), *flags, "root@127.0.0.1", command]
+
+
+_SSH_FAILED: Final = 255
+
+_ECHO: Final = "import sys, time\nfor _ in sys.stdin: print(time.monotonic_ns())"
+
+
+class GuestClock:
+    """Reads the guest's CLOCK_MONOTONIC from outside: the truth that the product's own estimate is checked against.
+
+    Args:
+        command: starts the echo.
+    """
+
+    def __init__(self, command: list[str]) -> None:
+        self._echo = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
+
+    def offset_ns(self) -> tuple[int, int]:
+        """Measure guest's clock minus this machine's.
+
+        Returns:
+            The offset and its greatest error, ns: half of the shortest of 50 round trips.
+        """
+        readings = []
+        for _ in range(50):
+            before_ns = time.monotonic_ns()
+            there_ns = self._ask()
+            after_ns = time.monotonic_ns()
+            readings.append((after_ns - before_ns, there_ns - (before_ns + after_ns) // 2))
+        round_trip_ns, offset_ns = min(readings)
+        return offset_ns, round_trip_ns // 2
+
+    def close(self) -> None:
+        """End the echo."""
+        self._echo.kill()
+        self._echo.wait()
+
+    def _ask(self) -> int:
+        assert self._echo.stdin is not None
+        assert self._echo.stdout is not None
+        self._echo.stdin.write(b"\n")
+        return int(self._echo.stdout.readline())
+
+
+def _as_root(member: tarfile.TarInfo) -> tarfile.TarInfo:
+    member.uid = member.gid = 0
+    member.uname = member.gname = "root"
+    member.mode |= 0o444 | (0o111 if member.isdir() else 0)
+    return member

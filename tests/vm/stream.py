@@ -1,0 +1,136 @@
+"""A host outside the guest that pairs its own images with the board's, and the proof that each pair is right."""
+
+import json
+import re
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from tests.support.numbered import saved_numbers
+from tests.support.programs import Program, host, ledgers, lines, until
+from tests.vm.guest import Guest
+
+FPS: Final = 10
+FRAMES: Final = 600
+"""A minute of numbered images: a number names one moment of it."""
+
+_DELAYS: Final = ("capture_ns", "outbox_ns", "propagation_ns", "pairing_ns", "queuing_ns", "processing_ns")
+
+Skew = Callable[[int, int], float]
+"""From the numbers of a pair's left and right image the true time between their exposures, s."""
+
+
+def replay_skew(offset_ns: int) -> Skew:
+    """True time skew of two replays on two machines: image k is exposed at k / FPS of each machine's clock.
+
+    Args:
+        offset_ns: board's clock minus the host's, measured from outside.
+    """
+    lap_s = FRAMES / FPS
+
+    def skew(left: int, right: int) -> float:
+        return ((left - right) / FPS - offset_ns / 1e9 + lap_s / 2) % lap_s - lap_s / 2
+
+    return skew
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """A running host.
+
+    Attributes:
+        receiver: its process.
+        out: its folder of results.
+    """
+
+    receiver: Program
+    out: Path
+
+    @property
+    def pairs(self) -> int:
+        """Pairs so far."""
+        return lines(self.out / "delays.jsonl")
+
+    def more(self, pairs: int, when: str) -> None:
+        """Wait for so many further pairs."""
+        wanted = self.pairs + pairs
+        until(lambda: self.pairs >= wanted, f"{pairs} pairs {when}; host: {self.receiver.stderr[-1000:]}")
+
+    def finish(self, skew: Skew, slack_s: float = 0.002) -> dict[str, Any]:
+        """Stop the host and check every pair, every delay and every count.
+
+        Args:
+            skew: the truth.
+            slack_s: how far the truth itself may be off.
+
+        Returns:
+            The host's report.
+        """
+        assert self.receiver.stop() == 0, self.receiver.stderr
+        assert "Traceback" not in self.receiver.stderr
+        check_pairs(self.out, skew, slack_s)
+        check_delays(self.out)
+        report: dict[str, Any] = self.receiver.json()
+        check_counts(report)
+        return report
+
+
+@contextmanager
+def streaming(guest: Guest, right: Path, out: Path, arguments: tuple[str, ...] = ()) -> Iterator[Stream]:
+    """Run a host against the guest's board for the length of a block; every pair is saved."""
+    camera = f"replay:{right}?fps={FPS}&loop=1"
+    command = ["run", "--camera", camera, "--link", guest.link, "--out", str(out), "--save-every", "1", "--json"]
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with host([*command, "--log-level", "info", *arguments], out.parent, f"{out.name}-host") as receiver:
+        yield Stream(receiver, out)
+
+
+def check_pairs(out: Path, skew: Skew, slack_s: float) -> None:
+    """The images of every pair were exposed within half a period of each other, by the truth and not by the product's own word."""
+    numbers = saved_numbers(out)
+    assert numbers
+    wrong = [
+        (left, right, skew(left, right)) for left, right in numbers if abs(skew(left, right)) > 0.5 / FPS + slack_s
+    ]
+    assert not wrong, f"{len(wrong)} of {len(numbers)} pairs are wrong: {wrong[:10]}"
+
+
+def check_delays(out: Path) -> None:
+    """No delay is negative, and they add up to the end-to-end delay to the nanosecond."""
+    for ledger in ledgers(out):
+        assert sum(ledger[name] for name in _DELAYS) == ledger["end_to_end_ns"]
+        # The propagation delay is measured across two clocks: it may be too small by their uncertainty, no more.
+        assert ledger["propagation_ns"] > -ledger["uncertainty_ns"], ledger
+        assert all(ledger[name] >= 0 for name in _DELAYS if name != "propagation_ns"), ledger
+
+
+def check_counts(report: dict[str, Any]) -> None:
+    """What was sent was received or lost; what was received was paired, orphaned or is held."""
+    frames = report["frames"]
+    assert frames["received"] == frames["paired"] + frames["held"] + sum(frames["orphaned"].values()), frames
+    for session in report["sessions"]:
+        if session["tail"] == "known":
+            assert session["sent"] == session["received"] + session["lost"], session
+        else:
+            assert session["sent"] >= session["received"] + session["lost"], session
+
+
+_STOPPED: Final = re.compile(r' stopped session=(\w+) grabbed=(\d+) sent=(\d+) dropped=("?)(\{.*?\})\4 garbage=(\d+)')
+
+
+def board_accounts(journal: str) -> dict[str, dict[str, int]]:
+    """The accounts that ended sessions have left in the journal, by session: grabbed, sent, dropped (over all reasons)."""
+    accounts = {}
+    for session, grabbed, sent, _, dropped, _ in _STOPPED.findall(journal):
+        reasons: dict[str, int] = json.loads(dropped.replace("'", '"'))
+        accounts[session] = {"grabbed": int(grabbed), "sent": int(sent), "dropped": sum(reasons.values())}
+    return accounts
+
+
+def kill(stream: Stream) -> None:
+    """End the host as a crash does."""
+    stream.receiver.send(signal.SIGKILL)
+    stream.receiver.wait()

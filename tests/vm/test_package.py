@@ -1,0 +1,132 @@
+"""The package's life on a board: installed, serving, removed, purged, and installed again."""
+
+import json
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.support.programs import until
+from tests.vm.guest import UNIT, Guest
+
+pytestmark = pytest.mark.timeout(600)  # the first test boots the board
+
+# What a package may touch. /run and /proc live in memory; dpkg and systemd keep books of their own; ldconfig's cache is rewritten anyhow.
+_EVERYTHING = (
+    (
+        "find / -xdev ( -path /run -o -path /proc -o -path /sys -o -path /tmp -o -path /root -o -path /var/log -o -path /var/lib/dpkg "
+        "-o -path /var/lib/systemd -o -path /var/cache -o -path /var/tmp ) -prune -o -printf '%p %y %u %m\\n' | sort"
+    )
+    .replace("( ", r"\( ")
+    .replace(" )", r" \)")
+)
+
+
+@pytest.fixture(scope="module")
+def before(bare_guest: Guest) -> str:
+    """Every file of the board, and its users, before the package was ever installed."""
+    return bare_guest.sh(_EVERYTHING + "; cat /etc/passwd /etc/group")
+
+
+@pytest.fixture(scope="module")
+def installed(bare_guest: Guest, before: str, package: Path) -> Iterator[Guest]:
+    """The board with the package as it comes."""
+    assert before
+    bare_guest.put(package, "/root")
+    bare_guest.sh(f"dpkg -i /root/{package.name}")
+    yield bare_guest
+    bare_guest.sh("dpkg --purge tandemscan-board")
+
+
+def test_the_service_runs_after_installation_and_names_what_is_missing(installed: Guest) -> None:
+    """Without any further word the service is enabled and up, and its status names the camera that is not there yet."""
+    assert installed.show("UnitFileState") == "enabled"
+    installed.until("ActiveState", "active", "the service is up")
+    installed.until("StatusText", "waiting for the camera", "the service says what is missing")
+
+
+def test_the_service_is_its_own_user_in_two_groups(installed: Guest) -> None:
+    """The agent runs as the user tandemscan in the groups video and dialout, without any capability."""
+    process = installed.show("MainPID")
+    status = installed.sh(f"cat /proc/{process}/status")
+    groups = installed.sh("id -Gn tandemscan").split()
+    assert installed.sh(f"stat -c %U /proc/{process}").strip() == "tandemscan"
+    assert set(groups) == {"tandemscan", "video", "dialout"}
+    for name in ("CapEff", "CapPrm", "CapBnd", "CapAmb"):
+        assert f"{name}:\t0000000000000000" in status
+    assert "NoNewPrivs:\t1" in status
+
+
+def test_the_exposure_is_at_most_2(installed: Guest) -> None:
+    """systemd-analyze security gives the running unit an exposure of 2.0 at most."""
+    installed.sh(f"systemd-analyze security {UNIT} --threshold=20 --no-pager")
+
+
+def test_the_unit_is_understood_without_a_warning(installed: Guest) -> None:
+    """systemd-analyze verify has nothing to say about the unit."""
+    assert installed.sh(f"systemd-analyze verify --man=no {UNIT}.service 2>&1") == ""
+
+
+def test_the_launcher_ignores_a_foreign_common(installed: Guest) -> None:
+    """board-agent started in a folder that holds somebody else's `common` prints its own settings; the conffile is understood."""
+    installed.sh("mkdir -p /tmp/x/common && echo 'raise SystemExit(9)' > /tmp/x/common/__init__.py")
+    shown = installed.sh("cd /tmp/x && board-agent settings --json --config /etc/tandemscan/board-agent.toml")
+    origins = {name: setting["origin"] for name, setting in json.loads(shown).items()}
+    assert set(origins.values()) == {"/etc/tandemscan/board-agent.toml"}, "the conffile shows every setting"
+    installed.sh("rm -r /tmp/x")
+
+
+def test_byte_code_is_compiled_on_installation(installed: Guest) -> None:
+    """Each module has its byte code, because the service itself may not write any."""
+    assert installed.sh("find /usr/lib/tandemscan -name '*.py' | wc -l") == installed.sh(
+        "find /usr/lib/tandemscan -name '*.pyc' | wc -l"
+    )
+
+
+def test_a_changed_conffile_outlives_an_upgrade_and_the_service_is_restarted(installed: Guest, package: Path) -> None:
+    """Installing again keeps the owner's settings and starts the new code."""
+    installed.sh("echo '# mine' >> /etc/tandemscan/board-agent.toml")
+    process = installed.show("MainPID")
+    installed.sh(f"dpkg -i /root/{package.name}")
+    assert "# mine" in installed.sh("cat /etc/tandemscan/board-agent.toml")
+    until(lambda: installed.show("MainPID") not in {process, "0"}, "the service runs the new code")
+
+
+def test_a_settings_mistake_is_one_line_in_the_journal_and_heals_by_itself(installed: Guest) -> None:
+    """With a bad value the service says which one and keeps trying; once mended it comes up without being asked."""
+    installed.sh("cp -p /etc/tandemscan/board-agent.toml /root/good")
+    installed.write("/etc/tandemscan/board-agent.toml", 'camera = 7\nlink = ["tcp://*:5555"]\n')
+    installed.code(f"systemctl restart {UNIT}")
+    until(lambda: "camera in /etc/tandemscan/board-agent.toml is 7" in installed.journal(), "the mistake is named")
+    until(lambda: int(installed.show("NRestarts")) >= 6, "it never gives up: systemd's own default would after five")
+    installed.sh("cp -p /root/good /etc/tandemscan/board-agent.toml && rm /root/good")
+    installed.until("ActiveState", "active", "the service is back")
+    assert "Traceback" not in installed.journal()
+
+
+def test_removal_keeps_the_settings_and_purge_leaves_nothing(installed: Guest, before: str, package: Path) -> None:
+    """After removal only the conffile is left; after purge every file, user and group is as before the installation."""
+    installed.sh("dpkg --remove tandemscan-board")
+    assert installed.show("ActiveState") == "inactive"
+    assert "# mine" in installed.sh("cat /etc/tandemscan/board-agent.toml")
+    assert installed.code("test -e /usr/lib/tandemscan") != 0
+    installed.sh("dpkg --purge tandemscan-board")
+    after = installed.sh(_EVERYTHING + "; cat /etc/passwd /etc/group")
+    changed = set(before.splitlines()) ^ set(after.splitlines())
+    # Backups that the user tools themselves write, in every Debian.
+    assert {
+        line
+        for line in changed
+        if not line.startswith(("/etc/passwd- ", "/etc/group- ", "/etc/shadow- ", "/etc/gshadow- "))
+    } == set()
+    assert installed.show("LoadState") == "not-found"
+    installed.sh(f"dpkg -i /root/{package.name}")
+    installed.until("ActiveState", "active", "it can be installed again")
+
+
+def test_two_builds_are_equal_byte_for_byte(package: Path, tmp_path: Path) -> None:
+    """The package is reproducible, whatever the umask."""
+    script = Path(__file__).resolve().parents[2] / "deploy" / "board" / "build-deb"
+    subprocess.run(["sh", "-c", f"umask 077; '{script}' '{tmp_path}'"], check=True, capture_output=True)
+    assert (tmp_path / package.name).read_bytes() == package.read_bytes()
