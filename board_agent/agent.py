@@ -12,7 +12,7 @@ from board_agent.outbox import Outbox
 from board_agent.sd_notify import Notifier
 from board_agent.status import StatusLine
 from common import now
-from common.camera.base import Camera, Ended, Spoiled
+from common.camera.base import Camera, CameraHealth, Ended, Skipped, Spoiled
 from common.camera.factory import open_camera
 from common.errors import ProtocolError, UnavailableError
 from common.frame import Frame
@@ -43,12 +43,14 @@ class Summary:
         counts: what became of its frames.
         garbage: packets that were none of ours.
         ended: whether the camera came to its end (a replay without loop).
+        camera: how the camera has fared.
     """
 
     session: str
     counts: BoardCounts
     garbage: int
     ended: bool
+    camera: CameraHealth
 
 
 def wait_for_camera(uri: str, clock: str, wake: socket.socket, notifier: Notifier) -> Camera | None:
@@ -112,6 +114,7 @@ class Agent:
         boot_id: id of the machine's boot.
         wake: readable end of a socket that is written to by signals.
         service: told that the loop goes round; None outside a service.
+        idle_ns: after this time without a host the camera rests; None: never.
     """
 
     def __init__(
@@ -123,8 +126,11 @@ class Agent:
         wake: socket.socket,
         *,
         service: Service | None = None,
+        idle_ns: int | None = None,
     ) -> None:
         self._service = service
+        self._idle_ns = idle_ns
+        self._alone_since_ns = now.monotonic_ns()
         self._camera = camera
         self._links = links
         self._wake = wake
@@ -152,37 +158,47 @@ class Agent:
         """
         now_ns = now.monotonic_ns()
         while not self._stopping and not (self._camera_ended and self._outbox.waiting is None):
-            self._poll(self._due_ns(now_ns), now_ns)
-            self._grab(now.monotonic_ns())
+            camera_ready = self._poll(self._due_ns(now_ns), now_ns)
+            now_ns = now.monotonic_ns()
+            if camera_ready or self._on_demand or now_ns >= self._camera.due_ns(now_ns):
+                self._grab(now_ns)
             self._flush()
             now_ns = now.monotonic_ns()
             if now_ns >= self._session.due_ns:
                 self._send_all(self._session.tick(now_ns, self._outbox.counts))
-            self._watch_host()
+            self._watch_host(now_ns)
             if self._service is not None:
                 self._service.alive(now_ns, self._outbox.counts, has_host=self._session.has_host)
         if self._camera_ended and not self._stopping:
             self._drain()
         self._outbox.discard(DropReason.STOPPED)
         self._send_all(self._session.leave(self._outbox.counts))
-        return Summary(self._session.session, self._outbox.counts, self._garbage, self._camera_ended)
+        return Summary(
+            self._session.session, self._outbox.counts, self._garbage, self._camera_ended, self._camera.health
+        )
 
     def _due_ns(self, now_ns: int) -> int:
         if self._on_demand:
             return now_ns if self._session.has_credit else self._session.due_ns
         return min(self._session.due_ns, self._camera.due_ns(now_ns))
 
-    def _poll(self, due_ns: int, now_ns: int) -> None:
-        """Wait for whatever comes first and take all packets; rounded up, because waking early would only spin."""
+    def _poll(self, due_ns: int, now_ns: int) -> bool:
+        """Wait for whatever comes first and take all packets; rounded up, because waking early would only spin.
+
+        Returns:
+            Whether the camera's descriptor is readable.
+        """
         wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
         ready = self._poller.poll(wait_ms)
         if not ready:
-            return
-        if any(item == self._wake.fileno() for item, _ in ready):
+            return False
+        woken = [item for item, _ in ready]
+        if self._wake.fileno() in woken:
             self._stopping = True
         for index, link in enumerate(self._links):
             for incoming in link.receive():
                 self._take(index, incoming)
+        return self._camera.pollable in woken
 
     def _take(self, index: int, incoming: Packet | Broken | Garbage) -> None:
         arrived_ns = now.monotonic_ns()
@@ -219,6 +235,8 @@ class Agent:
                 case Spoiled(sequence, fault):
                     self._outbox.spoiled()
                     _LOG.debug(event("frame_spoiled", sequence=sequence, fault=fault.value))
+                case Skipped():
+                    self._outbox.skipped()
                 case Ended():
                     self._camera_ended = True
 
@@ -248,10 +266,16 @@ class Agent:
             self._send_all(self._session.unreachable(outgoing.connection))
         return result
 
-    def _watch_host(self) -> None:
+    def _watch_host(self, now_ns: int) -> None:
+        """Note a host's coming and going; the camera rests when none has been there for a while."""
         if self._session.has_host != self._had_host:
             self._had_host = self._session.has_host
+            self._alone_since_ns = now_ns
             _LOG.info(event("host_connected" if self._had_host else "host_gone", session=self._session.session))
+            if self._had_host:
+                self._camera.resume(now_ns)
+        elif not self._had_host and self._idle_ns is not None and now_ns - self._alone_since_ns >= self._idle_ns:
+            self._camera.pause()
 
     def _drain(self) -> None:
         """Tell the host that this was all, and give it the time to take it in."""

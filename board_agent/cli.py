@@ -8,12 +8,13 @@ import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from board_agent.sd_notify import Notifier
 from board_agent.settings import ENVIRONMENT_PREFIX, BoardSettings
 from board_agent.status import StatusLine
 from common import logs, now
+from common.camera.base import CameraHealth
 from common.camera.factory import EXAMPLE, open_camera
 from common.errors import SettingsError, TandemError
 from common.link.factory import open_link, parse_link
@@ -28,13 +29,16 @@ if TYPE_CHECKING:
 _LOG: Final = logging.getLogger("board_agent")
 
 _EXAMPLES = """examples:
+  board-agent run --camera 'v4l2:/dev/video0?size=640x480&fps=30' --link 'tcp://*:5555'
   board-agent run --camera 'replay:frames?fps=30&loop=1'
   board-agent run --camera 'replay:frames?pace=demand' --link ipc:///tmp/board
   board-agent run --config /etc/tandemscan/board-agent.toml
+  board-agent cameras
   board-agent settings --json
 """
 
 INTERRUPTED = 130
+_LONGEST_IDLE_S: Final = 1e9
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -48,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = _parser().parse_args(arguments)
     try:
-        return _run(options) if options.verb == "run" else _settings(options)
+        return {"run": _run, "settings": _settings, "cameras": _cameras}[options.verb](options)
     except TandemError as error:
         if options.debug:
             raise
@@ -64,6 +68,12 @@ def _parser() -> argparse.ArgumentParser:
     show = verbs.add_parser(
         "settings", help="print each setting with its origin", description=_EXAMPLES, formatter_class=raw
     )
+    cameras = verbs.add_parser(
+        "cameras", help="list formats, rates and controls", description=_EXAMPLES, formatter_class=raw
+    )
+    for verb in (run, show, cameras):
+        verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
+        verb.add_argument("--debug", action="store_true", help="show tracebacks")
     for verb in (run, show):
         verb.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
         verb.add_argument("--camera", metavar="URI", help=EXAMPLE.replace("%", "%%"))
@@ -73,8 +83,6 @@ def _parser() -> argparse.ArgumentParser:
         verb.add_argument(
             "--log-level", choices=("debug", "info", "warning", "error"), help="how much to log to stderr"
         )
-        verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
-        verb.add_argument("--debug", action="store_true", help="show tracebacks")
     return parser
 
 
@@ -95,6 +103,14 @@ def _settings(options: argparse.Namespace) -> int:
     return 0
 
 
+def _cameras(options: argparse.Namespace) -> int:
+    from board_agent.cameras import list_cameras, table, values  # noqa: PLC0415 - needed by this verb alone
+
+    found = list_cameras()
+    print(json.dumps(values(found)) if options.json else table(found))
+    return 0
+
+
 def _run(options: argparse.Namespace) -> int:
     settings = _resolve(options).values
     if settings.log_level.upper() not in logging.getLevelNamesMapping():
@@ -102,21 +118,37 @@ def _run(options: argparse.Namespace) -> int:
     logs.set_up(logging.getLevelNamesMapping()[settings.log_level.upper()])
     if not settings.camera:
         raise SettingsError("no camera is given", f"use --camera {EXAMPLE}")
+    if not 0 <= settings.idle_after < _LONGEST_IDLE_S:
+        raise SettingsError(f"idle_after is {settings.idle_after}", "give seconds, 0 for never")
     signals = StopSignals()
     summary = _serve(settings, signals)
     session, counts = summary.session, {"grabbed": summary.counts.grabbed, "sent": summary.counts.sent}
     dropped = {reason.value: count for reason, count in summary.counts.dropped}
-    _LOG.info(logs.event("stopped", session=session, **counts, dropped=dropped, garbage=summary.garbage))
+    camera = _health(summary.camera)
+    _LOG.info(logs.event("stopped", session=session, **counts, dropped=dropped, garbage=summary.garbage, camera=camera))
     if options.json:
-        print(
-            json.dumps(
-                {"session": session, **counts, "dropped": dropped, "garbage": summary.garbage, "ended": summary.ended}
-            )
-        )
+        account = {"session": session, **counts, "dropped": dropped, "garbage": summary.garbage}
+        print(json.dumps({**account, "ended": summary.ended, "camera": camera}))
     else:
         drops = "".join(f", {count} {reason}" for reason, count in dropped.items()) or ", none dropped"
         print(f"session {session}: {counts['grabbed']} frames grabbed, {counts['sent']} sent{drops}", file=sys.stderr)
     return INTERRUPTED if signals.interrupted else 0
+
+
+def _health(health: CameraHealth) -> dict[str, Any]:
+    """A camera's health as a JSON object."""
+    return {
+        "state": health.state.value,
+        "missed": health.missed,
+        "faults": {fault.value: count for fault, count in health.faults},
+        "stalls": health.stalls,
+        "failures": health.failures,
+        "unplugged": health.unplugged,
+        "returned": health.returned,
+        "distrusted_stamps": health.distrusted_stamps,
+        "refused_controls": health.refused_controls,
+        "period_ms": None if health.period_ns is None else round(health.period_ns / 1e6, 3),
+    }
 
 
 def _serve(settings: BoardSettings, signals: StopSignals) -> "Summary":
@@ -132,12 +164,15 @@ def _serve(settings: BoardSettings, signals: StopSignals) -> "Summary":
         else:
             camera = open_camera(settings.camera, clock, now.monotonic_ns())
         if camera is None:
-            return Summary(session, BoardCounts(), 0, ended=False)
+            return Summary(session, BoardCounts(), 0, ended=False, camera=CameraHealth())
         opened.enter_context(closing(camera))
         links = [opened.enter_context(closing(open_link(uri))) for uri in uris]
         _LOG.info(logs.event("serving", session=session, camera=settings.camera, links=",".join(settings.link)))
+        idle_ns = round(settings.idle_after * 1e9) or None
         status = StatusLine(settings.camera, camera.description.pacing, settings.link, now.monotonic_ns())
-        summary = Agent(camera, links, session, boot_id, signals.reader, service=Service(notifier, status)).run()
+        summary = Agent(
+            camera, links, session, boot_id, signals.reader, service=Service(notifier, status), idle_ns=idle_ns
+        ).run()
         notifier.stopping("stopped")
         return summary
 

@@ -37,6 +37,11 @@ class Outbox:
         self._grabbed += 1
         self._drop(DropReason.SPOILED)
 
+    def skipped(self) -> None:
+        """Count a grab that a newer one had replaced before it was looked at."""
+        self._grabbed += 1
+        self._drop(DropReason.REPLACED)
+
     def sent(self) -> None:
         """Take note that the link took the waiting frame."""
         assert self._waiting is not None

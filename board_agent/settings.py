@@ -11,9 +11,12 @@ ENVIRONMENT_PREFIX = "BOARD_AGENT"
 class BoardSettings:
     """Settings of board-agent, from /etc/tandemscan/board-agent.toml or another file, the environment and options."""
 
-    camera: str = setting("", "camera URI, for example replay:PATH?fps=30&loop=1")
+    camera: str = setting("", "camera URI, for example v4l2:auto or v4l2:/dev/video0?size=640x480&fps=30")
     link: tuple[str, ...] = setting(("tcp://127.0.0.1:5555",), "links to serve; loopback unless told otherwise")
     wait_for_camera: bool = setting(
         default=False, doc="whether a missing camera is waited for; else it ends the program with exit 3"
+    )
+    idle_after: float = setting(
+        10.0, "seconds without a host after which the camera's stream is switched off; 0: never"
     )
     log_level: str = setting("info", "debug, info, warning or error")

@@ -14,14 +14,20 @@ class PixelFormat(Enum):
 
     MJPEG = "mjpeg"
     PNG = "png"
+    YUYV = "yuyv"
+    GREY = "grey"
+    NV12 = "nv12"
 
 
 class FrameFault(Enum):
-    """Why a frame's bytes are not the whole image that they claim to be."""
+    """Why a frame's bytes are not the whole image that they claim to be (flagged: its driver says so; stale: older than the stream)."""
 
     EMPTY = "empty"
     NO_START = "no_start"
     NO_END = "no_end"
+    WRONG_LENGTH = "wrong_length"
+    FLAGGED = "flagged"
+    STALE = "stale"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,18 +65,40 @@ _BRACKETS = {
 """First and last bytes of a whole image: JPEG ITU-T T.81 B.1.1.3 (SOI, EOI); PNG 1.2, 3.1 and 3.4 (signature, IEND with its CRC)."""
 
 
-def find_fault(pixel_format: PixelFormat, payload: Buffer) -> FrameFault | None:
+_RAW_BITS = {PixelFormat.YUYV: 16, PixelFormat.GREY: 8, PixelFormat.NV12: 12}
+"""Bits of one pixel of the raw formats, rows without padding: videodev2.h, V4L2_PIX_FMT_YUYV, _GREY, _NV12."""
+
+
+def raw_bytes(pixel_format: PixelFormat, width_px: int, height_px: int) -> int | None:
+    """How long a raw image is.
+
+    Args:
+        pixel_format: its encoding.
+        width_px: width, px.
+        height_px: height, px.
+
+    Returns:
+        Bytes; None for a compressed format.
+    """
+    bits = _RAW_BITS.get(pixel_format)
+    return None if bits is None else bits * width_px * height_px // 8
+
+
+def find_fault(pixel_format: PixelFormat, payload: Buffer, expected_bytes: int | None = None) -> FrameFault | None:
     """Check that encoded bytes begin and end as their format demands; the driver's error flag is not enough (DESIGN 5.5).
 
     Args:
         pixel_format: what the bytes claim to be.
         payload: the encoded image.
+        expected_bytes: length of a raw image (`raw_bytes`, or longer with padded rows); None: not checked.
 
     Returns:
         The fault, or None for a sound frame.
     """
     if not len(payload):
         return FrameFault.EMPTY
+    if pixel_format in _RAW_BITS:
+        return FrameFault.WRONG_LENGTH if expected_bytes is not None and len(payload) < expected_bytes else None
     start, end = _BRACKETS[pixel_format]
     if bytes(payload[: len(start)]) != start:
         return FrameFault.NO_START

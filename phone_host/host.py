@@ -149,6 +149,7 @@ class Host:
             fifo=self.settings.fifo,
             unwritten=self.results.unwritten,
             spoiled=self.source.spoiled,
+            skipped=self.source.skipped,
         )
 
     def _watch(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:

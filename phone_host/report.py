@@ -30,6 +30,7 @@ class RunFacts:
         fifo: depth and policy.
         unwritten: what the disk did not take.
         spoiled: own frames that were no whole images.
+        skipped: own frames that a newer one had replaced before they were looked at.
     """
 
     ended: str
@@ -44,6 +45,7 @@ class RunFacts:
     fifo: FifoSettings
     unwritten: Unwritten
     spoiled: int
+    skipped: int
 
     @property
     def pairs_per_second(self) -> float:
@@ -78,8 +80,9 @@ def build(facts: RunFacts) -> dict[str, object]:
             "before_clock": facts.link.no_clock,
         },
         "host_frames": {
-            "grabbed": facts.counts.host_frames + facts.spoiled,
+            "grabbed": facts.counts.host_frames + facts.spoiled + facts.skipped,
             "spoiled": facts.spoiled,
+            "skipped": facts.skipped,
             "paired": facts.counts.paired,
             "held": facts.counts.held_host,
             "orphaned": dict(facts.counts.host_orphans),

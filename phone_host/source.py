@@ -6,7 +6,7 @@ from collections.abc import Callable
 import zmq
 
 from common import now
-from common.camera.base import Camera, Ended, Grab, Spoiled
+from common.camera.base import Camera, Ended, Grab, Skipped, Spoiled
 from common.frame import Frame
 from common.protocol.message import Pacing
 
@@ -26,6 +26,7 @@ class Source:
         self._wanted = threading.Semaphore(0)
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
         self.spoiled = 0
+        self.skipped = 0
         self.ended = False
         self.failure: Exception | None = None
 
@@ -81,5 +82,7 @@ class Source:
                 self._deliver(grab)
             case Spoiled():
                 self.spoiled += 1
+            case Skipped():
+                self.skipped += 1
             case Ended():
                 self.ended = True

@@ -4,6 +4,7 @@ A camera never blocks: it says what to wait for (`pollable`, `due_ns`) and then 
 """
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import Protocol
 
 from common.frame import Frame, FrameFault
@@ -24,11 +25,59 @@ class Spoiled:
 
 
 @dataclass(frozen=True, slots=True)
+class Skipped:
+    """A grab that was passed over unread, because a newer one was there already; it has a sequence number like any other.
+
+    Attributes:
+        sequence: number of the grab.
+    """
+
+    sequence: int
+
+
+@dataclass(frozen=True, slots=True)
 class Ended:
     """No frame will follow."""
 
 
-Grab = Frame | Spoiled | Ended
+Grab = Frame | Spoiled | Skipped | Ended
+
+
+class CameraState(Enum):
+    """Whether frames come."""
+
+    RUNNING = "running"
+    PAUSED = "paused"
+    GONE = "gone"
+
+
+@dataclass(frozen=True, slots=True)
+class CameraHealth:
+    """How a camera has fared since it was opened.
+
+    Attributes:
+        state: whether frames come.
+        missed: frames that the camera took and the driver had no buffer for or lost on the bus (gaps in its numbers).
+        faults: number of spoiled grabs by what was wrong with them.
+        stalls: how often frames stayed away and the device was opened anew for it.
+        failures: how often the driver failed (EIO and the like) and the device was opened anew.
+        unplugged: how often the device vanished.
+        returned: how often the device was back after any of these.
+        distrusted_stamps: frames whose stamp could not be true, so that the moment of dequeuing stands for it.
+        refused_controls: controls that the driver would not set.
+        period_ns: time between frames as measured, ns; None where unknown.
+    """
+
+    state: CameraState = CameraState.RUNNING
+    missed: int = 0
+    faults: tuple[tuple[FrameFault, int], ...] = ()
+    stalls: int = 0
+    failures: int = 0
+    unplugged: int = 0
+    returned: int = 0
+    distrusted_stamps: int = 0
+    refused_controls: int = 0
+    period_ns: int | None = None
 
 
 class Camera(Protocol):
@@ -54,6 +103,20 @@ class Camera(Protocol):
 
     def anchor(self, first_ns: int) -> None:
         """Set the stamp of a demand-paced camera's first image, ns; later calls and other cameras take no notice."""
+
+    @property
+    def health(self) -> CameraHealth:
+        """How it has fared; values, for summaries and for those who watch."""
+
+    def pause(self) -> None:
+        """Take note that nobody listens: a device may rest. Again is harmless."""
+
+    def resume(self, now_ns: int) -> None:
+        """Take note that somebody listens again: frames come as soon as can be. Again is harmless.
+
+        Args:
+            now_ns: CLOCK_MONOTONIC now, ns.
+        """
 
     def close(self) -> None:
         """Let go of the device."""

@@ -8,7 +8,7 @@ from common.camera.replay import ReplayCamera, ReplaySettings
 from common.errors import SettingsError
 from common.protocol.message import Pacing
 
-EXAMPLE = "replay:PATH[?fps=30&loop=1&pace=clock|demand]"
+EXAMPLE = "v4l2:/dev/video0[?size=640x480&fps=30&format=mjpeg] or replay:PATH[?fps=30&loop=1&pace=clock|demand]"
 
 
 def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
@@ -28,9 +28,14 @@ def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
         DataError: a replay's images are bad.
     """
     scheme, found, rest = uri.partition(":")
-    if not found or scheme != "replay" or not rest:
+    if not found or scheme not in {"replay", "v4l2"} or (scheme == "replay" and not rest):
         raise SettingsError(f"camera {uri!r} is of no known kind", f"give {EXAMPLE}")
     path, options = _split(uri, rest)
+    if scheme == "v4l2":
+        from common.camera.v4l2 import V4l2Camera  # noqa: PLC0415 - ctypes and the kernel's structures only where they are of use
+        from common.camera.v4l2_uri import v4l2_settings  # noqa: PLC0415
+
+        return V4l2Camera(v4l2_settings(uri, path, options, clock), now_ns)
     return ReplayCamera(_replay_settings(uri, path, options, clock), now_ns)
 
 

@@ -10,7 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Final
 
-from common.camera.base import Ended, Grab, Spoiled
+from common.camera.base import CameraHealth, Ended, Grab, Spoiled
 from common.camera.imagefile import SUFFIXES, ImageFile, load
 from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import Frame, find_fault
@@ -119,6 +119,7 @@ class ReplayCamera:
         size = (first.width_px, first.height_px, first.pixel_format)
         self.description = CameraDescription(f"replay {name}", *size, self._period_ns, settings.pacing)
         self.pollable: int | None = None
+        self.health = CameraHealth()
         self._next = self._index_at(now_ns) + 1 if settings.pacing is Pacing.CLOCK else 0
         self._first_shown = self._next
         self._first_ns: int | None = None
@@ -156,6 +157,12 @@ class ReplayCamera:
             grabs.append(self._grab(now_ns))
         self._due_ns = self._time_of(self._next)
         return grabs
+
+    def pause(self) -> None:
+        """Nothing to rest: a film on the clock goes on, seen or unseen."""
+
+    def resume(self, now_ns: int) -> None:
+        """Nothing to wake."""
 
     def close(self) -> None:
         """Forget the files."""

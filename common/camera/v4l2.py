@@ -1,0 +1,298 @@
+"""A V4L2 camera for months of use: opened once, kept through unplugging, driver failures and stalls, resting while nobody listens.
+
+What is waited on is an epoll descriptor of its own: it stays the same while devices come and go behind it.
+"""
+
+import contextlib
+import errno
+import logging
+import select
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from common.camera.base import CameraHealth, CameraState, Grab
+from common.camera.v4l2_device import capture_nodes, lasting_name
+from common.camera.v4l2_formats import Wanted
+from common.camera.v4l2_stream import Stream, Tally, V4l2Settings
+from common.errors import TandemError, UnavailableError
+from common.logs import event
+from common.protocol.message import CameraDescription, Pacing
+
+_LOG = logging.getLogger(__name__)
+
+_FAR_FUTURE: Final = 2**63 - 1
+_RETRY_NS: Final = 200_000_000
+"""A camera that is gone is looked for five times a second: a stat() of its name, 10 us; a fifth of the second that recovery may take."""
+
+_LOOK_NS: Final = 1_000_000_000
+"""A resting camera is looked for once a second: without a stream no driver tells of an unplugged one."""
+
+_STALL_PERIODS: Final = 10
+_STALL_NS: Final = 1_000_000_000
+_FIRST_FRAME_NS: Final = 3_000_000_000
+"""Webcams take up to 2 s to begin (exposure search, power-up); then a second without any frame, or ten periods, is a stall."""
+
+_SETTLE_NS: Final = 2_000_000_000
+"""Automatic exposure and white balance of webcams settle within one to two seconds from the first frame."""
+
+_AUTO_EXPOSURE_NS: Final = 1_000_000_000
+"""An exposure time that the camera changes by itself, or whose changes the driver does not tell, is read once a second."""
+
+
+class V4l2Camera:
+    """A camera of this machine's kernel.
+
+    Args:
+        settings: what is asked for.
+        now_ns: CLOCK_MONOTONIC now, ns.
+
+    Raises:
+        UnavailableError: there is no such camera, it may not be opened, or another program has it.
+        SettingsError: it has not what is asked for.
+    """
+
+    def __init__(self, settings: V4l2Settings, now_ns: int) -> None:
+        self._path = _find(settings.path)
+        self._settings = settings
+        self._wishes = settings.wishes
+        self._tally = Tally()
+        self._stalls = self._failures = self._unplugged = self._returned = 0
+        self._stream: Stream | None = None
+        self._wanted = True
+        self._retry_ns = self._stall_ns = self._look_ns = _FAR_FUTURE
+        self._settle_ns: int | None = None
+        self._locked = not settings.wishes.lock
+        self._exposure_due_ns = _FAR_FUTURE
+        self._known_problem = ""
+        self._rate_is_off = False
+        self._epoll = select.epoll()
+        try:
+            stream = self._open()
+            # From now on exactly this is asked for, whatever a camera that is plugged in later may prefer.
+            width_px, height_px = stream.choice.size_px
+            wanted = Wanted(stream.choice.size_px, settings.wanted.fps, stream.choice.pixel_format)
+            self._settings = replace(settings, wanted=wanted)
+            self.description = CameraDescription(
+                stream.name, width_px, height_px, stream.pixel_format, stream.period_ns, Pacing.CLOCK
+            )
+            self._begin(stream, now_ns)
+        except OSError as error:
+            self.close()
+            raise UnavailableError(
+                f"camera {self._path} failed ({error.strerror})", "plug it in again, or into another port"
+            ) from None
+        except BaseException:
+            self.close()
+            raise
+        readout_ms = round(stream.readout_ns / 1e6, 1)
+        _LOG.info(
+            event(
+                "camera_open",
+                camera=self._path,
+                card=stream.name,
+                size=f"{width_px}x{height_px}",
+                format=stream.pixel_format.value,
+                period_ms=round(stream.period_ns / 1e6, 1),
+                readout_ms=readout_ms,
+            )
+        )
+
+    @property
+    def pollable(self) -> int | None:
+        """An epoll descriptor; becomes readable with a frame, a changed control or a lost camera."""
+        return self._epoll.fileno()
+
+    @property
+    def health(self) -> CameraHealth:
+        """How the camera has fared since it was opened first."""
+        if self._stream is None:
+            state = CameraState.GONE
+        else:
+            state = CameraState.RUNNING if self._wanted else CameraState.PAUSED
+        tally = self._tally
+        return CameraHealth(
+            state=state,
+            missed=tally.missed,
+            faults=tuple(tally.faults.items()),
+            stalls=self._stalls,
+            failures=self._failures,
+            unplugged=self._unplugged,
+            returned=self._returned,
+            distrusted_stamps=tally.distrusted,
+            refused_controls=tally.refused,
+            period_ns=tally.rate.period_ns,
+        )
+
+    def due_ns(self, now_ns: int) -> int:
+        """When something is to be done that no descriptor tells of: a stall, a retry, controls to be held."""
+        del now_ns
+        if self._stream is None:
+            return self._retry_ns
+        if not self._wanted:
+            return self._look_ns
+        return min(self._stall_ns, self._settle_ns or _FAR_FUTURE, self._exposure_due_ns)
+
+    def anchor(self, first_ns: int) -> None:
+        """A camera with a clock of its own takes no notice."""
+
+    def read(self, now_ns: int) -> list[Grab]:
+        """Give what has come; a device that fails is closed here and opened anew, now or later."""
+        if self._stream is None:
+            if now_ns >= self._retry_ns:
+                self._try_again(now_ns)
+            return []
+        if not self._wanted:
+            self._look(now_ns)
+            return []
+        try:
+            grabs = self._take(self._stream, now_ns)
+        except OSError as error:
+            self._lose(error, now_ns)
+            return []
+        if not grabs and now_ns >= self._stall_ns:
+            self._stalls += 1
+            self._drop(now_ns, "stalled")
+        return grabs
+
+    def pause(self) -> None:
+        """Switch the stream off; the device stays open, so that its controls are kept and the first frame is near."""
+        if not self._wanted:
+            return
+        self._wanted = False
+        self._look_ns = 0
+        if self._stream is not None:
+            self._epoll.unregister(self._stream.fd)
+            with contextlib.suppress(OSError):  # a camera that has just vanished is noticed by the next look
+                self._stream.stop()
+            _LOG.info(event("camera_paused", camera=self._path))
+
+    def resume(self, now_ns: int) -> None:
+        """Switch the stream on again."""
+        if self._wanted:
+            return
+        self._wanted = True
+        if self._stream is None:
+            self._retry_ns = now_ns
+            return
+        try:
+            self._begin(self._stream, now_ns)
+        except OSError as error:
+            self._lose(error, now_ns)
+            self._try_again(now_ns)
+        else:
+            _LOG.info(event("camera_resumed", camera=self._path))
+
+    def close(self) -> None:
+        """Let go of the device."""
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
+        self._epoll.close()
+
+    def _open(self) -> Stream:
+        return Stream(self._path, self._settings, self._wishes, self._tally)
+
+    def _begin(self, stream: Stream, now_ns: int) -> None:
+        """Start a stream and make it the current one."""
+        self._stream = stream
+        stream.start()
+        self._epoll.register(stream.fd, select.EPOLLIN | select.EPOLLPRI)
+        self._stall_ns = now_ns + max(_FIRST_FRAME_NS, _STALL_PERIODS * stream.period_ns)
+        self._settle_ns = None
+        self._exposure_due_ns = now_ns + _AUTO_EXPOSURE_NS
+
+    def _take(self, stream: Stream, now_ns: int) -> list[Grab]:
+        ready = self._epoll.poll(0)
+        if now_ns >= self._exposure_due_ns or any(mask & select.EPOLLPRI for _, mask in ready):
+            stream.read_exposure()
+            still_changes = not stream.tells_exposure or not self._wishes.lock
+            self._exposure_due_ns = now_ns + _AUTO_EXPOSURE_NS if still_changes else _FAR_FUTURE
+        if not ready:
+            return []
+        grabs = stream.take()
+        if grabs:
+            self._stall_ns = now_ns + max(_STALL_NS, _STALL_PERIODS * stream.period_ns)
+            self._settle(stream, now_ns)
+            self._watch_rate()
+        return grabs
+
+    def _settle(self, stream: Stream, now_ns: int) -> None:
+        """Hold the controls as found, some time after the first frame."""
+        if self._locked:
+            return
+        if self._settle_ns is None:
+            self._settle_ns = now_ns + _SETTLE_NS
+        elif now_ns >= self._settle_ns:
+            self._wishes = self._wishes.with_found(stream.lock(self._wishes))
+            self._locked, self._settle_ns = True, None
+
+    def _watch_rate(self) -> None:
+        """Say once when the camera's rate is not the nominal one (dim light, a full bus), and once when it is again."""
+        nominal_ns = self.description.period_ns
+        if self._tally.grabs % 32 or self._tally.rate.differs_from(nominal_ns) is self._rate_is_off:
+            return
+        self._rate_is_off = not self._rate_is_off
+        measured_ms, nominal_ms = round((self._tally.rate.period_ns or 0) / 1e6, 2), round(nominal_ns / 1e6, 2)
+        say = _LOG.warning if self._rate_is_off else _LOG.info
+        say(
+            event("rate_differs" if self._rate_is_off else "rate_nominal", period_ms=measured_ms, nominal_ms=nominal_ms)
+        )
+
+    def _look(self, now_ns: int) -> None:
+        """See whether a resting camera is still there."""
+        if now_ns < self._look_ns:
+            return
+        self._look_ns = now_ns + _LOOK_NS
+        if not self._path.exists():
+            self._lose(OSError(errno.ENODEV, "unplugged"), now_ns)
+
+    def _lose(self, error: OSError, now_ns: int) -> None:
+        if error.errno in {errno.ENODEV, errno.ENXIO}:
+            self._unplugged += 1
+            self._drop(now_ns, "unplugged")
+        else:
+            self._failures += 1
+            self._drop(now_ns, errno.errorcode.get(error.errno or 0, str(error)))
+
+    def _drop(self, now_ns: int, reason: str) -> None:
+        """Close the device; the next read opens it anew."""
+        _LOG.warning(event("camera_lost", camera=self._path, reason=reason))
+        if self._stream is not None:
+            self._stream.close()  # which takes it out of the epoll set, too
+            self._stream = None
+        self._known_problem = ""
+        self._locked = not self._wishes.lock
+        self._retry_ns = now_ns
+
+    def _try_again(self, now_ns: int) -> None:
+        """Look whether the camera is back, and open it; as it was, or not at all."""
+        self._retry_ns = now_ns + _RETRY_NS
+        if not self._path.exists():
+            return
+        try:
+            stream = self._open()
+            if not self._wanted:
+                self._stream, self._look_ns = stream, now_ns + _LOOK_NS
+            else:
+                self._begin(stream, now_ns)
+        except (TandemError, OSError) as error:
+            if self._stream is not None:
+                self._stream.close()
+                self._stream = None
+            if str(error) != self._known_problem:
+                self._known_problem = str(error)
+                _LOG.warning(event("camera_refuses", camera=self._path, problem=self._known_problem))
+            return
+        self._returned += 1
+        _LOG.info(event("camera_back", camera=self._path))
+
+
+def _find(path: str) -> Path:
+    """The camera that is meant, by a name that outlives unplugging."""
+    if path:
+        return lasting_name(Path(path))
+    nodes = capture_nodes()
+    if not nodes:
+        raise UnavailableError("no camera was found", "plug one in, or check that the user is in the group video")
+    return lasting_name(nodes[0])

@@ -1,0 +1,199 @@
+"""Which controls of a camera are set to what, in the order that drivers demand. Values only: no device is touched here.
+
+A control that follows an automatism is refused (EACCES) while that runs, so the automatism goes off first. What the user does not set is left
+to the automatism until it has settled, then read, and held at what was read: the two cameras of a rig must not change their minds mid-scan.
+"""
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Final
+
+from common.camera import v4l2_abi as abi
+
+
+class PowerLine(Enum):
+    """The mains whose lamps flicker: values of V4L2_CID_POWER_LINE_FREQUENCY."""
+
+    OFF = 0
+    HZ_50 = 1
+    HZ_60 = 2
+
+
+class Axis(Enum):
+    """One thing that a camera may adjust by itself."""
+
+    EXPOSURE = "exposure"
+    GAIN = "gain"
+    WHITE_BALANCE = "white_balance"
+    FOCUS = "focus"
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """One control of a camera, as its driver describes it.
+
+    Attributes:
+        id: V4L2_CID.
+        name: the driver's name.
+        kind: V4L2_CTRL_TYPE.
+        minimum: lowest value.
+        maximum: highest value.
+        step: between values.
+        default: the driver's default.
+        flags: V4L2_CTRL_FLAG bits.
+        menu: (index, name) of each item of a menu.
+    """
+
+    id: int
+    name: str
+    kind: int
+    minimum: int
+    maximum: int
+    step: int
+    default: int
+    flags: int = 0
+    menu: tuple[tuple[int, str], ...] = ()
+
+    @property
+    def can_be_set(self) -> bool:
+        """Whether the driver would ever take a value; an inactive control becomes active with its automatism off."""
+        return not self.flags & (abi.CTRL_FLAG_DISABLED | abi.CTRL_FLAG_GRABBED | abi.CTRL_FLAG_READ_ONLY)
+
+    @property
+    def can_be_read(self) -> bool:
+        """Whether the driver gives its value."""
+        return not self.flags & (abi.CTRL_FLAG_DISABLED | abi.CTRL_FLAG_WRITE_ONLY)
+
+    def fitted(self, value: int) -> int:
+        """The nearest value that the control takes."""
+        if self.kind not in {abi.CTRL_TYPE_INTEGER, abi.CTRL_TYPE_BOOLEAN}:
+            return value
+        step = max(1, self.step)
+        inside = min(max(value, self.minimum), self.maximum)
+        steps = (inside - self.minimum + step // 2) // step
+        return min(self.minimum + steps * step, self.maximum)
+
+    def has_item(self, index: int) -> bool:
+        """Whether a menu has an item of that index."""
+        return any(at == index for at, _ in self.menu)
+
+
+@dataclass(frozen=True, slots=True)
+class ControlWishes:
+    """What the user asks of the controls.
+
+    Attributes:
+        held: value of each axis in the control's own unit (exposure: 100 us; white balance: K); an axis that is missing is left to its automatism.
+        power_line: None: as it is.
+        lock: whether axes that are not held are held as found, once the automatism has settled.
+    """
+
+    held: tuple[tuple[Axis, int], ...] = ()
+    power_line: PowerLine | None = None
+    lock: bool = True
+
+    def value(self, axis: Axis) -> int | None:
+        """The value to hold an axis at; None: left to the automatism."""
+        return dict(self.held).get(axis)
+
+    def with_found(self, found: tuple[tuple[Axis, int], ...]) -> "ControlWishes":
+        """These wishes with the axes held that were found: a camera that is plugged in again comes back as it was."""
+        return replace(self, held=tuple({**dict(found), **dict(self.held)}.items()))
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Set one control.
+
+    Attributes:
+        control: which.
+        value: to what.
+    """
+
+    control: Control
+    value: int
+
+
+@dataclass(frozen=True, slots=True)
+class _AxisControls:
+    """The controls of an axis: the automatism, the values that switch it off (the best first), and the value itself."""
+
+    automatic: int
+    off: tuple[int, ...]
+    value: int
+
+
+_AXES: Final = {
+    Axis.EXPOSURE: _AxisControls(
+        abi.CID_AUTO_EXPOSURE, (abi.EXPOSURE_MANUAL, abi.EXPOSURE_SHUTTER_PRIORITY), abi.CID_EXPOSURE_TIME_ABSOLUTE
+    ),
+    Axis.GAIN: _AxisControls(abi.CID_AUTOGAIN, (0,), abi.CID_GAIN),
+    Axis.WHITE_BALANCE: _AxisControls(abi.CID_WHITE_BALANCE_AUTOMATIC, (0,), abi.CID_WHITE_BALANCE_TEMPERATURE),
+    Axis.FOCUS: _AxisControls(abi.CID_FOCUS_AUTOMATIC_CONTINUOUS, (0,), abi.CID_FOCUS_ABSOLUTE),
+}
+
+
+class ControlPlan:
+    """The order in which a camera's controls are set.
+
+    Args:
+        controls: what the camera has.
+    """
+
+    def __init__(self, controls: tuple[Control, ...]) -> None:
+        self._by_id = {control.id: control for control in controls}
+
+    def missing(self, wishes: ControlWishes) -> tuple[Axis, ...]:
+        """The axes that the user wants held and the camera does not have."""
+        return tuple(axis for axis, _ in wishes.held if _AXES[axis].value not in self._by_id)
+
+    def to_start(self, wishes: ControlWishes) -> list[Step]:
+        """What to set before the stream: frame rate before brightness, lamps, and the axes whose value is known."""
+        steps = self._maybe(abi.CID_EXPOSURE_DYNAMIC_FRAMERATE, 0)
+        if wishes.power_line is not None:
+            steps += self._maybe(abi.CID_POWER_LINE_FREQUENCY, wishes.power_line.value)
+        for axis in Axis:
+            value = wishes.value(axis)
+            if value is not None:
+                steps += self._hold(axis, value)
+        return steps
+
+    def to_find(self, wishes: ControlWishes) -> list[tuple[Axis, Control]]:
+        """What to read once the automatisms have settled: the axes that are to be held as found."""
+        if not wishes.lock:
+            return []
+        open_axes = [axis for axis in Axis if wishes.value(axis) is None]
+        found = [(axis, self._by_id.get(_AXES[axis].value)) for axis in open_axes]
+        return [(axis, control) for axis, control in found if control is not None and control.can_be_read]
+
+    def to_lock(self, found: tuple[tuple[Axis, int], ...], wishes: ControlWishes) -> list[Step]:
+        """How to hold what was found; an axis with an automatism but no value of its own just has it switched off."""
+        steps = [step for axis, value in found for step in self._hold(axis, value)]
+        done = {axis for axis, _ in (*found, *wishes.held)}
+        for axis in (Axis.GAIN, Axis.WHITE_BALANCE, Axis.FOCUS):
+            if axis not in done:
+                steps += self._switch_off(axis)
+        return steps
+
+    def exposure(self) -> Control | None:
+        """The control that tells the exposure time, if there is one that can be read."""
+        control = self._by_id.get(abi.CID_EXPOSURE_TIME_ABSOLUTE)
+        return control if control is not None and control.can_be_read else None
+
+    def _hold(self, axis: Axis, value: int) -> list[Step]:
+        if _AXES[axis].value not in self._by_id:
+            return []  # an automatism that is switched off with nothing to set instead would leave the image dark
+        return self._switch_off(axis) + self._maybe(_AXES[axis].value, value)
+
+    def _switch_off(self, axis: Axis) -> list[Step]:
+        automatic = self._by_id.get(_AXES[axis].automatic)
+        if automatic is None:
+            return []
+        off = [value for value in _AXES[axis].off if automatic.kind != abi.CTRL_TYPE_MENU or automatic.has_item(value)]
+        return self._maybe(automatic.id, off[0]) if off else []
+
+    def _maybe(self, control_id: int, value: int) -> list[Step]:
+        control = self._by_id.get(control_id)
+        if control is None or not control.can_be_set:
+            return []
+        return [Step(control, control.fitted(value))]

@@ -1,0 +1,307 @@
+"""One open V4L2 node: what it says of itself, its format, rate and controls. A thin shell over ioctls; decisions are made elsewhere.
+
+Methods raise the kernel's OSError, except for opening, which says in words what is wrong.
+"""
+
+import ctypes
+import errno
+import fcntl
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Final, Self
+
+from common.camera import v4l2_abi as abi
+from common.camera.v4l2_controls import Control
+from common.camera.v4l2_formats import FormatOffer, Rates, SizeRange
+from common.errors import UnavailableError
+
+_BY_ID: Final = Path("/dev/v4l/by-id")
+_BY_PATH: Final = Path("/dev/v4l/by-path")
+_MOST_ITEMS: Final = 256
+"""An enumeration that goes on beyond this is a driver's endless loop."""
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What a node says of itself.
+
+    Attributes:
+        driver: kernel driver, such as uvcvideo.
+        card: the camera's name.
+        bus: where it is plugged.
+        capabilities: V4L2_CAP bits of this very node.
+    """
+
+    driver: str
+    card: str
+    bus: str
+    capabilities: int
+
+    @property
+    def captures(self) -> bool:
+        """Whether the node gives images that can be streamed (a webcam's second node gives metadata)."""
+        wanted = abi.CAP_VIDEO_CAPTURE | abi.CAP_STREAMING
+        return self.capabilities & wanted == wanted
+
+
+@dataclass(frozen=True, slots=True)
+class PixelFormatSet:
+    """What the driver made of a format.
+
+    Attributes:
+        letters: four letters of the format.
+        size_px: (width, height), px.
+        row_bytes: from one row to the next, bytes; 0 for compressed formats.
+        image_bytes: most bytes of one image.
+    """
+
+    letters: str
+    size_px: tuple[int, int]
+    row_bytes: int
+    image_bytes: int
+
+
+def ioctl(fd: int, request: int, argument: ctypes.Structure | ctypes.c_int) -> None:
+    """Call an ioctl, again when a signal came in between."""
+    while True:
+        try:
+            fcntl.ioctl(fd, request, argument)
+        except InterruptedError:
+            continue
+        return
+
+
+def capture_nodes() -> list[Path]:
+    """All capture nodes, those with a name in /dev/v4l/by-id first, in name order; metadata and output nodes are left out."""
+    named = sorted(_BY_ID.glob("*")) if _BY_ID.is_dir() else []
+    numbered = sorted(Path("/dev").glob("video*"), key=lambda path: (len(path.name), path.name))
+    nodes: dict[Path, Path] = {}
+    for path in (*named, *numbered):
+        nodes.setdefault(path.resolve(), path)
+    return [path for path in nodes.values() if _captures(path)]
+
+
+def lasting_name(path: Path) -> Path:
+    """The name that a camera keeps when it is plugged in again: its link in by-id, else by-path, else the node itself."""
+    if path.parent in {_BY_ID, _BY_PATH}:
+        return path
+    target = path.resolve()
+    for folder in (_BY_ID, _BY_PATH):
+        for link in sorted(folder.glob("*")) if folder.is_dir() else ():
+            if link.resolve() == target:
+                return link
+    return path
+
+
+def _captures(path: Path) -> bool:
+    try:
+        with Device(path) as device:
+            return device.identity.captures
+    except (UnavailableError, OSError):
+        return False
+
+
+class Device:
+    """An open V4L2 node, not blocking.
+
+    Args:
+        path: the node or a link to it.
+
+    Raises:
+        UnavailableError: it is missing, not allowed or no V4L2 node.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self.fd = os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
+        except PermissionError:
+            raise UnavailableError(f"camera {path} may not be opened", "add the user to the group video") from None
+        except OSError as error:
+            raise UnavailableError(
+                f"camera {path} cannot be opened ({error.strerror})",
+                "plug it in, or give one of those that `board-agent cameras` lists",
+            ) from None
+        try:
+            self.identity = self._identify()
+        except OSError as error:
+            self.close()
+            raise UnavailableError(
+                f"{path} is no V4L2 node ({error.strerror})", "give a node such as /dev/video0"
+            ) from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the node; again is harmless."""
+        if self.fd >= 0:
+            fd, self.fd = self.fd, -1
+            os.close(fd)
+
+    def require_capture(self) -> None:
+        """Check that this node gives images.
+
+        Raises:
+            UnavailableError: it gives something else; the remedy names the node to use, where there is one.
+        """
+        capabilities = self.identity.capabilities
+        if self.identity.captures:
+            return
+        if capabilities & abi.CAP_META_CAPTURE:
+            raise UnavailableError(
+                f"camera {self.path} gives metadata, not images", "use the camera's other node, the one with index0"
+            )
+        if capabilities & abi.CAP_VIDEO_CAPTURE_MPLANE:
+            raise UnavailableError(f"camera {self.path} has planes in several buffers", "use a USB camera")
+        raise UnavailableError(f"camera {self.path} gives no images", "give one that `board-agent cameras` lists")
+
+    def formats(self) -> tuple[FormatOffer, ...]:
+        """The encodings and sizes that are offered."""
+        offers = []
+        for index in range(_MOST_ITEMS):
+            item = abi.FormatDescription(index=index, type=abi.BUF_TYPE_VIDEO_CAPTURE)
+            if not self._enumerate(abi.ENUM_FMT, item):
+                break
+            sizes, size_range = self._sizes(item.pixelformat)
+            offers.append(FormatOffer(abi.fourcc_name(item.pixelformat), _text(item.description), sizes, size_range))
+        return tuple(offers)
+
+    def rates(self, letters: str, size_px: tuple[int, int]) -> Rates:
+        """The frame rates of an encoding and size."""
+        named, between = set(), None
+        for index in range(_MOST_ITEMS):
+            item = abi.FrameInterval(index=index, pixel_format=abi.fourcc(letters), width=size_px[0], height=size_px[1])
+            if not self._enumerate(abi.ENUM_FRAMEINTERVALS, item):
+                break
+            shortest, longest = item.values[0], item.values[1]
+            if item.type == abi.FRMIVAL_TYPE_DISCRETE:
+                if shortest.numerator and shortest.denominator:
+                    named.add(Fraction(shortest.denominator, shortest.numerator))
+            else:
+                if all((shortest.numerator, shortest.denominator, longest.numerator, longest.denominator)):
+                    between = (
+                        Fraction(longest.denominator, longest.numerator),
+                        Fraction(shortest.denominator, shortest.numerator),
+                    )
+                break
+        return Rates(tuple(sorted(named, reverse=True)), between)
+
+    def set_format(self, letters: str, size_px: tuple[int, int]) -> PixelFormatSet:
+        """Set encoding and size, and give what the driver made of it."""
+        shape = abi.LAYOUTS[0]
+        item = shape.format(type=abi.BUF_TYPE_VIDEO_CAPTURE)
+        item.pix = abi.PixelLayout(
+            width=size_px[0], height=size_px[1], pixelformat=abi.fourcc(letters), field=abi.FIELD_NONE
+        )
+        ioctl(self.fd, shape.s_fmt, item)
+        pix = item.pix
+        row_bytes, size_px = int(pix.bytesperline), (int(pix.width), int(pix.height))
+        return PixelFormatSet(abi.fourcc_name(pix.pixelformat), size_px, row_bytes, int(pix.sizeimage))
+
+    def set_rate(self, rate_hz: Fraction) -> Fraction | None:
+        """Set the frame rate, Hz, and give what the driver made of it; None where it does not tell."""
+        item = abi.StreamParameters(type=abi.BUF_TYPE_VIDEO_CAPTURE)
+        try:
+            ioctl(self.fd, abi.G_PARM, item)
+            if item.capability & abi.CAP_TIMEPERFRAME:
+                item.timeperframe = abi.Fraction(rate_hz.denominator, rate_hz.numerator)
+                ioctl(self.fd, abi.S_PARM, item)
+        except OSError as error:
+            if error.errno in {errno.ENOTTY, errno.EINVAL}:
+                return None
+            raise
+        period = item.timeperframe
+        return Fraction(period.denominator, period.numerator) if period.numerator and period.denominator else None
+
+    def controls(self) -> tuple[Control, ...]:
+        """The controls, in the driver's order."""
+        found: list[Control] = []
+        query = abi.ControlQuery(id=abi.CTRL_FLAG_NEXT_CTRL)
+        while len(found) < _MOST_ITEMS and self._enumerate(abi.QUERY_EXT_CTRL, query):
+            if query.type != abi.CTRL_TYPE_CTRL_CLASS and not query.flags & abi.CTRL_FLAG_DISABLED:
+                limits = (query.minimum, query.maximum, query.step, query.default_value)
+                menu = tuple(self._menu(query)) if query.type == abi.CTRL_TYPE_MENU else ()
+                found.append(Control(query.id, _text(query.name), query.type, *limits, query.flags, menu))
+            query.id |= abi.CTRL_FLAG_NEXT_CTRL
+        return tuple(found)
+
+    def control(self, control_id: int) -> int:
+        """Read a control."""
+        item = abi.ControlValue(id=control_id)
+        ioctl(self.fd, abi.G_CTRL, item)
+        return int(item.value)
+
+    def set_control(self, control_id: int, value: int) -> None:
+        """Set a control."""
+        ioctl(self.fd, abi.S_CTRL, abi.ControlValue(id=control_id, value=value))
+
+    def watch_control(self, control_id: int) -> bool:
+        """Have changes of a control told as events (EPOLLPRI); False where the driver can't."""
+        item = abi.EventSubscription(type=abi.EVENT_CTRL, id=control_id, flags=abi.EVENT_SUB_FL_ALLOW_FEEDBACK)
+        try:
+            ioctl(self.fd, abi.SUBSCRIBE_EVENT, item)
+        except OSError:
+            return False
+        return True
+
+    def take_events(self) -> int:
+        """Take all waiting events and give their number; their content is not needed."""
+        for shape in abi.LAYOUTS:
+            count = 0
+            try:
+                while count < _MOST_ITEMS:
+                    ioctl(self.fd, shape.dqevent, shape.event())
+                    count += 1
+            except OSError as error:
+                if error.errno == errno.ENOTTY and shape is not abi.LAYOUTS[-1]:
+                    continue
+                if error.errno != errno.ENOENT:  # "no event waits"
+                    raise
+            return count
+        return 0
+
+    def _identify(self) -> Identity:
+        item = abi.Capability()
+        ioctl(self.fd, abi.QUERYCAP, item)
+        own = item.device_caps if item.capabilities & abi.CAP_DEVICE_CAPS else item.capabilities
+        return Identity(_text(item.driver), _text(item.card), _text(item.bus_info), own)
+
+    def _sizes(self, pixelformat: int) -> tuple[tuple[tuple[int, int], ...], SizeRange | None]:
+        sizes = []
+        for index in range(_MOST_ITEMS):
+            item = abi.FrameSize(index=index, pixel_format=pixelformat)
+            if not self._enumerate(abi.ENUM_FRAMESIZES, item):
+                break
+            values = tuple(item.values)
+            if item.type != abi.FRMSIZE_TYPE_DISCRETE:
+                return (), SizeRange(values[:3], values[3:])
+            sizes.append((values[0], values[1]))
+        return tuple(dict.fromkeys(sizes)), None
+
+    def _menu(self, query: abi.ControlQuery) -> Iterator[tuple[int, str]]:
+        for index in range(query.minimum, min(query.maximum, query.minimum + _MOST_ITEMS) + 1):
+            item = abi.MenuItem(id=query.id, index=index)
+            if self._enumerate(abi.QUERYMENU, item):  # EINVAL: an index without an item
+                yield index, _text(bytes(item.name))
+
+    def _enumerate(self, request: int, item: ctypes.Structure) -> bool:
+        """Ask for one item of a list; False when there is no such item, or no such list."""
+        try:
+            ioctl(self.fd, request, item)
+        except OSError as error:
+            if error.errno in {errno.EINVAL, errno.ENOTTY}:
+                return False
+            raise
+        return True
+
+
+def _text(raw: bytes) -> str:
+    """A driver's text up to its zero."""
+    return raw.split(b"\0")[0].decode("utf-8", "replace").strip()

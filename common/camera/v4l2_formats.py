@@ -1,0 +1,216 @@
+"""What a V4L2 camera offers, and the choice among it. Values only: no device is touched here."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final
+
+from common.errors import SettingsError, UnavailableError
+from common.frame import PixelFormat
+
+PREFERENCE: Final = (
+    ("MJPG", PixelFormat.MJPEG),
+    ("JPEG", PixelFormat.MJPEG),
+    ("YUYV", PixelFormat.YUYV),
+    ("NV12", PixelFormat.NV12),
+    ("GREY", PixelFormat.GREY),
+)
+"""Four letters of the formats that are passed on, the best first: JPEG is a tenth of the bytes, on the bus and on the link."""
+
+_USUAL_PX: Final = (640, 480)
+_USUAL_FPS: Final = Fraction(30)
+_SAME_RATE: Final = Fraction(1, 100)
+"""Rates are the same up to this share: drivers count in 100 ns, and people write 30 for 29.97."""
+
+
+@dataclass(frozen=True, slots=True)
+class SizeRange:
+    """Sizes that a camera scales to: minimum, maximum and step of width and height, px."""
+
+    width_px: tuple[int, int, int]
+    height_px: tuple[int, int, int]
+
+    def holds(self, size_px: tuple[int, int]) -> bool:
+        """Whether a size (width, height), px, is one of these."""
+        return all(
+            low <= value <= high and (value - low) % max(1, step) == 0
+            for value, (low, high, step) in zip(size_px, (self.width_px, self.height_px), strict=True)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """Frame rates of one size: those named, or everything between two; both empty where the driver does not tell.
+
+    Attributes:
+        named_hz: discrete rates, Hz, the highest first.
+        between_hz: lowest and highest rate, Hz, or None.
+    """
+
+    named_hz: tuple[Fraction, ...] = ()
+    between_hz: tuple[Fraction, Fraction] | None = None
+
+    @property
+    def highest_hz(self) -> Fraction | None:
+        """The highest rate, Hz; None where unknown."""
+        if self.named_hz:
+            return self.named_hz[0]
+        return self.between_hz[1] if self.between_hz else None
+
+    def __str__(self) -> str:
+        if self.named_hz:
+            return ", ".join(rate_text(rate) for rate in self.named_hz)
+        return " to ".join(rate_text(rate) for rate in self.between_hz) if self.between_hz else "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class FormatOffer:
+    """One encoding of a camera.
+
+    Attributes:
+        letters: its four letters.
+        text: the driver's name for it.
+        sizes_px: discrete sizes (width, height), px, in the driver's order.
+        size_range: sizes of a scaling camera; None for a discrete one.
+    """
+
+    letters: str
+    text: str
+    sizes_px: tuple[tuple[int, int], ...]
+    size_range: SizeRange | None = None
+
+    def has(self, size_px: tuple[int, int]) -> bool:
+        """Whether a size (width, height), px, is offered; a camera that names no size may have any."""
+        if self.size_range is not None:
+            return self.size_range.holds(size_px)
+        return size_px in self.sizes_px or not self.sizes_px
+
+    @property
+    def sizes_text(self) -> str:
+        """The sizes as people write them."""
+        if self.size_range is not None:
+            (w0, w1, _), (h0, h1, _) = self.size_range.width_px, self.size_range.height_px
+            return f"{w0}x{h0} to {w1}x{h1}"
+        return ", ".join(f"{width}x{height}" for width, height in self.sizes_px) or "any"
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What the user asks of the encoding; None: whatever is best.
+
+    Attributes:
+        size_px: (width, height), px.
+        fps: frames per second.
+        pixel_format: encoding.
+    """
+
+    size_px: tuple[int, int] | None = None
+    fps: Fraction | None = None
+    pixel_format: PixelFormat | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """An encoding and size that the camera offers.
+
+    Attributes:
+        letters: four letters of the format.
+        pixel_format: our name of it.
+        size_px: (width, height), px.
+    """
+
+    letters: str
+    pixel_format: PixelFormat
+    size_px: tuple[int, int]
+
+
+def rate_text(rate_hz: Fraction) -> str:
+    """A rate as people write it: 30, 29.97, 7.5."""
+    return f"{float(rate_hz):.2f}".rstrip("0").rstrip(".")
+
+
+def choose(offers: tuple[FormatOffer, ...], wanted: Wanted, camera: str) -> Choice:
+    """Choose encoding and size.
+
+    Args:
+        offers: what the camera has.
+        wanted: what the user asks for.
+        camera: how errors call it.
+
+    Returns:
+        The first format by PREFERENCE that fits; without a size 640x480, or the largest below it, or the smallest.
+
+    Raises:
+        UnavailableError: the camera has no format that is passed on (H.264 only, say).
+        SettingsError: it has not what is asked for; the message lists what it has.
+    """
+    by_letters = {offer.letters: offer for offer in offers}
+    known = [(by_letters[letters], kind) for letters, kind in PREFERENCE if letters in by_letters]
+    listed = ", ".join(offer.letters for offer in offers) or "none"
+    if not known:
+        raise UnavailableError(
+            f"camera {camera} has only {listed}, which is not passed on frame by frame",
+            "use a camera with MJPEG, YUYV, NV12 or GREY",
+        )
+    if wanted.pixel_format is not None:
+        known = [(offer, kind) for offer, kind in known if kind is wanted.pixel_format]
+        if not known:
+            raise SettingsError(
+                f"camera {camera} has no format {wanted.pixel_format.value}", f"give one of its formats: {listed}"
+            )
+    if wanted.size_px is None:
+        offer, kind = known[0]
+        return Choice(offer.letters, kind, _usual_size(offer))
+    for offer, kind in known:
+        if offer.has(wanted.size_px):
+            return Choice(offer.letters, kind, wanted.size_px)
+    width, height = wanted.size_px
+    offer, kind = known[0]
+    raise SettingsError(
+        f"camera {camera} has no size {width}x{height} in {kind.value}", f"give one of its sizes: {offer.sizes_text}"
+    )
+
+
+def choose_rate(rates: Rates, wanted: Wanted, camera: str) -> Fraction:
+    """Choose the frame rate.
+
+    Args:
+        rates: what the camera offers at the size.
+        wanted: what the user asks for.
+        camera: how errors call it.
+
+    Returns:
+        The rate, Hz; without a wish the highest up to 30, or the lowest there is.
+
+    Raises:
+        SettingsError: a rate is asked for that is not offered; the message lists those that are.
+    """
+    if wanted.fps is None:
+        if rates.named_hz:
+            return next((rate for rate in rates.named_hz if rate <= _USUAL_FPS * (1 + _SAME_RATE)), rates.named_hz[-1])
+        low, high = rates.between_hz or (_USUAL_FPS, _USUAL_FPS)
+        return max(low, min(high, _USUAL_FPS))
+    fps = wanted.fps
+    if rates.between_hz is not None and not rates.named_hz:
+        low, high = rates.between_hz
+        if low * (1 - _SAME_RATE) <= fps <= high * (1 + _SAME_RATE):
+            return max(low, min(high, fps))
+    elif not rates.named_hz:
+        return fps
+    for rate in rates.named_hz:
+        if abs(rate - fps) <= fps * _SAME_RATE:
+            return rate
+    raise SettingsError(f"camera {camera} has no rate {rate_text(fps)} at that size", f"give one of its rates: {rates}")
+
+
+def _usual_size(offer: FormatOffer) -> tuple[int, int]:
+    if offer.has(_USUAL_PX):
+        return _USUAL_PX
+    if offer.size_range is not None:
+        (w0, w1, _), (h0, h1, _) = offer.size_range.width_px, offer.size_range.height_px
+        return (w0, h0) if _area((w1, h1)) > _area(_USUAL_PX) else (w1, h1)
+    smaller = [size for size in offer.sizes_px if _area(size) <= _area(_USUAL_PX)]
+    return max(smaller, key=_area) if smaller else min(offer.sizes_px, key=_area)
+
+
+def _area(size_px: tuple[int, int]) -> int:
+    return size_px[0] * size_px[1]

@@ -1,0 +1,349 @@
+"""One life of a V4L2 device: opened, its format and controls set, streaming, until it is closed or lost. `v4l2.py` gives it further lives."""
+
+import contextlib
+import errno
+import logging
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Final
+
+from common import now
+from common.camera import v4l2_abi as abi
+from common.camera.base import Grab, Skipped, Spoiled
+from common.camera.v4l2_controls import Axis, ControlPlan, ControlWishes, Step
+from common.camera.v4l2_device import Device, PixelFormatSet
+from common.camera.v4l2_formats import Choice, Wanted, choose, choose_rate, rate_text
+from common.camera.v4l2_pack import Packing, SendPart
+from common.camera.v4l2_ring import RING_BUFFERS, Filled, Ring
+from common.camera.v4l2_stamps import (
+    RateMeter,
+    StampSource,
+    Timing,
+    estimated_readout_ns,
+    exposure_midpoint_ns,
+    is_trusted,
+    stamp_clock,
+    stamp_source,
+)
+from common.errors import UnavailableError
+from common.frame import Frame, FrameFault, PixelFormat, find_fault
+from common.logs import event
+from common.stamp import Stamp
+
+_LOG = logging.getLogger(__name__)
+
+_SEQUENCE_MASK: Final = 0xFFFFFFFF
+_BACKWARDS: Final = 0x80000000
+
+
+@dataclass(frozen=True, slots=True)
+class V4l2Settings:
+    """What is asked of a V4L2 camera.
+
+    Attributes:
+        path: node or link; empty: the first camera by its name in /dev/v4l/by-id.
+        wanted: encoding, size and rate.
+        wishes: controls.
+        part: whether raw images are sent whole or as their luma.
+        readout_ns: readout time of the sensor, ns; None: estimated.
+        latency_ns: this camera's constant between the end of the readout and the stamp, ns.
+        clock: name of the clock of the stamps.
+    """
+
+    path: str = ""
+    wanted: Wanted = field(default_factory=Wanted)
+    wishes: ControlWishes = field(default_factory=ControlWishes)
+    part: SendPart = SendPart.WHOLE
+    readout_ns: int | None = None
+    latency_ns: int = 0
+    clock: str = "host"
+
+
+@dataclass(slots=True)
+class Tally:
+    """Counts that outlive the device."""
+
+    grabs: int = 0
+    missed: int = 0
+    distrusted: int = 0
+    refused: int = 0
+    faults: dict[FrameFault, int] = field(default_factory=dict)
+    rate: RateMeter = field(default_factory=RateMeter)
+
+    def number(self) -> int:
+        """The sequence number of the next grab."""
+        self.grabs += 1
+        return self.grabs - 1
+
+
+class Stream:
+    """An open device that is ready to stream.
+
+    Attributes:
+        choice: encoding and size.
+        period_ns: nominal time between frames, ns.
+        exposure_ns: exposure time as last read, ns; None where the camera does not tell.
+        tells_exposure: whether the driver tells of each change of the exposure time.
+
+    Args:
+        path: node or link.
+        settings: what is asked for.
+        wishes: controls; after a first life with the values that were found then.
+        tally: where to count.
+
+    Raises:
+        UnavailableError: it can't be had.
+        SettingsError: it has not what is asked for.
+        OSError: the driver failed.
+    """
+
+    def __init__(self, path: Path, settings: V4l2Settings, wishes: ControlWishes, tally: Tally) -> None:
+        self._settings = settings
+        self._tally = tally
+        self._device = Device(path)
+        try:
+            self._device.require_capture()
+            self.choice = choose(self._device.formats(), settings.wanted, str(path))
+            self._packing = Packing.of(self._set_format(self.choice), self.choice.pixel_format, settings.part)
+            self.period_ns, self._timing = self._set_rate()
+            self._plan = ControlPlan(self._device.controls())
+            self._warn_missing(wishes)
+            self._apply(self._plan.to_start(wishes))
+            self._exposure_control = self._plan.exposure()
+            self.tells_exposure = self._exposure_control is not None and self._device.watch_control(
+                self._exposure_control.id
+            )
+            self.exposure_ns: int | None = None
+            self.read_exposure()
+            self._ring = Ring(self._device)
+        except BaseException:
+            self._device.close()
+            raise
+        self._last_sequence: int | None = None
+        self._sound = False
+        self._started_ns = 0
+        self._taken = 0
+        self._broken: OSError | None = None
+        if len(self._ring) < RING_BUFFERS:
+            _LOG.warning(event("few_buffers", camera=path, buffers=len(self._ring), wanted=RING_BUFFERS))
+
+    @property
+    def fd(self) -> int:
+        """What to wait on."""
+        return self._device.fd
+
+    @property
+    def name(self) -> str:
+        """The camera's name, for people."""
+        return f"{self._device.identity.card} ({self._device.identity.driver})"
+
+    @property
+    def pixel_format(self) -> PixelFormat:
+        """Encoding of the frames as they are sent."""
+        return self._packing.sent_as
+
+    @property
+    def readout_ns(self) -> int:
+        """The readout time that the stamps are corrected with, ns."""
+        return self._timing.readout_ns
+
+    def start(self) -> None:
+        """Begin to stream.
+
+        Raises:
+            OSError: the driver failed.
+        """
+        self._last_sequence, self._sound, self._taken = None, False, 0
+        self._tally.rate.restart()
+        self._started_ns = now.monotonic_ns()
+        self._ring.start()
+
+    def stop(self) -> None:
+        """End the stream; the device stays open.
+
+        Raises:
+            OSError: the driver failed.
+        """
+        self._ring.stop()
+
+    def close(self) -> None:
+        """Let go of the device, whatever state it is in."""
+        with contextlib.suppress(OSError):  # it may be gone
+            self._ring.stop()
+        self._ring.close()
+        self._device.close()
+
+    def take(self) -> list[Grab]:
+        """Take all filled buffers: the newest is copied out, once, older ones are skipped.
+
+        Raises:
+            OSError: the camera is gone or the driver failed; everything taken before has been given.
+        """
+        if self._broken is not None:
+            raise self._broken
+        grabs: list[Grab] = []
+        newest: Filled | None = None
+        for _ in range(len(self._ring) + 1):  # a camera faster than this loop must not keep it for ever
+            try:
+                filled = self._ring.take()
+            except OSError as error:
+                if newest is None:
+                    raise
+                self._broken = error
+                break
+            if filled is None:
+                break
+            self._note_sequence(filled.sequence)
+            if newest is not None:
+                self._give_back(newest)
+                grabs.append(Skipped(self._tally.number()))
+            newest = filled
+        if newest is not None:
+            grabs.append(self._grab(newest, now.monotonic_ns()))
+            self._give_back(newest)
+        return grabs
+
+    def read_exposure(self) -> None:
+        """Read the exposure time, and take the events that tell of its change.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        if self._exposure_control is None:
+            return
+        if self.tells_exposure:
+            self._device.take_events()
+        value = self._read(self._exposure_control.id)
+        self.exposure_ns = None if value is None else value * abi.EXPOSURE_UNIT_NS
+
+    def lock(self, wishes: ControlWishes) -> tuple[tuple[Axis, int], ...]:
+        """Hold exposure, gain, white balance and focus at what the automatisms have found.
+
+        Args:
+            wishes: what is held already.
+
+        Returns:
+            What was found.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        read = [(axis, self._read(control.id)) for axis, control in self._plan.to_find(wishes)]
+        found = tuple((axis, value) for axis, value in read if value is not None)
+        self._apply(self._plan.to_lock(found, wishes))
+        self.read_exposure()
+        held = {axis.value: value for axis, value in (*found, *wishes.held)}
+        _LOG.info(event("controls_held", camera=self._device.path, **held))
+        return found
+
+    def _set_format(self, choice: Choice) -> PixelFormatSet:
+        made = self._device.set_format(choice.letters, choice.size_px)
+        if (made.letters, made.size_px) != (choice.letters, choice.size_px):
+            asked, got = f"{choice.letters} {_size(choice.size_px)}", f"{made.letters} {_size(made.size_px)}"
+            raise UnavailableError(
+                f"camera {self._device.path} gives {got} when asked for {asked}",
+                f"ask for that: size={_size(made.size_px)}",
+            )
+        return made
+
+    def _set_rate(self) -> tuple[int, Timing]:
+        """Set the rate; give the nominal period and what follows for the stamps."""
+        path, choice = self._device.path, self.choice
+        rates = self._device.rates(choice.letters, choice.size_px)
+        rate_hz = choose_rate(rates, self._settings.wanted, str(path))
+        made_hz = self._device.set_rate(rate_hz)
+        if made_hz is None:
+            made_hz = rate_hz
+        elif abs(made_hz - rate_hz) > rate_hz / 100:
+            _LOG.warning(event("other_rate", camera=path, asked=rate_text(rate_hz), nominal=rate_text(made_hz)))
+        period_ns = int(1_000_000_000 / made_hz)
+        shortest_ns = min(period_ns, int(1_000_000_000 / (rates.highest_hz or Fraction(made_hz))))
+        readout_ns = self._settings.readout_ns
+        if readout_ns is None:
+            readout_ns = estimated_readout_ns(shortest_ns)
+        return period_ns, Timing(self._device.identity.driver, readout_ns, self._settings.latency_ns)
+
+    def _warn_missing(self, wishes: ControlWishes) -> None:
+        for axis in self._plan.missing(wishes):
+            _LOG.warning(event("no_such_control", camera=self._device.path, control=axis.value))
+
+    def _apply(self, steps: list[Step]) -> None:
+        for step in steps:
+            try:
+                self._device.set_control(step.control.id, step.value)
+            except OSError as error:
+                if error.errno == errno.ENODEV:
+                    raise
+                self._tally.refused += 1
+                reason = errno.errorcode.get(error.errno or 0, str(error))
+                _LOG.warning(event("control_refused", control=step.control.name, value=step.value, reason=reason))
+
+    def _read(self, control_id: int) -> int | None:
+        """A control's value; None where the driver does not give it."""
+        try:
+            return self._device.control(control_id)
+        except OSError as error:
+            if error.errno == errno.ENODEV:
+                raise
+            return None
+
+    def _give_back(self, filled: Filled) -> None:
+        try:
+            self._ring.give_back(filled.index)
+        except OSError as error:
+            self._broken = error  # told by the next `take`, so that this grab is not lost with it
+
+    def _note_sequence(self, sequence: int) -> None:
+        """Count the frames between this one and the last; a number that goes back is a driver that began anew."""
+        if self._last_sequence is not None:
+            gap = (sequence - self._last_sequence - 1) & _SEQUENCE_MASK
+            if gap < _BACKWARDS:
+                self._tally.missed += gap
+        self._last_sequence = sequence
+
+    def _grab(self, filled: Filled, grabbed_ns: int) -> Grab:
+        sequence = self._tally.number()
+        self._taken += 1
+        with self._ring.view(filled) as view:
+            fault = self._fault(filled, view)
+            payload = b"" if fault else self._packing.pack(view)
+        if fault is not None:
+            self._tally.faults[fault] = self._tally.faults.get(fault, 0) + 1
+            if not self._sound:
+                self._last_sequence = None  # v4l2loopback: a first buffer that is none, then numbers from anywhere
+            return Spoiled(sequence, fault)
+        self._sound = True
+        clock = self._settings.clock
+        exposed = Stamp(self._exposed_ns(filled, grabbed_ns), clock)
+        width_px, height_px = self.choice.size_px
+        return Frame(
+            sequence,
+            exposed,
+            Stamp(grabbed_ns, clock),
+            width_px,
+            height_px,
+            self._packing.sent_as,
+            self.exposure_ns,
+            payload,
+        )
+
+    def _fault(self, filled: Filled, view: memoryview) -> FrameFault | None:
+        if filled.flags & abi.BUF_FLAG_ERROR:
+            return FrameFault.FLAGGED
+        if not self._sound and self._taken <= len(self._ring) and filled.stamp_ns < self._started_ns:
+            return FrameFault.STALE
+        return find_fault(self.choice.pixel_format, view, self._packing.least_bytes)
+
+    def _exposed_ns(self, filled: Filled, grabbed_ns: int) -> int:
+        if is_trusted(filled.stamp_ns, stamp_clock(filled.flags), grabbed_ns):
+            stamp_ns, source = filled.stamp_ns, stamp_source(filled.flags, self._timing.driver)
+        else:
+            self._tally.distrusted += 1
+            stamp_ns, source = grabbed_ns, StampSource.END_OF_FRAME
+        self._tally.rate.add(stamp_ns, filled.sequence)
+        return min(grabbed_ns, exposure_midpoint_ns(stamp_ns, source, self._timing, self.exposure_ns))
+
+
+def _size(size_px: tuple[int, int]) -> str:
+    return f"{size_px[0]}x{size_px[1]}"
