@@ -39,11 +39,15 @@ WAVE_ECHOES_EARLY: Final = 5
 """Echoes back to back: the first wakes both sides up, the others measure without that bias (study of links, 3d)."""
 
 WAVE_NS: Final = 500 * MS
-WAVE_EARLY_NS: Final = 50 * MS
-"""Between two waves, and in the first second of a session, when the estimate is still young. An echo costs the board as much as half a frame
-(bench_link), so 6 a second are enough for a clock whose skew is known."""
+"""Between two waves. An echo costs the board as much as half a frame (bench_link): 6 a second do for a clock whose skew is known."""
 
+WAVE_YOUNG_NS: Final = 250 * MS
+YOUNG_NS: Final = 10_000 * MS
+"""So long after the beginning of a session the skew is hardly known, and an offset grows old quickly."""
+
+WAVE_EARLY_NS: Final = 50 * MS
 EARLY_NS: Final = 1000 * MS
+"""In its first second there is no estimate worth the name."""
 
 
 class _State(Enum):
@@ -125,8 +129,9 @@ class HostSession:
         if self._state is _State.SEEKING and now_ns >= self._hello_due_ns:
             return self._say_hello(now_ns)
         if self._state is _State.OPEN and now_ns >= self._wave_due_ns:
-            early = now_ns - self._opened_ns < EARLY_NS
-            self._wave_due_ns = now_ns + (WAVE_EARLY_NS if early else WAVE_NS)
+            age_ns = now_ns - self._opened_ns
+            early = age_ns < EARLY_NS
+            self._wave_due_ns = now_ns + (WAVE_EARLY_NS if early else WAVE_YOUNG_NS if age_ns < YOUNG_NS else WAVE_NS)
             self._wave += 1
             self._echoes_left = WAVE_ECHOES_EARLY if early else WAVE_ECHOES
             # Credit is granted up to an index, so repeating it is harmless and mends one that a broken connection swallowed.
