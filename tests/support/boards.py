@@ -1,0 +1,79 @@
+"""Chessboards before two known cameras: exact corners, and images rendered ray by ray."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.model import Camera, Image, Rig
+from phone_host.stereo.calibration import BoardPair
+from phone_host.stereo.target import Board
+from tests.support.rigs import project_points
+
+BOARD = Board(9, 6, 0.025)
+
+
+def poses(
+    count: int, seed: int, tilt_deg: float = 35.0, depth_m: tuple[float, float] = (0.45, 0.8)
+) -> NDArray[np.float64]:
+    """(V, 6) poses of boards in the left camera's axes: tilted by up to `tilt_deg`, spread over what both cameras see."""
+    random = np.random.default_rng(seed)
+    result = []
+    for _ in range(count):
+        axis = random.uniform(-1, 1, 2)
+        turn = np.radians(tilt_deg) * axis / max(1.0, float(np.linalg.norm(axis)))
+        z = random.uniform(*depth_m)
+        centre = np.array([random.uniform(-0.16, 0.2) * z, random.uniform(-0.08, 0.08) * z, z])
+        rotation = cv2.Rodrigues(np.array([turn[0], turn[1], random.uniform(-0.2, 0.2)]))[0]
+        middle = BOARD.points_m().mean(axis=0)
+        result.append(np.concatenate([np.ravel(cv2.Rodrigues(rotation)[0]), centre - rotation @ middle]))
+    return np.array(result)
+
+
+def exact_pairs(rig: Rig, board_poses: NDArray[np.float64], noise_px: float = 0.0, seed: int = 0) -> list[BoardPair]:
+    """The corners both cameras see, with Gaussian noise."""
+    random = np.random.default_rng(seed)
+    pairs = []
+    for index, pose in enumerate(board_poses):
+        points = BOARD.points_m() @ np.asarray(cv2.Rodrigues(pose[:3])[0]).T + pose[3:]
+        left, right = project_points(points, rig)
+        left, right = (corners + random.normal(0, noise_px, corners.shape) for corners in (left, right))
+        pairs.append(BoardPair(str(index), left, right))
+    return pairs
+
+
+def render_board(
+    camera: Camera, rotation: NDArray[np.float64], translation_m: NDArray[np.float64], board: Board = BOARD
+) -> Image:
+    """What a camera sees of a board at a pose in its own axes: white paper with a rim of one square, grey around it."""
+    fine, coarse = 3, 4  # rays per pixel and direction; pixels per solved ray: linear between them is 0.003 px off
+    steps_x = (np.arange(camera.width_px // coarse) + 0.5) * coarse - 0.5
+    steps_y = (np.arange(camera.height_px // coarse) + 0.5) * coarse - 0.5
+    columns, rows = np.meshgrid(steps_x, steps_y)
+    pixels = np.column_stack([columns.ravel(), rows.ravel()])[:, np.newaxis]
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-10)
+    slopes = cv2.undistortPointsIter(pixels, camera.matrix, camera.distortion, np.eye(3), np.eye(3), criteria)
+    grid = np.asarray(slopes, dtype=np.float64).reshape(*columns.shape, 2)
+    fine_size = (camera.width_px * fine, camera.height_px * fine)
+    dense = cv2.resize(grid, fine_size, interpolation=cv2.INTER_LINEAR)
+    # Rays into the board's axes, cut with its plane z = 0.
+    rays = np.dstack([dense, np.ones(dense.shape[:2])]) @ rotation
+    origin = -rotation.T @ translation_m
+    on_plane = origin[:2] - rays[..., :2] * (origin[2] / rays[..., 2:])
+    squares = on_plane / board.square_m + 1  # inner corners start one square inside
+    x, y = squares[..., 0], squares[..., 1]
+    black = (np.floor(x) + np.floor(y)) % 2 == 0
+    inside = (x >= 0) & (x < board.columns + 1) & (y >= 0) & (y < board.rows + 1)
+    paper = (x >= -1) & (x < board.columns + 2) & (y >= -1) & (y < board.rows + 2)
+    value = np.where(inside & black, 20.0, np.where(paper, 230.0, 120.0)).astype(np.float32)
+    size = (camera.width_px, camera.height_px)
+    image: Image = np.rint(cv2.resize(value, size, interpolation=cv2.INTER_AREA)).astype(np.uint8)
+    return image
+
+
+def render_pair(rig: Rig, pose: NDArray[np.float64], board: Board = BOARD) -> tuple[Image, Image]:
+    """Both cameras' images of a board at a pose in the left camera's axes."""
+    rotation = np.asarray(cv2.Rodrigues(pose[:3])[0], dtype=np.float64)
+    return (
+        render_board(rig.left, rotation, pose[3:], board),
+        render_board(rig.right, rig.R_right_left @ rotation, rig.R_right_left @ pose[3:] + rig.t_right_left_m, board),
+    )

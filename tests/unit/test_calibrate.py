@@ -1,0 +1,132 @@
+"""Calibration against rigs whose every number is known."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.errors import DataError
+from phone_host.model import Rig
+from phone_host.stereo.calibrate import calibrate
+from phone_host.stereo.calibration import BoardPair, Calibration, Reason
+from phone_host.stereo.verdict import Verdict, judge, vertical_p95_px
+from tests.support.boards import BOARD, exact_pairs, poses
+from tests.support.rigs import unlike_rig
+
+_SIZES = ((640, 480), (1280, 720))
+
+
+def _rig() -> Rig:
+    """The unlike rig without k3, which the boards do not reach far enough to tell."""
+    rig = unlike_rig()
+    for camera in (rig.left, rig.right):
+        camera.distortion[4] = 0
+    return rig
+
+
+def _baseline_mm(calibration: Calibration) -> float:
+    return float(np.linalg.norm(calibration.rig.t_right_left_m)) * 1e3
+
+
+_TRUE_BASELINE_MM = float(np.linalg.norm([100, 4, -6]))
+
+
+def test_exact_corners_give_back_the_rig() -> None:
+    """Two sizes, two lenses: all parameters come back, all pairs are used, rows meet, the verdict is good."""
+    rig = _rig()
+    found = calibrate(exact_pairs(rig, poses(15, seed=1)), BOARD, _SIZES)
+    for camera, truth in ((found.rig.left, rig.left), (found.rig.right, rig.right)):
+        assert (camera.width_px, camera.height_px) == (truth.width_px, truth.height_px)
+        np.testing.assert_allclose(camera.matrix, truth.matrix, atol=0.05)
+        np.testing.assert_allclose(camera.distortion[:4], truth.distortion[:4], atol=2e-3)
+    np.testing.assert_allclose(found.rig.R_right_left, rig.R_right_left, atol=1e-5)
+    np.testing.assert_allclose(found.rig.t_right_left_m, rig.t_right_left_m, atol=1e-5)
+    assert len(found.used) == 15
+    assert found.rejected == ()
+    assert vertical_p95_px(found) < 1e-3
+    assert judge(found, ()).verdict is Verdict.GOOD
+
+
+@given(st.integers(0, 1000))
+@settings(deadline=None, max_examples=8)
+def test_the_baseline_is_off_by_no_more_than_the_report_says(seed: int) -> None:
+    """With 0.2 px of noise the error stays within four of the reported standard deviations, and these are small."""
+    pairs = exact_pairs(_rig(), poses(12, seed=seed), noise_px=0.2, seed=seed)
+    found = calibrate(pairs, BOARD, _SIZES)
+    assert found.baseline_sigma_m * 1e3 < 1.0
+    assert abs(_baseline_mm(found) - _TRUE_BASELINE_MM) < 4 * found.baseline_sigma_m * 1e3 + 0.01
+    # 0.2 px in each coordinate is a distance of 0.28 px
+    assert found.rig.rms_stereo_px == pytest.approx(0.2 * np.sqrt(2), rel=0.15)
+
+
+def _changed(pairs: list[BoardPair], index: int, right_px: np.ndarray) -> list[BoardPair]:
+    changed = BoardPair(pairs[index].name, pairs[index].left_px, right_px)
+    return [changed if place == index else pair for place, pair in enumerate(pairs)]
+
+
+@pytest.mark.parametrize("jump_px", [2.0, 13.0])
+def test_a_view_whose_corners_jump_is_rejected_and_does_no_harm(jump_px: float) -> None:
+    """Of 15 pairs, the one with a third of its right corners off is named; the rig is that of the other 14."""
+    pairs = exact_pairs(_rig(), poses(15, seed=1), noise_px=0.1, seed=5)
+    jumped = pairs[6].right_px.copy()
+    jumped[::3] += np.array([jump_px, -jump_px / 2])
+    found = calibrate(_changed(pairs, 6, jumped), BOARD, _SIZES)
+    assert [(each.name, each.reason) for each in found.rejected] == [("6", Reason.CORNERS_RIGHT)]
+    others = calibrate([pair for pair in pairs if pair.name != "6"], BOARD, _SIZES)
+    assert _baseline_mm(found) == pytest.approx(_baseline_mm(others), abs=0.02)
+
+
+@pytest.mark.parametrize("shift_m", [0.0015, 0.05])
+def test_a_pair_of_two_moments_is_rejected(shift_m: float) -> None:
+    """A board that moved between the two exposures, by much or by a little more than a millimetre, is told as such."""
+    rig, where = _rig(), poses(15, seed=2)
+    pairs = exact_pairs(rig, where, noise_px=0.1, seed=6)
+    later = where[4].copy()
+    later[4] += shift_m
+    found = calibrate(_changed(pairs, 4, exact_pairs(rig, later[np.newaxis])[0].right_px), BOARD, _SIZES)
+    assert [(each.name, each.reason) for each in found.rejected] == [("4", Reason.MOVED)]
+
+
+def test_swapped_sides_are_told_with_the_remedy() -> None:
+    """Left images given as right ones calibrate well, but the verdict is reject: swap LEFT and RIGHT."""
+    pairs = [BoardPair(p.name, p.right_px, p.left_px) for p in exact_pairs(_rig(), poses(12, seed=3))]
+    found = calibrate(pairs, BOARD, (_SIZES[1], _SIZES[0]))
+    judgement = judge(found, ())
+    assert found.rectification is None
+    assert judgement.verdict is Verdict.REJECT
+    assert "swap LEFT and RIGHT" in judgement.remedies[0]
+
+
+def test_boards_that_are_all_parallel_are_told() -> None:
+    """Boards that face the camera leave the focal length open: a remedy names the tilt."""
+    pairs = exact_pairs(_rig(), poses(12, seed=4, tilt_deg=1.0), noise_px=0.2, seed=7)
+    judgement = judge(calibrate(pairs, BOARD, _SIZES), ())
+    assert any("tilt" in remedy for remedy in judgement.remedies)
+
+
+def test_a_board_in_the_middle_only_is_told() -> None:
+    """Boards far away cover the middle: a remedy asks for the corners."""
+    pairs = exact_pairs(_rig(), poses(12, seed=4, depth_m=(1.2, 1.3)), noise_px=0.1, seed=7)
+    judgement = judge(calibrate(pairs, BOARD, _SIZES), ())
+    assert any("corners" in remedy for remedy in judgement.remedies)
+
+
+def test_wild_corners_everywhere_are_no_calibration() -> None:
+    """With 1 px of noise rows cannot meet to half a pixel: reject, with what to do."""
+    pairs = exact_pairs(_rig(), poses(12, seed=8), noise_px=1.0, seed=8)
+    judgement = judge(calibrate(pairs, BOARD, _SIZES), ())
+    assert judgement.verdict is Verdict.REJECT
+    assert any("take new pairs" in remedy for remedy in judgement.remedies)
+
+
+def test_few_pairs_are_never_good() -> None:
+    """Four perfect pairs are usable at most."""
+    found = calibrate(exact_pairs(_rig(), poses(4, seed=9)), BOARD, _SIZES)
+    assert judge(found, ()).verdict is not Verdict.GOOD
+
+
+@pytest.mark.parametrize("count", [0, 2])
+def test_fewer_than_three_pairs_are_refused(count: int) -> None:
+    """Nothing is made up from two views."""
+    with pytest.raises(DataError, match=f"only {count} pairs"):
+        calibrate(exact_pairs(_rig(), poses(count, seed=1)), BOARD, _SIZES)

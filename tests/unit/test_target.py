@@ -1,0 +1,86 @@
+"""The chessboard: reading its size, finding it, and the order of its corners."""
+
+import numpy as np
+import pytest
+
+from common.errors import SettingsError
+from phone_host.stereo.target import Board, agree, find_corners, parse_board
+from tests.support.boards import BOARD, poses, render_pair
+from tests.support.rigs import project_points, unlike_rig
+
+
+@pytest.mark.parametrize("square", ["25mm", "2.5cm", "0.025m", "25", " 25 mm ", "25MM"])
+def test_lengths_are_read_with_their_unit(square: str) -> None:
+    """All ways to write 25 mm give 0.025 m; a bare number is millimetres."""
+    board = parse_board("9x6", square)
+    assert (board.columns, board.rows) == (9, 6)
+    assert board.square_m == pytest.approx(0.025)
+
+
+@pytest.mark.parametrize(
+    ("corners", "square", "option"),
+    [("9", "25mm", "--board"), ("9x", "25mm", "--board"), ("2x6", "25mm", "--board"), ("9x6", "25in", "--square"),
+     ("9x6", "0mm", "--square"), ("9x6", "-25mm", "--square"), ("9x6", "5m", "--square"), ("9x6", "nan", "--square")],
+)  # fmt: skip
+def test_sizes_that_make_no_sense_name_their_option(corners: str, square: str, option: str) -> None:
+    """A wrong size is a usage error that names the option."""
+    with pytest.raises(SettingsError, match=option):
+        parse_board(corners, square)
+
+
+def test_points_run_along_rows_in_metres() -> None:
+    """The second point is one square to the right, the one after a row is one square down."""
+    points = BOARD.points_m()
+    assert points.shape == (54, 3)
+    np.testing.assert_allclose(points[1], [0.025, 0, 0])
+    np.testing.assert_allclose(points[9], [0, 0.025, 0])
+
+
+def test_corners_of_a_rendered_board_are_where_geometry_puts_them() -> None:
+    """Through both lenses corners are found 0.25 px (root mean square) from their projection, none off by 0.5 px, in order."""
+    rig = unlike_rig()
+    for pose in poses(3, seed=3):
+        from_pose = _corners_m(pose)
+        expected = project_points(from_pose, rig)
+        for image, truth in zip(render_pair(rig, pose), expected, strict=True):
+            found = find_corners(image, BOARD)
+            assert found.shape == (54, 2)
+            # The board's first inner square is black here, so its white-first order is turned by half.
+            errors = np.linalg.norm(found[::-1] - truth, axis=1)
+            assert np.sqrt((errors**2).mean()) < 0.25  # edges without any lens blur alias
+            assert errors.max() < 0.5
+
+
+def _corners_m(pose: np.ndarray) -> np.ndarray:
+    import cv2  # noqa: PLC0415
+
+    points: np.ndarray = BOARD.points_m() @ np.asarray(cv2.Rodrigues(pose[:3])[0]).T + pose[3:]
+    return points
+
+
+def test_an_image_on_its_head_gives_the_same_corner_first() -> None:
+    """A 9x6 board tells by its colours which corner is the first, whichever way the camera is held."""
+    image = render_pair(unlike_rig(), poses(1, seed=4)[0])[0]
+    upright, turned = find_corners(image, BOARD), find_corners(image[::-1, ::-1].copy(), BOARD)
+    height, width = image.shape
+    np.testing.assert_allclose(np.array([width - 1, height - 1]) - turned, upright, atol=0.3)
+
+
+@pytest.mark.parametrize("board", [Board(8, 6, 0.025), Board(7, 5, 0.025), Board(6, 6, 0.025)])
+def test_boards_that_look_the_same_turned_get_one_order_in_both_views(board: Board) -> None:
+    """Whatever turn the detector gave the right view, it is brought to the left view's."""
+    grid = np.dstack(np.meshgrid(np.arange(board.columns) * 20.0, np.arange(board.rows) * 20.0))
+    left, right = grid.reshape(-1, 2) + 50, grid.reshape(-1, 2) * 0.9 + np.array([20, 60])
+    turns = [grid * 0.9 + np.array([20, 60])]
+    turns.append(turns[0][::-1, ::-1])
+    if board.columns == board.rows:
+        turns += [np.rot90(turns[0]), np.rot90(turns[0], 3)]
+    for turn in turns:
+        np.testing.assert_array_equal(agree(left, turn.reshape(-1, 2), board), right)
+
+
+def test_an_image_without_a_board_gives_no_corners() -> None:
+    """Noise and an empty wall hold no board."""
+    noise = np.random.default_rng(1).integers(0, 255, (240, 320)).astype(np.uint8)
+    assert find_corners(noise, BOARD).shape == (0, 2)
+    assert find_corners(np.full((240, 320, 3), 200, np.uint8), BOARD).shape == (0, 2)
