@@ -83,16 +83,28 @@ class Guest:
         ]
         with (self._folder / "qemu.log").open("wb") as log:
             self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
-        self.await_boot()
+        self._await_boot(after="")
 
-    def await_boot(self) -> None:
-        """Wait until systemd has started everything."""
+    @property
+    def boot_id(self) -> str:
+        """Id of this boot of the guest; empty while it cannot be asked."""
+        return self._ssh("cat /proc/sys/kernel/random/boot_id").stdout.strip()
+
+    def reboot(self) -> None:
+        """Shut down in order, boot again, and wait until it takes orders."""
+        before = self.boot_id
+        self.code("systemctl --no-block reboot")
+        self._await_boot(after=before)
+
+    def _await_boot(self, after: str) -> None:
+        """Wait until systemd has started everything, in a boot other than `after`."""
         deadline = time.monotonic() + _BOOT_S
-        while self._ssh("systemctl is-system-running --wait").returncode == _SSH_FAILED:
+        while self.boot_id in {"", after}:
             assert self._process is not None
             assert self._process.poll() is None, (self._folder / "qemu.log").read_text()
             assert time.monotonic() < deadline, f"no boot within {_BOOT_S:.0f} s: {self.console[-2000:]}"
             time.sleep(0.3)
+        self._ssh("systemctl is-system-running --wait")
 
     @property
     def console(self) -> str:
@@ -172,6 +184,7 @@ class Guest:
             "UserKnownHostsFile=/dev/null",
             "ConnectTimeout=5",
             "LogLevel=ERROR",
+            "ServerAliveInterval=5",
             "ControlMaster=auto",
             f"ControlPath={self._folder}/ssh",
             "ControlPersist=60",
@@ -179,8 +192,6 @@ class Guest:
         flags = [word for option in options for word in ("-o", option)]
         return ["ssh", "-F", "none", "-i", str(self._key), "-p", str(self._ssh_port), *flags, "root@127.0.0.1", command]
 
-
-_SSH_FAILED: Final = 255
 
 _ECHO: Final = "import sys, time\nfor _ in sys.stdin: print(time.monotonic_ns())"
 
@@ -213,7 +224,8 @@ class GuestClock:
     def close(self) -> None:
         """End the echo."""
         self._echo.kill()
-        self._echo.wait()
+        with self._echo:  # closes its pipes and waits
+            pass
 
     def _ask(self) -> int:
         assert self._echo.stdin is not None

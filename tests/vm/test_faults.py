@@ -59,7 +59,8 @@ def test_the_clock_estimate_is_true(guest: Guest, film: Path, tmp_path: Path) ->
         stream.finish(replay_skew(offset_ns), LATE_S)
     clock.close()
     for ledger in ledgers(tmp_path / "out"):
-        assert abs(ledger["offset_ns"] - offset_ns) <= ledger["uncertainty_ns"] + error_ns, ledger
+        # The product adds its offset to the board's clock to get the host's.
+        assert abs(ledger["offset_ns"] + offset_ns) <= ledger["uncertainty_ns"] + error_ns, ledger
 
 
 def test_a_killed_agent_is_restarted(guest: Guest, film: Path, skew: Skew, tmp_path: Path) -> None:
@@ -94,7 +95,7 @@ def test_a_restarted_service_says_goodbye(guest: Guest, film: Path, skew: Skew, 
         guest.sh(f"systemctl restart {UNIT}")
         stream.more(10, "after the restart")
         report = stream.finish(skew, LATE_S)
-    assert [session["tail"] for session in report["sessions"]] == ["known", "known"]
+    assert [session["tail"] for session in report["sessions"]] == ["known", "known"], stream.receiver.stderr
     accounts = board_accounts(guest.journal())
     first = report["sessions"][0]
     assert accounts[first["session"]]["sent"] == first["sent"]
@@ -104,7 +105,8 @@ def test_wall_clock_jumps_change_nothing(guest: Guest, film: Path, skew: Skew, t
     """The date set to 1970 and back, as on a board without a clock that meets a time server: same session, no pair lost or wrong."""
     with streaming(guest, film, tmp_path / "out") as stream:
         stream.more(10, "before the jump")
-        guest.sh("date -s @0")
+        # Linux refuses a date before its own boot: 1970 began an hour or so before this one.
+        guest.sh("date -s @$(($(cut -d. -f1 /proc/uptime) + 3600))")
         stream.more(10, "in 1970")
         guest.sh(f"date -s @{int(time.time())}")
         stream.more(10, "back in the present")
@@ -178,15 +180,9 @@ def test_a_cut_link_heals(guest: Guest, film: Path, skew: Skew, tmp_path: Path) 
 
 def test_a_rebooted_board_comes_back_by_itself(guest: Guest, film: Path, tmp_path: Path) -> None:
     """After a reboot, which sets the board's clock to zero, the same host pairs the right images by the new clock."""
-    boot = guest.sh("cat /proc/sys/kernel/random/boot_id")
     with streaming(guest, film, tmp_path / "out") as stream:
         stream.more(10, "before the reboot")
-        guest.code("systemctl reboot")
-        until(
-            lambda: "board_gone" in stream.receiver.stderr or "board_left" in stream.receiver.stderr, "the host notices"
-        )
-        guest.await_boot()
-        assert guest.sh("cat /proc/sys/kernel/random/boot_id") != boot
+        guest.reboot()
         stream.more(20, "after the reboot")
         assert stream.receiver.stop() == 0
     sessions = [ledger["session"] for ledger in ledgers(tmp_path / "out")]
