@@ -1,0 +1,254 @@
+"""The delay benchmark's pure parts: what is asked for, what is left out, what is said."""
+
+import dataclasses
+import json
+from html.parser import HTMLParser
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.errors import SettingsError
+from common.ledger import BoardMarks, PairLedger, StageTimes
+from common.protocol.message import BoardCounts
+from phone_host.bench import (
+    LINKS,
+    WARM_UP_S,
+    BoardAccount,
+    Case,
+    CaseResult,
+    Size,
+    after_warm_up,
+    cases,
+    parse_links,
+    parse_rates,
+    parse_sizes,
+    rig_of,
+)
+from phone_host.bench_report import Conditions, as_json, losses, page, rows
+from phone_host.delays import DELAYS, STAGES
+from phone_host.pairqueue import PairCounts
+from phone_host.receiver import LinkAccount, SessionAccount
+
+UNDER = Conditions("a machine", "a date", "sgbm", 4.0)
+UNITS = ("_ms", "_us", "_ns", "_s", "_hz", "_px", "_bytes", "_frames", "_pairs")
+
+
+def ledger(number: int, period_ns: int = 33_000_000) -> PairLedger:
+    """A pair whose delays are 1, 2, 3, 4, 5 and 15 ms."""
+    exposed_ns = number * period_ns
+    marks = BoardMarks(exposed_ns, exposed_ns + 1_000_000, exposed_ns + 3_000_000)
+    return PairLedger(
+        session="s",
+        sequence=number,
+        host_sequence=number,
+        bytes=50_000,
+        link="tcp",
+        board=marks,
+        received_ns=exposed_ns + 6_000_000,
+        paired_ns=exposed_ns + 10_000_000,
+        queued_ns=exposed_ns + 10_000_000,
+        dequeued_ns=exposed_ns + 15_000_000,
+        done_ns=exposed_ns + 30_000_000,
+        previous_done_ns=exposed_ns + 9_000_000,
+        stages=StageTimes(decode=1_000_000, match=14_000_000),
+        time_skew_ns=-5_000,
+        offset_ns=0,
+        uncertainty_ns=40_000,
+    )
+
+
+def result(pairs: int = 100, link: str = "tcp") -> CaseResult:
+    """A run of 108 frames: 3 dropped on the board, 1 under way, 2 lost, 1 orphaned, the FIFO dropped one pair."""
+    counts = BoardCounts()
+    account = SessionAccount("s", counts, counts, received=102, lost=2)
+    host = PairCounts(received=102, paired=101, dropped=1, taken=100, board_orphans=(("no_partner", 1),))
+    kept, measured_s = after_warm_up([ledger(number) for number in range(pairs)])
+    board = BoardAccount(108, 105, (("no_host", 3),))
+    return CaseResult(Case(link, Size(640, 480), 30), kept, measured_s, board, LinkAccount([account]), host, 100, 0)
+
+
+def keys_of_numbers(value: Any, key: str = "") -> list[str]:
+    if isinstance(value, dict):
+        # A dictionary of counts by reason takes its unit from its own key.
+        return [
+            found
+            for name, inner in value.items()
+            for found in keys_of_numbers(inner, key if key.endswith(UNITS) else name)
+        ]
+    if isinstance(value, list):
+        return [found for inner in value for found in keys_of_numbers(inner, key)]
+    return [key] if isinstance(value, int | float) else []
+
+
+@given(st.lists(st.sampled_from(LINKS), min_size=1))
+def test_links_are_each_measured_once(names: list[str]) -> None:
+    """Links come out in the order in which they were first named, none twice."""
+    assert parse_links(" , ".join(names)) == tuple(dict.fromkeys(names))
+
+
+@pytest.mark.parametrize("text", ["serial", "rfcomm", "tcp,foo", "", ",", "TCP"])
+def test_a_link_that_is_not_there_is_refused_with_those_that_are(text: str) -> None:
+    """The message of the refusal lists every link that can be measured."""
+    with pytest.raises(SettingsError) as caught:
+        parse_links(text)
+    assert all(name in caught.value.remedy for name in LINKS)
+
+
+@given(st.text())
+def test_any_text_is_read_or_refused(text: str) -> None:
+    """Whatever is typed for sizes, rates or links gives values or one SettingsError, nothing else."""
+    for parse in (parse_sizes, parse_rates, parse_links):
+        try:
+            assert parse(text)
+        except SettingsError as error:
+            assert "\n" not in error.remedy  # noqa: PT017 - any text is allowed to be refused
+
+
+@pytest.mark.parametrize(
+    "text", ["640", "640x", "x480", "0x0", "640x480x3", "-640x480", "63x480", "99999x9", "\u0666\u0664\u0660x480"]
+)
+def test_a_size_of_no_use_is_refused(text: str) -> None:
+    """Sizes are WIDTHxHEIGHT in plain digits within the limits."""
+    with pytest.raises(SettingsError):
+        parse_sizes(text)
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "29.97", "241", "a", ""])
+def test_a_rate_of_no_use_is_refused(text: str) -> None:
+    """Rates are whole numbers from 1 to 240."""
+    with pytest.raises(SettingsError):
+        parse_rates(text)
+
+
+def test_cases_are_all_combinations_with_links_next_to_each_other() -> None:
+    """Every link is measured with every size and rate, and the links of one size and rate follow each other."""
+    planned = cases(("tcp", "ipc"), (Size(320, 240), Size(640, 480)), (15, 30))
+    assert len(set(planned)) == len(planned) == 8
+    assert [case.link for case in planned] == ["tcp", "ipc"] * 4
+    assert all(
+        first.size == second.size and first.rate_hz == second.rate_hz
+        for first, second in zip(planned[::2], planned[1::2], strict=True)
+    )
+
+
+@given(st.integers(64, 4096), st.integers(64, 4096))
+def test_a_rig_of_any_size_has_the_same_field_of_view(width_px: int, height_px: int) -> None:
+    """Half the width over the focal length is the same for every size (tan of half the angle), and the centre is the middle."""
+    camera = rig_of(Size(width_px, height_px)).left
+    assert width_px / 2 / camera.matrix[0, 0] == pytest.approx(320 / 525, rel=1e-12)
+    assert (camera.matrix[0, 2], camera.matrix[1, 2]) == ((width_px - 1) / 2, (height_px - 1) / 2)
+
+
+@given(st.integers(0, 200))
+def test_the_first_second_is_left_out(pairs: int) -> None:
+    """No pair done within a second of the first one is kept, and every later one is."""
+    done = [ledger(number) for number in range(pairs)]
+    kept, measured_s = after_warm_up(done)
+    begin_ns = 30_000_000 + round(WARM_UP_S * 1e9)
+    assert list(kept) == [pair for pair in done if pair.done_ns > begin_ns]
+    assert not kept or measured_s == pytest.approx((done[-1].done_ns - begin_ns) / 1e9)
+
+
+def test_every_number_of_the_report_has_its_unit_in_its_key() -> None:
+    """A reader needs nothing but the key to know what a number is."""
+    report = as_json([result()], UNDER)
+    assert json.loads(json.dumps(report, allow_nan=False)) == report
+    assert [key for key in keys_of_numbers(report) if not key.endswith(UNITS)] == []
+
+
+def test_report_holds_each_delay_and_stage() -> None:
+    """The known delays of the pairs come out, stage by stage, in ms."""
+    run: Any = as_json([result()], UNDER)["runs"]
+    known = {
+        "capture": 1,
+        "outbox": 2,
+        "propagation": 3,
+        "pairing": 4,
+        "queuing": 5,
+        "processing": 15,
+        "end_to_end": 30,
+    }
+    known |= {"starvation": 1}
+    assert {name: run[0]["delays"][name]["p50_ms"] for name in DELAYS} == known
+    assert {name: run[0]["stages"][name]["max_ms"] for name in STAGES} == {
+        "decode": 1,
+        "rectify": 0,
+        "match": 14,
+        "reproject": 0,
+        "write": 0,
+    }
+    assert run[0]["clock_uncertainty"]["p99_us"] == 40
+
+
+def test_counts_of_the_report_are_conserved() -> None:
+    """Grabbed = sent + dropped; sent = received + lost + under way; received = paired + orphaned; paired = processed + dropped."""
+    runs: Any = as_json([result()], UNDER)["runs"]
+    whole = runs[0]["whole_run"]
+    assert whole["grabbed_frames"] == whole["sent_frames"] + sum(whole["dropped_on_board_frames"].values())
+    assert whole["sent_frames"] == whole["received_frames"] + whole["lost_on_link_frames"] + 1
+    assert whole["under_way_at_end_frames"] == 1
+    assert whole["received_frames"] == whole["paired_pairs"] + sum(whole["orphaned_frames"].values())
+    assert whole["paired_pairs"] == whole["processed_pairs"] + whole["dropped_in_fifo_pairs"]
+
+
+def test_losses_name_what_became_of_each_frame() -> None:
+    """Only reasons that happened are named."""
+    assert losses(result()) == {
+        "no_host_on_board": 3,
+        "lost_on_link": 2,
+        "no_partner_board_frame": 1,
+        "dropped_in_fifo": 1,
+    }
+
+
+def test_a_run_without_pairs_is_reported_without_numbers() -> None:
+    """Nothing measured is null in JSON and a dash in the table, never a zero."""
+    empty = result(pairs=0)
+    runs: Any = as_json([empty], UNDER)["runs"]
+    assert runs[0]["delays"]["processing"]["p50_ms"] is None
+    assert runs[0]["pair_rate_hz"] is None
+    assert {cell for row in rows([empty]) for cell in row[2:]} == {"-"}
+    assert "No pair was processed" in page([empty], UNDER)
+
+
+def test_the_table_has_a_line_for_each_stage_and_link() -> None:
+    """Every delay and every stage of processing stands there once for each link."""
+    table = rows([result(), result(link="ipc")])
+    assert len(table) == 2 * (len(DELAYS) + len(STAGES) + 1)
+    assert [row[1] for row in table[:2]] == ["tcp", "ipc"]
+    assert all(len(row) == 6 for row in table)
+
+
+def test_page_is_whole_html_and_refers_to_nothing_outside() -> None:
+    """All elements are closed, each link has its plots, and nothing is loaded from elsewhere."""
+
+    class Checker(HTMLParser):
+        open_tags: list[str]
+        plots = 0
+
+        def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+            assert not [value for name, value in attrs if name in {"src", "href"} and value and "://" in value]
+            self.plots += tag == "svg"
+            if tag not in {"meta", "br", "path", "line", "rect", "circle", "polygon"}:
+                self.open_tags.append(tag)
+
+        def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+            pass
+
+        def handle_endtag(self, tag: str) -> None:
+            if tag in self.open_tags:
+                while self.open_tags.pop() != tag:
+                    pass
+
+    checker = Checker()
+    checker.open_tags = []
+    text = page(
+        [result(), result(link="ipc"), dataclasses.replace(result(), case=Case("tcp", Size(320, 240), 15))], UNDER
+    )
+    checker.feed(text)
+    assert checker.open_tags == []
+    assert checker.plots == 2 * 3 * 2
+    assert "640x480 at 30" in text
+    assert "320x240 at 15" in text
