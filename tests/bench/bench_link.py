@@ -1,0 +1,207 @@
+"""One-way latency and CPU time of our link beside bare pyzmq, bare TCP and imagezmq: `python -m tests.bench.bench_link [--help]`.
+
+640x480 frames over loopback TCP at 30 per second, all transports in turns within one run, medians over the runs. Figures to reach for JPEGs of
+about 50 KB: one-way p50 at most 1.1 times that of bare pyzmq, the sender's CPU time at most 40 us a frame above it.
+"""
+
+import argparse
+import importlib.util
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from phone_host.demo import free_port
+from tests.bench.link_worker import RECEIVERS, SENDERS
+from tests.bench.machine import machine, may_use_fifo
+from tests.bench.payloads import write_jpegs, write_raw
+
+_FPS = 30
+_CONNECT_S = 2.0
+_WARM_UP_S = {"tandemscan": 12.0}
+"""Left out: the time to connect; of our own link also the first ten seconds of a session, in which it learns the clock with more echoes."""
+
+_NAMES = {
+    "tandemscan": "tandemscan link and protocol",
+    "pyzmq": "bare pyzmq PUSH/PULL",
+    "tcp": "bare TCP socket",
+    "imagezmq": "imagezmq REQ/REP",
+    "nothing": "pacing alone, nothing sent",
+}
+_LATENCY_RATIO = 1.1
+_SENDER_US = 40.0
+_PAYLOADS: dict[str, Callable[[Path], int]] = {"jpeg": write_jpegs, "raw": write_raw}
+
+
+@dataclass(slots=True)
+class Rows:
+    """What the runs of one transport gave, one number a run.
+
+    Attributes:
+        p50_us: one-way latency.
+        p95_us: the same.
+        p99_us: the same.
+        sender_us: CPU time a frame of the sender's process.
+        receiver_us: the same of the receiver's.
+        lost: frames that never came, over all runs.
+    """
+
+    p50_us: list[float] = field(default_factory=list)
+    p95_us: list[float] = field(default_factory=list)
+    p99_us: list[float] = field(default_factory=list)
+    sender_us: list[float] = field(default_factory=list)
+    receiver_us: list[float] = field(default_factory=list)
+    lost: int = 0
+
+    def add(self, sender: dict[str, float], receiver: dict[str, list[int]] | None, measured: int) -> None:
+        """Take one run."""
+        self.sender_us.append(sender["cpu_us_per_frame"])
+        if receiver is None:
+            return
+        delays = receiver["delays_ns"]
+        self.lost += measured - len(delays)
+        self.receiver_us.append(float(receiver["cpu_us_per_frame"]))  # type: ignore[arg-type]  # one number beside a list
+        for values, q in ((self.p50_us, 50), (self.p95_us, 95), (self.p99_us, 99)):
+            values.append(float(np.percentile(delays, q)) / 1000 if delays else float("nan"))
+
+    def medians(self) -> dict[str, float | int | None]:
+        """Medians over the runs; None where nothing was measured."""
+        names = ("p50_us", "p95_us", "p99_us", "sender_us", "receiver_us")
+        values: dict[str, list[float]] = {name: getattr(self, name) for name in names}
+        return {name: _median(row) for name, row in values.items()} | {
+            "p99_best_us": min(self.p99_us, default=None),
+            "lost_frames": self.lost,
+        }
+
+
+def main() -> None:
+    """Run and print."""
+    options = _options()
+    runs = range(options.runs)
+    transports = [name for name in _NAMES if name in options.transports]
+    missing = {}
+    if "imagezmq" in transports and importlib.util.find_spec("imagezmq") is None:
+        transports.remove("imagezmq")
+        missing["imagezmq"] = "not installed (pip install tandemscan[bench])"
+    frames = round(options.seconds * _FPS)
+    results: dict[str, dict[str, Rows]] = {}
+    sizes = {}
+    console = Console(stderr=True)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Progress(console=console, transient=True, disable=not console.is_terminal) as progress,
+    ):
+        task = progress.add_task("frames", total=len(options.payloads) * len(runs) * len(transports))
+        for payload in options.payloads:
+            target = Path(folder) / payload
+            target.mkdir()
+            sizes[payload] = _PAYLOADS[payload](target)
+            results[payload] = {name: Rows() for name in transports}
+        for payload, _, name in ((p, r, t) for r in runs for p in options.payloads for t in transports):
+            progress.update(task, description=f"{payload} over {name}")
+            sender, receiver = _run(name, Path(folder) / payload, frames)
+            results[payload][name].add(sender, receiver, frames)
+            progress.advance(task)
+    scheduling = "both ends SCHED_FIFO" if may_use_fifo() else "ordinary scheduling (SCHED_FIFO needs root)"
+    method = (
+        f"{options.runs} runs of {options.seconds:g} s each, in turns; medians over runs; {scheduling}, one core each"
+    )
+    if options.json:
+        print(json.dumps(_as_json(results, sizes, missing, method), indent=1))
+        return
+    print(f"{machine()}\n{method}")
+    for payload, rows in results.items():
+        _print(payload, sizes[payload], rows, missing)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser("python -m tests.bench.bench_link", description=__doc__)
+    parser.add_argument("--seconds", type=float, default=5.0, help="measured time of each run (default 5)")
+    parser.add_argument("--runs", type=int, default=5, help="runs of each transport (default 5)")
+    parser.add_argument("--payloads", nargs="+", choices=list(_PAYLOADS), default=list(_PAYLOADS))
+    parser.add_argument("--transports", nargs="+", choices=list(_NAMES), default=list(_NAMES))
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    return parser.parse_args()
+
+
+def _run(transport: str, folder: Path, frames: int) -> tuple[dict[str, float], dict[str, list[int]] | None]:
+    address = f"tcp://127.0.0.1:{free_port()}"
+    warm_up = round(_WARM_UP_S.get(transport, _CONNECT_S) * _FPS)
+
+    def start(role: str) -> subprocess.Popen[bytes]:
+        module = [sys.executable, "-m", "tests.bench.link_worker", role, transport, address, str(folder)]
+        return subprocess.Popen([*module, str(_FPS), str(warm_up), str(warm_up + frames)], stdout=subprocess.PIPE)
+
+    receiver = start("receive") if transport in RECEIVERS else None
+    assert transport in SENDERS
+    sender = start("send")
+    try:
+        limit_s = (warm_up + frames) / _FPS + 30
+        sent = sender.communicate(timeout=limit_s)[0]
+        received = receiver.communicate(timeout=limit_s)[0] if receiver else b"null"
+    finally:
+        for process in (sender, *([receiver] if receiver else [])):
+            process.kill()
+            process.wait()
+    return json.loads(sent), json.loads(received)
+
+
+def _median(values: list[float]) -> float | None:
+    return statistics.median(values) if values else None
+
+
+def _as_json(
+    results: dict[str, dict[str, Rows]], sizes: dict[str, int], missing: dict[str, str], method: str
+) -> dict[str, object]:
+    return {
+        "machine": str(machine()),
+        "method": method,
+        "missing": missing,
+        "payloads": {
+            payload: {
+                "bytes": sizes[payload],
+                "transports": {name: row.medians() for name, row in rows.items()},
+                "sender_us_by_run": {name: row.sender_us for name, row in rows.items()},
+                "p50_us_by_run": {name: row.p50_us for name, row in rows.items()},
+            }
+            for payload, rows in results.items()
+        },
+    }
+
+
+def _print(payload: str, size: int, rows: dict[str, Rows], missing: dict[str, str]) -> None:
+    table = Table(title=f"{payload}, 640x480, {size / 1000:.0f} KB, {_FPS} frames/s", title_justify="left")
+    table.add_column("transport")
+    for title in ("p50 us", "p95 us", "p99 us", "best p99 us", "sender us/frame", "receiver us/frame", "lost"):
+        table.add_column(title, justify="right")
+    for name, row in rows.items():
+        values = row.medians()
+        keys = ("p50_us", "p95_us", "p99_us", "p99_best_us", "sender_us", "receiver_us")
+        cells = ["-" if values[key] is None else f"{values[key]:.0f}" for key in keys]
+        table.add_row(_NAMES[name], *cells, str(row.lost) if row.p50_us else "-")
+    for name, why in missing.items():
+        table.add_row(_NAMES[name], why)
+    Console(width=150).print(table)
+    if payload == "jpeg" and {"tandemscan", "pyzmq"} <= rows.keys():
+        ours, bare = rows["tandemscan"], rows["pyzmq"]
+        ratio = statistics.median(ours.p50_us) / statistics.median(bare.p50_us)
+        more_us = statistics.median(ours.sender_us) - statistics.median(bare.sender_us)
+        print(f"one-way p50: {ratio:.2f} x bare pyzmq (to reach: {_LATENCY_RATIO}) {_verdict(ratio <= _LATENCY_RATIO)}")
+        print(f"sender: {more_us:+.0f} us/frame (to reach: {_SENDER_US:.0f}) {_verdict(more_us <= _SENDER_US)}")
+
+
+def _verdict(reached: bool) -> str:  # noqa: FBT001 - a yes or no to print
+    return "reached" if reached else "NOT reached"
+
+
+if __name__ == "__main__":
+    main()
