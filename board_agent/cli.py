@@ -16,6 +16,7 @@ from board_agent.status import StatusLine
 from common import logs, now
 from common.camera.base import CameraHealth
 from common.camera.factory import EXAMPLE, open_camera
+from common.commandline import ExamplesFirstParser
 from common.errors import SettingsError, TandemError
 from common.link.factory import open_link, parse_link
 from common.protocol.message import BoardCounts
@@ -61,16 +62,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    raw = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser("board-agent", description=_EXAMPLES, formatter_class=raw)
+    parser = ExamplesFirstParser("board-agent", description=_EXAMPLES)
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
-    run = verbs.add_parser("run", help="serve frames until stopped", description=_EXAMPLES, formatter_class=raw)
-    show = verbs.add_parser(
-        "settings", help="print each setting with its origin", description=_EXAMPLES, formatter_class=raw
-    )
-    cameras = verbs.add_parser(
-        "cameras", help="list formats, rates and controls", description=_EXAMPLES, formatter_class=raw
-    )
+    run = verbs.add_parser("run", help="serve frames until stopped", description=_EXAMPLES)
+    show = verbs.add_parser("settings", help="print each setting with its origin", description=_EXAMPLES)
+    cameras = verbs.add_parser("cameras", help="list formats, rates and controls", description=_EXAMPLES)
     for verb in (run, show, cameras):
         verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
         verb.add_argument("--debug", action="store_true", help="show tracebacks")

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
+from common.commandline import ExamplesFirstParser
 from common.errors import TandemError
 
 INTERRUPTED = 130
@@ -52,17 +53,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser(asked: str) -> argparse.ArgumentParser:
     """Make the parser; only the verb that is asked for brings its options, so that no other one is imported."""
-    raw = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser("phone-host", description=_EXAMPLES, formatter_class=raw)
+    parser = ExamplesFirstParser("phone-host", description=_EXAMPLES)
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     for name, explanation in _VERBS.items():
         if name != asked:
             verbs.add_parser(name, help=explanation)
             continue
         module = _module(name)
-        verb = verbs.add_parser(
-            name, help=explanation, description=f"examples:\n{module.EXAMPLES}", formatter_class=raw
-        )
+        verb = verbs.add_parser(name, help=explanation, description=f"examples:\n{module.EXAMPLES}")
         module.add_arguments(verb)
         verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
         verb.add_argument("--debug", action="store_true", help="show tracebacks")

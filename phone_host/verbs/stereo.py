@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -48,8 +47,6 @@ def run(options: argparse.Namespace) -> int:
             "neither --calibration nor --rectified is given",
             "give the rig.yaml of `phone-host calibrate`, or --rectified --disparities N",
         )
-    if not (math.isfinite(options.near) and options.near > 0):
-        raise SettingsError(f"--near {options.near:g}", "give millimetres above 0")
     watch = _StopWatch()
     left, right = read_pair(options.left, options.right)
     if options.rectified:

@@ -1,6 +1,7 @@
 """The options that name a stereo core, shared by the verbs that need one, and what they make of them."""
 
 import argparse
+import math
 from pathlib import Path
 
 from common.errors import SettingsError
@@ -65,6 +66,8 @@ def build_core(
         raise SettingsError(
             f"matcher {matcher!r} is unknown", f"give {' or '.join(name.value for name in MatcherName)}"
         )
+    if not (math.isfinite(options.near) and options.near > 0):
+        raise SettingsError(f"--near {options.near:g}", "give millimetres above 0")
     if calibration and options.rectified:
         raise SettingsError("--calibration and --rectified contradict each other", "give one of them")
     if calibration:

@@ -1,0 +1,31 @@
+"""The commands' help as a new user sees it."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.support.programs import program
+
+COMMANDS = [
+    ("board_agent.cli", []),
+    *(("board_agent.cli", [verb]) for verb in ("run", "settings", "cameras")),
+    ("phone_host.cli", []),
+    *(("phone_host.cli", [verb]) for verb in ("demo", "run", "calibrate", "stereo", "settings")),
+    ("phone_host.bench_cli", []),
+]
+
+
+@pytest.mark.parametrize(
+    ("module", "verb"), COMMANDS, ids=lambda value: " ".join(value) if isinstance(value, list) else value
+)
+def test_help_opens_with_examples(module: str, verb: list[str], tmp_path: Path) -> None:
+    """--help of every command and verb ends with exit 0 and opens with examples that begin with the command's own name."""
+    with program(module, [*verb, "--help"], tmp_path, "help") as running:
+        assert running.wait() == 0
+    first, second = running.out.read_text().splitlines()[:2]
+    assert first == "examples:"
+    name = {"board_agent.cli": "board-agent", "phone_host.cli": "phone-host", "phone_host.bench_cli": "delay-bench"}[
+        module
+    ]
+    assert second.split("=")[0].strip().startswith((name, "PHONE_HOST", "BOARD_AGENT"))
+    assert "--debug" in running.out.read_text() or not verb
