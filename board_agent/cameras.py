@@ -88,9 +88,12 @@ def _lines(camera: Listed) -> list[str]:
     ]
     lines += ["", f"  {'format':8} {'as':8} {'size':>11}  frames per second"]
     for offer, sizes in camera.formats:
-        name = _KNOWN.get(offer.letters, "not used")
+        if (name := _KNOWN.get(offer.letters)) is None:
+            continue
         for width, height, rates in ((*size, rates) for size, rates in sizes):
             lines.append(f"  {offer.letters:8} {name:8} {f'{width}x{height}':>11}  {rates}")
+    if unused := [offer.letters for offer, _ in camera.formats if offer.letters not in _KNOWN]:
+        lines.append(f"  not used: {', '.join(unused)}")
     if camera.controls:
         lines += ["", f"  {'control':32} {'value':>8} {'default':>8}  range"]
     for control, value in camera.controls:

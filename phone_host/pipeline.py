@@ -3,10 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from common.frame import Frame
 from common.ledger import StageTimes
+from common.protocol.message import FrameMessage
 from phone_host.model import CloudImage, Disparity, FramePair, RectifiedPair, Side
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.images import decode_pair
+from phone_host.stereo.raw_images import EncodedImage, decode_frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +54,10 @@ class Pipeline:
         Raises:
             DataError: a frame's bytes are no image, or its size does not fit the rig.
         """
-        board, host = memoryview(pair.board.message.payload), memoryview(pair.host.payload)
-        names = (f"board frame {pair.board.message.sequence}", f"host frame {pair.host.sequence}")
-        if self._board_side is Side.RIGHT:
-            board, host, names = host, board, (names[1], names[0])
+        board, host = _encoded(pair.board.message, "board"), _encoded(pair.host, "host")
+        first, second = (board, host) if self._board_side is Side.LEFT else (host, board)
         start_ns = self._clock()
-        left, right = decode_pair(board, host, *names)
+        left, right = decode_frames(first, second)
         decoded_ns = self._clock()
         if self._core is None:
             return Processed(RectifiedPair(left, right), None, None, StageTimes(decode=decoded_ns - start_ns))
@@ -74,3 +74,8 @@ class Pipeline:
             reproject=reprojected_ns - matched_ns,
         )
         return Processed(rectified, disparity, cloud, stages)
+
+
+def _encoded(frame: FrameMessage | Frame, whose: str) -> EncodedImage:
+    payload = memoryview(frame.payload)
+    return EncodedImage(payload, frame.pixel_format, frame.width_px, frame.height_px, f"{whose} frame {frame.sequence}")
