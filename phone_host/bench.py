@@ -233,7 +233,7 @@ def run_case(
         del processed
         ledgers.append(ledger)
 
-    with _board(shown.replay_uri(shown.left), address) as board:
+    with board_process(shown.replay_uri(shown.left), address) as board:
         host = Host(
             HostSettings(wait_ns=_PATIENCE_NS, save_every=0),
             open_camera(shown.replay_uri(shown.right), HOST_CLOCK, now.monotonic_ns()),
@@ -288,7 +288,7 @@ def _core(size: Size, matcher: MatcherName) -> StereoCore:
     return StereoCore(create_matcher(MatchSettings(matcher, disparities)), None, geometry)
 
 
-class _Board:
+class BoardProcess:
     """A running board-agent process."""
 
     def __init__(self, process: subprocess.Popen[bytes]) -> None:
@@ -314,7 +314,7 @@ class _Board:
 
 
 @contextmanager
-def _board(camera: str, address: str) -> Iterator[_Board]:
+def board_process(camera: str, address: str) -> Iterator[BoardProcess]:
     """A board-agent process for the length of a block; whatever happens, it is gone afterwards."""
     # -P: a folder named `common` where the user happens to stand must not be taken for ours.
     command = [sys.executable, "-P", "-m", "board_agent.cli", "run", "--camera", camera, "--link", address]
@@ -322,7 +322,7 @@ def _board(camera: str, address: str) -> Iterator[_Board]:
         [*command, "--log-level", "warning", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     try:
-        yield _Board(process)
+        yield BoardProcess(process)
     finally:
         if process.poll() is None:
             process.terminate()
