@@ -40,6 +40,7 @@ class StatusLine:
         self._measured_ns, self._grabbed = now_ns, counts.grabbed
         silent_ns = now_ns - self._moved_ns
         if not has_host:
+            self._moved_ns = now_ns  # the camera may rest
             return f"waiting for a host on {self._links}"
         if self._pacing is Pacing.CLOCK and silent_ns >= _SILENT_NS:
             return f"no frame from {self._camera} for {silent_ns // 1_000_000_000} s: is it plugged in?"

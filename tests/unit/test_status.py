@@ -39,3 +39,11 @@ def test_a_silent_camera_is_named_with_its_silence() -> None:
 def test_a_camera_on_demand_may_be_silent() -> None:
     """A demand-paced replay gives nothing while the host asks for nothing: that is no fault."""
     assert line(Pacing.DEMAND).text(60 * SECOND_NS, BoardCounts(1, 1), has_host=True).startswith("0.0 fps, 1 sent")
+
+
+def test_a_camera_that_rested_without_a_host_is_not_called_silent() -> None:
+    """An hour without host and frames is no silence of the camera: it counts from the host's coming."""
+    status = line()
+    status.text(3600 * SECOND_NS, BoardCounts(), has_host=False)
+    assert "fps" in status.text(3602 * SECOND_NS, BoardCounts(), has_host=True)
+    assert "for 4 s" in status.text(3604 * SECOND_NS, BoardCounts(), has_host=True)

@@ -1,5 +1,6 @@
 """The booted board that all tests here share. `make test-board` builds its image; without one they are skipped."""
 
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -8,12 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.numbered import write_film
 from tests.vm.guest import Guest, Image
-from tests.vm.stream import FPS, FRAMES
+from tests.vm.stream import FPS, Film, Skew, webcam_skew, write_film
+from tests.vm.webcam import Webcam
 
 ROOT = Path(__file__).resolve().parents[2]
-FILM = "/var/lib/tandemscan/frames"
+READOUT_MS = 20
+CAMERA = f"v4l2:auto?size=320x240&fps={FPS}&readout_ms={READOUT_MS}"
 
 
 def _image() -> Image:
@@ -56,25 +58,42 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A minute of numbered images."""
-    return write_film(tmp_path_factory.mktemp("film") / "frames", FRAMES)
+def film(tmp_path_factory: pytest.TempPathFactory) -> Film:
+    """A minute of numbered views of one plane."""
+    return write_film(tmp_path_factory.mktemp("film"))
 
 
 @pytest.fixture(scope="module")
-def guest(bare_guest: Guest, package: Path, film: Path) -> Guest:
-    """The board with its package installed and serving the numbered images to everybody."""
+def guest(bare_guest: Guest, package: Path) -> Guest:
+    """The board with its package installed, its camera's settings given, and its link open to everybody."""
     bare_guest.put(package, "/root")
     bare_guest.sh(f"dpkg -i /root/{package.name}")
-    if bare_guest.code(f"test -d {FILM}") != 0:
-        bare_guest.put(film, str(Path(FILM).parent))
-    configure(bare_guest, f"replay:{FILM}?fps={FPS}&loop=1")
+    configure(bare_guest, CAMERA)
     return bare_guest
+
+
+@pytest.fixture(scope="module")
+def webcam(guest: Guest, film: Film) -> Iterator[Webcam]:
+    """The webcam, plugged in."""
+    camera = Webcam(film.frames, FPS, READOUT_MS * 1_000_000)
+    camera.plug(guest)
+    yield camera
+    camera.close()
+
+
+@pytest.fixture
+def skew(webcam: Webcam) -> Skew:
+    """The truth about pairs: what the webcam knows of its own exposures."""
+    return webcam_skew(webcam.late_ns)
 
 
 def configure(guest: Guest, camera: str) -> None:
     """Set the service's camera, open its link to everybody, and restart it."""
-    guest.sh(
-        "sed -i -e 's|^camera = .*|camera = \"{camera}\"|' -e 's|^link = .*|link = [\"tcp://*:5555\"]|' "
-        "/etc/tandemscan/board-agent.toml && systemctl restart board-agent".format(camera=camera.replace("&", r"\&"))
-    )
+    edits = (f'camera = "{camera}"', 'link = ["tcp://*:5555"]')
+    script = " ".join(f"-e {shlex.quote(f's|^{edit.split()[0]} = .*|{_literal(edit)}|')}" for edit in edits)
+    guest.sh(f"sed -i {script} /etc/tandemscan/board-agent.toml && systemctl restart board-agent")
+
+
+def _literal(text: str) -> str:
+    """Text as the replacement of sed's `s|…|…|`."""
+    return text.replace("&", "\\&")

@@ -8,132 +8,118 @@ import pytest
 
 from tests.support.programs import ledgers, until
 from tests.vm.guest import UNIT, Guest
-from tests.vm.stream import Skew, board_accounts, kill, replay_skew, streaming
+from tests.vm.stream import Film, Skew, board_accounts, check_journal, kill, streaming
+from tests.vm.webcam import Webcam
 
 pytestmark = pytest.mark.timeout(600)  # the first test boots the board
 
 NETWORK_CARD = "eth1"
-LATE_S = 0.02
-"""How far the test's own measure of the guest's clock may be off on a busy machine, beside its stated error."""
-
-
-@pytest.fixture
-def skew(guest: Guest) -> Skew:
-    """The truth about pairs, by a measure of the guest's clock that the product knows nothing of."""
-    clock = guest.clock()
-    offset_ns, error_ns = clock.offset_ns()
-    clock.close()
-    assert error_ns < LATE_S * 1e9
-    return replay_skew(offset_ns)
 
 
 @pytest.fixture(autouse=True)
-def _sound_afterwards(guest: Guest) -> Iterator[None]:
-    """After each test the service is up, has kept its books and has never shown a traceback."""
+def _sound_afterwards(guest: Guest, webcam: Webcam) -> Iterator[None]:
+    """After each test the service is up, its books balance and it has never shown a traceback."""
+    assert webcam.plugged
     yield
-    guest.until("ActiveState", "active", "the service is up")
-    journal = guest.journal()
-    assert "Traceback" not in journal
-    for session, account in board_accounts(journal).items():
-        assert account["grabbed"] == account["sent"] + account["dropped"], session
+    check_journal(guest)
 
 
-def test_pairs_are_right_and_delays_add_up(guest: Guest, film: Path, skew: Skew, tmp_path: Path) -> None:
+def test_pairs_are_right_and_delays_add_up(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
     """50 pairs: the right images, one session, nothing lost, positive delays with an exact sum, and a status that tells the rate."""
-    with streaming(guest, film, tmp_path / "out") as stream:
+    with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(50, "at the start")
         guest.until("StatusText", "sent to the host", "the status tells the rate")
-        report = stream.finish(skew, LATE_S)
+        report = stream.finish(skew)
     assert len(report["sessions"]) == 1
     assert report["sessions"][0]["lost"] == 0
     assert report["sessions"][0]["tail"] == "known"
     guest.until("StatusText", "waiting for a host on tcp://*:5555", "the status tells that the host has left")
 
 
-def test_the_clock_estimate_is_true(guest: Guest, film: Path, tmp_path: Path) -> None:
+def test_the_clock_estimate_is_true(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
     """The offset in every ledger is within its own stated uncertainty of the offset measured from outside."""
     clock = guest.clock()
-    with streaming(guest, film, tmp_path / "out") as stream:
+    with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(30, "at the start")
         offset_ns, error_ns = clock.offset_ns()
-        stream.finish(replay_skew(offset_ns), LATE_S)
+        stream.finish(skew)
     clock.close()
     for ledger in ledgers(tmp_path / "out"):
         # The product adds its offset to the board's clock to get the host's.
         assert abs(ledger["offset_ns"] + offset_ns) <= ledger["uncertainty_ns"] + error_ns, ledger
 
 
-def test_a_killed_agent_is_restarted(guest: Guest, film: Path, skew: Skew, tmp_path: Path) -> None:
+def test_a_killed_agent_is_restarted(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
     """After SIGKILL systemd starts the agent anew and the same host pairs frames of the new session."""
     restarts = int(guest.show("NRestarts"))
-    with streaming(guest, film, tmp_path / "out") as stream:
+    with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the kill")
         guest.sh(f"systemctl kill -s KILL {UNIT}")
         stream.more(10, "after the kill")
-        report = stream.finish(skew, LATE_S)
+        report = stream.finish(skew)
     assert int(guest.show("NRestarts")) == restarts + 1
     assert [session["tail"] for session in report["sessions"]] == ["unknown", "known"]
 
 
-def test_a_hung_agent_is_restarted_by_the_watchdog(guest: Guest, film: Path, skew: Skew, tmp_path: Path) -> None:
+def test_a_hung_agent_is_restarted_by_the_watchdog(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
     """An agent that stops going round its loop (SIGSTOP) is killed by the watchdog and started anew."""
     restarts = int(guest.show("NRestarts"))
-    with streaming(guest, film, tmp_path / "out") as stream:
+    with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the stop")
         guest.sh(f"systemctl kill -s STOP {UNIT}")
         until(lambda: int(guest.show("NRestarts")) == restarts + 1, "the watchdog restarts the service")
         stream.more(10, "after the restart")
-        report = stream.finish(skew, LATE_S)
+        report = stream.finish(skew)
     assert "Watchdog timeout" in guest.journal()
     assert len(report["sessions"]) == 2
 
 
-def test_a_restarted_service_says_goodbye(guest: Guest, film: Path, skew: Skew, tmp_path: Path) -> None:
+def test_a_restarted_service_says_goodbye(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
     """`systemctl restart` ends the session with its account known to the host, and the next one streams."""
-    with streaming(guest, film, tmp_path / "out") as stream:
+    with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the restart")
         guest.sh(f"systemctl restart {UNIT}")
         stream.more(10, "after the restart")
-        report = stream.finish(skew, LATE_S)
+        report = stream.finish(skew)
     assert [session["tail"] for session in report["sessions"]] == ["known", "known"], stream.receiver.stderr
     accounts = board_accounts(guest.journal())
     first = report["sessions"][0]
-    assert accounts[first["session"]]["sent"] == first["sent"]
+    assert accounts[first["session"]]["sent"] >= first["sent"]  # an earlier host had the first ones
 
 
-def test_wall_clock_jumps_change_nothing(guest: Guest, film: Path, skew: Skew, tmp_path: Path) -> None:
+def test_wall_clock_jumps_change_nothing(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
     """The date set to 1970 and back, as on a board without a clock that meets a time server: same session, no pair lost or wrong."""
-    with streaming(guest, film, tmp_path / "out") as stream:
+    with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the jump")
         # Linux refuses a date before its own boot: 1970 began an hour or so before this one.
         guest.sh("date -s @$(($(cut -d. -f1 /proc/uptime) + 3600))")
         stream.more(10, "in 1970")
         guest.sh(f"date -s @{int(time.time())}")
         stream.more(10, "back in the present")
-        report = stream.finish(skew, LATE_S)
+        report = stream.finish(skew)
     assert len(report["sessions"]) == 1
     assert report["sessions"][0]["lost"] == 0
 
 
 def test_a_host_that_died_is_forgotten_and_a_new_one_served(
-    guest: Guest, film: Path, skew: Skew, tmp_path: Path
+    guest: Guest, film: Film, skew: Skew, tmp_path: Path
 ) -> None:
     """While the host is dead the board drops frames at the source and says so; a new host gets fresh frames of the same session."""
-    with streaming(guest, film, tmp_path / "first") as stream:
+    with streaming(guest, film.right, tmp_path / "first") as stream:
         stream.more(10, "of the first host")
         kill(stream)
     guest.until("StatusText", "waiting for a host", "the board has forgotten the dead host")
-    with streaming(guest, film, tmp_path / "second") as stream:
+    with streaming(guest, film.right, tmp_path / "second") as stream:
         stream.more(10, "of the second host")
-        stream.finish(skew, LATE_S)
+        stream.finish(skew)
     last, first = ledgers(tmp_path / "first")[-1], ledgers(tmp_path / "second")[0]
     assert last["session"] == first["session"]
     assert first["sequence"] > last["sequence"]
 
 
-def test_a_full_disk_stops_nothing(guest: Guest, film: Path, skew: Skew, tmp_path: Path) -> None:
+def test_a_full_disk_stops_nothing(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
     """With not one free block on the board's disk the stream goes on, and the service can even be restarted."""
-    with streaming(guest, film, tmp_path / "out") as stream:
+    with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before")
         guest.code("dd if=/dev/zero of=/filler bs=1M 2>/dev/null")
         try:
@@ -143,16 +129,16 @@ def test_a_full_disk_stops_nothing(guest: Guest, film: Path, skew: Skew, tmp_pat
             stream.more(10, "started on a full disk")
         finally:
             guest.sh("rm -f /filler /var/tmp/more")
-        report = stream.finish(skew, LATE_S)
+        report = stream.finish(skew)
     assert len(report["sessions"]) == 2
 
 
 @pytest.mark.parametrize("shape", ["delay 10ms 5ms loss 1% rate 20mbit", "rate 100kbit"], ids=["wireless", "crawling"])
 def test_a_bad_link_costs_frames_but_never_rightness(
-    guest: Guest, film: Path, skew: Skew, shape: str, tmp_path: Path
+    guest: Guest, film: Film, skew: Skew, shape: str, tmp_path: Path
 ) -> None:
     """With delay, jitter and loss, and with a fiftieth of the rate that the frames need, the pairs that arrive are right; then full rate again."""
-    with streaming(guest, film, tmp_path / "out") as stream:
+    with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "on a good link")
         guest.sh(f"tc qdisc add dev {NETWORK_CARD} root netem {shape}")
         try:
@@ -160,13 +146,13 @@ def test_a_bad_link_costs_frames_but_never_rightness(
         finally:
             guest.sh(f"tc qdisc del dev {NETWORK_CARD} root")
         stream.more(20, "on a good link again")
-        report = stream.finish(skew, LATE_S)
+        report = stream.finish(skew)
     assert report["sessions"][-1]["tail"] == "known"
 
 
-def test_a_cut_link_heals(guest: Guest, film: Path, skew: Skew, tmp_path: Path) -> None:
+def test_a_cut_link_heals(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
     """A cable pulled until both sides have given up, and plugged in again, brings the stream back."""
-    with streaming(guest, film, tmp_path / "out") as stream:
+    with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the cut")
         guest.sh(f"ip link set {NETWORK_CARD} down")
         try:
@@ -175,16 +161,20 @@ def test_a_cut_link_heals(guest: Guest, film: Path, skew: Skew, tmp_path: Path) 
         finally:
             guest.sh(f"ip link set {NETWORK_CARD} up")
         stream.more(10, "after the cut")
-        stream.finish(skew, LATE_S)
+        stream.finish(skew)
 
 
-def test_a_rebooted_board_comes_back_by_itself(guest: Guest, film: Path, tmp_path: Path) -> None:
+def test_a_rebooted_board_comes_back_by_itself(
+    guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
+) -> None:
     """After a reboot, which sets the board's clock to zero, the same host pairs the right images by the new clock."""
-    with streaming(guest, film, tmp_path / "out") as stream:
+    with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the reboot")
+        webcam.unplug()  # its USB bus goes down with the board
         guest.reboot()
+        webcam.plug(guest)
         stream.more(20, "after the reboot")
-        assert stream.receiver.stop() == 0
+        stream.finish(skew)
     sessions = [ledger["session"] for ledger in ledgers(tmp_path / "out")]
     assert len(set(sessions)) == 2
     assert sessions == sorted(sessions, key=sessions.index)

@@ -1,0 +1,116 @@
+"""What befalls a camera: pulled and plugged in again, spoiled frames, a plane whose depth is known."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from phone_host.formats.pfm import read_pfm
+from tests.support.programs import ledgers, until
+from tests.vm.conftest import READOUT_MS
+from tests.vm.guest import UNIT, Guest
+from tests.vm.stream import NUMBER_ROWS, Film, Skew, check_journal, streaming
+from tests.vm.webcam import Webcam
+
+pytestmark = pytest.mark.timeout(600)  # the first test boots the board
+
+DISPARITIES = 64
+
+
+@pytest.fixture(autouse=True)
+def _sound_afterwards(guest: Guest, webcam: Webcam) -> Iterator[None]:
+    """After each test the service is up, its books balance and it has never shown a traceback."""
+    assert webcam.plugged
+    yield
+    check_journal(guest)
+
+
+def test_depth_of_a_known_plane(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
+    """The disparity of nearly all pixels is within one pixel of the plane's own, through webcam, driver, board, link and stereo core."""
+    with streaming(guest, film.right, tmp_path / "out", ("--rectified", "--disparities", str(DISPARITIES))) as stream:
+        stream.more(5, "with disparity")
+        stream.finish(skew)
+    maps = sorted((tmp_path / "out").glob("pair-*/disparity.pfm"))
+    assert maps
+    for path in maps:
+        found = read_pfm(path)
+        inside = np.zeros(found.shape, bool)
+        inside[2 * NUMBER_ROWS : -8, DISPARITIES:-8] = True  # below the numbers, where the right view shows the same
+        error_px = np.abs(found - film.truth.disparity_px)[inside]
+        assert np.mean(error_px < 1.0) > 0.97, path  # NaN, no disparity, counts as wrong
+
+
+def test_stamps_are_those_of_the_exposure(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
+    """Both cameras expose at the same moments, and the board knows exposure and readout: the time skew left is the way into the driver."""
+    with streaming(guest, film.right, tmp_path / "out") as stream:
+        stream.more(30, "of both cameras")
+        stream.finish(skew)
+    skews_s = np.array([ledger["time_skew_ns"] for ledger in ledgers(tmp_path / "out")]) / 1e9
+    # Without the correction of half an exposure and half a readout the middle would lie 15 ms higher.
+    assert abs(np.median(skews_s)) < READOUT_MS / 2 / 1e3
+
+
+def test_a_pulled_camera_is_missed_and_found_again(
+    guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
+) -> None:
+    """Pulled while streaming, the camera is named as missing; in another port it goes on in the same session of the same process."""
+    process = guest.show("MainPID")
+    with streaming(guest, film.right, tmp_path / "out") as stream:
+        for usb_port in (1, 0):
+            stream.more(10, "before the pull")
+            webcam.unplug()
+            guest.until("StatusText", "is it plugged in?", "the status names the missing camera")
+            webcam.plug(guest, usb_port)
+            stream.more(10, "after the plug")
+        report = stream.finish(skew)
+    assert len(report["sessions"]) == 1
+    assert guest.show("MainPID") == process
+
+
+def test_a_camera_that_comes_after_the_service_is_served(
+    guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
+) -> None:
+    """A service that was started without any camera streams as soon as one is plugged in, and so does one whose driver was never loaded."""
+    webcam.unplug()
+    guest.sh(
+        "until ! lsmod | grep -q '^uvcvideo'; do modprobe -r uvcvideo videodev vhci_hcd; sleep 0.2; done 2>/dev/null"
+    )
+    guest.sh(f"systemctl restart {UNIT}")
+    guest.until("StatusText", "waiting for the camera", "the service runs without a camera")
+    with streaming(guest, film.right, tmp_path / "out") as stream:
+        webcam.plug(guest)
+        stream.more(10, "of the camera that came late")
+        stream.finish(skew)
+
+
+def test_truncated_frames_are_dropped_and_counted(
+    guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
+) -> None:
+    """Of frames cut in half in the camera none is paired; the board counts them as spoiled, the others stream on."""
+    guest.sh(f"systemctl restart {UNIT}")
+    webcam.truncated, webcam.truncate_every = 0, 3
+    with streaming(guest, film.right, tmp_path / "out") as stream:
+        stream.more(20, "with every third frame cut")
+        webcam.truncate_every = 0
+        stream.more(10, "of whole frames")
+        stream.finish(skew)
+    sent = ledgers(tmp_path / "out")[-1]["session"]
+    guest.sh(f"systemctl restart {UNIT}")
+    until(lambda: f"session={sent}" in guest.journal().rpartition(" stopped ")[2], "the account is in the journal")
+    account = next(line for line in guest.journal().splitlines() if f" stopped session={sent}" in line)
+    assert webcam.truncated >= 20 // 2 - 1
+    spoiled = int(account.partition("'spoiled': ")[2].partition("}")[0].partition(",")[0])
+    assert 1 <= spoiled <= webcam.truncated
+
+
+def test_a_resting_camera_starts_for_a_host(
+    guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
+) -> None:
+    """Without a host the stream is switched off after a while, and a host that comes then gets frames all the same."""
+    before = webcam.starts
+    until(lambda: not webcam.streaming, "the stream is switched off")
+    with streaming(guest, film.right, tmp_path / "out") as stream:
+        stream.more(10, "after the rest")
+        stream.finish(skew)
+    assert webcam.starts > before

@@ -1,0 +1,259 @@
+"""A webcam of this machine on the guest's USB bus: its kernel's own uvcvideo driver finds a camera on vhci_hcd, here sits the device.
+
+The guest connects and hands the connection to its kernel, which from then on speaks USB/IP over it (the kernel's
+Documentation/usb/usbip_protocol.rst). The device runs outside the guest, so that it does not eat the board's time.
+"""
+
+import math
+import select
+import socket
+import struct
+import threading
+import time
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Final
+
+from tests.support.programs import until
+from tests.vm import uvc
+from tests.vm.guest import Guest
+
+_SUBMIT, _UNLINK, _RET_SUBMIT, _RET_UNLINK = 1, 2, 3, 4
+_HEADER_BYTES: Final = 48
+_STALLED, _UNLINKED = -32, -104  # -EPIPE, -ECONNRESET
+_HIGH_SPEED: Final = 3
+_DEVICE_ID: Final = 0x10001
+
+_PLUG: Final = (
+    "import socket; s = socket.create_connection(('10.0.2.2', {port})); s.setsockopt(6, 1, 1); "
+    "open('/sys/devices/platform/vhci_hcd.0/attach', 'w').write(f'{usb_port} {{s.fileno()}} {device} {speed}')"
+)
+
+
+def with_comment(jpeg: bytes, text: str) -> bytes:
+    """Put a COM segment (ITU-T T.81, B.2.4.5) behind a JPEG's start marker."""
+    body = text.encode()
+    return jpeg[:2] + b"\xff\xfe" + struct.pack(">H", len(body) + 2) + body + jpeg[2:]
+
+
+class Webcam:
+    """A camera that can be plugged into a guest.
+
+    It shows image number floor(t * fps) of this machine's CLOCK_MONOTONIC, as a replay does, with the middle of its exposure at k / fps:
+    half the exposure time and half the readout later the first byte leaves.
+
+    Args:
+        frames: JPEGs, shown in turn.
+        fps: of its own accord; a driver that asks for less gets less.
+        readout_ns: of its sensor.
+        model: what it is.
+    """
+
+    def __init__(self, frames: Sequence[bytes], fps: int, readout_ns: int, model: uvc.Model | None = None) -> None:
+        self.late_ns: dict[int, int] = {}
+        """By number of the image in `frames`: how much later than due its first byte left, the last time."""
+        self.truncate_every = 0
+        """Every which frame loses its second half; 0: none."""
+        self.truncated = 0
+        self.starts = 0
+        """How often a driver has started the stream."""
+        self.streaming = False
+        self._frames, self._fps, self._readout_ns = frames, fps, readout_ns
+        self._model = model or uvc.Model()
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._connection: socket.socket | None = None
+        self._thread: threading.Thread | None = None
+
+    @property
+    def plugged(self) -> bool:
+        """Whether a guest has it."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def plug(self, guest: Guest, usb_port: int = 0) -> None:
+        """Plug it into a guest's USB port, and wait until the port took it."""
+        guest.sh("modprobe -a vhci_hcd uvcvideo")
+        port = self._listener.getsockname()[1]
+        attach = _PLUG.format(port=port, usb_port=usb_port, device=_DEVICE_ID + usb_port, speed=_HIGH_SPEED)
+        # The port of a camera that was just pulled stays busy for a moment.
+        until(lambda: guest.code(f'python3 -c "{attach}"') == 0, "the USB port takes the camera")
+        self._listener.settimeout(10)
+        while True:  # the newest connection is the one that was handed over; failed attempts were closed
+            self._connection, _ = self._listener.accept()
+            self._listener.settimeout(0)
+            if not select.select([self._listener], [], [], 0)[0]:
+                break
+            self._connection.close()
+        self._connection.setblocking(True)  # noqa: FBT003 - the standard library's own signature
+        self._connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._thread = threading.Thread(target=self._serve, args=(self._connection,), daemon=True)
+        self._thread.start()
+
+    def unplug(self) -> None:
+        """Pull it."""
+        if self._connection is not None:
+            with suppress(OSError):
+                self._connection.shutdown(socket.SHUT_RDWR)
+            assert self._thread is not None
+            self._thread.join(10)
+            self._connection.close()
+            self._connection = None
+
+    def close(self) -> None:
+        """Pull it and put it away."""
+        self.unplug()
+        self._listener.close()
+
+    def _serve(self, connection: socket.socket) -> None:
+        with suppress(OSError, EOFError):
+            _Device(self, connection).run()
+
+
+class _Device:
+    """One plugging-in: its requests, its controls, its stream."""
+
+    def __init__(self, camera: Webcam, connection: socket.socket) -> None:
+        self._camera, self._socket = camera, connection
+        self._waiting: deque[tuple[int, int]] = deque()  # (sequence number, bytes) of transfers that want image data
+        self._controls = {where: control.default for where, control in uvc.CONTROLS.items()}
+        self._probe = self._commit = camera._model.probe(1, 333333)
+        self._streaming = False
+        self._odd = False
+        self._number = 0
+        self._rest = b""
+
+    def run(self) -> None:
+        """Serve until the connection ends."""
+        try:
+            while True:
+                wait_s = self._feed()
+                if select.select([self._socket], [], [], wait_s)[0]:
+                    self._request()
+        finally:
+            self._stop()
+
+    def _request(self) -> None:
+        header = self._read(_HEADER_BYTES)
+        command, sequence, _, is_in, endpoint = struct.unpack_from(">5I", header)
+        if command == _UNLINK:
+            (unlinked,) = struct.unpack_from(">I", header, 20)
+            found = [item for item in self._waiting if item[0] == unlinked]
+            for item in found:
+                self._waiting.remove(item)
+            self._socket.sendall(struct.pack(">5Ii24x", _RET_UNLINK, sequence, 0, 0, 0, _UNLINKED if found else 0))
+            return
+        assert command == _SUBMIT, command
+        (length,) = struct.unpack_from(">i", header, 24)
+        out = self._read(length) if not is_in and length else b""
+        if endpoint:
+            self._waiting.append((sequence, length))
+            return
+        answer = self._control(header[40:48], out)
+        if answer is None:
+            self._return(sequence, b"", _STALLED)
+        elif is_in:
+            self._return(sequence, answer)
+        else:
+            self._return(sequence, b"", 0, length)
+
+    def _control(self, setup: bytes, out: bytes) -> bytes | None:
+        """Answer a control request; None: stalled."""
+        kind, request, value, index, length = struct.unpack("<BBHHH", setup)
+        if kind & 0x60 == 0:
+            return self._standard(request, value, length)
+        unit, selector = index >> 8, value >> 8
+        if unit == 0 and index & 0xFF == 1 and selector in {uvc.PROBE, uvc.COMMIT}:
+            return self._negotiate(request, selector, out, length)
+        control = uvc.CONTROLS.get((unit, selector))
+        if control is None:
+            return None
+        if request == uvc.SET_CUR:
+            self._controls[unit, selector] = int.from_bytes(out, "little")
+            return b""
+        return control.answer(request, self._controls[unit, selector])[:length]
+
+    def _standard(self, request: int, value: int, length: int) -> bytes | None:
+        model = self._camera._model
+        if request == 6:  # GET_DESCRIPTOR
+            kind, index = value >> 8, value & 0xFF
+            known = {1: model.device, 2: model.configuration, 6: model.qualifier}
+            if kind == 3:
+                return model.string(index)[:length]
+            return known[kind][:length] if kind in known else None
+        if request == 1:  # CLEAR_FEATURE of the endpoint: how a bulk camera is told to stop
+            self._stop()
+        # GET_STATUS, GET_CONFIGURATION, GET_INTERFACE; what is set is taken as it is
+        return {0: b"\0\0", 8: b"\1", 10: b"\0"}.get(request, b"")[:length]
+
+    def _negotiate(self, request: int, selector: int, out: bytes, length: int) -> bytes:
+        if request == uvc.SET_CUR:
+            _, _, frame, interval = struct.unpack_from("<HBBI", out)
+            self._probe = self._camera._model.probe(frame, interval)
+            if selector == uvc.COMMIT:
+                self._commit = self._probe
+                self._start()
+            return b""
+        if request == uvc.GET_LEN:
+            return struct.pack("<H", len(self._probe))
+        if request == uvc.GET_INFO:
+            return b"\x03"
+        return (self._commit if selector == uvc.COMMIT else self._probe)[:length]
+
+    def _start(self) -> None:
+        self._streaming = self._camera.streaming = True
+        self._camera.starts += 1
+        self._rest = b""
+        self._number = math.floor((time.monotonic_ns() - self._delay_ns()) * self._rate_hz() / 1e9) + 1
+
+    def _stop(self) -> None:
+        self._streaming = self._camera.streaming = False
+
+    def _rate_hz(self) -> int:
+        interval: int = struct.unpack_from("<I", self._commit, 4)[0]
+        return min(self._camera._fps, round(1e7 / interval))
+
+    def _delay_ns(self) -> int:
+        """From the middle of an exposure to the first byte."""
+        return (self._controls[uvc.EXPOSURE] * 100_000 + self._camera._readout_ns) // 2
+
+    def _feed(self) -> float:
+        """Give image data to the transfers that wait for it; tells how long there is nothing to do, s."""
+        while self._streaming and self._waiting:
+            now_ns = time.monotonic_ns()
+            if not self._rest:
+                due_ns = round(self._number * 1e9 / self._rate_hz()) + self._delay_ns()
+                if now_ns < due_ns:
+                    return (due_ns - now_ns) / 1e9
+                self._begin_frame(now_ns - due_ns)
+            sequence, length = self._waiting.popleft()
+            room = min(length, uvc.PAYLOAD_BYTES) - 2
+            data, self._rest = self._rest[:room], self._rest[room:]
+            self._return(sequence, uvc.payload(data, odd=self._odd, last=not self._rest))
+            if not self._rest:
+                self._odd = not self._odd
+        return 1.0
+
+    def _begin_frame(self, late_ns: int) -> None:
+        camera, number = self._camera, self._number
+        skipped = int(late_ns * self._rate_hz() / 1e9)  # stalled for whole periods: those images were never taken
+        self._number = number + skipped + 1
+        number += skipped
+        camera.late_ns[number % len(camera._frames)] = late_ns - round(skipped * 1e9 / self._rate_hz())
+        frame = with_comment(camera._frames[number % len(camera._frames)], f"number={number}")
+        if camera.truncate_every and number % camera.truncate_every == 0:
+            camera.truncated += 1
+            frame = frame[: len(frame) // 2]
+        self._rest = frame
+
+    def _return(self, sequence: int, data: bytes, status: int = 0, length: int | None = None) -> None:
+        taken = len(data) if length is None else length
+        self._socket.sendall(struct.pack(">5Iiiiii8x", _RET_SUBMIT, sequence, 0, 0, 0, status, taken, 0, 0, 0) + data)
+
+    def _read(self, length: int) -> bytes:
+        data = b""
+        while len(data) < length:
+            more = self._socket.recv(length - len(data))
+            if not more:
+                raise EOFError
+            data += more
+        return data
