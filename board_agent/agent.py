@@ -147,8 +147,7 @@ class Agent:
         self._poller = zmq.Poller()
         for pollable in (wake, *(item for link in links for item in link.pollables)):
             self._poller.register(pollable, zmq.POLLIN)
-        if camera.pollable is not None:
-            self._poller.register(camera.pollable, zmq.POLLIN)
+        self._camera_fd: int | None = None
 
     def run(self) -> Summary:
         """Serve until a signal comes or the camera ends; then say goodbye.
@@ -188,6 +187,7 @@ class Agent:
         Returns:
             Whether the camera's descriptor is readable.
         """
+        self._watch_camera()
         wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
         ready = self._poller.poll(wait_ms)
         if not ready:
@@ -198,7 +198,17 @@ class Agent:
         for index, link in enumerate(self._links):
             for incoming in link.receive():
                 self._take(index, incoming)
-        return self._camera.pollable in woken
+        return self._camera_fd in woken
+
+    def _watch_camera(self) -> None:
+        """Wait on the camera's descriptor, which changes when a device is lost and comes back."""
+        if self._camera.pollable == self._camera_fd:
+            return
+        if self._camera_fd is not None:
+            self._poller.unregister(self._camera_fd)
+        self._camera_fd = self._camera.pollable
+        if self._camera_fd is not None:
+            self._poller.register(self._camera_fd, zmq.POLLIN | zmq.POLLPRI)
 
     def _take(self, index: int, incoming: Packet | Broken | Garbage) -> None:
         arrived_ns = now.monotonic_ns()

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from typing import Final
 
 import zmq
 
@@ -9,6 +10,9 @@ from common import now
 from common.camera.base import Camera, Ended, Grab, Skipped, Spoiled
 from common.frame import Frame
 from common.protocol.message import Pacing
+
+_LONGEST_WAIT_MS: Final = 100
+"""What the end of a run waits for this thread at most, and how late a stall may be noticed."""
 
 
 class Source:
@@ -70,11 +74,11 @@ class Source:
             return
         wait_ns = self._camera.due_ns(now.monotonic_ns()) - now.monotonic_ns()
         if self._camera.pollable is None:
-            self._stop.wait(max(0, wait_ns) / 1e9)
+            self._stop.wait(min(max(0, wait_ns) / 1e9, _LONGEST_WAIT_MS / 1e3))
             return
         poller = zmq.Poller()
-        poller.register(self._camera.pollable, zmq.POLLIN)
-        poller.poll(100)
+        poller.register(self._camera.pollable, zmq.POLLIN | zmq.POLLPRI)
+        poller.poll(_LONGEST_WAIT_MS)
 
     def _take(self, grab: Grab) -> None:
         match grab:

@@ -89,7 +89,10 @@ class Camera(Protocol):
 
     @property
     def pollable(self) -> int | None:
-        """A file descriptor that becomes readable with a frame; None for a camera that goes by `due_ns` alone."""
+        """A file descriptor that becomes readable, urgent or in error when there is something to read; None for a camera that goes by `due_ns` alone.
+
+        It may change with every `read`, `pause` and `resume`: a device that was lost comes back as another one.
+        """
 
     def due_ns(self, now_ns: int) -> int:
         """When `read` will have something, ns on the machine's CLOCK_MONOTONIC; the far future if that is up to `pollable` or demand."""

@@ -1,6 +1,7 @@
 """A V4L2 camera for months of use: opened once, kept through unplugging, driver failures and stalls, resting while nobody listens.
 
-What is waited on is an epoll descriptor of its own: it stays the same while devices come and go behind it.
+`pollable` is the device's own descriptor and so changes with it. An epoll set that stays the same was tried: v4l2loopback, and vb2 before Linux
+5.11, tell an epoll set nothing of a frame if one was waiting already when the device joined it.
 """
 
 import contextlib
@@ -14,6 +15,7 @@ from typing import Final
 from common.camera.base import CameraHealth, CameraState, Grab
 from common.camera.v4l2_device import capture_nodes, lasting_name
 from common.camera.v4l2_formats import Wanted
+from common.camera.v4l2_ring import RING_BUFFERS
 from common.camera.v4l2_stream import Stream, Tally, V4l2Settings
 from common.errors import TandemError, UnavailableError
 from common.logs import event
@@ -66,7 +68,8 @@ class V4l2Camera:
         self._exposure_due_ns = _FAR_FUTURE
         self._known_problem = ""
         self._rate_is_off = False
-        self._epoll = select.epoll()
+        self._is_coming_back = False
+        self._poll = select.poll()
         try:
             stream = self._open()
             # From now on exactly this is asked for, whatever a camera that is plugged in later may prefer.
@@ -85,6 +88,8 @@ class V4l2Camera:
         except BaseException:
             self.close()
             raise
+        if stream.buffers < RING_BUFFERS:
+            _LOG.warning(event("few_buffers", camera=self._path, buffers=stream.buffers, wanted=RING_BUFFERS))
         readout_ms = round(stream.readout_ns / 1e6, 1)
         _LOG.info(
             event(
@@ -100,8 +105,8 @@ class V4l2Camera:
 
     @property
     def pollable(self) -> int | None:
-        """An epoll descriptor; becomes readable with a frame, a changed control or a lost camera."""
-        return self._epoll.fileno()
+        """The device while it streams: readable with a frame, urgent with a changed control, in error when it is lost."""
+        return self._stream.fd if self._stream is not None and self._wanted else None
 
     @property
     def health(self) -> CameraHealth:
@@ -153,6 +158,7 @@ class V4l2Camera:
         if not grabs and now_ns >= self._stall_ns:
             self._stalls += 1
             self._drop(now_ns, "stalled")
+            self._retry_ns = now_ns + _RETRY_NS
         return grabs
 
     def pause(self) -> None:
@@ -162,7 +168,6 @@ class V4l2Camera:
         self._wanted = False
         self._look_ns = 0
         if self._stream is not None:
-            self._epoll.unregister(self._stream.fd)
             with contextlib.suppress(OSError):  # a camera that has just vanished is noticed by the next look
                 self._stream.stop()
             _LOG.info(event("camera_paused", camera=self._path))
@@ -188,7 +193,6 @@ class V4l2Camera:
         if self._stream is not None:
             self._stream.close()
             self._stream = None
-        self._epoll.close()
 
     def _open(self) -> Stream:
         return Stream(self._path, self._settings, self._wishes, self._tally)
@@ -197,14 +201,15 @@ class V4l2Camera:
         """Start a stream and make it the current one."""
         self._stream = stream
         stream.start()
-        self._epoll.register(stream.fd, select.EPOLLIN | select.EPOLLPRI)
+        self._poll = select.poll()
+        self._poll.register(stream.fd, select.POLLIN | select.POLLPRI)
         self._stall_ns = now_ns + max(_FIRST_FRAME_NS, _STALL_PERIODS * stream.period_ns)
         self._settle_ns = None
         self._exposure_due_ns = now_ns + _AUTO_EXPOSURE_NS
 
     def _take(self, stream: Stream, now_ns: int) -> list[Grab]:
-        ready = self._epoll.poll(0)
-        if now_ns >= self._exposure_due_ns or any(mask & select.EPOLLPRI for _, mask in ready):
+        ready = self._poll.poll(0)
+        if now_ns >= self._exposure_due_ns or any(mask & select.POLLPRI for _, mask in ready):
             stream.read_exposure()
             still_changes = not stream.tells_exposure or not self._wishes.lock
             self._exposure_due_ns = now_ns + _AUTO_EXPOSURE_NS if still_changes else _FAR_FUTURE
@@ -213,6 +218,10 @@ class V4l2Camera:
         grabs = stream.take()
         if grabs:
             self._stall_ns = now_ns + max(_STALL_NS, _STALL_PERIODS * stream.period_ns)
+            if self._is_coming_back:
+                self._is_coming_back = False
+                self._returned += 1
+                _LOG.info(event("camera_back", camera=self._path))
             self._settle(stream, now_ns)
             self._watch_rate()
         return grabs
@@ -257,11 +266,13 @@ class V4l2Camera:
 
     def _drop(self, now_ns: int, reason: str) -> None:
         """Close the device; the next read opens it anew."""
-        _LOG.warning(event("camera_lost", camera=self._path, reason=reason))
+        # A camera that is opened again and again without a frame stays lost: that is no news.
+        level = logging.DEBUG if self._is_coming_back else logging.WARNING
+        _LOG.log(level, event("camera_lost", camera=self._path, reason=reason))
         if self._stream is not None:
-            self._stream.close()  # which takes it out of the epoll set, too
+            self._stream.close()
             self._stream = None
-        self._known_problem = ""
+        self._is_coming_back = True
         self._locked = not self._wishes.lock
         self._retry_ns = now_ns
 
@@ -283,9 +294,8 @@ class V4l2Camera:
             if str(error) != self._known_problem:
                 self._known_problem = str(error)
                 _LOG.warning(event("camera_refuses", camera=self._path, problem=self._known_problem))
-            return
-        self._returned += 1
-        _LOG.info(event("camera_back", camera=self._path))
+        else:
+            self._known_problem = ""
 
 
 def _find(path: str) -> Path:

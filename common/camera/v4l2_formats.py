@@ -145,7 +145,9 @@ def choose(offers: tuple[FormatOffer, ...], wanted: Wanted, camera: str) -> Choi
     """
     by_letters = {offer.letters: offer for offer in offers}
     known = [(by_letters[letters], kind) for letters, kind in PREFERENCE if letters in by_letters]
-    listed = ", ".join(offer.letters for offer in offers) or "none"
+    listed = ", ".join(offer.letters for offer in offers)
+    if not offers:
+        raise UnavailableError(f"camera {camera} offers no format now", "plug it in again, or start what feeds it")
     if not known:
         raise UnavailableError(
             f"camera {camera} has only {listed}, which is not passed on frame by frame",

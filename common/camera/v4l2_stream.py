@@ -15,7 +15,7 @@ from common.camera.v4l2_controls import Axis, ControlPlan, ControlWishes, Step
 from common.camera.v4l2_device import Device, PixelFormatSet
 from common.camera.v4l2_formats import Choice, Wanted, choose, choose_rate, rate_text
 from common.camera.v4l2_pack import Packing, SendPart
-from common.camera.v4l2_ring import RING_BUFFERS, Filled, Ring
+from common.camera.v4l2_ring import Filled, Ring
 from common.camera.v4l2_stamps import (
     RateMeter,
     StampSource,
@@ -125,13 +125,16 @@ class Stream:
         self._started_ns = 0
         self._taken = 0
         self._broken: OSError | None = None
-        if len(self._ring) < RING_BUFFERS:
-            _LOG.warning(event("few_buffers", camera=path, buffers=len(self._ring), wanted=RING_BUFFERS))
 
     @property
     def fd(self) -> int:
         """What to wait on."""
         return self._device.fd
+
+    @property
+    def buffers(self) -> int:
+        """Length of the ring."""
+        return len(self._ring)
 
     @property
     def name(self) -> str:
@@ -234,7 +237,8 @@ class Stream:
         self._apply(self._plan.to_lock(found, wishes))
         self.read_exposure()
         held = {axis.value: value for axis, value in (*found, *wishes.held)}
-        _LOG.info(event("controls_held", camera=self._device.path, **held))
+        if held:
+            _LOG.info(event("controls_held", camera=self._device.path, **held))
         return found
 
     def _set_format(self, choice: Choice) -> PixelFormatSet:
