@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from common import logs
+from common.commandline import ExamplesFirstParser
 from common.errors import SettingsError, TandemError, UnavailableError
 from common.signals import StopSignals
 
@@ -57,8 +58,7 @@ class _StoppedError(Exception):
 
 
 def _parser() -> argparse.ArgumentParser:
-    raw = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser("delay-bench", description=_EXAMPLES, formatter_class=raw)
+    parser = ExamplesFirstParser("delay-bench", description=_EXAMPLES)
     parser.add_argument("--links", default="tcp,ipc", metavar="NAMES", help="links to measure (default tcp,ipc)")
     parser.add_argument(
         "--size", default="320x240,640x480", metavar="SIZES", help="image sizes (default 320x240,640x480)"
