@@ -218,13 +218,17 @@ class V4l2Camera:
         grabs = stream.take()
         if grabs:
             self._stall_ns = now_ns + max(_STALL_NS, _STALL_PERIODS * stream.period_ns)
-            if self._is_coming_back:
-                self._is_coming_back = False
-                self._returned += 1
-                _LOG.info(event("camera_back", camera=self._path))
+            self._note_back()
             self._settle(stream, now_ns)
             self._watch_rate()
         return grabs
+
+    def _note_back(self) -> None:
+        """Say once that a camera that was lost is back: with its first frame, or by being there when no frame is wanted."""
+        if self._is_coming_back:
+            self._is_coming_back = False
+            self._returned += 1
+            _LOG.info(event("camera_back", camera=self._path))
 
     def _settle(self, stream: Stream, now_ns: int) -> None:
         """Hold the controls as found, some time after the first frame."""
@@ -285,6 +289,7 @@ class V4l2Camera:
             stream = self._open()
             if not self._wanted:
                 self._stream, self._look_ns = stream, now_ns + _LOOK_NS
+                self._note_back()
             else:
                 self._begin(stream, now_ns)
         except (TandemError, OSError) as error:

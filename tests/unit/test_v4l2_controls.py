@@ -1,0 +1,120 @@
+"""The order and the values in which a camera's controls are set."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.camera import v4l2_abi as abi
+from common.camera.v4l2_controls import Axis, Control, ControlPlan, ControlWishes, PowerLine
+
+_AUTO_EXPOSURE = Control(
+    abi.CID_AUTO_EXPOSURE, "Auto Exposure", abi.CTRL_TYPE_MENU, 0, 3, 1, 3, 0, ((1, "Manual"), (3, "Aperture"))
+)
+_EXPOSURE = Control(
+    abi.CID_EXPOSURE_TIME_ABSOLUTE,
+    "Exposure Time",
+    abi.CTRL_TYPE_INTEGER,
+    1,
+    5000,
+    1,
+    156,
+    abi.CTRL_FLAG_INACTIVE,
+)
+_DYNAMIC = Control(abi.CID_EXPOSURE_DYNAMIC_FRAMERATE, "Dynamic Framerate", abi.CTRL_TYPE_BOOLEAN, 0, 1, 1, 0)
+_GAIN = Control(abi.CID_GAIN, "Gain", abi.CTRL_TYPE_INTEGER, 0, 100, 10, 0)
+_AUTO_WHITE = Control(abi.CID_WHITE_BALANCE_AUTOMATIC, "White Balance, Auto", abi.CTRL_TYPE_BOOLEAN, 0, 1, 1, 1)
+_WHITE = Control(abi.CID_WHITE_BALANCE_TEMPERATURE, "White Balance", abi.CTRL_TYPE_INTEGER, 2800, 6500, 1, 4600, 0x10)
+_AUTO_FOCUS = Control(abi.CID_FOCUS_AUTOMATIC_CONTINUOUS, "Focus, Auto", abi.CTRL_TYPE_BOOLEAN, 0, 1, 1, 1)
+_FOCUS = Control(abi.CID_FOCUS_ABSOLUTE, "Focus", abi.CTRL_TYPE_INTEGER, 0, 250, 5, 0, abi.CTRL_FLAG_INACTIVE)
+_MAINS = Control(
+    abi.CID_POWER_LINE_FREQUENCY, "Power Line", abi.CTRL_TYPE_MENU, 0, 2, 1, 2, 0, ((0, "Off"), (1, "50"), (2, "60"))
+)
+_WEBCAM = (_WHITE, _AUTO_WHITE, _GAIN, _MAINS, _FOCUS, _AUTO_FOCUS, _EXPOSURE, _AUTO_EXPOSURE, _DYNAMIC)
+
+
+def _set(steps: list[object]) -> list[tuple[str, int]]:
+    return [(step.control.name, step.value) for step in steps]  # type: ignore[attr-defined]  # steps of a plan
+
+
+def test_known_values_are_set_with_the_automatism_off_first() -> None:
+    """Frame rate first, then each automatism off before its value: the order that drivers demand (EACCES otherwise)."""
+    wishes = ControlWishes(((Axis.FOCUS, 30), (Axis.EXPOSURE, 100), (Axis.WHITE_BALANCE, 4000)), PowerLine.HZ_50)
+    assert _set([*ControlPlan(_WEBCAM).to_start(wishes)]) == [
+        ("Dynamic Framerate", 0),
+        ("Power Line", 1),
+        ("Auto Exposure", 1),
+        ("Exposure Time", 100),
+        ("White Balance, Auto", 0),
+        ("White Balance", 4000),
+        ("Focus, Auto", 0),
+        ("Focus", 30),
+    ]
+
+
+def test_what_was_found_is_held() -> None:
+    """Axes without a wish are read, and then held at just that; those with a wish are left alone."""
+    plan, wishes = ControlPlan(_WEBCAM), ControlWishes(((Axis.GAIN, 20),))
+    assert [axis for axis, _ in plan.to_find(wishes)] == [Axis.EXPOSURE, Axis.WHITE_BALANCE, Axis.FOCUS]
+    found = ((Axis.EXPOSURE, 333), (Axis.WHITE_BALANCE, 5100), (Axis.FOCUS, 45))
+    assert _set([*plan.to_lock(found, wishes)]) == [
+        ("Auto Exposure", 1),
+        ("Exposure Time", 333),
+        ("White Balance, Auto", 0),
+        ("White Balance", 5100),
+        ("Focus, Auto", 0),
+        ("Focus", 45),
+    ]
+    held = wishes.with_found(found)
+    assert held.value(Axis.GAIN) == 20
+    assert held.value(Axis.EXPOSURE) == 333
+    assert plan.to_find(held) == []
+
+
+def test_lock_off_leaves_the_automatisms_alone() -> None:
+    """With lock=0 nothing is read to be held, and only the frame rate is kept constant."""
+    plan, wishes = ControlPlan(_WEBCAM), ControlWishes(lock=False)
+    assert plan.to_find(wishes) == []
+    assert _set([*plan.to_start(wishes)]) == [("Dynamic Framerate", 0)]
+
+
+def test_a_camera_without_controls_is_left_alone() -> None:
+    """Nothing is set that is not there, and wishes that cannot be met are named."""
+    plan, wishes = ControlPlan(()), ControlWishes(((Axis.EXPOSURE, 100),), PowerLine.HZ_60)
+    assert plan.to_start(wishes) == []
+    assert plan.to_find(wishes) == []
+    assert plan.to_lock((), wishes) == []
+    assert plan.missing(wishes) == (Axis.EXPOSURE,)
+    assert plan.exposure() is None
+
+
+def test_an_automatism_without_a_value_is_switched_off() -> None:
+    """White balance that has only an automatism is held by switching that off; exposure is not: it could go dark."""
+    plan = ControlPlan((_AUTO_WHITE, _AUTO_EXPOSURE))
+    assert _set([*plan.to_lock((), ControlWishes())]) == [("White Balance, Auto", 0)]
+
+
+def test_shutter_priority_stands_in_for_manual() -> None:
+    """A camera whose menu has no manual mode is held in shutter priority."""
+    menu = Control(abi.CID_AUTO_EXPOSURE, "Auto Exposure", abi.CTRL_TYPE_MENU, 0, 3, 1, 3, 0, ((0, "A"), (2, "S")))
+    steps = ControlPlan((menu, _EXPOSURE)).to_start(ControlWishes(((Axis.EXPOSURE, 50),)))
+    assert _set([*steps]) == [("Auto Exposure", 2), ("Exposure Time", 50)]
+
+
+@pytest.mark.parametrize("flag", [abi.CTRL_FLAG_GRABBED, abi.CTRL_FLAG_READ_ONLY, abi.CTRL_FLAG_DISABLED])
+def test_controls_that_cannot_be_set_are_not_tried(flag: int) -> None:
+    """Grabbed, read-only and disabled controls are left alone; inactive ones are set, for they wake with their automatism off."""
+    gain = Control(abi.CID_GAIN, "Gain", abi.CTRL_TYPE_INTEGER, 0, 100, 1, 0, flag)
+    assert ControlPlan((gain,)).to_start(ControlWishes(((Axis.GAIN, 5),))) == []
+    assert _EXPOSURE.can_be_set
+
+
+@given(
+    value=st.integers(-(2**40), 2**40), low=st.integers(-1000, 1000), span=st.integers(0, 5000), step=st.integers(0, 99)
+)
+def test_values_are_fitted_to_the_range(value: int, low: int, span: int, step: int) -> None:
+    """A fitted value lies in the range, on the grid or at its end, and no further off than half a step from what can be had."""
+    control = Control(abi.CID_GAIN, "Gain", abi.CTRL_TYPE_INTEGER, low, low + span, step, low)
+    fitted = control.fitted(value)
+    assert low <= fitted <= low + span
+    assert (fitted - low) % max(1, step) == 0 or fitted == low + span
+    assert abs(fitted - min(max(value, low), low + span)) <= max(1, step) // 2 + 1

@@ -1,0 +1,112 @@
+"""The choice among what a camera offers."""
+
+from fractions import Fraction
+
+import pytest
+
+from common.camera.v4l2_formats import FormatOffer, Rates, SizeRange, Wanted, choose, choose_rate
+from common.errors import SettingsError, UnavailableError
+from common.frame import PixelFormat
+
+_SIZES = ((1920, 1080), (1280, 720), (640, 480), (320, 240))
+_MJPEG = FormatOffer("MJPG", "Motion-JPEG", _SIZES)
+_YUYV = FormatOffer("YUYV", "YUYV 4:2:2", ((640, 480), (800, 600)))
+_H264 = FormatOffer("H264", "H.264", _SIZES)
+
+
+def test_jpeg_at_the_usual_size_without_a_wish() -> None:
+    """Of a camera that has both, MJPEG is taken, at 640x480, wherever they stand in its list."""
+    choice = choose((_YUYV, _H264, _MJPEG), Wanted(), "/dev/video0")
+    assert (choice.letters, choice.pixel_format, choice.size_px) == ("MJPG", PixelFormat.MJPEG, (640, 480))
+
+
+@pytest.mark.parametrize(
+    ("sizes", "expected"),
+    [
+        (((1280, 720), (320, 240), (352, 288)), (352, 288)),
+        (((1920, 1080), (1280, 720)), (1280, 720)),
+    ],
+)
+def test_without_the_usual_size_the_nearest_is_taken(
+    sizes: tuple[tuple[int, int], ...], expected: tuple[int, int]
+) -> None:
+    """A camera without 640x480 gives its largest size below that, or its smallest."""
+    assert choose((FormatOffer("MJPG", "", sizes),), Wanted(), "x").size_px == expected
+
+
+def test_a_size_that_only_raw_has_is_taken_raw() -> None:
+    """A size that MJPEG lacks is taken from the next format."""
+    choice = choose((_MJPEG, _YUYV), Wanted((800, 600)), "x")
+    assert (choice.letters, choice.size_px) == ("YUYV", (800, 600))
+
+
+def test_a_format_that_is_asked_for_is_taken() -> None:
+    """The user's format goes before the preference."""
+    assert choose((_MJPEG, _YUYV), Wanted(None, None, PixelFormat.YUYV), "x").letters == "YUYV"
+
+
+def test_an_absent_size_is_refused_with_the_list() -> None:
+    """A size that is not there is an error of one line that names the camera and lists its sizes."""
+    with pytest.raises(SettingsError) as caught:
+        choose((_MJPEG,), Wanted((800, 601)), "/dev/video0")
+    text = str(caught.value)
+    assert "\n" not in text
+    assert "/dev/video0 has no size 800x601" in text
+    assert "1920x1080, 1280x720, 640x480, 320x240" in text
+
+
+def test_an_absent_format_is_refused_with_the_list() -> None:
+    """A format that is not there is an error that lists the camera's formats."""
+    with pytest.raises(SettingsError, match="no format nv12: give one of its formats: MJPG, YUYV"):
+        choose((_MJPEG, _YUYV), Wanted(None, None, PixelFormat.NV12), "x")
+
+
+def test_a_camera_with_h264_alone_is_refused() -> None:
+    """H.264 is no sequence of images; the error says so, and what to use instead."""
+    with pytest.raises(UnavailableError, match=r"has only H264, which is not passed on.*MJPEG"):
+        choose((_H264,), Wanted(), "x")
+
+
+def test_a_camera_without_any_format_is_not_there_yet() -> None:
+    """A loopback device that nobody feeds offers nothing: unavailable now, not wrong."""
+    with pytest.raises(UnavailableError, match="no format now"):
+        choose((), Wanted(), "x")
+
+
+def test_a_scaling_camera_takes_sizes_on_its_grid() -> None:
+    """Between minimum and maximum a size counts as offered if it is a whole number of steps away."""
+    offer = FormatOffer("YUYV", "", (), SizeRange((48, 1920, 2), (32, 1080, 8)))
+    assert choose((offer,), Wanted((642, 480)), "x").size_px == (642, 480)
+    for size in ((641, 480), (640, 484), (1922, 480), (640, 24)):
+        with pytest.raises(SettingsError, match="48x32 to 1920x1080"):
+            choose((offer,), Wanted(size), "x")
+
+
+_NAMED = Rates((Fraction(60), Fraction(10_000_000, 333_333), Fraction(15)))
+
+
+@pytest.mark.parametrize(
+    ("rates", "wish", "expected"),
+    [
+        (_NAMED, None, Fraction(10_000_000, 333_333)),
+        (_NAMED, Fraction(30), Fraction(10_000_000, 333_333)),
+        (_NAMED, Fraction("59.94"), Fraction(60)),
+        (Rates((Fraction(90), Fraction(60))), None, Fraction(60)),
+        (Rates((), (Fraction(1), Fraction(25))), None, Fraction(25)),
+        (Rates((), (Fraction(1), Fraction(25))), Fraction(20), Fraction(20)),
+        (Rates(), None, Fraction(30)),
+        (Rates(), Fraction(12), Fraction(12)),
+    ],
+)
+def test_the_rate(rates: Rates, wish: Fraction | None, expected: Fraction) -> None:
+    """Without a wish the highest rate up to 30 is taken; a wish is met within one per cent; an unknown list refuses nothing."""
+    assert choose_rate(rates, Wanted(None, wish), "x") == expected
+
+
+@pytest.mark.parametrize(
+    ("rates", "listed"), [(_NAMED, "60, 30, 15"), (Rates((), (Fraction(1), Fraction(15))), "1 to 15")]
+)
+def test_an_absent_rate_is_refused_with_the_list(rates: Rates, listed: str) -> None:
+    """A rate that is not there is an error that lists those that are."""
+    with pytest.raises(SettingsError, match=f"no rate 25 at that size: give one of its rates: {listed}"):
+        choose_rate(rates, Wanted(None, Fraction(25)), "x")
