@@ -1,0 +1,249 @@
+"""Packets of both lanes over one byte stream: cut into chunks, control in front of images, put together again. Sans-I/O, `now_ns` passed in.
+
+A packet is u16 header length, u32 payload length, header, payload; its chunks carry consecutive numbers, so that one whose chunk is missing is
+dropped and never patched up. Only chunks on the frames' lane are acknowledged, by the newest number that came: the counter is absolute, so a
+lost acknowledgement is mended by the next. Control is neither held back nor acknowledged; it is little, and its own protocol repeats it.
+"""
+
+import struct
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Final
+
+from common.frame import Buffer
+from common.protocol.framing import UNIT_OVERHEAD_BYTES, Side, Unit, UnitKind, unit_parts
+from common.protocol.message import Lane
+from common.protocol.pacing import MS, Window
+from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
+
+_LENGTHS: Final = struct.Struct("<HI")
+_NUMBERS: Final = 1 << 16
+_NEVER: Final = 2**63 - 1
+
+_BATCH_BYTES: Final = 64 * 1024
+"""Bytes given at one go: what a tty takes at once at most; control that comes later waits behind them."""
+
+_QUEUE_PACKETS: Final = 32
+"""Packets that may wait on a lane: a wave of echoes and a few accounts."""
+
+_ABANDON_NS: Final = 1000 * MS
+"""A frame of which nothing was acknowledged for this long is given up: who comes back shall have a fresh one."""
+
+_KIND_OF: Final = {Lane.FRAMES: UnitKind.FRAMES, Lane.CONTROL: UnitKind.CONTROL}
+_LANE_OF: Final = {kind: lane for lane, kind in _KIND_OF.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """A packet that came in whole."""
+
+    lane: Lane
+    header: Buffer
+    payload: Buffer
+
+
+@dataclass(slots=True)
+class _Parcel:
+    """A packet on its way out."""
+
+    head: bytes
+    payload: memoryview
+    at: int = 0
+    begun_ns: int = 0
+
+    @property
+    def size_bytes(self) -> int:
+        return len(self.head) + len(self.payload)
+
+    def take(self, count: int) -> tuple[Buffer, bool, bool]:
+        """Give the next chunk's body, whether it is the first and whether it is the last."""
+        first, start = self.at == 0, self.at - len(self.head)
+        self.at += count
+        if start >= 0:
+            body: Buffer = self.payload[start : start + count]
+        else:
+            body = self.head[start:][:count] + bytes(self.payload[: max(0, start + count)])
+        return body, first, self.at >= self.size_bytes
+
+
+class Cutter:
+    """One side's way out: takes packets, gives bytes to write.
+
+    Args:
+        side: this side.
+    """
+
+    def __init__(self, side: Side) -> None:
+        self._side = side
+        self._queues: dict[Lane, deque[_Parcel]] = {lane: deque() for lane in Lane}
+        self._numbers = dict.fromkeys(Lane, 0)
+        self._acknowledge: int | None = None
+        self._window = Window()
+        self._abandoned = 0
+
+    @property
+    def bytes_per_s(self) -> float:
+        """The line's measured rate; 0 while unknown."""
+        return self._window.bytes_per_s
+
+    @property
+    def abandoned(self) -> int:
+        """Packets that were given up half sent, so far."""
+        return self._abandoned
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing waits to be written."""
+        return self._acknowledge is None and not any(self._queues.values())
+
+    @property
+    def due_ns(self) -> int:
+        """When `take` wants to be called next even if nothing has happened; 2^63 - 1: never."""
+        queue = self._queues[Lane.FRAMES]
+        return min(self._window.due_ns, self._abandon_ns(queue[0])) if queue else self._window.due_ns
+
+    def ready(self, lane: Lane) -> bool:
+        """Whether a packet with a payload would be taken now: none is on its way on that lane, and its first chunk may leave at once."""
+        if self._queues[lane]:
+            return False
+        return lane is Lane.CONTROL or self._window.has_room(self._window.chunk_bytes + UNIT_OVERHEAD_BYTES)
+
+    def put(self, lane: Lane, header: bytes, payload: Buffer) -> bool:
+        """Take a packet to be sent.
+
+        Args:
+            lane: where it goes.
+            header: at most MAX_HEADER_BYTES.
+            payload: at most MAX_PAYLOAD_BYTES; kept until it has left, not copied.
+
+        Returns:
+            Whether it was taken. A packet without a payload may wait in line, one with a payload only leave at once.
+        """
+        assert len(header) <= MAX_HEADER_BYTES
+        assert len(payload) <= MAX_PAYLOAD_BYTES
+        queue = self._queues[lane]
+        if len(queue) >= _QUEUE_PACKETS or (len(payload) and not self.ready(lane)):
+            return False
+        queue.append(_Parcel(_LENGTHS.pack(len(header), len(payload)) + header, memoryview(payload).cast("B")))
+        return True
+
+    def acknowledge(self, number: int) -> None:
+        """Tell the peer, in front of all else, the newest of its FRAMES units that came."""
+        self._acknowledge = number
+
+    def acknowledged(self, number: int, now_ns: int) -> None:
+        """Take the peer's word of the newest FRAMES unit that came to it."""
+        self._window.acknowledged(number, now_ns)
+
+    def take(self, now_ns: int) -> bytes:
+        """Give the next bytes to write; they are to be written before any others are taken.
+
+        Args:
+            now_ns: any steady clock, ns.
+
+        Returns:
+            At most about 64 KB; empty while nothing may be sent.
+        """
+        self._window.tick(now_ns)
+        frames = self._queues[Lane.FRAMES]
+        if frames and now_ns >= self._abandon_ns(frames[0]):
+            frames.popleft()
+            self._abandoned += 1
+        parts: list[Buffer] = []
+        size = 0
+        if self._acknowledge is not None:
+            parts += unit_parts(
+                self._side, Unit(UnitKind.ACK, first=True, last=True, number=self._acknowledge, body=b"")
+            )
+            self._acknowledge = None
+        while size < _BATCH_BYTES and self._queues[Lane.CONTROL]:
+            size += self._cut(Lane.CONTROL, self._window.chunk_bytes, parts)
+        while size < _BATCH_BYTES and frames:
+            chunk = self._window.chunk_bytes
+            if not self._window.has_room(chunk + UNIT_OVERHEAD_BYTES):
+                return b"".join(parts)
+            frames[0].begun_ns = frames[0].begun_ns or now_ns
+            number = self._numbers[Lane.FRAMES]
+            written = self._cut(Lane.FRAMES, chunk, parts)
+            self._window.sent(number, written, now_ns)
+            size += written
+        if not frames:
+            self._window.starved()
+        return b"".join(parts)
+
+    def _cut(self, lane: Lane, count: int, parts: list[Buffer]) -> int:
+        """Add the next chunk of a lane; gives its size on the wire."""
+        queue = self._queues[lane]
+        body, first, last = queue[0].take(count)
+        if last:
+            queue.popleft()
+        parts += unit_parts(self._side, Unit(_KIND_OF[lane], first, last, self._numbers[lane], body))
+        self._numbers[lane] = (self._numbers[lane] + 1) % _NUMBERS
+        return len(body) + UNIT_OVERHEAD_BYTES
+
+    def _abandon_ns(self, parcel: _Parcel) -> int:
+        """When a packet is to be given up; never before its first chunk was written."""
+        return max(parcel.begun_ns, self._window.acknowledged_ns) + _ABANDON_NS if parcel.at else _NEVER
+
+
+@dataclass(slots=True)
+class _Assembly:
+    """A packet on its way in; its chunks are copied, for a view would keep all that was read with it."""
+
+    header_bytes: int
+    size_bytes: int
+    next_number: int
+    data: bytearray = field(default_factory=bytearray)
+
+
+class Joiner:
+    """One side's way in: takes units, gives whole packets. Keeps at most one packet for each lane, and of that only what has come."""
+
+    def __init__(self) -> None:
+        self._under_way: dict[Lane, _Assembly] = {}
+        self._broken = 0
+
+    @property
+    def broken(self) -> int:
+        """Packets that had begun and lacked a chunk, so far."""
+        return self._broken
+
+    def add(self, unit: Unit) -> Whole | None:
+        """Take a FRAMES or CONTROL unit.
+
+        Returns:
+            The packet that it completes.
+        """
+        lane = _LANE_OF[unit.kind]
+        assembly = self._under_way.pop(lane, None)
+        if unit.first:
+            self._broken += assembly is not None
+            assembly = _begin(unit)
+        elif assembly is not None and unit.number != assembly.next_number:
+            self._broken += 1
+            assembly = None
+        if assembly is None:
+            return None
+        have_bytes = len(assembly.data) + len(unit.body)
+        if have_bytes > assembly.size_bytes or unit.last != (have_bytes == assembly.size_bytes):
+            self._broken += 1
+            return None
+        if not unit.last:
+            assembly.data += unit.body
+            assembly.next_number = (unit.number + 1) % _NUMBERS
+            self._under_way[lane] = assembly
+            return None
+        if assembly.data:
+            assembly.data += unit.body
+        whole = memoryview(assembly.data or unit.body)
+        split = _LENGTHS.size + assembly.header_bytes
+        return Whole(lane, whole[_LENGTHS.size : split], whole[split:])
+
+
+def _begin(unit: Unit) -> _Assembly | None:
+    if len(unit.body) < _LENGTHS.size:
+        return None
+    header_bytes, payload_bytes = _LENGTHS.unpack_from(unit.body)
+    if header_bytes > MAX_HEADER_BYTES or payload_bytes > MAX_PAYLOAD_BYTES:
+        return None
+    return _Assembly(header_bytes, _LENGTHS.size + header_bytes + payload_bytes, unit.number)

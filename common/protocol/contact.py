@@ -1,0 +1,134 @@
+"""Who is at the other end of a wire: a wire cannot tell that a program has gone, or that another has taken its place. Sans-I/O.
+
+The dialler says OPEN with a number that it has never used, until it hears ACCEPT with that number; nothing is sent before. The listener
+takes every new number for a new contact and says WHO to a dialler that it does not know; each says CLOSE when it leaves. As a wire keeps
+the order of bytes, all that follows the first OPEN or ACCEPT of a number belongs to that contact and nothing before it does.
+"""
+
+import struct
+from enum import Enum
+from typing import Final
+
+from common.protocol.framing import Side, Unit, UnitKind
+
+_WORD: Final = struct.Struct("<BI")
+_NEVER: Final = 2**63 - 1
+_NUMBERS: Final = 1 << 32
+
+RETRY_NS: Final = 100_000_000
+"""Between two attempts to be heard; a peer that comes back is met within this time."""
+
+
+class News(Enum):
+    """What a word meant."""
+
+    NONE = 0
+    MET = 1
+    PARTED = 2
+
+
+class _Word(Enum):
+    OPEN = 0
+    ACCEPT = 1
+    WHO = 2
+    CLOSE = 3
+
+
+class Contact:
+    """One side's knowledge of the other.
+
+    Args:
+        side: which this is.
+        number: random below 2^32, so that no earlier life of this side has used it.
+    """
+
+    def __init__(self, side: Side, number: int) -> None:
+        self._dials = side is Side.DIALLER
+        self._number = number if self._dials else None
+        self._up = False
+        self._due_ns = 0
+        self._say: list[tuple[_Word, int]] = [] if self._dials else [(_Word.WHO, 0)]
+
+    @property
+    def is_up(self) -> bool:
+        """Whether the two have met."""
+        return self._up
+
+    @property
+    def number(self) -> int:
+        """The contact's number."""
+        return self._number or 0
+
+    @property
+    def due_ns(self) -> int:
+        """When `words` wants to be called next, ns; 2^63 - 1: never."""
+        if self._say:
+            return 0
+        return self._due_ns if self._dials and not self._up else _NEVER
+
+    def hear(self, body: bytes) -> News:
+        """Take a CONTACT unit's body."""
+        if len(body) != _WORD.size:
+            return News.NONE
+        value, number = _WORD.unpack(body)
+        if value >= len(_Word):
+            return News.NONE
+        word = _Word(value)
+        return self._hear_as_dialler(word, number) if self._dials else self._hear_as_listener(word, number)
+
+    def hear_stranger(self, now_ns: int) -> None:
+        """Take note, as listener, of a unit from a dialler that this side does not know."""
+        if not self._dials and now_ns >= self._due_ns:
+            self._due_ns = now_ns + RETRY_NS
+            self._say.append((_Word.WHO, 0))
+
+    def words(self, now_ns: int) -> list[Unit]:
+        """Give what is to be said now."""
+        if self._dials and not self._up and now_ns >= self._due_ns:
+            self._due_ns = now_ns + RETRY_NS
+            self._say.append((_Word.OPEN, self.number))
+        said, self._say = self._say, []
+        return [
+            Unit(UnitKind.CONTACT, first=True, last=True, number=0, body=_WORD.pack(word.value, number))
+            for word, number in said
+        ]
+
+    def leave(self) -> None:
+        """Say goodbye next; for the dialler what follows is a new contact."""
+        if self._up:
+            self._say.append((_Word.CLOSE, self.number))
+        self._part()
+
+    def interrupt(self) -> None:
+        """Take note that the line was lost: the other end has to be met anew, and cannot be told."""
+        self._part()
+        self._say = [] if self._dials else [(_Word.WHO, 0)]
+
+    def _hear_as_dialler(self, word: _Word, number: int) -> News:
+        if word is _Word.ACCEPT and number == self._number and not self._up:
+            self._up = True
+            return News.MET
+        if word is _Word.WHO or (word is _Word.CLOSE and number == self._number):
+            was_up = self._up
+            if was_up:
+                self._part()
+            self._due_ns = 0
+            return News.PARTED if was_up else News.NONE
+        return News.NONE
+
+    def _hear_as_listener(self, word: _Word, number: int) -> News:
+        if word is _Word.OPEN:
+            self._say.append((_Word.ACCEPT, number))
+            if self._up and number == self._number:
+                return News.NONE  # said twice
+            self._number, self._up = number, True
+            return News.MET
+        if word is _Word.CLOSE and self._up and number == self._number:
+            self._part()
+            return News.PARTED
+        return News.NONE
+
+    def _part(self) -> None:
+        self._up = False
+        self._due_ns = 0
+        self._number = (self.number + 1) % _NUMBERS if self._dials else None

@@ -1,0 +1,193 @@
+"""How much may be under way on a line whose rate nobody knows: measured from acknowledgements. Sans-I/O, `now_ns` passed in.
+
+The bound on unacknowledged bytes is rate x (least round trip + 10 ms) - the bytes of the unit that took the least round trip (5 ms' worth at
+most), so that what is written next waits about 10 ms at most behind what was written before; but never below two chunks of 256 bytes, which
+keep a slow line busy.
+The rate is the largest delivery rate of late, a sample being what arrived between a unit's writing and its acknowledgement over that time
+(Cheng et al., "Delivery Rate Estimation", draft-cheng-iccrg-delivery-rate-estimation-02). As a busy line always holds a queue, the least
+round trip is measured anew every ten seconds with the line let run empty (BBR's ProbeRTT, draft-cardwell-iccrg-bbr-congestion-control-02,
+4.3.4). Lengths of a tty's output queue are not asked for: drivers and adapters tell less than they hold.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+from common.protocol.framing import MAX_BODY_BYTES, UNIT_OVERHEAD_BYTES
+
+MS: Final = 1_000_000
+
+MIN_CHUNK_BYTES: Final = 256
+"""Small enough that two of them are worth waiting for at 115200 baud (46 ms), large enough that their frames cost 4 %."""
+
+_CHUNK_NS: Final = 2_500_000
+"""A chunk takes this long on the line: a quarter of the slack, so that the line does not run empty between two acknowledgements."""
+
+_SLACK_NS: Final = 10 * MS
+_LEAST_UNIT_BYTES: Final = MIN_CHUNK_BYTES + UNIT_OVERHEAD_BYTES
+_FLOOR_BYTES: Final = 2 * _LEAST_UNIT_BYTES
+
+_RATE_SPAN_NS: Final = 1000 * MS
+"""The rate is the largest of this span and the one before: a line that has become slower is believed after two seconds."""
+
+_ROUND_TRIP_SPAN_NS: Final = 10_000 * MS
+
+_FIRST_PATIENCE_NS: Final = 1000 * MS
+_LEAST_PATIENCE_NS: Final = 200 * MS
+_MOST_PATIENCE_NS: Final = 2000 * MS
+"""Without word of them for this long (four round trips, within these limits) the units under way are written off."""
+
+_MOST_REMEMBERED: Final = 4096
+_NUMBERS: Final = 1 << 16
+
+
+@dataclass(slots=True)
+class _UnderWay:
+    """A unit that was written, with the state of delivery at that moment."""
+
+    number: int
+    size_bytes: int
+    sent_ns: int
+    delivered_bytes: int
+    delivered_ns: int
+    first_sent_ns: int
+    alone: bool
+    starved: bool
+    counts: bool = True
+
+
+class Window:
+    """The bound on unacknowledged bytes of one direction of a line."""
+
+    def __init__(self) -> None:
+        self._under_way: deque[_UnderWay] = deque()
+        self._under_way_bytes = 0
+        self._delivered_bytes = 0
+        self._delivered_ns = 0
+        self._first_sent_ns = 0
+        self._starved_until_bytes = 0
+        self._rate_before = 0.0
+        self._rate_now = 0.0
+        self._rate_since_ns = 0
+        self._round_trip_ns = 0
+        self._round_trip_bytes = 0
+        self._round_trip_at_ns = 0
+        self._smooth_ns = 0
+        self._probing = False
+        self._progress_ns = 0
+        self._acknowledged_ns = 0
+        self._backoff = 1
+
+    @property
+    def bytes_per_s(self) -> float:
+        """The line's measured rate; 0 while unknown."""
+        return max(self._rate_before, self._rate_now) * 1e9
+
+    @property
+    def chunk_bytes(self) -> int:
+        """How large a chunk's body is to be now."""
+        return min(MAX_BODY_BYTES, max(MIN_CHUNK_BYTES, int(max(self._rate_before, self._rate_now) * _CHUNK_NS)))
+
+    @property
+    def limit_bytes(self) -> int:
+        """How many bytes may be under way now."""
+        if self._probing:
+            return 1
+        rate = max(self._rate_before, self._rate_now)
+        if self._backoff > 1 or not rate:
+            return _FLOOR_BYTES
+        own_bytes = min(self._round_trip_bytes, rate * _SLACK_NS / 2)
+        limit = max(_FLOOR_BYTES, int(rate * (self._round_trip_ns + _SLACK_NS) - own_bytes))
+        # On a slow line the slack is less than a chunk: without a whole one more than is known to fit, no higher rate would ever be seen.
+        return limit if self.chunk_bytes > MIN_CHUNK_BYTES else -(-limit // _LEAST_UNIT_BYTES) * _LEAST_UNIT_BYTES
+
+    @property
+    def acknowledged_ns(self) -> int:
+        """When word of a unit came last; 0: never."""
+        return self._acknowledged_ns
+
+    def has_room(self, size_bytes: int) -> bool:
+        """Whether a unit of that size may be written now."""
+        return not self._under_way_bytes or self._under_way_bytes + size_bytes <= self.limit_bytes
+
+    def starved(self) -> None:
+        """Take note that there was room and nothing to write: rates measured on what is under way may be too small."""
+        self._starved_until_bytes = self._delivered_bytes + self._under_way_bytes
+
+    def sent(self, number: int, size_bytes: int, now_ns: int) -> None:
+        """Take note of a unit that is being written.
+
+        Args:
+            number: of the unit.
+            size_bytes: on the wire.
+            now_ns: any steady clock, ns.
+        """
+        alone = not self._under_way_bytes
+        if alone:
+            self._first_sent_ns = self._delivered_ns = self._progress_ns = now_ns
+        self._under_way_bytes += size_bytes
+        state = (self._delivered_bytes, self._delivered_ns, self._first_sent_ns)
+        starved = self._delivered_bytes < self._starved_until_bytes
+        self._under_way.append(_UnderWay(number, size_bytes, now_ns, *state, alone, starved))
+        if len(self._under_way) > _MOST_REMEMBERED:
+            self._forget(self._under_way.popleft())
+
+    def acknowledged(self, number: int, now_ns: int) -> None:
+        """Take note that a unit has come, and with it the fate of all before it is known.
+
+        Args:
+            number: of the unit; one that is not under way teaches nothing.
+            now_ns: any steady clock, ns.
+        """
+        if not self._under_way or (number - self._under_way[0].number) % _NUMBERS >= len(self._under_way):
+            return
+        while True:
+            unit = self._under_way.popleft()
+            self._forget(unit)
+            self._delivered_bytes += unit.size_bytes
+            if unit.number == number:
+                break
+        self._delivered_ns = self._progress_ns = self._acknowledged_ns = now_ns
+        self._backoff = 1
+        self._first_sent_ns = unit.sent_ns
+        self._learn(unit, now_ns)
+
+    def tick(self, now_ns: int) -> None:
+        """Do what time demands: write off what nobody acknowledges, let the line run empty to measure its round trip."""
+        if self._under_way_bytes and now_ns >= self.due_ns:
+            for unit in self._under_way:
+                unit.counts = False
+            self._under_way_bytes = 0
+            self._backoff = min(self._backoff * 2, 16)
+        if self._round_trip_ns and now_ns - self._round_trip_at_ns >= _ROUND_TRIP_SPAN_NS:
+            self._probing = True
+
+    @property
+    def due_ns(self) -> int:
+        """When units under way are to be written off; 2^63 - 1 while there are none."""
+        if not self._under_way_bytes:
+            return 2**63 - 1
+        patience = 4 * self._smooth_ns if self._smooth_ns else _FIRST_PATIENCE_NS
+        patience = min(_MOST_PATIENCE_NS, max(_LEAST_PATIENCE_NS, patience) * self._backoff)
+        return self._progress_ns + patience
+
+    def _forget(self, unit: _UnderWay) -> None:
+        if unit.counts:
+            self._under_way_bytes -= unit.size_bytes
+
+    def _learn(self, unit: _UnderWay, now_ns: int) -> None:
+        round_trip_ns = max(1, now_ns - unit.sent_ns)
+        self._smooth_ns = (7 * self._smooth_ns + round_trip_ns) // 8 if self._smooth_ns else round_trip_ns
+        stale = self._probing and unit.alone
+        if not self._round_trip_ns or round_trip_ns <= self._round_trip_ns or stale:
+            self._round_trip_ns, self._round_trip_bytes, self._round_trip_at_ns = round_trip_ns, unit.size_bytes, now_ns
+            self._probing = False
+        took_ns = max(unit.sent_ns - unit.first_sent_ns, now_ns - unit.delivered_ns)
+        if took_ns < self._round_trip_ns:
+            return  # acknowledgements that came in a heap
+        rate = (self._delivered_bytes - unit.delivered_bytes) / took_ns
+        if unit.starved and rate <= max(self._rate_before, self._rate_now):
+            return
+        if now_ns - self._rate_since_ns >= _RATE_SPAN_NS:
+            self._rate_before, self._rate_now, self._rate_since_ns = self._rate_now, 0.0, now_ns
+        self._rate_now = max(self._rate_now, rate)

@@ -1,0 +1,98 @@
+"""Two ends of a line in virtual time: a rate, a delay, and what spoils bytes. Nothing sleeps; the same seed gives the same run."""
+
+import heapq
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from common.protocol.chunking import Whole
+from common.protocol.duplex import Change, Duplex
+from common.protocol.framing import Side
+
+Spoil = Callable[[bytes], bytes]
+
+_GRAIN_BYTES = 16
+_GRAIN_NS = 100_000
+"""A line hands on what it has after this many bytes or this much time."""
+
+
+@dataclass(slots=True)
+class Way:
+    """One direction.
+
+    Attributes:
+        bytes_per_s: how fast bytes leave; what has not left waits in a queue without end.
+        delay_ns: from leaving to arriving.
+        spoil: what becomes of the bytes on the way.
+    """
+
+    bytes_per_s: float
+    delay_ns: int
+    spoil: Spoil = bytes
+    free_ns: int = 0
+
+
+@dataclass(slots=True)
+class VirtualLine:
+    """Both ends and the line between them.
+
+    Attributes:
+        ends: dialler and listener.
+        ways: from each end to the other.
+        came: what each end was told, with its time.
+        now_ns: virtual time.
+    """
+
+    ends: dict[Side, Duplex]
+    ways: dict[Side, Way]
+    came: dict[Side, list[tuple[int, Whole | Change]]] = field(default_factory=lambda: {side: [] for side in Side})
+    now_ns: int = 1
+    _arrivals: list[tuple[int, int, Side, bytes]] = field(default_factory=list)
+    _count: int = 0
+
+    @classmethod
+    def of(cls, bytes_per_s: float, delay_ns: int, spoil: Spoil = bytes) -> "VirtualLine":
+        """A line with two like directions."""
+        ends = {side: Duplex(side, 17) for side in Side}
+        return cls(ends, {side: Way(bytes_per_s, delay_ns, spoil) for side in Side})
+
+    def write(self) -> None:
+        """Let both ends write what they have."""
+        for side, end in self.ends.items():
+            way = self.ways[side]
+            while data := end.take(self.now_ns):
+                way.free_ns = max(way.free_ns, self.now_ns)
+                step = max(_GRAIN_BYTES, int(way.bytes_per_s * _GRAIN_NS / 1e9))
+                for at in range(0, len(data), step):
+                    grain = data[at : at + step]
+                    way.free_ns += round(len(grain) / way.bytes_per_s * 1e9)
+                    self._count += 1
+                    arrival = (way.free_ns + way.delay_ns, self._count, side.peer, way.spoil(grain))
+                    heapq.heappush(self._arrivals, arrival)
+
+    def run(self, until_ns: int, act: Callable[["VirtualLine"], None] = lambda _: None) -> None:
+        """Let time pass; `act` is called after everything that happens."""
+        act(self)
+        self.write()
+        while self.now_ns < until_ns:
+            due = min(end.due_ns for end in self.ends.values())
+            arrival = self._arrivals[0][0] if self._arrivals else until_ns
+            self.now_ns = max(self.now_ns, min(until_ns, arrival, max(due, self.now_ns + 1000)))
+            while self._arrivals and self._arrivals[0][0] <= self.now_ns:
+                _, _, side, data = heapq.heappop(self._arrivals)
+                self._note(side, self.ends[side].feed(data, self.now_ns))
+            for side, end in self.ends.items():
+                self._note(side, end.silence(self.now_ns))
+            act(self)
+            self.write()
+
+    def meet(self) -> None:
+        """Let the two ends meet."""
+        while not all(end.is_up for end in self.ends.values()):
+            self.run(self.now_ns + 10_000_000)
+
+    def packets(self, side: Side) -> list[Whole]:
+        """The packets that came to an end."""
+        return [event for _, event in self.came[side] if isinstance(event, Whole)]
+
+    def _note(self, side: Side, events: list[Whole | Change]) -> None:
+        self.came[side] += [(self.now_ns, event) for event in events]
