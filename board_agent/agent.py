@@ -28,6 +28,9 @@ _LOG = logging.getLogger(__name__)
 _DRAIN_NS: Final = 5_000_000_000
 """After the last frame the host gets this long to say goodbye: longer than any pipeline keeps a pair."""
 
+_FAREWELL_NS: Final = 300_000_000
+"""A host answers a goodbye within a round trip; one that hangs is not waited for longer than a person would notice."""
+
 _LONGEST_WAIT_MS: Final = 1000
 
 _CAMERA_RETRY_MS: Final = 250
@@ -171,7 +174,7 @@ class Agent:
         if self._camera_ended and not self._stopping:
             self._drain()
         self._outbox.discard(DropReason.STOPPED)
-        self._send_all(self._session.leave(self._outbox.counts))
+        self._part()
         return Summary(
             self._session.session, self._outbox.counts, self._garbage, self._camera_ended, self._camera.health
         )
@@ -296,6 +299,21 @@ class Agent:
             unsaid = [item for item in unsaid if self._send(item) is not SendResult.SENT]
             self._send_all(self._session.tick(now_ns, self._outbox.counts))
             self._poll(min(self._session.due_ns, deadline_ns), now_ns)
+
+
+    def _part(self) -> None:
+        """Say goodbye, and stay until the host has answered: ZeroMQ throws away what was not read when a connection closes."""
+        farewell = self._session.leave(self._outbox.counts)
+        self._send_all(farewell)
+        poller = zmq.Poller()
+        for pollable in (item for link in self._links for item in link.pollables):
+            poller.register(pollable, zmq.POLLIN)
+        deadline_ns = now.monotonic_ns() + _FAREWELL_NS
+        while farewell and self._session.has_host and (left_ns := deadline_ns - now.monotonic_ns()) > 0:
+            poller.poll(left_ns // 1_000_000 + 1)
+            for index, link in enumerate(self._links):
+                for incoming in link.receive():
+                    self._take(index, incoming)
 
 
 def _address(link_index: int, connection: bytes) -> bytes:

@@ -231,7 +231,7 @@ class Receiver:
                 case Refused(reason):
                     self.refused = reason
                 case Vanished(orderly):
-                    self._current.vanished |= not orderly
+                    self._current.vanished = not orderly
                     _LOG.info(event("board_gone", session=self._current.session, orderly=orderly))
 
     @property

@@ -30,7 +30,11 @@ class Packet:
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """A connection that this side had dialled broke; what was under way on it is gone. The link dials again by itself."""
+    """A connection that this side had dialled broke. The link dials again by itself.
+
+    What was under way on it is gone, so may be what had come but was not received yet, and what is sent at that very moment: what must be
+    heard is said until it is answered.
+    """
 
     connection: bytes
 

@@ -117,12 +117,12 @@ class ZeroMqListener:
     def __init__(self, address: str) -> None:
         self.kind = address.partition(":")[0]
         self.dialled: dict[Lane, bytes] = {}
+        if self.kind == "ipc":
+            _free_path(address.removeprefix("ipc://"))
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._socket = self._context.socket(zmq.ROUTER)
         _configure(self._socket)
         self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # a vanished host is told of instead of swallowing frames
-        if self.kind == "ipc":
-            _free_path(address.removeprefix("ipc://"))
         before = os.umask(0o177)  # an ipc path is for its owner only
         try:
             self._socket.bind(address)
@@ -184,13 +184,15 @@ class ZeroMqDialer:
 
     def receive(self) -> Iterator[Incoming]:
         """Give all packets that have come in, frames first, then the news of broken connections: a peer's last words come before its end."""
-        for lane in (Lane.FRAMES, Lane.CONTROL):
-            connection = self.dialled[lane]
-            yield from _receive(self._sockets[connection], connection, routed=False)
+        broken = []  # asked for before the packets, so that none that came before the break can be overlooked
         for connection, monitor in self._monitors.items():
             while _has_something(monitor):
                 monitor.recv_multipart(_NOW)
-                yield Broken(connection)
+                broken.append(Broken(connection))
+        for lane in (Lane.FRAMES, Lane.CONTROL):
+            connection = self.dialled[lane]
+            yield from _receive(self._sockets[connection], connection, routed=False)
+        yield from broken
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Hand a packet over; before the peer is there it is FULL (ZMQ_IMMEDIATE)."""

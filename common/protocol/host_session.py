@@ -4,6 +4,7 @@ from enum import Enum
 from typing import Final, assert_never
 
 from common.protocol.message import (
+    BoardCounts,
     BoardHello,
     Bye,
     Credit,
@@ -49,6 +50,12 @@ WAVE_EARLY_NS: Final = 50 * MS
 EARLY_NS: Final = 1000 * MS
 """In its first second there is no estimate worth the name."""
 
+WAVE_PATIENCE_NS: Final = 1000 * MS
+"""An echo under way is waited for this long before another wave: on a slow line a wave takes longer than the time between two."""
+
+WAVE_REST: Final = 4
+"""After a wave the line has this many times its length for other things: echoes at 115200 baud would else take 2 % of it."""
+
 
 class _State(Enum):
     SEEKING = 0
@@ -74,7 +81,9 @@ class HostSession:
         self._hello_due_ns = 0
         self._wave_due_ns = 0
         self._wave = 0
+        self._wave_ns = 0
         self._echoes_left = 0
+        self._unanswered = False
         self._next_index = 0
         self._below_index = 0
 
@@ -95,7 +104,9 @@ class HostSession:
             return min(self._wave_due_ns, self._heard_ns + SILENCE_NS)
         return self._hello_due_ns
 
-    def receive(self, connection: bytes, message: Message, now_ns: int) -> list[Output]:
+    def receive(  # noqa: PLR0911 - one line for each kind of message
+        self, connection: bytes, message: Message, now_ns: int
+    ) -> list[Output]:
         """Take one message from a connection.
 
         Args:
@@ -117,8 +128,10 @@ class HostSession:
                 return self._take_frame(message, now_ns)
             case HostHello() | Ping() | Credit():
                 return []  # a host's words from a board: nothing a sound board sends
-            case Pong() | Status() | End() | Bye():
+            case Pong() | Status() | End():
                 return self._attend(connection, message, now_ns)
+            case Bye(counts):
+                return self._part(connection, counts, now_ns)
             case _:
                 assert_never(message)
 
@@ -129,6 +142,10 @@ class HostSession:
         if self._state is _State.SEEKING and now_ns >= self._hello_due_ns:
             return self._say_hello(now_ns)
         if self._state is _State.OPEN and now_ns >= self._wave_due_ns:
+            if self._unanswered and now_ns - self._wave_ns < WAVE_PATIENCE_NS:
+                self._wave_due_ns = min(now_ns + WAVE_EARLY_NS, self._wave_ns + WAVE_PATIENCE_NS)
+                return []
+            self._wave_ns = now_ns
             age_ns = now_ns - self._opened_ns
             early = age_ns < EARLY_NS
             self._wave_due_ns = now_ns + (WAVE_EARLY_NS if early else WAVE_YOUNG_NS if age_ns < YOUNG_NS else WAVE_NS)
@@ -198,6 +215,7 @@ class HostSession:
         self._below_index = 0
         self._wave += 1  # echoes under way are of an earlier connection, perhaps of another clock
         self._echoes_left = 0
+        self._unanswered = False
         self._hello = hello
         self._state = _State.OPEN
         self._opened_ns = self._heard_ns = self._wave_due_ns = now_ns
@@ -213,7 +231,7 @@ class HostSession:
         self._heard_ns = now_ns
         return [Arrived(frame, lost)]
 
-    def _attend(self, connection: bytes, message: Pong | Status | End | Bye, now_ns: int) -> list[Output]:
+    def _attend(self, connection: bytes, message: Pong | Status | End, now_ns: int) -> list[Output]:
         if self._state is not _State.OPEN or self._hello is None or connection not in self._lanes.values():
             return []
         self._heard_ns = now_ns
@@ -221,6 +239,10 @@ class HostSession:
             case Pong(wave, t0_ns, t1_ns, t2_ns):
                 if wave != self._wave:
                     return []
+                self._unanswered = False
+                if not self._echoes_left and now_ns - self._opened_ns >= EARLY_NS:
+                    rest_ns = min(WAVE_PATIENCE_NS, WAVE_REST * (now_ns - self._wave_ns))
+                    self._wave_due_ns = max(self._wave_due_ns, now_ns + rest_ns)
                 return [Echo(wave, t0_ns, t1_ns, t2_ns, now_ns), *self._ping()]
             case Status(session, counts) | End(session, counts):
                 if session != self._hello.session:
@@ -228,16 +250,23 @@ class HostSession:
                 lost = max(0, counts.sent - self._next_index) if connection == self._lanes[Lane.FRAMES] else 0
                 self._next_index += lost
                 return [Counted(counts, isinstance(message, End), lost)]
-            case Bye(counts):
-                self._state = _State.SEEKING
-                self._greeted.clear()
-                self._hello_due_ns = now_ns + HELLO_RETRY_NS
-                return [Counted(counts, ended=False), Vanished(orderly=True)]
             case _:
                 assert_never(message)
+
+    def _part(self, connection: bytes, counts: BoardCounts, now_ns: int) -> list[Output]:
+        """Take a board's goodbye. It may come on one lane just after the other one broke: its account is the session's last all the same."""
+        if self._hello is None or connection not in self._lanes.values() or counts.sent < self._next_index:
+            return []
+        if self._state is _State.OPEN:
+            self._state = _State.SEEKING
+            self._greeted.clear()
+            self._hello_due_ns = now_ns + HELLO_RETRY_NS
+        # Answered, so that the board keeps the connection until its last words were read.
+        return [Outgoing(connection, Bye()), Counted(counts, ended=False), Vanished(orderly=True)]
 
     def _ping(self) -> list[Output]:
         if not self._echoes_left:
             return []
         self._echoes_left -= 1
+        self._unanswered = True
         return [Outgoing(self._lanes[Lane.CONTROL], Ping(self._wave, 0))]

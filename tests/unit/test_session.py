@@ -266,11 +266,25 @@ def test_a_boards_goodbye_gives_its_last_account() -> None:
     counts = BoardCounts(100, 90)
     [goodbye] = world.board.leave(counts)
     assert goodbye.message == Bye(counts)
-    outputs = host.session.receive(host.names[Lane.CONTROL], goodbye.message, world.now_ns)
-    assert outputs == [Counted(counts, ended=False), Vanished(orderly=True)]
+    control = host.names[Lane.CONTROL]
+    outputs = host.session.receive(control, goodbye.message, world.now_ns)
+    assert outputs == [Outgoing(control, Bye()), Counted(counts, ended=False), Vanished(orderly=True)]
     assert not host.session.is_open
     world.settle(1000 * MS)
     assert host.session.is_open
+
+
+def test_a_goodbye_counts_also_when_the_other_lane_broke_first() -> None:
+    """The last account is taken even when the frames' lane was seen to break just before it, but not that of another life."""
+    world = World()
+    world.settle(300 * MS)
+    host = world.hosts[0]
+    host.session.interrupted(world.now_ns)
+    counts = BoardCounts(100, 90)
+    control = host.names[Lane.CONTROL]
+    assert host.session.receive(control, Bye(BoardCounts(1, 1)), world.now_ns) == []
+    outputs = host.session.receive(control, Bye(counts), world.now_ns)
+    assert outputs == [Outgoing(control, Bye()), Counted(counts, ended=False), Vanished(orderly=True)]
 
 
 def test_the_end_is_said_until_it_is_heard() -> None:

@@ -1,0 +1,92 @@
+"""Waiting for what a link gives, without sleeping: poll its sockets until a condition holds."""
+
+import socket
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import zmq
+
+from common.link.base import Broken, Garbage, Link, Packet, SendResult
+from common.protocol.message import Lane
+
+PATIENCE_S = 60
+
+
+@dataclass(slots=True)
+class End:
+    """One end of a link, with everything that came in at it."""
+
+    link: Link
+    packets: list[tuple[bytes, bytes, bytes]] = field(default_factory=list)
+    broken: list[bytes] = field(default_factory=list)
+    garbage: int = 0
+
+    def take(self) -> None:
+        """Take what has come in."""
+        for incoming in self.link.receive():
+            match incoming:
+                case Packet(connection, header, payload):
+                    self.packets.append((connection, bytes(header), bytes(payload)))
+                case Broken(connection):
+                    self.broken.append(connection)
+                case Garbage():
+                    self.garbage += 1
+
+    @property
+    def headers(self) -> list[bytes]:
+        """The headers that came, in order."""
+        return [header for _, header, _ in self.packets]
+
+
+def wait_until(condition: Callable[[], bool], *ends: End) -> None:
+    """Take what comes in at these ends until the condition holds; it is tried again at least every 20 ms."""
+    poller = zmq.Poller()
+    for end in ends:
+        for pollable in end.link.pollables:
+            poller.register(pollable, zmq.POLLIN)
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline, "the condition was not met in a minute"
+        poller.poll(20)
+        for end in ends:
+            end.take()
+
+
+def send_until_sent(end: End, connection: bytes, header: bytes, payload: bytes, *others: End) -> None:
+    """Hand a packet over as soon as the link takes it."""
+    wait_until(lambda: end.link.send(connection, header, payload) is SendResult.SENT, end, *others)
+
+
+def meet(listener: End, dialler: End, greeting: bytes = b"hello") -> dict[Lane, bytes]:
+    """Let the listener learn the dialler's connections; gives its names for them. A greeting that is not heard within a second is repeated."""
+    names: dict[Lane, bytes] = {}
+    for lane, connection in dialler.link.dialled.items():
+        _greet(listener, dialler, connection, greeting + lane.name.encode())
+        names[lane] = next(
+            name for name, said, _ in reversed(listener.packets) if said == greeting + lane.name.encode()
+        )
+    return names
+
+
+def _greet(listener: End, dialler: End, connection: bytes, header: bytes) -> None:
+    said_at = -1.0
+
+    def heard() -> bool:
+        nonlocal said_at
+        if header in listener.headers:
+            return True
+        unheard = time.monotonic() - said_at > 1
+        if unheard and dialler.link.send(connection, header, b"") is SendResult.SENT:
+            said_at = time.monotonic()
+        return False
+
+    wait_until(heard, listener, dialler)
+
+
+def free_port() -> int:
+    """A TCP port of the loopback interface that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+    return port
