@@ -18,6 +18,7 @@ class Act(Enum):
     PUT = auto()
     PUT_WITHOUT_HOST = auto()
     SPOILED = auto()
+    SKIPPED = auto()
     SENT = auto()
     LINK_FULL = auto()
     STOPPED = auto()
@@ -43,6 +44,8 @@ def test_no_frame_is_lost_from_the_account(acts: list[Act]) -> None:
                 assert (outbox.waiting is None) == (act is Act.PUT_WITHOUT_HOST)
             case Act.SPOILED:
                 outbox.spoiled()
+            case Act.SKIPPED:
+                outbox.skipped()
             case Act.SENT:
                 if outbox.waiting is not None:
                     outbox.sent()
@@ -53,7 +56,7 @@ def test_no_frame_is_lost_from_the_account(acts: list[Act]) -> None:
         counts = outbox.counts
         dropped = sum(count for _, count in counts.dropped)
         assert counts.grabbed == counts.sent + dropped + (outbox.waiting is not None)
-        assert counts.grabbed - before.grabbed == (act in {Act.PUT, Act.PUT_WITHOUT_HOST, Act.SPOILED})
+        assert counts.grabbed - before.grabbed == (act in {Act.PUT, Act.PUT_WITHOUT_HOST, Act.SPOILED, Act.SKIPPED})
         if outbox.waiting is not None:
             assert outbox.waiting.sequence == newest
 
