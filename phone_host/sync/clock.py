@@ -1,28 +1,52 @@
-"""Where the board's clock stands to the host's, from two-way echoes. Pure: samples in, estimate out.
+"""Where the board's clock stands to the host's, from two-way echoes. Pure: echoes in, estimate out; time is that of the newest echo.
 
 An echo gives two hard facts: the board's t1 lies after the host's t0, and its t2 before the host's t3. With H(b) = b + offset(b) the host
 time of board time b:    t0 - t1 <= offset(t1)    and    offset(t2) <= t3 - t2.
-Averages are useless when frames fill the link (study of links, 3d); extremes are not. So the skew is fitted to the best echo of each wave,
-and the offset is the middle of what the two families of one-way minima still allow.
+Averages are useless when frames fill the link (study of links, 3d); extremes are not. `hull` keeps the extremes, `strip` finds the lines between
+them and weighs them; this module feeds both, notices clocks that jump, and states two figures.
+
+`bound`: hard. It contains the truth whatever the delays, as long as the clocks' rates differ by at most MAX_SKEW and their difference changes by at
+most SKEW_CHANGE. Half of the least round trip is the best it can be.
+`uncertainty`: contains the truth in 99.9 % if the link is nearly symmetric: the least delays there and back differ by at most twice ASYMMETRY of the
+least round trip, and the delays above them scatter without memory from wave to wave.
+
+Sources: Mills, RFC 5905 (four stamps, minimum filter); `hull` and `strip` name the others.
 """
 
+import math
 from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
 from common.protocol.session import Echo
+from phone_host.sync.hull import Hull, widening_ns
+from phone_host.sync.strip import MAX_SKEW, Allowed, Belief, Spacing, allowed_lines, believe
 
-WINDOW_NS: Final = 10_000_000_000
-"""One-way minima are taken over this long: some 40 waves, in which even a full link shows a gap."""
+__all__ = ["ASYMMETRY", "MAX_SKEW", "ClockEstimate", "ClockEstimator", "HostTime"]
 
-SKEW_WINDOW_NS: Final = 120_000_000_000
-"""The skew is fitted over this long; crystals change theirs over minutes."""
+ASYMMETRY: Final = 0.04
+"""Error per least round trip that an unequal pair of least delays may make: half of their difference (bench_clock, real processes)."""
 
-SKEW_SPAN_NS: Final = 5_000_000_000
-"""Before this much time has passed the skew is taken as unknown, not fitted to noise."""
+WAVES: Final = 96
+"""Waves whose scatter is looked at: 48 s when old, more than the widening lets matter on any link of this project."""
 
-MAX_SKEW: Final = 200e-6
-"""No two crystals differ by more than this (100 ppm each)."""
+_SMALLEST: Final = 8
+"""The spacing is that of so many smallest delays: fewer are chance, more are not near the least one any more."""
+
+_LEAST_SPACING_NS: Final = 500.0
+"""Nobody takes a stamp more exactly than this in an interpreter."""
+
+_CONFIRMED_WAVES: Final = 3
+"""After so many waves on the new side of a jump it was no outlier."""
+
+
+@dataclass(frozen=True, slots=True)
+class HostTime:
+    """A moment of the board on the host's clock, ns, with the half-widths of what is not known."""
+
+    ns: int
+    uncertainty_ns: int
+    bound_ns: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +57,13 @@ class ClockEstimate:
         reference_ns: board time at which `offset_ns` holds.
         offset_ns: host clock minus board clock there, ns.
         skew: change of the offset per ns of board time.
-        skew_uncertainty: of that skew.
-        uncertainty_ns: half of the interval that the echoes leave for the offset at the reference.
-        round_trip_ns: least round trip in the window.
+        skew_uncertainty: of that skew, 99.9 % under near-symmetry.
+        uncertainty_ns: of the offset at the reference, 99.9 % under near-symmetry.
+        round_trip_ns: least round trip of late.
+        low_ns: least offset at the reference that the facts allow; hard.
+        high_ns: greatest.
+        skew_low: least skew that the facts allow; hard.
+        skew_high: greatest.
     """
 
     reference_ns: int
@@ -44,39 +72,183 @@ class ClockEstimate:
     skew_uncertainty: float
     uncertainty_ns: int
     round_trip_ns: int
+    low_ns: int
+    high_ns: int
+    skew_low: float
+    skew_high: float
+
+    @property
+    def bound_ns(self) -> int:
+        """Half-width at the reference that contains the true offset whatever the asymmetry, ns."""
+        return self.bound_at(self.reference_ns)
 
     def offset_at(self, board_ns: int) -> int:
         """Host clock minus board clock at a board time, ns."""
         return self.offset_ns + round(self.skew * (board_ns - self.reference_ns))
 
+    def limits_at(self, board_ns: int) -> tuple[int, int]:
+        """Least and greatest offset at a board time that the facts allow, ns; hard."""
+        age_ns = board_ns - self.reference_ns
+        low, high = (self.skew_low, self.skew_high) if age_ns >= 0 else (self.skew_high, self.skew_low)
+        wide = widening_ns(age_ns)
+        return self.low_ns + math.floor(low * age_ns - wide), self.high_ns + math.ceil(high * age_ns + wide)
+
+    def bound_at(self, board_ns: int) -> int:
+        """Half-width of the interval around `offset_at` that contains the true offset whatever the asymmetry, ns."""
+        offset_ns = self.offset_at(board_ns)
+        low_ns, high_ns = self.limits_at(board_ns)
+        return max(high_ns - offset_ns, offset_ns - low_ns)
+
     def uncertainty_at(self, board_ns: int) -> int:
-        """Half-width of the interval that holds the true offset at a board time, ns; grows with the distance from the echoes."""
-        return self.uncertainty_ns + round(self.skew_uncertainty * abs(board_ns - self.reference_ns))
+        """Half-width that contains the true offset in 99.9 % on a nearly symmetric link, ns; grows with the distance from the echoes."""
+        age_ns = board_ns - self.reference_ns
+        grown = self.skew_uncertainty * abs(age_ns) + widening_ns(age_ns)
+        return min(self.uncertainty_ns + math.ceil(grown), self.bound_at(board_ns))
+
+    def to_host(self, board_ns: int) -> HostTime:
+        """Give the host's time of a moment of the board's clock, ns."""
+        return HostTime(board_ns + self.offset_at(board_ns), self.uncertainty_at(board_ns), self.bound_at(board_ns))
 
 
 @dataclass(slots=True)
 class _Wave:
-    """What one wave of echoes left: its tightest lower and upper fact and its best single echo."""
+    """What one wave of echoes left: its tightest lower and upper fact (board's time, ns) and its least round trip."""
 
     number: int
     lower: tuple[int, int]
     upper: tuple[int, int]
-    best: tuple[int, int, int]
+    round_trip_ns: int
+
+
+class _Learned:
+    """All that is known of one pair of clocks between two jumps.
+
+    Args:
+        echo: the first one.
+        prior_skew: what the skew was before the jump; 0 when nothing is known.
+    """
+
+    def __init__(self, echo: Echo, prior_skew: float) -> None:
+        self._lower, self._upper = Hull(), Hull()
+        self._prior_skew = prior_skew
+        self._spacing: Spacing | None = None
+        self.waves: deque[_Wave] = deque(maxlen=WAVES)
+        self._store(echo)
+        self.estimate = self._solved()
+        assert self.estimate is not None
+
+    def agrees_with(self, echo: Echo) -> bool:
+        """Whether an echo can be of these clocks: its facts leave something of what the earlier ones left."""
+        estimate = self.estimate
+        if estimate is None or echo.t1_ns < estimate.reference_ns:
+            return False
+        return (
+            echo.t0_ns - echo.t1_ns <= estimate.limits_at(echo.t1_ns)[1]
+            and echo.t3_ns - echo.t2_ns >= estimate.limits_at(echo.t2_ns)[0]
+        )
+
+    def add(self, echo: Echo) -> bool:
+        """Learn from an echo; gives whether all facts still agree."""
+        new_wave = self.waves[-1].number != echo.wave
+        tight = self._is_tight(echo)
+        self._store(echo)
+        if new_wave or tight:
+            self.estimate = self._solved()
+        return self.estimate is not None
+
+    def _store(self, echo: Echo) -> None:
+        # Stamps are rounded, so that a fact may be 1 ns too strict.
+        lower, upper = (echo.t1_ns, echo.t0_ns - echo.t1_ns - 1), (echo.t2_ns, echo.t3_ns - echo.t2_ns + 1)
+        round_trip_ns = (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns)
+        self._lower.add(*lower)
+        self._upper.add(upper[0], -upper[1])
+        self._newest = echo
+        if not self.waves or self.waves[-1].number != echo.wave:
+            self.waves.append(_Wave(echo.wave, lower, upper, round_trip_ns))
+            return
+        wave = self.waves[-1]
+        wave.lower = max(wave.lower, lower, key=lambda fact: fact[1])
+        wave.upper = min(wave.upper, upper, key=lambda fact: fact[1])
+        wave.round_trip_ns = min(wave.round_trip_ns, round_trip_ns)
+
+    def _is_tight(self, echo: Echo) -> bool:
+        """Whether an echo came as close to the lines as the best few; of others only the first of a wave is worth the arithmetic."""
+        estimate, spacing = self.estimate, self._spacing
+        if estimate is None or spacing is None:
+            return True
+        delay_ns = estimate.round_trip_ns / 2
+        there_ns = echo.t1_ns + estimate.offset_at(echo.t1_ns) - echo.t0_ns - delay_ns
+        back_ns = echo.t3_ns - echo.t2_ns - estimate.offset_at(echo.t2_ns) - delay_ns
+        return there_ns < spacing.there_ns or back_ns < spacing.back_ns
+
+    def _solved(self) -> ClockEstimate | None:
+        """Make the estimate; None if the facts contradict each other."""
+        # All values are taken relative to the newest fact: offsets may be hours, and floats must tell a ns.
+        reference_ns, origin_ns = self._newest.t2_ns, self._newest.t3_ns - self._newest.t2_ns
+        lower = self._lower.seen_from(reference_ns, origin_ns)
+        upper = self._upper.seen_from(reference_ns, -origin_ns)
+        rows = allowed_lines(lower, upper, self._prior_skew)
+        if not rows:
+            return None
+        spacing = self._spacing or self._first_spacing(rows)
+        middle_ns = sum(wave.upper[0] - reference_ns for wave in self.waves) / len(self.waves)
+        belief = believe(rows, spacing, middle_ns, self._prior_skew)
+        self._spacing = self._measured_spacing(belief.best, reference_ns, origin_ns)
+        return self._told(rows, belief, reference_ns, origin_ns)
+
+    def _told(self, rows: list[Allowed], belief: Belief, reference_ns: int, origin_ns: int) -> ClockEstimate:
+        error = math.ceil(belief.offset_error_ns + ASYMMETRY * (belief.best.high_ns - belief.best.low_ns)) + 1
+        offset_ns = round(belief.offset_ns)
+        # Low rises with the skew and high does too (all facts are past): the extremes lie at the ends.
+        low_ns, high_ns = math.floor(rows[0].low_ns), math.ceil(rows[-1].high_ns)
+        return ClockEstimate(
+            reference_ns,
+            origin_ns + offset_ns,
+            belief.skew,
+            belief.skew_error,
+            min(error, max(high_ns - offset_ns, offset_ns - low_ns)),
+            min(wave.round_trip_ns for wave in self.waves),
+            origin_ns + low_ns,
+            origin_ns + high_ns,
+            rows[0].skew,
+            rows[-1].skew,
+        )
+
+    def _first_spacing(self, rows: list[Allowed]) -> Spacing:
+        """A guess for the first wave: the delay above the least is a quarter of the round trip."""
+        guess = max(_LEAST_SPACING_NS, max(row.high_ns - row.low_ns for row in rows) / 4 / len(self.waves))
+        return Spacing(guess, guess)
+
+    def _measured_spacing(self, line: Allowed, reference_ns: int, origin_ns: int) -> Spacing | None:
+        """Measure how close the waves' best echoes came to the touching lines; None while there are too few."""
+        count = min(_SMALLEST, len(self.waves) // 2)
+        if count < 2:
+            return None
+        there, back = [], []
+        for wave in self.waves:
+            age = wave.lower[0] - reference_ns
+            there.append(line.low_ns + line.skew * age - (wave.lower[1] - origin_ns) + widening_ns(age))
+            age = wave.upper[0] - reference_ns
+            back.append(wave.upper[1] - origin_ns - line.high_ns - line.skew * age + widening_ns(age))
+        values = (sorted(side)[count] / (count - 1) for side in (there, back))
+        return Spacing(*(max(_LEAST_SPACING_NS, value) for value in values))
 
 
 class ClockEstimator:
-    """Learns one board clock; a new boot of the board needs a new estimator."""
+    """Learns one board clock; a new boot of the board needs a new estimator.
+
+    A contradiction means that a clock jumped (a phone slept, a debugger stopped one): the new side is believed at once. The old side is set aside
+    until three waves confirm the jump; an echo that agrees only with the old side ends the excursion as an outlier.
+    """
 
     def __init__(self) -> None:
-        self._waves: deque[_Wave] = deque()
-        self._estimate: ClockEstimate | None = None
+        self._learned: _Learned | None = None
+        self._aside: _Learned | None = None
 
     @property
     def estimate(self) -> ClockEstimate | None:
         """The present estimate; None before the first echo."""
-        if self._estimate is None and self._waves:
-            self._estimate = self._solve()
-        return self._estimate
+        return self._learned.estimate if self._learned is not None else None
 
     def add(self, echo: Echo) -> None:
         """Learn from one echo; one whose times run backwards is no echo and is passed over.
@@ -84,83 +256,28 @@ class ClockEstimator:
         Args:
             echo: its four times.
         """
-        round_trip_ns = (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns)
-        if round_trip_ns < 0 or echo.t2_ns < echo.t1_ns:
+        if echo.t3_ns - echo.t0_ns < echo.t2_ns - echo.t1_ns or echo.t2_ns < echo.t1_ns:
             return
-        lower = (echo.t1_ns, echo.t0_ns - echo.t1_ns)
-        upper = (echo.t2_ns, echo.t3_ns - echo.t2_ns)
-        best = (round_trip_ns, (echo.t1_ns + echo.t2_ns) // 2, (lower[1] + upper[1]) // 2)
-        self._estimate = None
-        wave = self._waves[-1] if self._waves else None
-        if wave is None or wave.number != echo.wave:
-            self._waves.append(_Wave(echo.wave, lower, upper, best))
-            self._forget(echo.t1_ns)
-            return
-        wave.lower = max(wave.lower, lower, key=lambda fact: fact[1])
-        wave.upper = min(wave.upper, upper, key=lambda fact: fact[1])
-        wave.best = min(wave.best, best)
+        learned = self._learned
+        if learned is None:
+            self._learned = _Learned(echo, 0.0)
+        elif learned.agrees_with(echo):
+            self._continue(learned, echo)
+        elif self._aside is not None and self._aside.agrees_with(echo):
+            self._learned, self._aside = self._aside, None
+            self._continue(self._learned, echo)
+        else:
+            self._begin(learned, echo)
 
-    def _forget(self, newest_ns: int) -> None:
-        while newest_ns - self._waves[0].lower[0] > SKEW_WINDOW_NS:
-            self._waves.popleft()
+    def _continue(self, learned: _Learned, echo: Echo) -> None:
+        if not learned.add(echo):
+            self._begin(None, echo)
+        elif len(learned.waves) >= _CONFIRMED_WAVES:
+            self._aside = None
 
-    def _jumped(self) -> bool:
-        """Whether no two crystals could have got from the wave before to the newest one: a phone slept, however long ago that wave is."""
-        if len(self._waves) < 2:
-            return False
-        before, newest = self._waves[-2], self._waves[-1]
-        low = _carried(before.lower, newest.upper[0], 0.0, -MAX_SKEW)
-        high = _carried(before.upper, newest.lower[0], 0.0, MAX_SKEW)
-        return low > newest.upper[1] or high < newest.lower[1]
-
-    def _solve(self) -> ClockEstimate:
-        newest = self._waves[-1]
-        if self._jumped():
-            self._waves = deque([newest])
-        reference_ns = newest.upper[0]
-        skew, skew_uncertainty = self._skew()
-        recent = [wave for wave in self._waves if reference_ns - wave.lower[0] <= WINDOW_NS]
-        low, high = (
-            max(_carried(wave.lower, reference_ns, skew, -skew_uncertainty) for wave in recent),
-            min(_carried(wave.upper, reference_ns, skew, skew_uncertainty) for wave in recent),
-        )
-        if low > high:
-            # The facts contradict each other: a clock jumped (suspend, a debugger). Only the newest wave is of the present.
-            self._waves = deque([newest])
-            skew, skew_uncertainty = self._skew()
-            low, high = newest.lower[1], newest.upper[1]
-            recent = [newest]
-        # Rounded up, so that the interval is never narrower than the facts.
-        half = max(1, (high - low + 1) // 2)
-        return ClockEstimate(
-            reference_ns, (low + high) // 2, skew, skew_uncertainty, half, min(wave.best[0] for wave in recent)
-        )
-
-    def _skew(self) -> tuple[float, float]:
-        """Fit a line through the best echo of each wave, weighted by how close each came to the least round trip."""
-        first, last = self._waves[0].best[1], self._waves[-1].best[1]
-        if last - first < SKEW_SPAN_NS:
-            return 0.0, MAX_SKEW
-        least = min(wave.best[0] for wave in self._waves)
-        total = mean_x = mean_y = 0.0
-        points = [
-            (wave.best[1] - first, wave.best[2] - self._waves[0].best[2], 1.0 / (wave.best[0] - least / 2 + 1000) ** 2)
-            for wave in self._waves
-        ]
-        for x, y, weight in points:
-            total += weight
-            mean_x += weight * x
-            mean_y += weight * y
-        mean_x, mean_y = mean_x / total, mean_y / total
-        spread = sum(weight * (x - mean_x) ** 2 for x, _, weight in points)
-        slope = sum(weight * (x - mean_x) * (y - mean_y) for x, y, weight in points) / spread
-        residual = sum(weight * (y - mean_y - slope * (x - mean_x)) ** 2 for x, y, weight in points)
-        # Three standard errors of the slope, plus 0.1 ppm for its own change over the window (crystal and temperature).
-        error = 3 * (residual / max(1, len(points) - 2) / spread) ** 0.5 + 1e-7
-        return max(-MAX_SKEW, min(MAX_SKEW, slope)), min(MAX_SKEW, error)
-
-
-def _carried(fact: tuple[int, int], reference_ns: int, skew: float, margin: float) -> int:
-    """Move a one-way fact to the reference time along the skew, widened by what the skew is not known by."""
-    age_ns = reference_ns - fact[0]
-    return fact[1] + round(skew * age_ns + margin * abs(age_ns))
+    def _begin(self, before: _Learned | None, echo: Echo) -> None:
+        """Believe this echo alone."""
+        if before is not None and len(before.waves) >= _CONFIRMED_WAVES:
+            self._aside = before
+        known = self._aside.estimate if self._aside is not None else None
+        self._learned = _Learned(echo, known.skew if known is not None else 0.0)

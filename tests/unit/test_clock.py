@@ -139,6 +139,24 @@ def test_a_long_silence_is_no_jump() -> None:
     assert all(item.error_ns <= item.uncertainty_ns for item in errors)
 
 
+@pytest.mark.parametrize("queue_ns", [500 * MS, 5 * SECOND_NS])
+def test_a_link_that_fills_up_does_not_make_forget(queue_ns: int) -> None:
+    """When all echoes of a minute wait seconds behind frames on one of the two ways, the error stays below 200 ppm of that minute."""
+    clocks = TwoClocks(START_NS - SECOND_NS, Fraction(50, 10**6))
+    estimator = ClockEstimator()
+    run(estimator, clocks, random.Random(2), seconds=15)
+    for number in range(240):
+        t0 = START_NS + 15 * SECOND_NS + number * 250 * MS
+        t1 = t0 + 50_000
+        t3 = t1 + queue_ns + (number * 7919 % 100) * MS  # the way back is full, the queue's length changes
+        estimator.add(Echo(10**6 + number, t0, clocks.board(t1), clocks.board(t1) + 10, t3))
+        estimate = estimator.estimate
+        assert estimate is not None
+        found = error_at(estimate, clocks, clocks.board(t3))
+        assert found.error_ns <= found.uncertainty_ns + 1
+        assert found.error_ns < 200e-6 * (60 + 15) * SECOND_NS
+
+
 def test_nothing_heard_is_nothing_known() -> None:
     """Before the first echo there is no estimate, and echoes whose times run backwards are none."""
     estimator = ClockEstimator()

@@ -137,12 +137,12 @@ def test_a_full_disk_stops_nothing(guest: Guest, film: Film, skew: Skew, tmp_pat
 def test_a_bad_link_costs_frames_but_never_rightness(
     guest: Guest, film: Film, skew: Skew, shape: str, tmp_path: Path
 ) -> None:
-    """With delay, jitter and loss, and with a fiftieth of the rate that the frames need, the pairs that arrive are right; then full rate again."""
+    """With delay, jitter and loss, and with a seventeenth of the rate that the frames need, the pairs that arrive are right; then full rate again."""
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "on a good link")
         guest.sh(f"tc qdisc add dev {NETWORK_CARD} root netem {shape}")
         try:
-            stream.more(15, f"with {shape}")
+            stream.more(8, f"with {shape}")
         finally:
             guest.sh(f"tc qdisc del dev {NETWORK_CARD} root")
         stream.more(20, "on a good link again")

@@ -1,6 +1,7 @@
 """The package's life on a board: installed, serving, removed, purged, and installed again."""
 
 import json
+import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.programs import until
+from tests.vm.conftest import ROOT
 from tests.vm.guest import UNIT, Guest
 
 pytestmark = pytest.mark.timeout(600)  # the first test boots the board
@@ -25,7 +27,8 @@ _EVERYTHING = (
 
 @pytest.fixture(scope="module")
 def before(bare_guest: Guest) -> str:
-    """Every file of the board, and its users, before the package was ever installed."""
+    """Every file of the board, and its users, without the package."""
+    bare_guest.code("dpkg --purge tandemscan-board")
     return bare_guest.sh(_EVERYTHING + "; cat /etc/passwd /etc/group")
 
 
@@ -125,8 +128,16 @@ def test_removal_keeps_the_settings_and_purge_leaves_nothing(installed: Guest, b
     installed.until("ActiveState", "active", "it can be installed again")
 
 
-def test_two_builds_are_equal_byte_for_byte(package: Path, tmp_path: Path) -> None:
-    """The package is reproducible, whatever the umask."""
-    script = Path(__file__).resolve().parents[2] / "deploy" / "board" / "build-deb"
-    subprocess.run(["sh", "-c", f"umask 077; '{script}' '{tmp_path}'"], check=True, capture_output=True)
-    assert (tmp_path / package.name).read_bytes() == package.read_bytes()
+def test_two_builds_are_equal_byte_for_byte(tmp_path: Path) -> None:
+    """The package is reproducible, whatever the umask, the time and the folder."""
+    built: list[bytes] = []
+    for umask in ("022", "077"):
+        tree = tmp_path / umask
+        for part in ("board_agent", "common", "deploy/board"):
+            shutil.copytree(ROOT / part if not built else tmp_path / "022" / part, tree / part)
+        shutil.copy(ROOT / "pyproject.toml", tree)
+        command = f"umask {umask}; SOURCE_DATE_EPOCH=1700000000 deploy/board/build-deb"
+        subprocess.run(["sh", "-c", command], cwd=tree, check=True, capture_output=True)
+        (package,) = (tree / "dist").iterdir()
+        built.append(package.read_bytes())
+    assert built[0] == built[1]
