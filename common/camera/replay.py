@@ -192,8 +192,9 @@ class ReplayCamera:
         return start + (2 * index * self._step + self._rate) // (2 * self._rate)  # rounded to the nearest ns
 
     def _index_at(self, now_ns: int) -> int:
-        index = now_ns * self._rate // self._step
-        return index if self._time_of(index) <= now_ns else index - 1  # rounding to ns may put an exposure just after
+        # Rounding to ns may put an exposure just before or just after its exact time: half a ns on decides as `_time_of` does.
+        index = (2 * now_ns + 1) * self._rate // (2 * self._step)
+        return index if self._time_of(index) <= now_ns else index - 1
 
     def _load(self, position: int) -> ImageFile:
         image = self._cache[position]

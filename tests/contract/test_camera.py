@@ -1,0 +1,291 @@
+"""What every camera must do; a new one adds its openers to CAMERAS. Behind that, what a replay promises beyond it."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from common.camera.base import Camera, Ended, Grab, Spoiled
+from common.camera.factory import open_camera
+from common.errors import DataError, TandemError, UnavailableError
+from common.frame import Frame, FrameFault, PixelFormat, find_fault
+from common.protocol.message import Pacing
+from tests.support.pictures import encoded, jpeg, picture
+
+CLOCK = "board:test"
+START_NS = 5_000_000_007
+IMAGES = 5
+
+
+@dataclass(slots=True)
+class Set:
+    """A camera on simulated time.
+
+    Attributes:
+        camera: open.
+        now_ns: the time.
+    """
+
+    camera: Camera
+    now_ns: int
+
+    def next(self) -> list[Grab]:
+        """Let time pass until the camera has something, and take that."""
+        if self.camera.description.pacing is Pacing.DEMAND:
+            self.now_ns += 1_000_000
+        else:
+            self.now_ns = max(self.now_ns, self.camera.due_ns(self.now_ns))
+        return self.camera.read(self.now_ns)
+
+    def take(self, count: int) -> list[Grab]:
+        """At least this many grabs, or all up to the end."""
+        grabs: list[Grab] = []
+        while len(grabs) < count and not (grabs and isinstance(grabs[-1], Ended)):
+            grabs += self.next()
+        return grabs
+
+
+def fill(folder: Path, images: int = IMAGES) -> list[bytes]:
+    """Put JPEGs frame1.jpg ... there; gives their bytes in name order."""
+    folder.mkdir(exist_ok=True)
+    contents = [jpeg(seed=i) for i in range(images)]
+    for i, content in enumerate(contents):
+        (folder / f"frame{i + 1}.jpg").write_bytes(content)
+    return contents
+
+
+def replay(options: str) -> Callable[[Path], Set]:
+    """Opens a replay of five JPEGs."""
+
+    def opened(folder: Path) -> Set:
+        fill(folder)
+        return Set(open_camera(f"replay:{folder}?{options}", CLOCK, START_NS), START_NS)
+
+    return opened
+
+
+CAMERAS: dict[str, Callable[[Path], Set]] = {
+    "replay clock loop": replay("fps=30&loop=1"),
+    "replay clock": replay("fps=30"),
+    "replay demand loop": replay("fps=30&loop=1&pace=demand"),
+    "replay demand": replay("fps=24&pace=demand"),
+}
+
+
+@pytest.fixture(params=CAMERAS)
+def opened(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Set]:
+    """Each kind of camera, open."""
+    made = CAMERAS[request.param](tmp_path / "images")
+    yield made
+    made.camera.close()
+
+
+def test_description_fits_the_frames(opened: Set) -> None:
+    """Size and encoding of every frame are those of the description, and its bytes are a whole image of that size."""
+    description = opened.camera.description
+    assert description.period_ns > 0
+    for grab in opened.take(IMAGES):
+        if isinstance(grab, Frame):
+            assert (grab.width_px, grab.height_px) == (description.width_px, description.height_px)
+            assert grab.pixel_format is description.pixel_format
+            assert find_fault(grab.pixel_format, grab.payload) is None
+            image = cv2.imdecode(np.frombuffer(grab.payload, np.uint8), cv2.IMREAD_UNCHANGED)
+            assert image is not None
+            assert image.shape[:2] == (description.height_px, description.width_px)
+
+
+def test_sequence_counts_every_grab(opened: Set) -> None:
+    """Grabs are numbered from 0 without a gap while they are read in time."""
+    grabs = [grab for grab in opened.take(2 * IMAGES) if not isinstance(grab, Ended)]
+    assert [grab.sequence for grab in grabs] == list(range(len(grabs)))
+    assert len(grabs) >= IMAGES
+
+
+def test_stamps_rise_and_are_on_the_named_clock(opened: Set) -> None:
+    """Exposures rise strictly, a frame is grabbed when it is read, and both stamps are on the machine's clock."""
+    frames = [grab for grab in opened.take(2 * IMAGES) if isinstance(grab, Frame)]
+    for before, after in pairwise(frames):
+        assert before.exposed < after.exposed
+        assert before.grabbed <= after.grabbed
+    assert {frame.exposed.clock for frame in frames} == {frame.grabbed.clock for frame in frames} == {CLOCK}
+    if opened.camera.description.pacing is Pacing.CLOCK:
+        assert all(frame.exposed <= frame.grabbed for frame in frames)
+
+
+def test_reading_never_waits_nor_repeats(opened: Set) -> None:
+    """A camera that goes by the clock gives nothing before its time and nothing twice; one on demand gives one grab a read."""
+    if opened.camera.description.pacing is Pacing.DEMAND:
+        assert [len(opened.next()) for _ in range(IMAGES)] == [1] * IMAGES
+        return
+    assert opened.camera.read(opened.now_ns) == []
+    due_ns = opened.camera.due_ns(opened.now_ns)
+    assert due_ns > opened.now_ns
+    assert opened.camera.read(due_ns - 1) == []
+    assert len(opened.camera.read(due_ns)) == 1
+    assert opened.camera.read(due_ns) == []
+
+
+def test_frames_follow_each_other_at_the_stated_period(opened: Set) -> None:
+    """The mean distance of exposures is the description's period, to the nanosecond of its rounding."""
+    frames = [grab for grab in opened.take(IMAGES) if isinstance(grab, Frame)]
+    span_ns = frames[-1].exposed - frames[0].exposed
+    assert abs(span_ns - (len(frames) - 1) * opened.camera.description.period_ns) <= len(frames)
+
+
+# A replay's own promises.
+
+
+def test_on_the_clock_image_k_is_exposed_at_k_over_fps(tmp_path: Path) -> None:
+    """Image number k of CLOCK_MONOTONIC is exposed at k / fps exactly, and is file k modulo their number."""
+    contents = fill(tmp_path)
+    camera = open_camera(f"replay:{tmp_path}?fps=30&loop=1", CLOCK, START_NS)
+    frames = camera.read(START_NS + 1_000_000_000)
+    first = START_NS * 30 // 10**9 + 1
+    assert len(frames) == 30
+    for k, frame in enumerate(frames, start=first):
+        assert isinstance(frame, Frame)
+        assert frame.exposed.ns == round(k * 10**9 / 30)
+        assert frame.payload == contents[k % IMAGES]
+
+
+@pytest.mark.parametrize("later_ns", [1, 33_333_333, 1_234_567_891, 3600 * 10**9])
+def test_two_replays_agree_whenever_they_were_started(tmp_path: Path, later_ns: int) -> None:
+    """Two replays on one machine show the same number at the same moment with the same stamp."""
+    fill(tmp_path / "a")
+    fill(tmp_path / "b")
+    early = open_camera(f"replay:{tmp_path}/a?fps=25&loop=1", CLOCK, START_NS)
+    late = open_camera(f"replay:{tmp_path}/b?fps=25&loop=1", CLOCK, START_NS + later_ns)
+    then_ns = START_NS + later_ns
+    early.read(then_ns)
+    ours, theirs = (camera.read(then_ns + 400_000_000) for camera in (early, late))
+    assert len(ours) == len(theirs) == 10
+    for one, other in zip(ours, theirs, strict=True):
+        assert isinstance(one, Frame)
+        assert isinstance(other, Frame)
+        assert (one.exposed, one.payload) == (other.exposed, other.payload)
+
+
+def test_without_loop_every_image_is_shown_once_then_it_ends(tmp_path: Path) -> None:
+    """On the clock and on demand: the files in name order, each once, then Ended, again and again."""
+    contents = fill(tmp_path, images=11)
+    for pace in ("clock", "demand"):
+        opened = Set(open_camera(f"replay:{tmp_path}?pace={pace}", CLOCK, START_NS), START_NS)
+        grabs = opened.take(100)
+        assert [grab.payload for grab in grabs if isinstance(grab, Frame)] == contents
+        assert isinstance(grabs[-1], Ended)
+        assert opened.camera.read(opened.now_ns + 10**9)[-1:] == [Ended()]
+
+
+def test_on_demand_stamps_are_first_plus_k_over_fps(tmp_path: Path) -> None:
+    """However irregular the demand, stamps are the first read's time (or the anchor) + k / fps; with loop it goes round."""
+    contents = fill(tmp_path)
+    for anchor_ns in (None, 777):
+        camera = open_camera(f"replay:{tmp_path}?fps=24&pace=demand&loop=1", CLOCK, START_NS)
+        if anchor_ns is not None:
+            camera.anchor(anchor_ns)
+            camera.anchor(anchor_ns + 1)  # the first one counts
+        first_ns = START_NS + 5 if anchor_ns is None else anchor_ns
+        for k in range(2 * IMAGES):
+            [frame] = camera.read(START_NS + 5 + k * k * 10**8)
+            assert isinstance(frame, Frame)
+            assert frame.exposed.ns == first_ns + round(k * 10**9 / 24)
+            assert frame.payload == contents[k % IMAGES]
+
+
+@pytest.mark.parametrize("options", ["fps=30", "pace=demand"])
+def test_a_truncated_jpeg_is_a_spoiled_grab(tmp_path: Path, options: str) -> None:
+    """A file that lost its end comes as Spoiled under its own number; the frames around it are not disturbed."""
+    contents = fill(tmp_path)
+    (tmp_path / "frame3.jpg").write_bytes(contents[2][:-100])
+    opened = Set(open_camera(f"replay:{tmp_path}?{options}", CLOCK, START_NS), START_NS)
+    grabs = opened.take(IMAGES)
+    assert grabs[2] == Spoiled(2, FrameFault.NO_END)
+    frames = [grab for grab in grabs if isinstance(grab, Frame)]
+    assert [frame.sequence for frame in frames] == [0, 1, 3, 4]
+    assert frames[2].exposed - frames[1].exposed == pytest.approx(2 * opened.camera.description.period_ns, abs=2)
+
+
+@pytest.mark.parametrize("suffix", [".pgm", ".ppm", ".png"])
+def test_other_images_are_sent_without_loss(tmp_path: Path, suffix: str) -> None:
+    """PGM, PPM and PNG files arrive as PNG with exactly their pixels."""
+    image = picture(40, 30)
+    pixels = image[..., 0] if suffix == ".pgm" else image
+    (tmp_path / f"a{suffix}").write_bytes(encoded(suffix, np.ascontiguousarray(pixels)))
+    camera = open_camera(f"replay:{tmp_path}?pace=demand", CLOCK, START_NS)
+    [frame] = camera.read(START_NS)
+    assert isinstance(frame, Frame)
+    assert frame.pixel_format is PixelFormat.PNG
+    decoded = cv2.imdecode(np.frombuffer(frame.payload, np.uint8), cv2.IMREAD_UNCHANGED)
+    assert decoded is not None
+    np.testing.assert_array_equal(decoded, pixels)
+
+
+def spoil_nothing(folder: Path) -> None:
+    """No image at all."""
+    for path in folder.iterdir():
+        path.unlink()
+
+
+def spoil_size(folder: Path) -> None:
+    """One image of another size."""
+    (folder / "frame4.jpg").write_bytes(jpeg(48, 24))
+
+
+def spoil_kind(folder: Path) -> None:
+    """One image of another encoding."""
+    (folder / "frame4.jpg").write_bytes(encoded(".png", picture()))
+
+
+def spoil_text(folder: Path) -> None:
+    """One file that is no image."""
+    (folder / "frame4.jpg").write_text("not an image")
+
+
+def spoil_folder(folder: Path) -> None:
+    """A folder that is called like an image."""
+    (folder / "frame4.jpg").unlink()
+    (folder / "frame4.jpg").mkdir()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "named"),
+    [
+        (spoil_nothing, "images"),
+        (spoil_size, "frame4.jpg is 48x24"),
+        (spoil_kind, "frame4.jpg is png"),
+        (spoil_text, "frame4.jpg"),
+        (spoil_folder, "frame4.jpg"),
+    ],
+)
+def test_a_bad_folder_is_refused_by_name(tmp_path: Path, spoil: Callable[[Path], None], named: str) -> None:
+    """A replay of no images, unlike ones or other files is bad data, told in one line with the file's name."""
+    folder = tmp_path / "images"
+    fill(folder)
+    spoil(folder)
+    with pytest.raises(DataError) as caught:
+        open_camera(f"replay:{folder}", CLOCK, START_NS)
+    assert named in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_folder_is_unavailable(tmp_path: Path) -> None:
+    """A folder that is not there may come: exit code 3, with its name."""
+    with pytest.raises(UnavailableError, match="nowhere") as caught:
+        open_camera(f"replay:{tmp_path}/nowhere", CLOCK, START_NS)
+    assert caught.value.exit_code == 3
+
+
+def test_files_that_vanish_later_are_told(tmp_path: Path) -> None:
+    """A film too long for memory whose files are taken away ends with an error that names the file, not with a crash."""
+    big = jpeg() + bytes(200)
+    for i in range(3):
+        (tmp_path / f"{i}.jpg").write_bytes(big)
+    camera = open_camera(f"replay:{tmp_path}?pace=demand&loop=1", CLOCK, START_NS)
+    camera.close()  # forgets what it had in memory
+    (tmp_path / "0.jpg").unlink()
+    with pytest.raises(TandemError, match=r"0\.jpg"):
+        camera.read(START_NS)
