@@ -145,6 +145,7 @@ class Agent:
         self._session = BoardSession(session, boot_id, camera.description, dialled)
         self._had_host = False
         self._camera_ended = False
+        self._held_back = False
         self._garbage = 0
         self._stopping = False
         self._poller = zmq.Poller()
@@ -181,7 +182,7 @@ class Agent:
 
     def _due_ns(self, now_ns: int) -> int:
         if self._on_demand:
-            return now_ns if self._session.has_credit else self._session.due_ns
+            return now_ns if self._session.has_credit and not self._held_back else self._session.due_ns
         return min(self._session.due_ns, self._camera.due_ns(now_ns))
 
     def _poll(self, due_ns: int, now_ns: int) -> bool:
@@ -191,9 +192,10 @@ class Agent:
             Whether the camera's descriptor is readable.
         """
         self._watch_camera()
+        due_ns = min(due_ns, *(link.due_ns for link in self._links))
         wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
         ready = self._poller.poll(wait_ms)
-        if not ready:
+        if not ready and now.monotonic_ns() < min(link.due_ns for link in self._links):
             return False
         woken = [item for item, _ in ready]
         if self._wake.fileno() in woken:
@@ -256,9 +258,14 @@ class Agent:
     def _flush(self) -> None:
         """Send the waiting frame if there is credit for it."""
         frame = self._outbox.waiting
+        self._held_back = False
         if frame is None or not self._session.has_credit:
             return
-        match self._send(self._session.send(frame)):
+        outgoing = self._session.send(frame)
+        if not self._links[outgoing.connection[0]].ready(outgoing.connection[1:]):
+            self._held_back = True  # the frame before is still leaving; this one waits, or a newer one
+            return
+        match self._send(outgoing):
             case SendResult.SENT:
                 self._session.sent()
                 self._outbox.sent()

@@ -74,7 +74,10 @@ def _parser() -> argparse.ArgumentParser:
         verb.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
         verb.add_argument("--camera", metavar="URI", help=EXAMPLE.replace("%", "%%"))
         verb.add_argument(
-            "--link", action="append", metavar="URI", help="tcp://HOST:PORT or ipc://PATH; may be given again"
+            "--link",
+            action="append",
+            metavar="URI",
+            help="tcp://HOST:PORT, ipc://PATH or serial:DEVICE; may be given again",
         )
         verb.add_argument(
             "--log-level", choices=("debug", "info", "warning", "error"), help="how much to log to stderr"

@@ -161,8 +161,10 @@ class Receiver:
 
     def _step(self) -> None:
         now_ns = now.monotonic_ns()
-        wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - self._session.due_ns) // 1_000_000)))
-        if ready := self._poller.poll(wait_ms):
+        due_ns = min(self._session.due_ns, self._link.due_ns)
+        wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
+        ready = self._poller.poll(wait_ms)
+        if ready or now.monotonic_ns() >= self._link.due_ns:
             if any(item == self._wake_read for item, _ in ready):
                 os.read(self._wake_read, 4096)
             for incoming in self._link.receive():
@@ -203,7 +205,9 @@ class Receiver:
             self._handle(self._session.grant(self._queue.free_slots()), now_ns)
             return
         # One frame under way, more only where the link is longer than a period: each further one would be older when used.
-        needed = min(_MOST_UNDER_WAY, 1 + math.floor(estimate.round_trip_ns / hello.camera.period_ns))
+        # A link that itself holds the next frame back, so that a newer one may take its place, always has credit for that one too.
+        periods = math.floor(estimate.round_trip_ns / hello.camera.period_ns)
+        needed = min(_MOST_UNDER_WAY, 1 + max(periods, int(self._link.self_paced)))
         if self._session.outstanding < needed:
             # A swift link never has two frames under way, whatever the credit: then several are granted at once, which spares the
             # board most wake-ups (a fifth of its CPU time a frame, bench_link).

@@ -72,6 +72,17 @@ class Link(Protocol):
     def pollables(self) -> Sequence[Any]:
         """Sockets or file descriptors to wait on with a zmq.Poller; readable means that `receive` has something."""
 
+    @property
+    def due_ns(self) -> int:
+        """When `receive` wants to be called next even if nothing is readable, by this machine's steady clock, ns; 2^63 - 1: never."""
+
+    @property
+    def self_paced(self) -> bool:
+        """Whether `ready` is false until the frame before has left: then credit may run one frame ahead, and the line is never idle."""
+
+    def ready(self, connection: bytes) -> bool:
+        """Whether a frame would be taken now, as far as is known without trying."""
+
     def receive(self) -> Iterator[Incoming]:
         """Give all that has come in, without waiting."""
 

@@ -3,10 +3,13 @@
 from dataclasses import dataclass
 from urllib.parse import parse_qsl, urlsplit
 
-from common.errors import SettingsError
+from common.errors import SettingsError, UnavailableError
 from common.link.base import Link
 
-_EXAMPLES = "give tcp://HOST:PORT or ipc://PATH"
+_MAX_BAUD = 20_000_000
+"""The fastest adapters reach 12 Mbaud."""
+
+_EXAMPLES = "give tcp://HOST:PORT, ipc://PATH or serial:DEVICE"
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,17 +19,20 @@ class LinkUri:
     Attributes:
         address: what the transport takes, without options.
         listens: whether this side waits to be dialled.
+        baud: speed of a serial port that has one; None: the usual.
     """
 
     address: str
     listens: bool
+    baud: int | None = None
 
 
 def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
     """Read a link URI.
 
     Args:
-        uri: `tcp://HOST:PORT` or `ipc://PATH`, with `?bind=1` or `?connect=1` to swap who listens.
+        uri: `tcp://HOST:PORT`, `ipc://PATH` or `serial:DEVICE`, with `?bind=1` or `?connect=1` to swap who listens; a serial port also takes
+            `baud=N`.
         listens_by_default: true on the board, which binds; false on the host, which connects.
 
     Returns:
@@ -36,18 +42,21 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
         SettingsError: the URI makes no sense.
     """
     address, _, query = uri.partition("?")
-    scheme, found, rest = address.partition("://")
-    if not found or scheme not in {"tcp", "ipc"} or not rest:
+    is_serial = address.startswith("serial:")
+    scheme, found, rest = address.partition(":" if is_serial else "://")
+    if not found or scheme not in {"tcp", "ipc", "serial"} or not rest:
         raise SettingsError(f"link {uri!r} is of no known kind", _EXAMPLES)
     if scheme == "tcp":
         _check_port(uri, address)
     options = dict(parse_qsl(query, keep_blank_values=True))
+    baud = _baud(uri, options.pop("baud")) if is_serial and "baud" in options else None
     unknown = set(options) - {"bind", "connect"}
     if unknown or set(options.values()) - {"1"} or len(options) > 1:
         raise SettingsError(
-            f"link {uri!r} has options {query!r}", "?bind=1 and ?connect=1 are the only ones, one at a time"
+            f"link {uri!r} has options {query!r}",
+            "?bind=1 and ?connect=1 are the only ones, one at a time" + (", and baud=N" if is_serial else ""),
         )
-    return LinkUri(address, listens_by_default if not options else "bind" in options)
+    return LinkUri(address, listens_by_default if not options else "bind" in options, baud)
 
 
 def open_link(uri: LinkUri) -> Link:
@@ -61,8 +70,10 @@ def open_link(uri: LinkUri) -> Link:
 
     Raises:
         SettingsError: the address makes no sense.
-        UnavailableError: the port or path is taken.
+        UnavailableError: the port or path is taken, or the device is missing.
     """
+    if uri.address.startswith("serial:"):
+        return _open_serial(uri)
     from common.link.zeromq import ZeroMqDialer, ZeroMqListener  # noqa: PLC0415 - only the transport that is used is loaded
 
     if not uri.listens and "//*:" in uri.address:
@@ -83,3 +94,19 @@ def _check_port(uri: str, address: str) -> None:
         raise SettingsError(
             f"link {uri!r} names no host", "give its name or address, or * to listen on every interface"
         )
+
+
+def _baud(uri: str, text: str) -> int:
+    if not text.isascii() or not text.isdigit() or not 0 < int(text) <= _MAX_BAUD:
+        raise SettingsError(f"link {uri!r} has a baud rate of {text!r}", "give a number, for example ?baud=115200")
+    return int(text)
+
+
+def _open_serial(uri: LinkUri) -> Link:
+    try:
+        from common.link.serial import DEFAULT_BAUD, SerialLink  # noqa: PLC0415 - only the transport that is used is loaded
+    except ImportError as error:
+        raise UnavailableError(
+            f"{uri.address} cannot be opened ({error})", "install pyserial (apt: python3-serial)"
+        ) from None
+    return SerialLink(uri.address.removeprefix("serial:"), uri.baud or DEFAULT_BAUD, listens=uri.listens)

@@ -106,9 +106,9 @@ class StreamLink:
         return self._duplex.counts
 
     def ready(self, connection: bytes) -> bool:
-        """Whether a frame would be taken now."""
+        """Whether a frame would be taken now, or is to be tried because the connection is gone."""
         lane = self._lane(connection)
-        return lane is not None and not self._pending and self._duplex.ready(lane)
+        return lane is None or (not self._pending and self._duplex.ready(lane))
 
     def receive(self) -> Iterator[Incoming]:
         """Give all packets that have come in, write what waits, find the device again."""

@@ -28,6 +28,13 @@ def test_ipc_addresses() -> None:
     assert parse_link("ipc://x?connect=1", listens_by_default=True) == LinkUri("ipc://x", listens=False)
 
 
+def test_serial_ports() -> None:
+    """A serial port is named by its path; its speed and who plays the listener are options."""
+    assert parse_link("serial:/dev/ttyGS0", listens_by_default=True) == LinkUri("serial:/dev/ttyGS0", listens=True)
+    fast = parse_link("serial:/dev/ttyUSB0?baud=3000000&bind=1", listens_by_default=False)
+    assert fast == LinkUri("serial:/dev/ttyUSB0", listens=True, baud=3_000_000)
+
+
 @pytest.mark.parametrize(
     "uri",
     [
@@ -53,6 +60,14 @@ def test_ipc_addresses() -> None:
         "tcp://host:5555?bind=1&connect=1",
         "tcp://host:5555?bond=1",
         "ipc://x?timeout=3",
+        "ipc://x?baud=9600",
+        "serial:",
+        "serial:?bind=1",
+        "serial:/dev/ttyS1?baud=fast",
+        "serial:/dev/ttyS1?baud=0",
+        "serial:/dev/ttyS1?baud=-9600",
+        "serial:/dev/ttyS1?baud=99999999999",
+        "serial:/dev/ttyS1?speed=9600",
     ],
 )
 def test_bad_uris_are_named(uri: str) -> None:
