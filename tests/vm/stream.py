@@ -3,6 +3,7 @@
 import json
 import re
 import signal
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ import numpy as np
 
 from tests.support.numbered import BITS, draw, saved_numbers
 from tests.support.planes import Plane, plane
-from tests.support.programs import Program, host, ledgers, lines, until
+from tests.support.programs import PATIENCE_S, Program, host, ledgers, lines
 from tests.vm.guest import Guest
 
 FPS: Final = 10
@@ -100,7 +101,12 @@ class Stream:
     def more(self, pairs: int, when: str) -> None:
         """Wait for so many further pairs."""
         wanted = self.pairs + pairs
-        until(lambda: self.pairs >= wanted, f"{pairs} pairs {when}; host: {self.receiver.stderr[-1000:]}")
+        deadline = time.monotonic() + PATIENCE_S
+        while self.pairs < wanted:
+            assert self.receiver.process.poll() is None, f"the host has ended: {self.receiver.stderr[-2000:]}"
+            late = f"not within {PATIENCE_S:.0f} s: {pairs} pairs {when}; the host says: {self.receiver.stderr[-2000:]}"
+            assert time.monotonic() < deadline, late
+            time.sleep(0.05)
 
     def finish(self, skew: Skew) -> dict[str, Any]:
         """Stop the host and check every pair, every delay and every count.
