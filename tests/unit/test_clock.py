@@ -178,8 +178,9 @@ def test_one_echo_bounds_the_offset(offset_ns: int, there_ns: int, work_ns: int,
     estimate = estimator.estimate
     assert estimate is not None
     assert estimate.round_trip_ns == there_ns + back_ns
-    drift_ns = MAX_SKEW * work_ns
+    # The board's work lies between the two facts: each limit and its rate may be off by the drift meanwhile; four times are rounded outwards.
+    slack_ns = 4 * MAX_SKEW * work_ns + 4
     assert abs(estimate.offset_at(t1) - offset_ns) <= estimate.bound_at(t1) + 1
-    assert estimate.bound_at(t1) <= (there_ns + back_ns) / 2 + drift_ns + 4  # four times, each rounded outwards
+    assert estimate.bound_at(t1) <= (there_ns + back_ns) / 2 + slack_ns
     assert 0 < estimate.uncertainty_at(t1) <= estimate.bound_at(t1)
     assert 0 < estimate.skew_uncertainty <= MAX_SKEW
