@@ -7,7 +7,6 @@
 import contextlib
 import errno
 import logging
-import select
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -69,7 +68,6 @@ class V4l2Camera:
         self._known_problem = ""
         self._rate_is_off = False
         self._is_coming_back = False
-        self._poll = select.poll()
         try:
             stream = self._open()
             # From now on exactly this is asked for, whatever a camera that is plugged in later may prefer.
@@ -201,21 +199,20 @@ class V4l2Camera:
         """Start a stream and make it the current one."""
         self._stream = stream
         stream.start()
-        self._poll = select.poll()
-        self._poll.register(stream.fd, select.POLLIN | select.POLLPRI)
         self._stall_ns = now_ns + max(_FIRST_FRAME_NS, _STALL_PERIODS * stream.period_ns)
         self._settle_ns = None
         self._exposure_due_ns = now_ns + _AUTO_EXPOSURE_NS
 
     def _take(self, stream: Stream, now_ns: int) -> list[Grab]:
-        ready = self._poll.poll(0)
-        if now_ns >= self._exposure_due_ns or any(mask & select.POLLPRI for _, mask in ready):
+        grabs = stream.take()
+        if now_ns >= self._exposure_due_ns:
             stream.read_exposure()
             still_changes = not stream.tells_exposure or not self._wishes.lock
             self._exposure_due_ns = now_ns + _AUTO_EXPOSURE_NS if still_changes else _FAR_FUTURE
-        if not ready:
-            return []
-        grabs = stream.take()
+        elif (
+            not grabs and stream.has_events()
+        ):  # woken for something else: asking for events with each frame costs an ioctl
+            stream.read_exposure()
         if grabs:
             self._stall_ns = now_ns + max(_STALL_NS, _STALL_PERIODS * stream.period_ns)
             self._note_back()

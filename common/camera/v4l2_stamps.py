@@ -142,6 +142,6 @@ class RateMeter:
         return sorted(self._periods_ns)[len(self._periods_ns) // 2]
 
     def differs_from(self, nominal_ns: int) -> bool:
-        """Whether the camera's period is more than 10 % off the nominal one."""
-        period_ns = self.period_ns
+        """Whether the camera's period, over a full window, is more than 10 % off the nominal one."""
+        period_ns = self.period_ns if len(self._periods_ns) == _RATE_WINDOW else None
         return period_ns is not None and abs(period_ns - nominal_ns) > _RATE_TOLERANCE * nominal_ns

@@ -207,16 +207,22 @@ class Stream:
             self._give_back(newest)
         return grabs
 
+    def has_events(self) -> bool:
+        """Take the events that wait, and tell whether there was one: the exposure time has changed.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        return self.tells_exposure and self._device.take_events() > 0
+
     def read_exposure(self) -> None:
-        """Read the exposure time, and take the events that tell of its change.
+        """Read the exposure time.
 
         Raises:
             OSError: the camera is gone.
         """
         if self._exposure_control is None:
             return
-        if self.tells_exposure:
-            self._device.take_events()
         value = self._read(self._exposure_control.id)
         self.exposure_ns = None if value is None else value * abi.EXPOSURE_UNIT_NS
 
