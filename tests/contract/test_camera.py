@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from common.camera.base import Camera, Ended, Grab, Spoiled
+from common.camera.base import Camera, CameraState, Ended, Grab, Spoiled
 from common.camera.factory import open_camera
 from common.errors import DataError, TandemError, UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat, find_fault
@@ -134,6 +134,17 @@ def test_frames_follow_each_other_at_the_stated_period(opened: Set) -> None:
     frames = [grab for grab in opened.take(IMAGES) if isinstance(grab, Frame)]
     span_ns = frames[-1].exposed - frames[0].exposed
     assert abs(span_ns - (len(frames) - 1) * opened.camera.description.period_ns) <= len(frames)
+
+
+def test_a_rest_is_harmless(opened: Set) -> None:
+    """Told twice that nobody listens and twice that somebody does, a camera runs on, and says so."""
+    opened.take(1)
+    for _ in range(2):
+        opened.camera.pause()
+    for _ in range(2):
+        opened.camera.resume(opened.now_ns)
+    assert any(isinstance(grab, Frame) for grab in opened.take(1))
+    assert opened.camera.health.state is CameraState.RUNNING
 
 
 # A replay's own promises.
