@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from common.frame import PixelFormat
 from common.ledger import BoardMarks
+from common.protocol.host_session import YOUNG_NS
 from common.protocol.message import (
     BoardCounts,
     BoardHello,
@@ -33,6 +34,7 @@ from common.protocol.session import (
     Counted,
     Echo,
     Outgoing,
+    Output,
     Refused,
     Vanished,
     stamped,
@@ -355,3 +357,23 @@ def test_send_times_are_set_at_the_last_moment(then_ns: int, now_ns: int) -> Non
     assert isinstance(stamped_frame, FrameMessage)
     assert stamped_frame.marks == BoardMarks(0, 0, now_ns)
     assert stamped(Credit(9), now_ns) == Credit(9)
+
+
+@pytest.mark.parametrize(("round_trip_ns", "echoes"), [(MS // 2, 3), (2 * MS, 8)])
+def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, echoes: int) -> None:
+    """In a young session a wave on a link with slow echoes has eight of them, on a swift one three, and in an old session always three."""
+    world = World()
+    world.settle(1500 * MS)
+    host = world.hosts[0]
+    control = host.names[Lane.CONTROL]
+    for begin_ns, expected in ((world.now_ns, echoes), (world.now_ns + YOUNG_NS, 3)):
+        now_ns, heard = begin_ns, 0
+        outputs: list[Output] = []
+        while not outputs:
+            now_ns += MS
+            host.session.receive(control, Status("", BoardCounts()), now_ns)  # a sign of life
+            outputs = host.session.tick(now_ns)
+        while pings := [o.message for o in outputs if isinstance(o, Outgoing) and isinstance(o.message, Ping)]:
+            t0_ns, now_ns, heard = now_ns, now_ns + round_trip_ns, heard + 1
+            outputs = host.session.receive(control, Pong(pings[0].wave, t0_ns, 1, 2), now_ns)
+        assert heard == expected
