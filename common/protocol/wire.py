@@ -173,7 +173,8 @@ def _fields(message: Message) -> list[Any]:  # noqa: PLR0911 - one line for each
             times = [message.exposure_ns, marks.exposed_ns, marks.grabbed_ns, marks.sent_ns]
             return [message.session, message.sent_index, message.sequence, *size, *times]
         case Ping(wave, t0_ns):
-            return [wave, t0_ns]
+            # As long as its answer: on a serial line 18 bytes more one way would make the clock wrong by 0.14 ms (640 kbit/s).
+            return [wave, t0_ns, t0_ns, t0_ns]
         case Pong(wave, t0_ns, t1_ns, t2_ns):
             return [wave, t0_ns, t1_ns, t2_ns]
         case Status(session, counts) | End(session, counts):
@@ -202,7 +203,9 @@ def _read(kind: type, reader: "_Reader", payload: Buffer) -> Message:  # noqa: P
     if kind is FrameMessage:
         return _read_frame(reader, payload)
     if kind is Ping:
-        return Ping(reader.count(), reader.time_ns())
+        ping = Ping(reader.count(), reader.time_ns())
+        reader.time_ns(), reader.time_ns()  # filling
+        return ping
     if kind is Pong:
         return Pong(reader.count(), reader.time_ns(), reader.time_ns(), reader.time_ns())
     if kind is Credit:

@@ -23,6 +23,8 @@ from common.protocol.message import (
     Lane,
     Message,
     Pacing,
+    Ping,
+    Pong,
     Refusal,
     RefusalReason,
 )
@@ -253,3 +255,11 @@ def test_any_folder_name_makes_a_hello(name: str) -> None:
     message = decode(encode(BoardHello("s", "b", camera, BoardCounts()))[0])
     assert isinstance(message, BoardHello)
     assert message.camera.name[:3] == name[:3].replace("\udcff", "?")
+
+
+def test_an_echo_is_as_long_as_its_answer() -> None:
+    """On a slow line unequal lengths would be taken for a difference of the clocks."""
+    uptime_ns = 3600 * 10**9
+    ping, pong = encode(Ping(7, uptime_ns)), encode(Pong(7, uptime_ns, uptime_ns, uptime_ns))
+    assert len(ping[0]) == len(pong[0])
+    assert decode(*ping) == Ping(7, uptime_ns)
