@@ -51,8 +51,9 @@ class Webcam:
     """
 
     def __init__(self, frames: Sequence[bytes], fps: int, readout_ns: int, model: uvc.Model | None = None) -> None:
-        self.late_ns: dict[int, int] = {}
-        """By number of the image in `frames`: how much later than due its first byte left, the last time."""
+        self.late_ns: dict[int, tuple[int, int]] = {}
+        """By number of the image in `frames`, the last time: how much later than due its first bytes left, and how much later the guest's
+        driver had taken them. It stamped them in between; on a busy machine that may be long."""
         self.truncate_every = 0
         """Every which frame loses its second half; 0: none."""
         self.truncated = 0
@@ -121,6 +122,10 @@ class _Device:
         self._odd = False
         self._number = 0
         self._rest = b""
+        self._taken: deque[tuple[int, int] | None] = (
+            deque()
+        )  # (image, due_ns) of each transfer that the driver has not yet offered anew
+        self._first: tuple[int, int] | None = None
 
     def run(self) -> None:
         """Serve until the connection ends."""
@@ -147,6 +152,7 @@ class _Device:
         out = self._read(length) if not is_in and length else b""
         if endpoint:
             self._waiting.append((sequence, length))
+            self._note_taken()
             return
         answer = self._control(header[40:48], out)
         if answer is None:
@@ -199,10 +205,17 @@ class _Device:
             return b"\x03"
         return (self._commit if selector == uvc.COMMIT else self._probe)[:length]
 
+    def _note_taken(self) -> None:
+        """The driver offers a transfer anew as soon as it has taken what was in it, in the same order."""
+        if self._taken and (first := self._taken.popleft()) is not None:
+            image, due_ns = first
+            self._camera.late_ns[image] = (self._camera.late_ns[image][0], time.monotonic_ns() - due_ns)
+
     def _start(self) -> None:
         self._streaming = self._camera.streaming = True
         self._camera.starts += 1
         self._rest = b""
+        self._taken.clear()
         self._number = math.floor((time.monotonic_ns() - self._delay_ns()) * self._rate_hz() / 1e9) + 1
 
     def _stop(self) -> None:
@@ -224,22 +237,29 @@ class _Device:
                 due_ns = round(self._number * 1e9 / self._rate_hz()) + self._delay_ns()
                 if now_ns < due_ns:
                     return (due_ns - now_ns) / 1e9
-                self._begin_frame(now_ns - due_ns)
+                self._begin_frame(now_ns, due_ns)
             sequence, length = self._waiting.popleft()
             room = min(length, uvc.PAYLOAD_BYTES) - 2
             data, self._rest = self._rest[:room], self._rest[room:]
+            self._taken.append(self._first)
+            self._first = None
             self._return(sequence, uvc.payload(data, odd=self._odd, last=not self._rest))
             if not self._rest:
                 self._odd = not self._odd
         return 1.0
 
-    def _begin_frame(self, late_ns: int) -> None:
-        camera, number = self._camera, self._number
-        skipped = int(late_ns * self._rate_hz() / 1e9)  # stalled for whole periods: those images were never taken
-        self._number = number + skipped + 1
-        number += skipped
-        camera.late_ns[number % len(camera._frames)] = late_ns - round(skipped * 1e9 / self._rate_hz())
-        frame = with_comment(camera._frames[number % len(camera._frames)], f"number={number}")
+    def _begin_frame(self, now_ns: int, due_ns: int) -> None:
+        camera = self._camera
+        skipped = int(
+            (now_ns - due_ns) * self._rate_hz() / 1e9
+        )  # stalled for whole periods: those images were never taken
+        number = self._number + skipped
+        self._number = number + 1
+        due_ns += round(skipped * 1e9 / self._rate_hz())
+        image = number % len(camera._frames)
+        camera.late_ns[image] = (now_ns - due_ns, now_ns - due_ns)
+        self._first = (image, due_ns)
+        frame = with_comment(camera._frames[image], f"number={number}")
         if camera.truncate_every and number % camera.truncate_every == 0:
             camera.truncated += 1
             frame = frame[: len(frame) // 2]
