@@ -4,7 +4,7 @@ import random
 import socket
 import stat
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,8 +17,9 @@ from common.link.factory import open_link, parse_link
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_PAYLOAD_BYTES, decode
 from tests.support.links import End, free_port, meet, send_until_sent, wait_until
+from tests.support.pty_line import PtyLine
 
-TRANSPORTS = ("tcp", "ipc")
+TRANSPORTS = ("tcp", "ipc", "serial")
 MB = 2**20
 
 
@@ -34,9 +35,12 @@ class Ends:
     address: str
     board_listens: bool
     opened: list[Link] = field(default_factory=list)
+    cable: PtyLine | None = None
 
     def _open(self, *, listens: bool) -> End:
         uri = self.address
+        if self.cable is not None:
+            uri = self.cable.uris[0 if listens else 1]  # a cable has two ends of different names
         if not self.board_listens:  # the options that swap the two
             uri += "?bind=1" if listens else "?connect=1"
         board_asks = listens == self.board_listens
@@ -61,16 +65,31 @@ class Ends:
 @pytest.fixture(params=TRANSPORTS)
 def address(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     """A free address of each transport."""
-    return f"tcp://127.0.0.1:{free_port()}" if request.param == "tcp" else f"ipc://{tmp_path}/link"
+    free = {
+        "tcp": f"tcp://127.0.0.1:{free_port()}",
+        "ipc": f"ipc://{tmp_path}/link",
+        "serial": f"serial:{tmp_path}/ttyBoard",
+    }
+    return free[request.param]
 
 
 @pytest.fixture(params=["board listens", "host listens"])
-def ends(request: pytest.FixtureRequest, address: str) -> Iterator[Ends]:
+def ends(request: pytest.FixtureRequest, address: str, tmp_path: Path) -> Iterator[Ends]:
     """Both ends of each transport, with either side as the one that binds."""
     made = Ends(address, request.param == "board listens")
-    yield made
-    for link in made.opened:
-        link.close()
+    with ExitStack() as stack:
+        if address.startswith("serial:"):
+            made.cable = stack.enter_context(PtyLine(tmp_path))
+        yield made
+        for link in made.opened:
+            link.close()
+
+
+@pytest.fixture
+def _sockets(address: str) -> None:
+    """Only for transports that a stranger can connect to."""
+    if address.startswith("serial:"):
+        pytest.skip("nobody else can connect to a serial line; test_serial.py lets garbage appear on one")
 
 
 @pytest.fixture
@@ -130,9 +149,9 @@ def test_a_reader_that_does_not_read_makes_the_link_full(pair: tuple[End, End, d
             assert result is SendResult.FULL
             refusals += 1
             for pollable in listener.link.pollables:
-                pollable.poll(1)  # lets the transport move what it can
+                zmq.zmq_poll([(pollable, zmq.POLLIN)], 1)  # lets the transport move what it can
     assert len(taken) * max(size, 1) < 64 * MB
-    wait_until(lambda: len(dialler.packets) >= len(taken), dialler)
+    wait_until(lambda: len(dialler.packets) >= len(taken), dialler, listener)
     assert dialler.headers == taken
     assert all(payload.strip() == header for _, header, payload in dialler.packets if size)
     send_until_sent(listener, connection, b"after", b"", dialler)
@@ -146,7 +165,7 @@ def test_one_full_lane_does_not_stop_the_other(pair: tuple[End, End, dict[Lane, 
     while refusals < 50:
         refusals += listener.link.send(names[Lane.FRAMES], b"frame", bytes(MB)) is SendResult.FULL
     assert listener.link.send(names[Lane.CONTROL], b"control", b"") is SendResult.SENT
-    wait_until(lambda: b"control" in dialler.headers, dialler)
+    wait_until(lambda: b"control" in dialler.headers, dialler, listener)
     send_until_sent(dialler, dialler.link.dialled[Lane.CONTROL], b"answer", b"")
     wait_until(lambda: b"answer" in listener.headers, listener)
 
@@ -246,6 +265,7 @@ def test_an_oversize_packet_is_not_delivered(pair: tuple[End, End, dict[Lane, by
     assert b"huge" not in listener.headers
 
 
+@pytest.mark.usefixtures("_sockets")
 def test_foreign_packets_are_garbage(pair: tuple[End, End, dict[Lane, bytes]], ends: Ends) -> None:
     """A ZeroMQ stranger's packets of three or more parts are reported as garbage, its short ones as packets; the link lives on."""
     listener, dialler, _ = pair
@@ -263,6 +283,7 @@ def test_foreign_packets_are_garbage(pair: tuple[End, End, dict[Lane, bytes]], e
     meet(listener, dialler, b"still here ")
 
 
+@pytest.mark.usefixtures("_sockets")
 def test_strangers_without_zeromq_cost_nothing(pair: tuple[End, End, dict[Lane, bytes]], ends: Ends) -> None:
     """Random bytes, half a greeting or silence from plain sockets never make a message, and the link lives on."""
     listener, dialler, names = pair
