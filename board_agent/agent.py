@@ -20,8 +20,8 @@ from common.link.base import Broken, Garbage, Link, Packet, SendResult
 from common.logs import event
 from common.protocol.board_session import BoardSession
 from common.protocol.message import PROTOCOL_VERSION, BoardCounts, DropReason, Pacing, Refusal, RefusalReason
-from common.protocol.session import Outgoing, stamped
-from common.protocol.wire import VersionError, decode, encode, encode_for_any_version
+from common.protocol.session import Outgoing
+from common.protocol.wire import VersionError, decode, encode_for_any_version, encode_stamped
 
 _LOG = logging.getLogger(__name__)
 
@@ -280,7 +280,7 @@ class Agent:
 
     def _send(self, outgoing: Outgoing) -> SendResult:
         link = self._links[outgoing.connection[0]]
-        header, payload = encode(stamped(outgoing.message, now.monotonic_ns()))
+        header, payload = encode_stamped(outgoing.message, now.monotonic_ns)
         result = link.send(outgoing.connection[1:], header, payload)
         if result is SendResult.UNREACHABLE:
             self._send_all(self._session.unreachable(outgoing.connection))

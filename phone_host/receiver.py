@@ -27,9 +27,8 @@ from common.protocol.session import (
     Refused,
     Stale,
     Vanished,
-    stamped,
 )
-from common.protocol.wire import VersionError, decode, encode
+from common.protocol.wire import VersionError, decode, encode_stamped
 from phone_host.model import BoardFrame
 from phone_host.pairqueue import PairQueue
 from phone_host.sync.clock import ClockEstimate, ClockEstimator
@@ -218,7 +217,7 @@ class Receiver:
         for output in outputs:
             match output:
                 case Outgoing(connection, message):
-                    header, payload = encode(stamped(message, now.monotonic_ns()))
+                    header, payload = encode_stamped(message, now.monotonic_ns)
                     self._link.send(connection, header, payload)
                 case Arrived(frame, lost):
                     self._accept_frame(frame, lost, now_ns)

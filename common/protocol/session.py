@@ -1,14 +1,13 @@
 """What both roles of a link's session share: what they put out, and the times after which they act.
 
 The state machines (`board_session`, `host_session`) are sans-I/O: messages and `now_ns` go in, a list of outputs comes out. Shells own
-sockets and clocks; they send an `Outgoing` as it is, except that `stamped` sets its send time at the last moment.
+sockets and clocks; they send an `Outgoing` as it is, except that `wire.encode_stamped` sets its send time at the last moment.
 """
 
 from dataclasses import dataclass
 from typing import Final
 
-from common.ledger import BoardMarks
-from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Message, Ping, Pong, RefusalReason
+from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Message, RefusalReason
 
 MS: Final = 1_000_000
 
@@ -98,24 +97,3 @@ class Vanished:
 
 
 Output = Outgoing | Accepted | Arrived | Stale | Echo | Counted | Refused | Vanished
-
-
-def stamped(message: Message, now_ns: int) -> Message:
-    """Set a message's send time; called just before its first byte is written.
-
-    Args:
-        message: any message.
-        now_ns: the sender's clock, ns.
-    """
-    match message:
-        case Ping(wave):
-            return Ping(wave, now_ns)
-        case Pong(wave, t0_ns, t1_ns):
-            return Pong(wave, t0_ns, t1_ns, now_ns)
-        case FrameMessage():
-            marks = BoardMarks(message.marks.exposed_ns, message.marks.grabbed_ns, now_ns)
-            numbers = (message.session, message.sent_index, message.sequence)
-            size = (message.width_px, message.height_px, message.pixel_format)
-            return FrameMessage(*numbers, *size, message.exposure_ns, marks, message.payload)
-        case _:
-            return message

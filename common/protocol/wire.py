@@ -5,6 +5,7 @@ message needs; anything else raises ProtocolError and nothing more. The first tw
 that two versions can at least tell each other so.
 """
 
+from collections.abc import Callable
 from enum import Enum
 from typing import Any, Final, TypeVar, assert_never
 
@@ -94,6 +95,25 @@ def encode(message: Message) -> tuple[bytes, Buffer]:
     """
     header: bytes = msgpack.packb([PROTOCOL_VERSION, _KIND_OF[type(message)], *_fields(message)])
     return header, message.payload if isinstance(message, FrameMessage) else b""
+
+
+def encode_stamped(message: Message, clock: Callable[[], int]) -> tuple[bytes, Buffer]:
+    """Like `encode`, but the send time of a frame, ping or pong is read when all else is encoded: just before the first byte is written.
+
+    Args:
+        message: any message; its own send time, if it has one, is not looked at.
+        clock: gives the sender's clock, ns.
+
+    Returns:
+        Header bytes and payload.
+    """
+    if not isinstance(message, FrameMessage | Ping | Pong):
+        return encode(message)
+    fields = _fields(message)
+    fields[-1] = _NS  # the send time comes last in all three; this one takes the nine bytes of any 64 bit integer
+    header: bytes = msgpack.packb([PROTOCOL_VERSION, _KIND_OF[type(message)], *fields])
+    payload = message.payload if isinstance(message, FrameMessage) else b""
+    return header[:-8] + clock().to_bytes(8, "big"), payload
 
 
 def decode(header: Buffer, payload: Buffer = b"") -> Message:
@@ -299,7 +319,11 @@ class _Reader:
         return self._items[self._at - 1]
 
     def _integer(self, low: int, high: int) -> int:
-        value = self._next()
+        at = self._at
+        if at >= len(self._items):
+            raise _bad("fields are missing")
+        self._at = at + 1
+        value = self._items[at]
         if type(value) is not int or not low <= value <= high:  # bool is an int to isinstance
             raise _bad(f"field {self._at} is no integer in {low}..{high}")
-        return value
+        return int(value)

@@ -251,9 +251,10 @@ def send_tandemscan(job: Job) -> Tally:
 
 
 def receive_tandemscan(job: Job) -> Tally:
-    """Our host: the receiver with session, clock and credit; a frame is usable when it comes to the pair queue."""
+    """Our host: the receiver with session, clock and credit."""
     from common import now  # noqa: PLC0415 - the other transports shall not pay for our imports
     from common.link.factory import open_link, parse_link  # noqa: PLC0415
+    from common.protocol.message import FrameMessage  # noqa: PLC0415
     from phone_host.model import BoardFrame  # noqa: PLC0415
     from phone_host.pairqueue import PairQueue  # noqa: PLC0415
     from phone_host.receiver import Receiver  # noqa: PLC0415
@@ -261,15 +262,23 @@ def receive_tandemscan(job: Job) -> Tally:
 
     tally = job.tally()
 
-    class Stamping(PairQueue):
-        """Stamps frames in place of pairing them."""
+    class Stamping(Receiver):
+        """Stamps frames when they are decoded and the session has taken them."""
+
+        def _accept_frame(self, frame: FrameMessage, lost: int, now_ns: int) -> None:
+            assert len(frame.payload)
+            tally.arrived(frame.sequence, frame.marks.sent_ns)
+            super()._accept_frame(frame, lost, now_ns)
+
+    class NoPairing(PairQueue):
+        """Ends the frames' way: pairing is no part of a link."""
 
         def add_board(self, frame: BoardFrame) -> None:
-            tally.arrived(frame.message.sequence, frame.message.marks.sent_ns)
+            pass
 
-    queue = Stamping(FifoSettings(), None, 1_000_000_000 // job.fps)
+    queue = NoPairing(FifoSettings(), None, 1_000_000_000 // job.fps)
     link = open_link(parse_link(job.address, listens_by_default=False))
-    receiver = Receiver(link, now.random_id(), queue, lambda _exposed_ns: None)
+    receiver = Stamping(link, now.random_id(), queue, lambda _exposed_ns: None)
     receiver.start()
     while not receiver.ended and receiver.failure is None:
         time.sleep(0.1)

@@ -20,6 +20,7 @@ from common.protocol.message import (
     HostHello,
     Knock,
     Lane,
+    Message,
     Ping,
     Pong,
     Refusal,
@@ -37,8 +38,8 @@ from common.protocol.session import (
     Output,
     Refused,
     Vanished,
-    stamped,
 )
+from common.protocol.wire import decode, encode_stamped
 from tests.support.session_world import World
 
 
@@ -351,6 +352,10 @@ def test_strangers_are_asked_who_they_are() -> None:
 @settings(deadline=None)
 def test_send_times_are_set_at_the_last_moment(then_ns: int, now_ns: int) -> None:
     """Stamping sets a ping's t0, a pong's t2 and a frame's `sent` to now, keeps all else, and leaves other messages alone."""
+
+    def stamped(message: Message, now_ns: int) -> Message:
+        return decode(*encode_stamped(message, lambda: now_ns))
+
     assert stamped(Ping(3, then_ns), now_ns) == Ping(3, now_ns)
     assert stamped(Pong(3, 1, 2, then_ns), now_ns) == Pong(3, 1, 2, now_ns)
     stamped_frame = stamped(frame("s", 5), now_ns)
