@@ -81,26 +81,25 @@ def _send(sock: zmq.Socket[bytes], prefix: list[bytes], header: bytes, payload: 
     return SendResult.SENT
 
 
-def _has_something(sock: zmq.Socket[bytes]) -> bool:
-    """Whether there is something to receive; asking is cheaper than the exception for having nothing, which would come once a wake-up."""
-    return bool(int(sock.getsockopt(zmq.EVENTS)) & _READABLE)
+def _poller(sockets: Sequence[zmq.Socket[bytes]]) -> zmq.Poller:
+    """Tells which sockets have something to receive: one call for all, cheaper than the exception of one that has nothing."""
+    poller = zmq.Poller()
+    for sock in sockets:
+        poller.register(sock, _READABLE)
+    return poller
 
 
-def _receive(sock: zmq.Socket[bytes], connection: bytes, *, routed: bool) -> Iterator[Incoming]:
-    while _has_something(sock):
-        if routed:
-            connection = sock.recv(_NOW)
-        header = sock.recv(_NOW, copy=False)
-        if not header.more:
-            yield Packet(connection, header.bytes, b"")
-            continue
-        payload = sock.recv(_NOW, copy=False)
-        if not payload.more:
-            yield Packet(connection, header.bytes, payload.buffer)
-            continue
-        while sock.recv(_NOW, copy=False).more:
-            pass
-        yield Garbage(connection)
+def _receive(sock: zmq.Socket[bytes], connection: bytes) -> Incoming:
+    """Take one packet off a socket that has one."""
+    header = sock.recv(_NOW, copy=False)
+    if not header.more:
+        return Packet(connection, header.bytes, b"")
+    payload = sock.recv(_NOW, copy=False)
+    if not payload.more:
+        return Packet(connection, header.bytes, payload.buffer)
+    while sock.recv(_NOW, copy=False).more:
+        pass
+    return Garbage(connection)
 
 
 class _AlwaysReady:
@@ -142,6 +141,7 @@ class ZeroMqListener(_AlwaysReady):
             raise _explained(address, error, "stop what listens there, or choose another with --link") from None
         finally:
             os.umask(before)
+        self._readable = _poller((self._socket,))
 
     @property
     def pollables(self) -> Sequence[zmq.Socket[bytes]]:
@@ -150,7 +150,8 @@ class ZeroMqListener(_AlwaysReady):
 
     def receive(self) -> Iterator[Incoming]:
         """Give all packets that have come in."""
-        return _receive(self._socket, b"", routed=True)
+        while self._readable.poll(0):
+            yield _receive(self._socket, self._socket.recv(_NOW))
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Hand a packet over for one connection."""
@@ -187,6 +188,10 @@ class ZeroMqDialer(_AlwaysReady):
             except zmq.ZMQError as error:
                 self._context.destroy(linger=0)
                 raise _explained(address, error, "give --link tcp://HOST:PORT or ipc://PATH") from None
+        self._lanes = tuple(
+            (self._sockets[self.dialled[lane]], self.dialled[lane]) for lane in (Lane.FRAMES, Lane.CONTROL)
+        )
+        self._readable = _poller(self.pollables)
 
     @property
     def pollables(self) -> Sequence[zmq.Socket[bytes]]:
@@ -195,14 +200,15 @@ class ZeroMqDialer(_AlwaysReady):
 
     def receive(self) -> Iterator[Incoming]:
         """Give all packets that have come in, frames first, then the news of broken connections: a peer's last words come before its end."""
-        broken = []  # asked for before the packets, so that none that came before the break can be overlooked
-        for connection, monitor in self._monitors.items():
-            while _has_something(monitor):
-                monitor.recv_multipart(_NOW)
-                broken.append(Broken(connection))
-        for lane in (Lane.FRAMES, Lane.CONTROL):
-            connection = self.dialled[lane]
-            yield from _receive(self._sockets[connection], connection, routed=False)
+        broken = []
+        while ready := [sock for sock, _ in self._readable.poll(0)]:
+            for sock, connection in self._lanes:
+                if sock in ready:
+                    yield _receive(sock, connection)
+            for connection, monitor in self._monitors.items():
+                if monitor in ready:
+                    monitor.recv_multipart(_NOW)
+                    broken.append(Broken(connection))
         yield from broken
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:

@@ -67,6 +67,21 @@ _KIND_OF: Final = {kind: index for index, kind in enumerate(_KINDS)}
 _PIXEL_FORMATS: Final = tuple(PixelFormat)
 _DROP_REASONS: Final = tuple(DropReason)
 
+_FRAME_RANGES: Final = (
+    (0, _MAX_COUNT),
+    (0, _MAX_COUNT),
+    (1, MAX_SIZE_PX),
+    (1, MAX_SIZE_PX),
+    (0, len(_PIXEL_FORMATS) - 1),
+    (0, _NS),
+    (-_NS, _NS),
+    (-_NS, _NS),
+    (-_NS, _NS),
+)
+"""Of a frame's numbers: index, sequence, width, height, encoding, exposure time (which may be missing), three times."""
+
+_EXPOSURE_AT: Final = 5
+
 E = TypeVar("E", bound=Enum)
 
 
@@ -221,7 +236,7 @@ def _counts_fields(counts: BoardCounts) -> list[Any]:
 
 def _read(kind: type, reader: "_Reader", payload: Buffer) -> Message:  # noqa: PLR0911 - one line for each kind of message
     if kind is FrameMessage:
-        return _read_frame(reader, payload)
+        return _read_frame(reader.rest(), payload)
     if kind is Ping:
         ping = Ping(reader.count(), reader.time_ns())
         reader.time_ns(), reader.time_ns()  # filling
@@ -245,13 +260,22 @@ def _read(kind: type, reader: "_Reader", payload: Buffer) -> Message:  # noqa: P
     return Bye(reader.counts())
 
 
-def _read_frame(reader: "_Reader", payload: Buffer) -> FrameMessage:
+def _read_frame(items: list[Any], payload: Buffer) -> FrameMessage:
+    """Read the message that comes thirty times a second: the same checks as a reader's, in one loop."""
     if len(payload) > MAX_PAYLOAD_BYTES:
         raise _bad(f"payload of {len(payload)} bytes")
-    session, sent_index, sequence = reader.text(), reader.count(), reader.count()
-    width_px, height_px, pixel_format = reader.size_px(), reader.size_px(), reader.choice(_PIXEL_FORMATS)
-    exposure_ns = reader.optional_duration_ns()
-    marks = BoardMarks(reader.time_ns(), reader.time_ns(), reader.time_ns())
+    if len(items) != 1 + len(_FRAME_RANGES):
+        raise _bad(f"{len(items)} fields of a frame")
+    session, *numbers = items
+    if type(session) is not str or len(session) > _MAX_TEXT:
+        raise _bad("a frame's session is not a short text")
+    for at, (low, high) in enumerate(_FRAME_RANGES):
+        value = numbers[at]
+        if (type(value) is not int or not low <= value <= high) and not (at == _EXPOSURE_AT and value is None):
+            raise _bad(f"a frame's number {at} is no integer in {low}..{high}")
+    sent_index, sequence, width_px, height_px, encoding, exposure_ns, *times_ns = numbers
+    marks = BoardMarks(*times_ns)
+    pixel_format = _PIXEL_FORMATS[encoding]
     return FrameMessage(session, sent_index, sequence, width_px, height_px, pixel_format, exposure_ns, marks, payload)
 
 
@@ -261,6 +285,12 @@ class _Reader:
     def __init__(self, items: list[Any]) -> None:
         self._items = items
         self._at = 0
+
+    def rest(self) -> list[Any]:
+        """Give all that is left, unchecked."""
+        left = self._items[self._at :]
+        self._at = len(self._items)
+        return left
 
     def finish(self) -> None:
         """Check that nothing is left over."""
@@ -275,12 +305,6 @@ class _Reader:
 
     def size_px(self) -> int:
         return self._integer(1, MAX_SIZE_PX)
-
-    def optional_duration_ns(self) -> int | None:
-        if self._at < len(self._items) and self._items[self._at] is None:
-            self._at += 1
-            return None
-        return self._integer(0, _NS)
 
     def text(self) -> str:
         value = self._next()
