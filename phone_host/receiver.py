@@ -164,10 +164,10 @@ class Receiver:
         wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
         ready = self._poller.poll(wait_ms)
         if ready or now.monotonic_ns() >= self._link.due_ns:
-            if any(item == self._wake_read for item, _ in ready):
-                os.read(self._wake_read, 4096)
             for incoming in self._link.receive():
                 self._take(incoming, now.monotonic_ns())
+            if any(item == self._wake_read for item, _ in ready):
+                os.read(self._wake_read, 4096)
         now_ns = now.monotonic_ns()
         if now_ns >= self._session.due_ns:
             self._handle(self._session.tick(now_ns), now_ns)

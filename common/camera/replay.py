@@ -13,7 +13,7 @@ from typing import Final
 from common.camera.base import CameraHealth, Ended, Grab, Spoiled
 from common.camera.imagefile import SUFFIXES, ImageFile, load
 from common.errors import DataError, SettingsError, UnavailableError
-from common.frame import Frame, find_fault
+from common.frame import Frame, FrameFault, find_fault
 from common.protocol.message import CameraDescription, Pacing
 from common.stamp import Stamp
 
@@ -109,7 +109,7 @@ class ReplayCamera:
     def __init__(self, settings: ReplaySettings, now_ns: int) -> None:
         self._settings = settings
         self._paths = find_images(settings.path)
-        self._cache: list[ImageFile | None] = [None] * len(self._paths)
+        self._cache: list[tuple[ImageFile, FrameFault | None] | None] = [None] * len(self._paths)
         self._cached_bytes = 0
         # Image k is exposed k * _step / _rate ns after the start. Integers: a Fraction costs 0.1 ms a frame where caches are cold.
         self._step, self._rate = settings.fps.denominator * 1_000_000_000, settings.fps.numerator
@@ -178,8 +178,8 @@ class ReplayCamera:
         self._sequence += 1
         # On the clock the image follows from the time alone, so that two replays agree; without loop it is the first one first.
         position = index if self._settings.loop else shown
-        image = self._load(position % len(self._paths))
-        if fault := find_fault(image.pixel_format, image.payload):
+        image, fault = self._load(position % len(self._paths))
+        if fault is not None:
             return Spoiled(sequence, fault)
         exposed = Stamp(self._time_of(index), self._settings.clock)
         grabbed = Stamp(now_ns, self._settings.clock)
@@ -196,19 +196,20 @@ class ReplayCamera:
         index = (2 * now_ns + 1) * self._rate // (2 * self._step)
         return index if self._time_of(index) <= now_ns else index - 1
 
-    def _load(self, position: int) -> ImageFile:
-        image = self._cache[position]
-        if image is None:
+    def _load(self, position: int) -> tuple[ImageFile, FrameFault | None]:
+        known = self._cache[position]
+        if known is None:
             image = load(self._paths[position])
+            known = image, find_fault(image.pixel_format, image.payload)
             if self._cached_bytes + len(image.payload) <= _CACHE_BYTES:
-                self._cache[position] = image
+                self._cache[position] = known
                 self._cached_bytes += len(image.payload)
-        return image
+        return known
 
     def _check_alike(self) -> ImageFile:
-        first = self._load(0)
+        first, _ = self._load(0)
         for position, path in enumerate(self._paths[1:], start=1):
-            other = self._load(position)
+            other, _ = self._load(position)
             if (other.width_px, other.height_px) != (first.width_px, first.height_px):
                 theirs, ours = f"{other.width_px}x{other.height_px}", f"{first.width_px}x{first.height_px}"
                 raise DataError(

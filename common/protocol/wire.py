@@ -161,17 +161,20 @@ def decode(header: Buffer, payload: Buffer = b"") -> Message:
         raise _bad(f"header is not msgpack ({error})") from None
     if not isinstance(items, list) or len(items) < 2:
         raise _bad("header is not [version, kind, …]")
-    reader = _Reader(items)
-    version = reader.count()
+    version, kind = items[0], items[1]
+    if type(version) is not int or not 0 <= version <= _MAX_COUNT:
+        raise _bad("header without a version")
     if version != PROTOCOL_VERSION:
         raise VersionError(version)
-    kind = reader.count()
-    if kind >= len(_KINDS):
-        raise _bad(f"unknown kind {kind}")
-    message = _read(_KINDS[kind], reader, payload)
+    if type(kind) is not int or not 0 <= kind < len(_KINDS):
+        raise _bad(f"unknown kind {kind!r:.40}")
+    if kind == _KIND_OF[FrameMessage]:
+        return _read_frame(items, payload)
+    if len(payload):
+        raise _bad(f"{_KINDS[kind].__name__} with a payload")
+    reader = _Reader(items, 2)
+    message = _read(_KINDS[kind], reader)
     reader.finish()
-    if len(payload) and not isinstance(message, FrameMessage):
-        raise _bad(f"{type(message).__name__} with a payload")
     return message
 
 
@@ -234,9 +237,7 @@ def _counts_fields(counts: BoardCounts) -> list[Any]:
     ]
 
 
-def _read(kind: type, reader: "_Reader", payload: Buffer) -> Message:  # noqa: PLR0911 - one line for each kind of message
-    if kind is FrameMessage:
-        return _read_frame(reader.rest(), payload)
+def _read(kind: type, reader: "_Reader") -> Message:  # noqa: PLR0911 - one line for each kind of message
     if kind is Ping:
         ping = Ping(reader.count(), reader.time_ns())
         reader.time_ns(), reader.time_ns()  # filling
@@ -261,12 +262,17 @@ def _read(kind: type, reader: "_Reader", payload: Buffer) -> Message:  # noqa: P
 
 
 def _read_frame(items: list[Any], payload: Buffer) -> FrameMessage:
-    """Read the message that comes thirty times a second: the same checks as a reader's, in one loop."""
+    """Read the message that comes thirty times a second: the same checks as a reader's, in one loop.
+
+    Args:
+        items: the whole header, version and kind included.
+        payload: the image.
+    """
     if len(payload) > MAX_PAYLOAD_BYTES:
         raise _bad(f"payload of {len(payload)} bytes")
-    if len(items) != 1 + len(_FRAME_RANGES):
-        raise _bad(f"{len(items)} fields of a frame")
-    session, *numbers = items
+    if len(items) != 3 + len(_FRAME_RANGES):
+        raise _bad(f"frame of {len(items)} fields")
+    _, _, session, *numbers = items
     if type(session) is not str or len(session) > _MAX_TEXT:
         raise _bad("a frame's session is not a short text")
     for at, (low, high) in enumerate(_FRAME_RANGES):
@@ -282,15 +288,9 @@ def _read_frame(items: list[Any], payload: Buffer) -> FrameMessage:
 class _Reader:
     """Takes checked fields off a header, front to back."""
 
-    def __init__(self, items: list[Any]) -> None:
+    def __init__(self, items: list[Any], at: int = 0) -> None:
         self._items = items
-        self._at = 0
-
-    def rest(self) -> list[Any]:
-        """Give all that is left, unchecked."""
-        left = self._items[self._at :]
-        self._at = len(self._items)
-        return left
+        self._at = at
 
     def finish(self) -> None:
         """Check that nothing is left over."""
