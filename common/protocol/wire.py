@@ -212,7 +212,7 @@ def _fields(message: Message) -> list[Any]:  # noqa: PLR0911 - one line for each
             return [message.session, message.sent_index, message.sequence, *size, *times]
         case Ping(wave, t0_ns):
             # As long as its answer: on a serial line 18 bytes more one way would make the clock wrong by 0.14 ms (640 kbit/s).
-            return [wave, t0_ns, t0_ns, t0_ns]
+            return [wave, _NS, _NS, t0_ns]
         case Pong(wave, t0_ns, t1_ns, t2_ns):
             return [wave, t0_ns, t1_ns, t2_ns]
         case Status(session, counts) | End(session, counts):
@@ -239,9 +239,8 @@ def _counts_fields(counts: BoardCounts) -> list[Any]:
 
 def _read(kind: type, reader: "_Reader") -> Message:  # noqa: PLR0911 - one line for each kind of message
     if kind is Ping:
-        ping = Ping(reader.count(), reader.time_ns())
-        reader.time_ns(), reader.time_ns()  # filling
-        return ping
+        wave, _, _, t0_ns = reader.count(), reader.time_ns(), reader.time_ns(), reader.time_ns()  # filling in the middle
+        return Ping(wave, t0_ns)
     if kind is Pong:
         return Pong(reader.count(), reader.time_ns(), reader.time_ns(), reader.time_ns())
     if kind is Credit:

@@ -27,8 +27,8 @@ from common.link.stream import StreamLink
 from common.protocol.framing import Side
 from common.protocol.host_session import HostSession
 from common.protocol.message import FrameMessage, Lane
-from common.protocol.session import Arrived, Echo, Outgoing, Output, stamped
-from common.protocol.wire import decode, encode
+from common.protocol.session import Arrived, Echo, Outgoing, Output
+from common.protocol.wire import decode, encode_stamped
 from tests.bench.machine import be_quiet
 
 _CRC = struct.Struct("<I")
@@ -156,7 +156,7 @@ def send_ours(device: str, frames: int, payload: bytes) -> dict[str, float]:
                 ended = True
         while connection and sent < frames and link.ready(connection):
             message = FrameMessage("session", sent, sent, 640, 480, PixelFormat.MJPEG, None, marks, payload)
-            header, body = encode(stamped(message, now.monotonic_ns()))
+            header, body = encode_stamped(message, now.monotonic_ns)
             if link.send(connection, header, body) is SendResult.SENT:
                 sent += 1
     used = cpu_s() - before
@@ -207,7 +207,7 @@ def play_host(uri: str, seconds: float) -> dict[str, object]:
         for output in outputs:
             match output:
                 case Outgoing(connection, message):
-                    header, payload = encode(stamped(message, now.monotonic_ns()))
+                    header, payload = encode_stamped(message, now.monotonic_ns)
                     link.send(connection, header, payload)
                 case Echo():
                     echoes.append((output.t3_ns, output.t3_ns - output.t0_ns - (output.t2_ns - output.t1_ns)))
