@@ -78,9 +78,11 @@ class PtyLine:
         folder: where the two paths are made.
         bytes_per_s: what each direction carries; 0: as fast as it goes.
         delay_ns: from leaving one end to arriving at the other.
+        urgent: put it before ordinary work where that is permitted: a real line never waits for a processor.
     """
 
-    def __init__(self, folder: Path, bytes_per_s: float = 0, delay_ns: int = 0) -> None:
+    def __init__(self, folder: Path, bytes_per_s: float = 0, delay_ns: int = 0, *, urgent: bool = False) -> None:
+        self._urgent = urgent
         self.paths = (folder / "ttyBoard", folder / "ttyHost")
         self.ways = (_Way(bytes_per_s, delay_ns), _Way(bytes_per_s, delay_ns))
         self._masters: list[int] = []
@@ -139,6 +141,9 @@ class PtyLine:
         self.close()
 
     def _run(self) -> None:
+        if self._urgent:
+            with suppress(PermissionError):  # for this thread only
+                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(20))
         while not self._stopping:
             with self._lock:
                 idle = [self._step(*ends, way) for ends, way in self._directions()]
