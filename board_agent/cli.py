@@ -16,8 +16,8 @@ from board_agent.status import StatusLine
 from common import logs, now
 from common.camera.base import CameraHealth
 from common.camera.factory import EXAMPLE, open_camera
-from common.commandline import ExamplesFirstParser
-from common.errors import SettingsError, TandemError
+from common.commandline import INTERRUPTED, ExamplesFirstParser, run_command
+from common.errors import SettingsError
 from common.link.factory import open_link, parse_link
 from common.protocol.message import BoardCounts
 from common.settings import Resolved, resolve
@@ -38,7 +38,6 @@ _EXAMPLES = """examples:
   board-agent settings --json
 """
 
-INTERRUPTED = 130
 _LONGEST_IDLE_S: Final = 1e9
 
 
@@ -49,16 +48,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: without the program's name; None for those of the process.
 
     Returns:
-        The exit code: 0 done, 2 wrong usage, 3 device or link not to be had, 4 bad data, 130 interrupted.
+        The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout not to be had, 4 bad data, 130 interrupted.
     """
-    options = _parser().parse_args(arguments)
-    try:
-        return {"run": _run, "settings": _settings, "cameras": _cameras}[options.verb](options)
-    except TandemError as error:
-        if options.debug:
-            raise
-        print(f"board-agent: error: {error}", file=sys.stderr)
-        return error.exit_code
+    verbs = {"run": _run, "settings": _settings, "cameras": _cameras}
+    return run_command(_parser(), arguments, lambda options: verbs[options.verb](options))
 
 
 def _parser() -> argparse.ArgumentParser:

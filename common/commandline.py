@@ -1,7 +1,24 @@
-"""What the commands' parsers have in common: help opens with examples, an error is one line."""
+"""What the commands have in common: help opens with examples, an error is one line, the exit code is the contract's."""
 
 import argparse
-from typing import NoReturn
+import contextlib
+import errno
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Final, NoReturn
+
+from common.errors import TandemError
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
+
+INTERRUPTED: Final = 130
+
+_UNAVAILABLE: Final = 3
+
+# What writing to stdout fails with when the disk, a quota, a device or the terminal behind it gives out.
+_WRITE_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
 
 
 class ExamplesFirstParser(argparse.ArgumentParser):
@@ -18,7 +35,77 @@ class ExamplesFirstParser(argparse.ArgumentParser):
         finally:
             self.description = examples
 
+    def print_help(self, file: "SupportsWrite[str] | None" = None) -> None:
+        """Print the help text; unlike argparse's own method without hiding that it could not be written."""
+        print(self.format_help(), end="", file=file)
+
     def error(self, message: str) -> NoReturn:
         """Say what is wrong in one line on stderr, without the usage, and leave with exit 2."""
         one_line = " ".join(message.split())
         self.exit(2, f"{self.prog}: error: {one_line}: see {self.prog} --help\n")
+
+
+def run_command(
+    parser: argparse.ArgumentParser, arguments: Sequence[str] | None, command: Callable[[argparse.Namespace], int]
+) -> int:
+    """Run one command from its arguments to its exit code, with all that it prints flushed.
+
+    Errors are one line on stderr; `--debug` shows the traceback instead. A full disk behind stdout is such an error. A reader that has
+    closed its end (`| head -1`) is none: the command says nothing and keeps its exit code, or 0 where it was cut short in printing.
+
+    Args:
+        parser: knows `--debug`, and the verbs if there are any.
+        arguments: without the program's name; None for those of the process.
+        command: takes the options, gives the exit code; prints what it has to say when it is done.
+
+    Returns:
+        The exit code: 0 done, 2 wrong usage, 3 a device or link not to be had or stdout not writable, 4 bad data, 130 interrupted.
+    """
+    options = argparse.Namespace(debug=False)
+    code = 0
+    try:
+        code = _ran(parser, arguments, command, options)
+        if sys.stdout is not None:  # a process may be born without one
+            sys.stdout.flush()
+    except BrokenPipeError:
+        _forget_stdout()
+    except OSError as error:
+        _forget_stdout()
+        if options.debug or error.errno not in _WRITE_FAILURES or error.filename is not None:
+            raise
+        _say(f"{parser.prog}: error: stdout cannot be written ({error.strerror}): make room, or send it elsewhere")
+        return _UNAVAILABLE
+    return code
+
+
+def _ran(
+    parser: argparse.ArgumentParser,
+    arguments: Sequence[str] | None,
+    command: Callable[[argparse.Namespace], int],
+    options: argparse.Namespace,
+) -> int:
+    try:
+        return command(parser.parse_args(arguments, options))
+    except SystemExit as leaving:  # argparse, after --help or an error
+        return leaving.code if isinstance(leaving.code, int) else 0
+    except TandemError as error:
+        if options.debug:
+            raise
+        _say(f"{parser.prog}: error: {error}")
+        return error.exit_code
+    except KeyboardInterrupt:
+        _say(f"{parser.prog}: interrupted")
+        return INTERRUPTED
+
+
+def _say(line: str) -> None:
+    with contextlib.suppress(OSError):  # with stderr gone, too, the exit code has to do
+        print(line, file=sys.stderr)
+
+
+def _forget_stdout() -> None:
+    """Send what is still buffered nowhere: the interpreter flushes once more when it ends, and would complain in its own words."""
+    with contextlib.suppress(OSError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from common import logs
-from common.commandline import ExamplesFirstParser
-from common.errors import SettingsError, TandemError, UnavailableError
+from common.commandline import INTERRUPTED, ExamplesFirstParser, run_command
+from common.errors import SettingsError, UnavailableError
 from common.signals import StopSignals
 
 if TYPE_CHECKING:
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from phone_host.bench_report import Conditions
     from phone_host.film import Film
     from phone_host.stereo.match import MatcherName
-
-INTERRUPTED = 130
 
 _EXAMPLES = """examples:
   delay-bench
@@ -38,19 +36,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: without the program's name; None for those of the process.
 
     Returns:
-        The exit code: 0 done, 2 wrong usage, 3 a link or process cannot be had, 4 nothing was measured, 130 interrupted.
+        The exit code: 0 done, 2 wrong usage, 3 a link, a process or stdout cannot be had, 4 nothing was measured, 130 interrupted.
     """
-    options = _parser().parse_args(arguments)
-    try:
-        return _run(options)
-    except TandemError as error:
-        if options.debug:
-            raise
-        print(f"delay-bench: error: {error}", file=sys.stderr)
-        return error.exit_code
-    except KeyboardInterrupt:  # before the signals are caught
-        print("delay-bench: interrupted", file=sys.stderr)
-        return INTERRUPTED
+    return run_command(_parser(), arguments, _run)
 
 
 class _StoppedError(Exception):

@@ -6,10 +6,7 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from common.commandline import ExamplesFirstParser
-from common.errors import TandemError
-
-INTERRUPTED = 130
+from common.commandline import ExamplesFirstParser, run_command
 
 _VERBS = {
     "demo": "both programs on this machine, a rendered scene with known truth, a full report",
@@ -34,20 +31,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: without the program's name; None for those of the process.
 
     Returns:
-        The exit code: 0 done, 2 wrong usage, 3 device or link not to be had, 4 bad data, 130 interrupted.
+        The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout not to be had, 4 bad data, 130 interrupted.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
-    options = _parser(next((word for word in given if not word.startswith("-")), "")).parse_args(given)
-    try:
-        code: int = _module(options.verb).run(options)
-    except TandemError as error:
-        if options.debug:
-            raise
-        print(f"phone-host: error: {error}", file=sys.stderr)
-        return error.exit_code
-    except KeyboardInterrupt:
-        print("phone-host: interrupted", file=sys.stderr)
-        return INTERRUPTED
+    parser = _parser(next((word for word in given if not word.startswith("-")), ""))
+    return run_command(parser, given, _run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    code: int = _module(options.verb).run(options)
     return code
 
 

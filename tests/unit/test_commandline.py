@@ -1,8 +1,13 @@
-"""What all commands do alike: errors of usage are one line."""
+"""What all commands do alike: errors are one line, wherever they come from."""
+
+import errno
+from argparse import Namespace
+from collections.abc import Callable
 
 import pytest
 
-from common.commandline import ExamplesFirstParser
+from common.commandline import ExamplesFirstParser, run_command
+from common.errors import DataError, SettingsError, UnavailableError
 
 
 def sample() -> ExamplesFirstParser:
@@ -37,3 +42,53 @@ def test_wrong_usage_is_one_line_and_exit_2(
     assert said.err.endswith(" --help\n")
     assert said.err.count("\n") == 1
     assert culprit in said.err
+
+
+def run(command: Callable[[Namespace], int], arguments: list[str] | None = None) -> int:
+    parser = ExamplesFirstParser("sample")
+    parser.add_argument("--debug", action="store_true")
+    return run_command(parser, arguments or [], command)
+
+
+def failing(error: BaseException) -> Callable[[Namespace], int]:
+    def command(_: Namespace) -> int:
+        raise error
+
+    return command
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (SettingsError("--a is 3", "give 2"), 2, "sample: error: --a is 3: give 2\n"),
+        (UnavailableError("no link", "plug it in"), 3, "sample: error: no link: plug it in\n"),
+        (DataError("bad", "mend it"), 4, "sample: error: bad: mend it\n"),
+        (KeyboardInterrupt(), 130, "sample: interrupted\n"),
+    ],
+)
+def test_errors_are_one_line_and_their_exit_code(
+    error: BaseException, code: int, line: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each error of the tree and Ctrl-C is one line on stderr with its exit code."""
+    assert run(failing(error)) == code
+    assert capsys.readouterr().err == line
+
+
+def test_the_commands_own_code_is_given_and_help_is_0(capsys: pytest.CaptureFixture[str]) -> None:
+    """What the command returns is the exit code; --help gives 0, an unknown option 2."""
+    assert run(lambda _: 4) == 4
+    assert run(lambda _: 4, ["--help"]) == 0
+    assert run(lambda _: 4, ["--speed"]) == 2
+    assert "--debug" in capsys.readouterr().out
+
+
+def test_debug_shows_the_traceback() -> None:
+    """With --debug the error goes on to the interpreter."""
+    with pytest.raises(SettingsError):
+        run(failing(SettingsError("a", "b")), ["--debug"])
+
+
+def test_an_error_that_is_not_stdouts_is_not_called_so() -> None:
+    """An OSError about a file is a gap in our code and stays one."""
+    with pytest.raises(OSError, match="No space"):
+        run(failing(OSError(errno.ENOSPC, "No space left on device", "cloud.ply")))
