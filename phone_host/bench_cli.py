@@ -88,8 +88,9 @@ def _run(options: argparse.Namespace) -> int:
     else:
         _print(results, under)
     if signals.stop:
-        print(f"delay-bench: interrupted after {len(results)} of {len(planned)} runs", file=sys.stderr)
-        return INTERRUPTED
+        how = "interrupted" if signals.interrupted else "stopped"
+        print(f"delay-bench: {how} after {len(results)} of {len(planned)} runs", file=sys.stderr)
+        return INTERRUPTED if signals.interrupted else 0
     return 0 if all(result.ledgers for result in results) else 4
 
 
