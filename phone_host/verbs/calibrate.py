@@ -1,12 +1,12 @@
 """phone-host calibrate: calibrate two cameras from pictures of a chessboard."""
 
 import argparse
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common.errors import DataError, UnavailableError
+from phone_host.formats.json_text import json_text
 
 if TYPE_CHECKING:
     from phone_host.stereo.board_views import BoardViews
@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
         report = _failed(files, views, error)
         _write_report(options.out, report)
         if options.json:
-            print(json.dumps(report))
+            print(json_text(report))
         else:
             print(_rejections(views.rejected))
         raise
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
     }
     _write_rig(options.out, calibration)
     _write_report(options.out, report)
-    print(json.dumps(report) if options.json else _summary(report, calibration, rejected, options.out))
+    print(json_text(report) if options.json else _summary(report, calibration, rejected, options.out))
     return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
 
 
@@ -170,7 +170,7 @@ def _write_report(out: Path, report: dict[str, Any]) -> None:
 
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        write_text(out.with_name("report.json"), json.dumps(report, indent=2) + "\n")
+        write_text(out.with_name("report.json"), json_text(report, indent=2) + "\n")
     except OSError as error:
         raise _unwritable(out, error) from error
 

@@ -1,13 +1,13 @@
 """phone-host stereo: disparity and point cloud of one pair of images."""
 
 import argparse
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common import now
 from common.errors import SettingsError, UnavailableError
+from phone_host.formats.json_text import json_text
 
 if TYPE_CHECKING:
     from phone_host.model import CloudImage, Disparity, RectifiedPair
@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
         "files": ["disparity.pfm", "disparity.png", *(["cloud.ply"] if cloud is not None else []), "report.json"],
     }
     _write_report(options.out, report)
-    print(json.dumps(report) if options.json else _summary(report, options.out))
+    print(json_text(report) if options.json else _summary(report, options.out))
     return 0
 
 
@@ -152,7 +152,7 @@ def _write_report(out: Path, report: dict[str, Any]) -> None:
     from phone_host.formats.atomic import write_text  # noqa: PLC0415
 
     try:
-        write_text(out / "report.json", json.dumps(report, indent=2) + "\n")
+        write_text(out / "report.json", json_text(report, indent=2) + "\n")
     except OSError as error:
         raise _unwritable(out, error) from error
 

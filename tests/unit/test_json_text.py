@@ -1,0 +1,13 @@
+"""JSON that every reader takes."""
+
+import json
+import math
+
+from phone_host.formats.json_text import json_text
+
+
+def test_what_is_no_number_is_null_at_every_depth() -> None:
+    """NaN and both infinities become null in dicts, lists and tuples; all else stays as it is."""
+    value = {"a": math.nan, "b": [1.5, math.inf, {"c": (-math.inf, 0, True, "NaN", None)}]}
+    assert json.loads(json_text(value)) == {"a": None, "b": [1.5, None, {"c": [None, 0, True, "NaN", None]}]}
+    assert "NaN" not in json_text([math.nan], indent=2)
