@@ -10,9 +10,9 @@ from phone_host.model import Side, StereoGeometry
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatcherName, MatchSettings, create_matcher
 from phone_host.stereo.rectify import Rectifier
-from phone_host.stereo.reproject import disparities_for_near
+from phone_host.stereo.reproject import DEFAULT_NEAR_M, disparities_for_near
 
-_DEFAULT_NEAR_MM = 300.0
+_DEFAULT_NEAR_MM = DEFAULT_NEAR_M * 1000
 
 
 def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,14 +29,13 @@ def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=_DEFAULT_NEAR_MM,
         metavar="MM",
-        help="nearest depth with --calibration (default 300)",
+        help=f"nearest depth with --calibration (default {_DEFAULT_NEAR_MM:g})",
     )
     parser.add_argument("--focal", type=float, metavar="PX", help="focal length of rectified images")
     parser.add_argument("--baseline", type=float, metavar="MM", help="baseline of rectified images")
     parser.add_argument(
         "--doffs",
         type=float,
-        default=0.0,
         metavar="PX",
         help="x of the right principal point minus the left (default 0)",
     )
@@ -70,12 +69,14 @@ def build_core(
         raise SettingsError(f"--near {options.near:g}", "give millimetres above 0")
     if calibration and options.rectified:
         raise SettingsError("--calibration and --rectified contradict each other", "give one of them")
+    _refuse_idle_geometry(options, calibration)
     if calibration:
         rig = read_rig(Path(calibration))
         rectifier = Rectifier(rig)
-        disparities = options.disparities or disparities_for_near(
-            rectifier.geometry, options.near / 1000, rectifier.rectification.width_px
-        )
+        disparities = options.disparities
+        if disparities is None:
+            width_px = rectifier.rectification.width_px
+            disparities = disparities_for_near(rectifier.geometry, options.near / 1000, width_px)
         return StereoCore(create_matcher(MatchSettings(MatcherName(matcher), disparities)), rectifier), rig.board_side
     if not options.rectified:
         return None, None
@@ -90,6 +91,17 @@ def build_core(
     ), None
 
 
+def _refuse_idle_geometry(options: argparse.Namespace, calibration: str) -> None:
+    """Refuse options of the geometry that would say nothing: the user means something by them."""
+    given = [f"--{name}" for name in ("focal", "baseline", "doffs", "center") if getattr(options, name) is not None]
+    if given and calibration:
+        raise SettingsError(f"{given[0]} contradicts --calibration", "leave it out: the rig has its own geometry")
+    if given and not options.rectified:
+        raise SettingsError(f"{given[0]} without --rectified", "add --rectified, or leave it out")
+    if given and options.focal is None and options.baseline is None:
+        raise SettingsError(f"{given[0]} without --focal and --baseline", "give both, or leave it out")
+
+
 def rectified_geometry(options: argparse.Namespace, size_px: tuple[int, int]) -> StereoGeometry | None:
     """Read --focal, --baseline, --doffs and --center; None without focal length and baseline.
 
@@ -100,12 +112,21 @@ def rectified_geometry(options: argparse.Namespace, size_px: tuple[int, int]) ->
         raise SettingsError("--focal and --baseline belong together", "give both, or neither for no point cloud")
     if options.focal is None:
         return None
-    if not (options.focal > 0 and options.baseline > 0):
-        raise SettingsError(f"--focal {options.focal} --baseline {options.baseline}", "both must be above 0")
+    for name, value in (("--focal", options.focal), ("--baseline", options.baseline)):
+        if not (math.isfinite(value) and value > 0):
+            raise SettingsError(f"{name} {value:g}", "give a number above 0")
+    doffs_px = 0.0 if options.doffs is None else options.doffs
+    if not math.isfinite(doffs_px):
+        raise SettingsError(f"--doffs {doffs_px:g}", "give a number of px")
+    cx_px, cy_px = ((n - 1) / 2 for n in size_px) if options.center is None else _center(options.center)
+    return StereoGeometry(options.focal, options.baseline / 1000, cx_px, cy_px, doffs_px)
+
+
+def _center(text: str) -> tuple[float, float]:
     try:
-        cx_px, cy_px = (
-            (float(part) for part in options.center.split(",")) if options.center else ((n - 1) / 2 for n in size_px)
-        )
+        cx_px, cy_px = (float(part) for part in text.split(","))
     except ValueError:
-        raise SettingsError(f"--center {options.center!r}", "give CX,CY in px, for example 319.5,239.5") from None
-    return StereoGeometry(options.focal, options.baseline / 1000, cx_px, cy_px, options.doffs)
+        cx_px = cy_px = math.nan
+    if not (math.isfinite(cx_px) and math.isfinite(cy_px)):
+        raise SettingsError(f"--center {text!r}", "give CX,CY in px, for example 319.5,239.5")
+    return cx_px, cy_px

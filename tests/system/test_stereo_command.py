@@ -132,6 +132,30 @@ def _bad_cases(folder: Path) -> dict[str, tuple[list[object], int, str]]:
         "no number": ([left, right, "--rectified", *out], 2, "--disparities"),
         "no disparities": ([left, right, "--rectified", "--disparities", 0, *out], 2, "disparities"),
         "half a geometry": ([left, right, *rectified, "--focal", 500, *out], 2, "--baseline"),
+        "no disparities with a rig": (
+            [left, right, "--calibration", folder / "rig.yaml", "--disparities", 0, *out],
+            2,
+            "disparities",
+        ),
+        "focal not finite": ([left, right, *rectified, "--focal", "nan", "--baseline", 100, *out], 2, "--focal"),
+        "baseline not finite": ([left, right, *rectified, "--focal", 500, "--baseline", "inf", *out], 2, "--baseline"),
+        "doffs not finite": (
+            [left, right, *rectified, "--focal", 500, "--baseline", 100, "--doffs", "nan", *out],
+            2,
+            "--doffs",
+        ),
+        "center not finite": (
+            [left, right, *rectified, "--focal", 500, "--baseline", 100, "--center", "nan,3", *out],
+            2,
+            "--center",
+        ),
+        "geometry and a rig": (
+            [left, right, "--calibration", folder / "rig.yaml", "--center", "99,59", *out],
+            2,
+            "--center contradicts",
+        ),
+        "center alone": ([left, right, *rectified, "--center", "99,59", *out], 2, "--center without --focal"),
+        "doffs alone": ([left, right, *rectified, "--doffs", 0, *out], 2, "--doffs without --focal"),
         "near": ([left, right, "--calibration", folder / "rig.yaml", "--near", 0, *out], 2, "--near"),
         "out is a file": ([left, right, *rectified, "--out", folder / "file"], 3, "file"),
     }
