@@ -31,6 +31,9 @@ _DRAIN_NS: Final = 5_000_000_000
 _FAREWELL_NS: Final = 300_000_000
 """A host answers a goodbye within a round trip; one that hangs is not waited for longer than a person would notice."""
 
+_FULL_RETRY_NS: Final = 2_000_000
+"""A frame that may not be dropped is offered again after this time to a link that was full; ZeroMQ does not say when it has room."""
+
 _LONGEST_WAIT_MS: Final = 1000
 
 _CAMERA_RETRY_MS: Final = 250
@@ -146,6 +149,7 @@ class Agent:
         self._had_host = False
         self._camera_ended = False
         self._held_back = False
+        self._retry_ns = 0
         self._garbage = 0
         self._stopping = False
         self._poller = zmq.Poller()
@@ -182,7 +186,9 @@ class Agent:
 
     def _due_ns(self, now_ns: int) -> int:
         if self._on_demand:
-            return now_ns if self._session.has_credit and not self._held_back else self._session.due_ns
+            if self._session.has_credit and not self._held_back:
+                return max(now_ns, self._retry_ns)
+            return self._session.due_ns
         return min(self._session.due_ns, self._camera.due_ns(now_ns))
 
     def _poll(self, due_ns: int, now_ns: int) -> bool:
@@ -250,8 +256,8 @@ class Agent:
                 case Spoiled(sequence, fault):
                     self._outbox.spoiled()
                     _LOG.debug(event("frame_spoiled", sequence=sequence, fault=fault.value))
-                case Skipped():
-                    self._outbox.skipped()
+                case Skipped(_, frames):
+                    self._outbox.skipped(frames)
                 case Ended():
                     self._camera_ended = True
 
@@ -271,6 +277,8 @@ class Agent:
                 self._outbox.sent()
             case SendResult.FULL if not self._on_demand:
                 self._outbox.discard(DropReason.LINK_FULL)
+            case SendResult.FULL:
+                self._retry_ns = now.monotonic_ns() + _FULL_RETRY_NS
             case _:
                 pass  # unreachable: the frame waits for the host to come back, or for a newer one
 
@@ -306,7 +314,6 @@ class Agent:
             unsaid = [item for item in unsaid if self._send(item) is not SendResult.SENT]
             self._send_all(self._session.tick(now_ns, self._outbox.counts))
             self._poll(min(self._session.due_ns, deadline_ns), now_ns)
-
 
     def _part(self) -> None:
         """Say goodbye, and stay until the host has answered: ZeroMQ throws away what was not read when a connection closes."""

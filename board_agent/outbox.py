@@ -37,10 +37,10 @@ class Outbox:
         self._grabbed += 1
         self._drop(DropReason.SPOILED)
 
-    def skipped(self) -> None:
-        """Count a grab that a newer one had replaced before it was looked at."""
-        self._grabbed += 1
-        self._drop(DropReason.REPLACED)
+    def skipped(self, frames: int = 1) -> None:
+        """Count grabs that newer ones had replaced before they were looked at."""
+        self._grabbed += frames
+        self._drop(DropReason.REPLACED, frames)
 
     def sent(self) -> None:
         """Take note that the link took the waiting frame."""
@@ -54,5 +54,5 @@ class Outbox:
             self._waiting = None
             self._drop(reason)
 
-    def _drop(self, reason: DropReason) -> None:
-        self._dropped[reason] = self._dropped.get(reason, 0) + 1
+    def _drop(self, reason: DropReason, frames: int = 1) -> None:
+        self._dropped[reason] = self._dropped.get(reason, 0) + frames

@@ -71,7 +71,7 @@ def losses(result: CaseResult) -> dict[str, int]:
     counts, link = result.counts, result.link
     lost = {f"{reason}_on_board": count for reason, count in result.board.dropped}
     lost["lost_on_link"] = sum(account.lost for account in link.sessions)
-    lost["stale"] = sum(account.stale for account in link.sessions)
+    lost["stale"] = sum(account.duplicate + account.old_session for account in link.sessions)
     lost["before_clock"] = link.no_clock
     lost |= {f"{reason}_board_frame": count for reason, count in counts.board_orphans}
     lost["dropped_in_fifo"] = counts.dropped

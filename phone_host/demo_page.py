@@ -97,7 +97,7 @@ def _drops(facts: RunFacts) -> tuple[tuple[str, str], ...]:
     rows = [
         *(
             (f"frames dropped on the board: {reason.replace('_', ' ')}", count)
-            for reason, count in board_drops(facts).items()
+            for reason, count in board_drops(facts.link).items()
         ),
         ("frames lost on the link", sum(account.lost for account in facts.link.sessions)),
         *(

@@ -14,7 +14,7 @@ from common.errors import DataError, UnavailableError
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.logs import event
-from common.protocol.message import RefusalReason
+from common.protocol.message import Pacing, RefusalReason
 from phone_host.delays import DelayStatistics
 from phone_host.model import FramePair, Side
 from phone_host.pairqueue import PairQueue
@@ -92,9 +92,11 @@ class Host:
         self.settings = settings
         self.delays = DelayStatistics()
         self.results = Results(settings.out, settings.save_every)
-        self.queue = PairQueue(settings.fifo, settings.tolerance_ns, camera.description.period_ns)
+        own = camera.description
+        on_demand = own.pacing is Pacing.DEMAND
+        self.queue = PairQueue(settings.fifo, settings.tolerance_ns, own.period_ns, on_demand=on_demand)
         self.source = Source(camera, self.queue.add_host)
-        self.receiver = Receiver(link, now.random_id(), self.queue, self._frame_arrived)
+        self.receiver = Receiver(link, now.random_id(), self.queue, self)
         self._pipeline = Pipeline(core, settings.board_side, now.monotonic_ns)
         self._on_pair = on_pair
         self._worker = threading.Thread(target=self._work, name="worker", daemon=True)
@@ -125,10 +127,11 @@ class Host:
         try:
             return self._watch(stop, watch)
         finally:
+            self._finished.set()  # the pair in hand is finished, those that still wait are not begun
             self.source.stop()
-            self.receiver.stop()
             self.queue.finish()
             self._worker.join()
+            self.receiver.stop()  # last: the worker wakes it
 
     def facts(self, ended: str) -> RunFacts:
         """Give everything a report is made of, now.
@@ -168,13 +171,22 @@ class Host:
             if self.receiver.ended or self.source.ended:
                 ending_since_ns = now_ns if ending_since_ns is None else ending_since_ns
                 if self._all_paired() or now_ns - ending_since_ns > _LAST_PARTNER_NS:
-                    self.queue.finish()
-                    self._worker.join()
-                    self._raise_failures()
-                    reached = self.settings.pairs and self.processed >= self.settings.pairs
-                    return EndReason.PAIRS_REACHED if reached else EndReason.STREAM_ENDED
+                    return self._drain(stop, watch)
         self._raise_failures()
         return EndReason.PAIRS_REACHED
+
+    def _drain(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
+        """Let the worker finish the pairs that wait; no frame will follow."""
+        self.queue.finish()
+        while self._worker.is_alive():
+            self._worker.join(_STEP_S)
+            if watch is not None:
+                watch()
+            if stop():
+                return EndReason.STOPPED
+        self._raise_failures()
+        reached = self.settings.pairs and self.processed >= self.settings.pairs
+        return EndReason.PAIRS_REACHED if reached else EndReason.STREAM_ENDED
 
     def _all_paired(self) -> bool:
         counts = self.queue.counts
@@ -199,9 +211,14 @@ class Host:
             if failure is not None:
                 raise failure
 
-    def _frame_arrived(self, exposed_ns: int) -> None:
+    def session_began(self) -> None:
+        """See BoardListener."""
+        self.source.forget()
+
+    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
+        """See BoardListener."""
         if self.source.on_demand:
-            self.source.want(exposed_ns)
+            self.source.want(exposed_ns, index)
 
     def _work(self) -> None:
         try:

@@ -1,6 +1,5 @@
 """The live table of a run in a terminal."""
 
-import time
 from types import TracebackType
 from typing import Final, Self
 
@@ -10,8 +9,10 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 from rich.text import Text
 
+from common import now
 from phone_host.delays import DELAYS, Spread
 from phone_host.host import Host
+from phone_host.report import board_drops
 
 _REFRESH_S: Final = 0.25
 _RECENT: Final = 300
@@ -31,7 +32,7 @@ class LiveTable:
         self._host = host
         self._live = Live(console=console or Console(stderr=True), auto_refresh=False, transient=True)
         self._seconds = seconds
-        self._started_s = time.monotonic()
+        self._started_s = now.monotonic_ns() / 1e9
         self._shown_s = 0.0
         self._last = (0, self._started_s)
         self._rate = 0.0
@@ -52,7 +53,7 @@ class LiveTable:
 
     def refresh(self) -> None:
         """Show the present state, at most a few times a second."""
-        now_s = time.monotonic()
+        now_s = now.monotonic_ns() / 1e9
         if now_s - self._shown_s < _REFRESH_S:
             return
         self._shown_s = now_s
@@ -81,11 +82,8 @@ class LiveTable:
         estimate = receiver.estimate
         clock = f"clock +-{estimate.uncertainty_ns / 1000:.0f} us" if estimate else "clock unknown"
         board = "board connected" if receiver.connected else "waiting for the board"
-        drops: dict[str, int] = {}
-        for account in receiver.account.sessions:
-            for reason, count in account.latest.dropped:
-                drops[f"{reason.value} (board)"] = drops.get(f"{reason.value} (board)", 0) + count
-            drops["lost on the link"] = drops.get("lost on the link", 0) + account.lost
+        drops = {f"{reason} (board)": count for reason, count in board_drops(receiver.account).items()}
+        drops["lost on the link"] = sum(account.lost for account in receiver.account.sessions)
         drops |= {f"{reason} (host)": count for reason, count in counts.board_orphans}
         drops["full FIFO"] = counts.dropped
         shown = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in drops.items() if count) or "none"

@@ -14,8 +14,8 @@ from phone_host.model import BoardFrame, FramePair
 from phone_host.sync.fifo import Fifo, FifoSettings, Overflow
 from phone_host.sync.pairing import BoardOrphan, HostOrphan, OrphanReason, Outcome, Paired, Pairing, PairingSettings
 
-_HOST_BYTES: Final = 64 * 1024 * 1024
-"""Host frames wait, still encoded, in at most this much memory: 40 s of 50 KB JPEGs at 30 fps, more than any link delays."""
+_SIDE_BYTES: Final = 64 * 1024 * 1024
+"""Frames of each side wait for their partners, still encoded, in at most this much memory: 40 s of 50 KB JPEGs at 30 fps, more than any link delays."""
 
 _FIRST_WAIT_NS: Final = 2_000_000_000
 """Before a delay has been measured a host frame waits this long for its partner."""
@@ -62,7 +62,9 @@ class PairQueue:
         host_period_ns: time between two frames of the own camera.
     """
 
-    def __init__(self, fifo: FifoSettings, tolerance_ns: int | None, host_period_ns: int) -> None:
+    def __init__(
+        self, fifo: FifoSettings, tolerance_ns: int | None, host_period_ns: int, *, on_demand: bool = False
+    ) -> None:
         self._settings = fifo
         self._fifo: Fifo[FramePair] = Fifo(fifo)
         self._tolerance_ns = tolerance_ns
@@ -71,10 +73,11 @@ class PairQueue:
         self._pairing: Pairing[BoardFrame, Frame] | None = None
         self._changed = threading.Condition()
         self._closed = False
+        self._timeless = on_demand
         self._received = self._host_frames = self._paired = self._dropped = self._taken = 0
         self._board_orphans: dict[str, int] = {}
         self._host_orphans: dict[str, int] = {}
-        self._host_bytes = 0
+        self._host_bytes = self._board_bytes = 0
         self._host_wait_ns = _FIRST_WAIT_NS
 
     @property
@@ -97,12 +100,18 @@ class PairQueue:
         with self._changed:
             return max(0, self._fifo.free - (self._pairing.held_board if self._pairing else 0))
 
-    def begin(self, board_period_ns: int) -> None:
-        """A board session begins: frames of an earlier one find no partner any more."""
+    def begin(self, board_period_ns: int, *, on_demand: bool) -> None:
+        """A board session begins: frames of an earlier one find no partner any more.
+
+        Args:
+            board_period_ns: time between two frames of the board's camera.
+            on_demand: its stamps count from its first image, so that not even the own camera's old stamps mean anything now.
+        """
         with self._changed:
+            self._timeless |= on_demand
             if self._pairing is not None:
                 self._settle(self._pairing.restart(OrphanReason.STREAM_ENDED))
-            if self._pairing is None or board_period_ns != self._board_period_ns:
+            if self._pairing is None or board_period_ns != self._board_period_ns or on_demand:
                 self._board_period_ns = board_period_ns
                 if self._pairing is not None:
                     self._settle(self._pairing.finish())
@@ -113,27 +122,35 @@ class PairQueue:
         with self._changed:
             assert self._pairing is not None
             self._received += 1
+            if self._closed:
+                self._count(self._board_orphans, OrphanReason.STREAM_ENDED.value)
+                return
             delay_ns = frame.received_ns - frame.marks.exposed_ns
             # The study of links found bursts up to twice the usual delay; the slow decay follows a link that gets faster.
             self._host_wait_ns = min(_SLOWEST_NS, max(delay_ns, self._host_wait_ns * 63 // 64))
+            self._board_bytes += len(frame.message.payload)
             self._settle(self._pairing.add_board(frame.marks.exposed_ns, frame, now.monotonic_ns()))
+            while self._board_bytes > _SIDE_BYTES:
+                self._settle(self._pairing.evict_oldest_board())
 
     def add_host(self, frame: Frame) -> None:
         """Take a frame of the own camera."""
         with self._changed:
             self._host_frames += 1
-            if self._pairing is None:
-                self._count(self._host_orphans, "no_board")
+            if self._pairing is None or self._closed:
+                self._count(self._host_orphans, OrphanReason.STREAM_ENDED.value if self._closed else "no_board")
                 return
             now_ns = now.monotonic_ns()
             self._host_bytes += len(frame.payload)
             self._settle(self._pairing.add_host(frame.exposed.ns, frame, now_ns))
             self._evict(now_ns)
+            while self._host_bytes > _SIDE_BYTES:
+                self._settle(self._pairing.evict_oldest_host())
 
     def tick(self) -> None:
         """Let time pass: settle what has waited long enough."""
         with self._changed:
-            if self._pairing is not None:
+            if self._pairing is not None and not self._closed:
                 now_ns = now.monotonic_ns()
                 self._settle(self._pairing.decide(now_ns))
                 self._evict(now_ns)
@@ -158,28 +175,30 @@ class PairQueue:
 
     def _evict(self, now_ns: int) -> None:
         assert self._pairing is not None
+        if self._timeless:
+            return  # stamps of images shown on demand are labels; the wall clock says nothing about them
         longer_ns = max(self._board_period_ns, self._host_period_ns)
         patience_ns = self._host_wait_ns + 2 * longer_ns
         self._settle(self._pairing.evict_host(now_ns - patience_ns))
         # A host frame is here as soon as its camera gave it; a board frame without one after this time never gets one.
         self._settle(self._pairing.evict_board(now_ns - patience_ns - self.tolerance_ns))
-        while self._host_bytes > _HOST_BYTES:
-            self._settle(self._pairing.evict_oldest_host())
 
     def _settle(self, outcomes: Iterable[Outcome[BoardFrame, Frame]]) -> None:
         for outcome in outcomes:
             match outcome:
                 case Paired(board, host, time_skew_ns):
                     self._host_bytes -= len(host.payload)
+                    self._board_bytes -= len(board.message.payload)
                     paired_ns = now.monotonic_ns()
                     self._paired += 1
                     pair = FramePair(board, host, time_skew_ns, paired_ns, now.monotonic_ns())
                     self._dropped += len(self._fifo.put(pair))
                     self._changed.notify()
-                case BoardOrphan(_, reason):
+                case BoardOrphan(frame, reason):
+                    self._board_bytes -= len(frame.message.payload)
                     self._count(self._board_orphans, reason.value)
-                case HostOrphan(frame, reason):
-                    self._host_bytes -= len(frame.payload)
+                case HostOrphan(own, reason):
+                    self._host_bytes -= len(own.payload)
                     self._count(self._host_orphans, reason.value)
                 case _:
                     assert_never(outcome)

@@ -4,10 +4,9 @@ import logging
 import math
 import os
 import threading
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Protocol
 
 import zmq
 
@@ -48,6 +47,23 @@ _SWIFT: Final = 4
 """A link is swift while a frame takes less than this part of a period: then it has come before the next one is grabbed."""
 
 
+_FAREWELL_NS: Final = 300_000_000
+"""How long a leaving host waits for the board's last account: a few round trips of any usable link."""
+
+_REFUSAL_NS: Final = 1_000_000_000
+"""A board that refuses does so at every hello, five times a second; one that has not done so for this long is gone."""
+
+
+class BoardListener(Protocol):
+    """Who is told of the board by the receiver's thread."""
+
+    def session_began(self) -> None:
+        """A life of the board begins; nothing of the one before will follow."""
+
+    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
+        """A frame has come: its exposure on the host's clock, and its number if the board shows images on demand."""
+
+
 @dataclass(slots=True)
 class SessionAccount:
     """One life of a board as the host saw it; closed accounts are kept for the report.
@@ -58,7 +74,8 @@ class SessionAccount:
         latest: the board's newest account.
         received: frames that came.
         lost: frames that were sent and never came (gaps).
-        stale: frames delivered again or of an older session, dropped.
+        duplicate: frames that a transport delivered again, dropped.
+        old_session: frames of an older life of the board, dropped.
         ended: whether the board said that no frame follows.
         vanished: whether the board went without a word: what it sent after `latest` is unknown.
     """
@@ -68,7 +85,8 @@ class SessionAccount:
     latest: BoardCounts
     received: int = 0
     lost: int = 0
-    stale: int = 0
+    duplicate: int = 0
+    old_session: int = 0
     ended: bool = False
     vanished: bool = False
 
@@ -90,13 +108,13 @@ class Receiver:
         link: open link; closed by this.
         host_id: random id of this process's life.
         queue: where frames go.
-        arrived: told the exposure (host's clock, ns) of each frame that came.
+        listener: told of sessions and frames.
     """
 
-    def __init__(self, link: Link, host_id: str, queue: PairQueue, arrived: Callable[[int], None]) -> None:
+    def __init__(self, link: Link, host_id: str, queue: PairQueue, listener: BoardListener) -> None:
         self._link = link
         self._queue = queue
-        self._arrived = arrived
+        self._listener = listener
         self._session = HostSession(host_id, link.dialled)
         self._clock = ClockEstimator()
         self._hello: BoardHello | None = None
@@ -106,10 +124,18 @@ class Receiver:
         for pollable in (*link.pollables, self._wake_read):
             self._poller.register(pollable, zmq.POLLIN)
         self._stopping = False
+        self._settled = False
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
         self.account = LinkAccount()
         self.failure: Exception | None = None
-        self.refused: RefusalReason | None = None
+        self._refused: tuple[RefusalReason, int] | None = None
+
+    @property
+    def refused(self) -> RefusalReason | None:
+        """Why the board that was last heard does not talk to us; None when it does, or is silent now."""
+        if self._refused is None or now.monotonic_ns() - self._refused[1] > _REFUSAL_NS:
+            return None
+        return self._refused[0]
 
     @property
     def connected(self) -> bool:
@@ -152,11 +178,21 @@ class Receiver:
         try:
             while not self._stopping:
                 self._step()
-            self._handle(self._session.leave(), now.monotonic_ns())
+            self._part()
         except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
             self.failure = error
         finally:
             self._link.close()
+
+    def _part(self) -> None:
+        """Say goodbye and wait a moment for the board's last account: it comes behind the last frame."""
+        farewell = self._session.leave()
+        self._handle(farewell, now.monotonic_ns())
+        deadline_ns = now.monotonic_ns() + _FAREWELL_NS
+        while farewell and not self._settled and (left_ns := deadline_ns - now.monotonic_ns()) > 0:
+            self._poller.poll(left_ns // 1_000_000 + 1)
+            for incoming in self._link.receive():
+                self._take(incoming, now.monotonic_ns())
 
     def _step(self) -> None:
         now_ns = now.monotonic_ns()
@@ -184,7 +220,8 @@ class Receiver:
                 try:
                     message = decode(header, payload)
                 except VersionError as error:
-                    self.refused = RefusalReason.VERSION
+                    if not self._session.is_open:  # in a running session it is somebody else's noise
+                        self._refused = (RefusalReason.VERSION, now_ns)
                     self._count_garbage(error.problem)
                 except ProtocolError as error:
                     self._count_garbage(error.problem)
@@ -223,16 +260,18 @@ class Receiver:
                     self._accept_frame(frame, lost, now_ns)
                 case Echo():
                     self._clock.add(output)
-                case Stale():
-                    self._current.stale += 1
+                case Stale(_, old_session):
+                    self._current.old_session += old_session
+                    self._current.duplicate += not old_session
                 case Accepted():
                     self._begin(output)
-                case Counted(counts, ended, lost):
+                case Counted(counts, ended, lost, last):
+                    self._settled = last
                     self._current.lost += lost
                     self._current.latest = max(counts, self._current.latest, key=lambda account: account.grabbed)
                     self._current.ended |= ended
                 case Refused(reason):
-                    self.refused = reason
+                    self._refused = (reason, now_ns)
                 case Vanished(orderly):
                     self._current.vanished = not orderly
                     _LOG.info(event("board_gone", session=self._current.session, orderly=orderly))
@@ -245,7 +284,7 @@ class Receiver:
 
     def _begin(self, accepted: Accepted) -> None:
         hello = accepted.hello
-        self.refused = None
+        self._refused = None
         self.account.connects += 1
         if self._hello is None or self._hello.boot_id != hello.boot_id:
             self._clock = ClockEstimator()  # another boot is another clock
@@ -256,7 +295,8 @@ class Receiver:
             self._current.vanished = False
         else:
             self.account.sessions.append(SessionAccount(hello.session, hello.counts, hello.counts))
-            self._queue.begin(hello.camera.period_ns)
+            self._listener.session_began()
+            self._queue.begin(hello.camera.period_ns, on_demand=hello.camera.pacing is Pacing.DEMAND)
         camera = hello.camera
         size = f"{camera.width_px}x{camera.height_px}"
         _LOG.info(event("board_found", session=hello.session, resumed=accepted.resumed, camera=camera.name, size=size))
@@ -276,7 +316,8 @@ class Receiver:
         uncertainty_ns = estimate.uncertainty_at(sent_ns)
         self._transit_ns = now_ns - marks.sent_ns
         self._queue.add_board(BoardFrame(frame, self._link.kind, marks, now_ns, offset_ns, uncertainty_ns))
-        self._arrived(marks.exposed_ns)
+        on_demand = self._hello is not None and self._hello.camera.pacing is Pacing.DEMAND
+        self._listener.frame_arrived(marks.exposed_ns, frame.sequence if on_demand else None)
 
 
 def refusal_text(reason: RefusalReason) -> tuple[str, str]:

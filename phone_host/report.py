@@ -48,6 +48,11 @@ class RunFacts:
     skipped: int
 
     @property
+    def stopped(self) -> int:
+        """Pairs that still waited when the run was ended."""
+        return self.counts.paired - self.processed - self.undecodable - self.counts.dropped
+
+    @property
     def pairs_per_second(self) -> float:
         """Rate of results, 1/s; NaN with fewer than two."""
         return (self.processed - 1) / self.seconds if self.processed > 1 and self.seconds > 0 else float("nan")
@@ -92,7 +97,7 @@ def build(facts: RunFacts) -> dict[str, object]:
             "processed": facts.processed,
             "undecodable": facts.undecodable,
             "dropped_fifo": facts.counts.dropped,
-            "not_processed": facts.counts.paired - facts.processed - facts.undecodable - facts.counts.dropped,
+            "stopped": facts.stopped,
         },
         "unwritten": asdict(facts.unwritten),
     }
@@ -145,8 +150,8 @@ def summary(facts: RunFacts) -> str:
 
 def _losses(facts: RunFacts) -> list[str]:
     lost = sum(account.lost for account in facts.link.sessions)
-    stale = sum(account.stale for account in facts.link.sessions)
-    board = {reason: n for reason, n in board_drops(facts).items() if n}
+    stale = sum(account.duplicate + account.old_session for account in facts.link.sessions)
+    board = {reason: n for reason, n in board_drops(facts.link).items() if n}
     parts = [
         *(f"{n} {reason} on the board" for reason, n in board.items()),
         *([f"{lost} lost on the link"] if lost else []),
@@ -154,6 +159,7 @@ def _losses(facts: RunFacts) -> list[str]:
         *(f"{n} board frames {reason}" for reason, n in facts.counts.board_orphans),
         *(f"{n} host frames {reason}" for reason, n in facts.counts.host_orphans),
         *([f"{facts.counts.dropped} pairs in a full FIFO"] if facts.counts.dropped else []),
+        *([f"{facts.stopped} pairs by the run's end"] if facts.stopped else []),
         *([f"{facts.undecodable} pairs undecodable"] if facts.undecodable else []),
     ]
     lines = ["dropped: " + (", ".join(parts).replace("_", " ") or "nothing")]
@@ -164,10 +170,10 @@ def _losses(facts: RunFacts) -> list[str]:
     return lines
 
 
-def board_drops(facts: RunFacts) -> dict[str, int]:
+def board_drops(link: LinkAccount) -> dict[str, int]:
     """Frames that the board dropped while this host was connected, by reason."""
     drops: dict[str, int] = {}
-    for account in facts.link.sessions:
+    for account in link.sessions:
         before = dict(account.first.dropped)
         for reason, count in account.latest.dropped:
             drops[reason.value] = drops.get(reason.value, 0) + count - before.get(reason, 0)
@@ -195,14 +201,17 @@ def _clock(facts: RunFacts) -> dict[str, object]:
 def _session(facts: RunFacts, index: int) -> dict[str, object]:
     account = facts.link.sessions[index]
     before = dict(account.first.dropped)
+    dropped = {reason.value: count - before.get(reason, 0) for reason, count in account.latest.dropped}
+    grabbed, sent = account.latest.grabbed - account.first.grabbed, account.latest.sent - account.first.sent
     return {
         "session": account.session,
-        "grabbed": account.latest.grabbed - account.first.grabbed,
-        "sent": max(account.latest.sent - account.first.sent, account.received + account.lost),
-        "dropped": {reason.value: count - before.get(reason, 0) for reason, count in account.latest.dropped},
+        "grabbed": grabbed,
+        "sent": sent,
+        "dropped": dropped,
+        "waiting": grabbed - sent - sum(dropped.values()),
         "received": account.received,
         "lost": account.lost,
-        "stale": account.stale,
+        "stale": {"duplicate": account.duplicate, "old_session": account.old_session},
         "ended": account.ended,
         "tail": "unknown" if account.vanished else "known",
     }

@@ -4,6 +4,7 @@ While writing fails, lines of delays.jsonl wait in memory (bounded) and pairs ar
 follow in order. What is still missing at the end is said with the exit code.
 """
 
+import errno
 import json
 import logging
 import os
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from common import now
 from common.errors import UnavailableError
 from common.ledger import PairLedger
 from common.logs import event
@@ -22,6 +24,9 @@ from phone_host.formats.preview import write_png
 from phone_host.pipeline import Processed
 
 _LOG = logging.getLogger(__name__)
+
+_RETRY_NS: Final = 1_000_000_000
+"""While the disk is full it is tried again this often, not at every pair."""
 
 _PENDING_BYTES: Final = 16 * 1024 * 1024
 """Lines kept while the disk is full: about ten minutes at 30 pairs per second."""
@@ -59,12 +64,14 @@ class Results:
         self._pending: list[bytes] = []
         self._pending_bytes = 0
         self._lost_lines = self._unsaved_pairs = 0
-        self._cause = ""
+        self._cause = self._last_cause = ""
+        self._tried_ns = 0
         self._file = -1
         self._written_bytes = 0
         if folder is not None:
             try:
                 folder.mkdir(parents=True, exist_ok=True)
+                _remove_earlier(folder)
                 self._file = os.open(
                     folder / "delays.jsonl", os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644
                 )
@@ -74,9 +81,14 @@ class Results:
                 ) from None
 
     @property
+    def complete(self) -> bool:
+        """Whether everything has been written so far."""
+        return not (self._lost_lines or self._pending or self._unsaved_pairs or self._cause)
+
+    @property
     def unwritten(self) -> Unwritten:
         """What has not been written so far."""
-        return Unwritten(self._lost_lines + len(self._pending), self._unsaved_pairs, self._cause)
+        return Unwritten(self._lost_lines + len(self._pending), self._unsaved_pairs, self._last_cause)
 
     def save_pair(self, number: int, processed: Processed) -> None:
         """Write a pair's folder if it is its turn; all of it or nothing.
@@ -112,7 +124,8 @@ class Results:
         line = ledger.to_json().encode() + b"\n"
         self._pending.append(line)
         self._pending_bytes += len(line)
-        self._flush()
+        if not self._cause or now.monotonic_ns() - self._tried_ns > _RETRY_NS:
+            self.flush()
         while self._pending_bytes > _PENDING_BYTES:
             self._pending_bytes -= len(self._pending.pop(0))
             self._lost_lines += 1
@@ -125,14 +138,18 @@ class Results:
         """
         if self._folder is None:
             return
-        self._flush()
+        self.flush()
         try:
             write_text(self._folder / "report.json", json.dumps(report, indent=1) + "\n")
         except OSError as error:
             self._failed(error)
         os.close(self._file)
 
-    def _flush(self) -> None:
+    def flush(self) -> None:
+        """Write the lines that wait; what cannot be written goes on waiting."""
+        if self._folder is None or not self._pending:
+            return
+        self._tried_ns = now.monotonic_ns()
         data = b"".join(self._pending)
         try:
             done = os.pwrite(self._file, data, self._written_bytes)
@@ -141,11 +158,12 @@ class Results:
             return
         if done < len(data):  # the disk filled up in the middle of a line: the next try writes over the torn part
             os.ftruncate(self._file, self._written_bytes)
+            self._failed(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
             return
         self._written_bytes += done
         self._pending.clear()
         self._pending_bytes = 0
-        if self._cause and not self._unsaved_pairs:
+        if self._cause:
             _LOG.info(event("results_written_again", folder=self._folder))
             self._cause = ""
 
@@ -159,4 +177,11 @@ class Results:
                     remedy="make room; the run goes on",
                 )
             )
-        self._cause = error.strerror or str(error)
+        self._cause = self._last_cause = error.strerror or str(error)
+
+
+def _remove_earlier(folder: Path) -> None:
+    """Remove what an earlier run left in the folder, or it would be taken for this one's; nothing else is touched."""
+    (folder / "report.json").unlink(missing_ok=True)
+    for pair in folder.glob("pair-[0-9][0-9][0-9][0-9][0-9][0-9]*"):
+        shutil.rmtree(pair)

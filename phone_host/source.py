@@ -1,5 +1,6 @@
 """The host's own camera in a thread of its own; frames go to the pair queue."""
 
+import queue
 import threading
 from collections.abc import Callable
 from typing import Final
@@ -27,7 +28,10 @@ class Source:
         self._camera = camera
         self._deliver = deliver
         self._stop = threading.Event()
-        self._wanted = threading.Semaphore(0)
+        self._wants: queue.SimpleQueue[tuple[int, int, int | None] | None] = queue.SimpleQueue()
+        self._life = 0
+        self._expected: int | None = None
+        self._reading = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
         self.spoiled = 0
         self.skipped = 0
@@ -43,35 +47,57 @@ class Source:
         """Begin to read."""
         self._thread.start()
 
-    def want(self, exposed_ns: int) -> None:
-        """Ask a demand-paced camera for its next image, because a board frame of that exposure (host's clock, ns) has come.
+    def want(self, exposed_ns: int, index: int | None) -> None:
+        """Ask a demand-paced camera for its next image, because a board frame has come.
 
-        A board that is paced by demand, too, counts its stamps from its first image; so both count from the same moment.
+        Args:
+            exposed_ns: exposure of the board's frame on the host's clock.
+            index: number of that frame if the board is paced by demand, too: images of one number belong together. None for a board
+                with a clock of its own: then the camera counts its stamps from the first frame that asked.
         """
-        self._camera.anchor(exposed_ns)
-        self._wanted.release()
+        self._wants.put((self._life, exposed_ns, index))
+
+    def forget(self) -> None:
+        """Drop what was asked for: another board session begins, whose stamps begin anew. No image asked for before comes after this."""
+        with self._reading:
+            self._life += 1
+            self._expected = None
 
     def stop(self) -> None:
         """End the thread and let go of the camera."""
         self._stop.set()
-        self._wanted.release()
+        self._wants.put(None)
         self._thread.join()
         self._camera.close()
 
     def _run(self) -> None:
         try:
             while not self._stop.is_set() and not self.ended:
-                self._wait()
-                if not self._stop.is_set():
-                    for grab in self._camera.read(now.monotonic_ns()):
-                        self._take(grab)
+                if self.on_demand:
+                    self._answer(self._wants.get())
+                else:
+                    self._wait()
+                    self._read()
         except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
             self.failure = error
 
+    def _answer(self, want: tuple[int, int, int | None] | None) -> None:
+        """Show the image that was asked for; None was only to wake the thread."""
+        with self._reading:
+            if want is None or want[0] != self._life:
+                return
+            _, exposed_ns, index = want
+            if self._expected is None or index not in {None, self._expected}:
+                self._camera.anchor(exposed_ns, index or 0)
+            self._expected = 0 if index is None else index + 1
+            self._read()
+
+    def _read(self) -> None:
+        for grab in self._camera.read(now.monotonic_ns()):
+            if not self._stop.is_set():
+                self._take(grab)
+
     def _wait(self) -> None:
-        if self.on_demand:
-            self._wanted.acquire()
-            return
         wait_ns = self._camera.due_ns(now.monotonic_ns()) - now.monotonic_ns()
         if self._camera.pollable is None:
             self._stop.wait(min(max(0, wait_ns) / 1e9, _LONGEST_WAIT_MS / 1e3))
@@ -86,7 +112,7 @@ class Source:
                 self._deliver(grab)
             case Spoiled():
                 self.spoiled += 1
-            case Skipped():
-                self.skipped += 1
+            case Skipped(_, frames):
+                self.skipped += frames
             case Ended():
                 self.ended = True

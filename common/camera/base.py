@@ -29,10 +29,12 @@ class Skipped:
     """A grab that was passed over unread, because a newer one was there already; it has a sequence number like any other.
 
     Attributes:
-        sequence: number of the grab.
+        sequence: number of the grab; of the first one where several are told of at once.
+        frames: how many.
     """
 
     sequence: int
+    frames: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +106,8 @@ class Camera(Protocol):
             now_ns: CLOCK_MONOTONIC now, ns. A demand-paced camera gives one image for each call.
         """
 
-    def anchor(self, first_ns: int) -> None:
-        """Set the stamp of a demand-paced camera's first image, ns; later calls and other cameras take no notice."""
+    def anchor(self, exposed_ns: int, index: int) -> None:
+        """Let a demand-paced camera's next image be number `index`, exposed at `exposed_ns`; other cameras take no notice."""
 
     @property
     def health(self) -> CameraHealth:

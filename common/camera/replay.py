@@ -10,7 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Final
 
-from common.camera.base import CameraHealth, Ended, Grab, Spoiled
+from common.camera.base import CameraHealth, Ended, Grab, Skipped, Spoiled
 from common.camera.imagefile import SUFFIXES, ImageFile, load
 from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import Frame, FrameFault, find_fault
@@ -131,10 +131,12 @@ class ReplayCamera:
         del now_ns
         return self._due_ns
 
-    def anchor(self, first_ns: int) -> None:
-        """Set the stamp of a demand-paced camera's first image, ns; without it that is the time of the first read."""
-        if self._first_ns is None:
-            self._first_ns = first_ns
+    def anchor(self, exposed_ns: int, index: int) -> None:
+        """Let a demand-paced camera's next image be number `index`, exposed at `exposed_ns`; without it the first read sets the time."""
+        if self._settings.pacing is Pacing.DEMAND:
+            self._first_ns = 0
+            self._first_ns = exposed_ns - self._time_of(index)
+            self._next = index
 
     def read(self, now_ns: int) -> list[Grab]:
         """Give the images that have become due; of several missed ones all, so that each is accounted for.
@@ -143,16 +145,17 @@ class ReplayCamera:
             DataError: a file has become unreadable.
         """
         if self._settings.pacing is Pacing.DEMAND:
-            self.anchor(now_ns)
+            if self._first_ns is None:
+                self.anchor(now_ns, 0)
             return [self._grab(now_ns)]
-        grabs: list[Grab] = []
         if now_ns < self._due_ns:
-            return grabs
+            return []
         newest = self._index_at(now_ns)
-        # After a long stall (a stopped process) only the newest images matter, and their number must stay bounded.
-        skipped = max(0, newest - self._next + 1 - _BACKLOG)
-        self._sequence += skipped
-        self._next += skipped
+        # After a long stall (a stopped process) only the newest images are read; the others are told of by their number.
+        passed = max(0, newest - self._next + 1 - _BACKLOG) if self._settings.loop else 0
+        grabs: list[Grab] = [Skipped(self._sequence, passed)] if passed else []
+        self._sequence += passed
+        self._next += passed
         while self._next <= newest and not (grabs and isinstance(grabs[-1], Ended)):
             grabs.append(self._grab(now_ns))
         self._due_ns = self._time_of(self._next)
@@ -225,4 +228,4 @@ class ReplayCamera:
 
 
 _BACKLOG: Final = 64
-"""Most images given by one read: two seconds of video, as much as a driver's ring could ever hold and more."""
+"""Most images read at once: two seconds of video, as much as a driver's ring could ever hold and more."""

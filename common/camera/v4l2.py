@@ -136,7 +136,7 @@ class V4l2Camera:
             return self._look_ns
         return min(self._stall_ns, self._settle_ns or _FAR_FUTURE, self._exposure_due_ns)
 
-    def anchor(self, first_ns: int) -> None:
+    def anchor(self, exposed_ns: int, index: int) -> None:
         """A camera with a clock of its own takes no notice."""
 
     def read(self, now_ns: int) -> list[Grab]:

@@ -97,8 +97,10 @@ class BoardSession:
                 host.below_index = max(host.below_index, below_index)
                 return []
             case Bye():
+                # The last account goes behind the last frame, so that what it tells of and has not come is lost.
+                farewell = Status(self.session, counts)
                 self._host = None
-                return []
+                return [Outgoing(host.lanes[Lane.FRAMES], farewell)] if Lane.FRAMES in host.lanes else []
             case BoardHello() | Knock() | Refusal() | FrameMessage() | Pong() | Status() | End():
                 return []  # a board's words from a host: nothing a sound host sends
             case _:
@@ -168,10 +170,10 @@ class BoardSession:
         )
 
     def leave(self, counts: BoardCounts) -> list[Outgoing]:
-        """Say goodbye to the host, with the final account."""
-        if self._host is None or Lane.CONTROL not in self._host.lanes:
-            return []
-        return [Outgoing(self._host.lanes[Lane.CONTROL], Bye(counts))]
+        """Say goodbye to the host, with the final account; behind the last frame where its lane is there."""
+        lanes = {} if self._host is None else self._host.lanes
+        connection = lanes.get(Lane.FRAMES, lanes.get(Lane.CONTROL))
+        return [] if connection is None else [Outgoing(connection, Bye(counts))]
 
     def _account(self, host: _Host, counts: BoardCounts) -> list[Outgoing]:
         """Give the account of the frames, and mend what a lost packet could have left for ever.

@@ -82,6 +82,7 @@ class HostSession:
         self._host_id = host_id
         self._lanes = dict(dialled)
         self._state = _State.SEEKING
+        self._leaving = False
         self._greeted: dict[Lane, BoardHello] = {}
         self._hello: BoardHello | None = None
         self._opened_ns = 0
@@ -186,7 +187,8 @@ class HostSession:
         return [*([Vanished(orderly=False)] if was_open else []), *self._seek(now_ns)]
 
     def leave(self) -> list[Output]:
-        """Say goodbye, so that the board is free for another host at once."""
+        """Say goodbye, so that the board is free for another host at once; its last account answers."""
+        self._leaving = True
         return [Outgoing(self._lanes[Lane.CONTROL], Bye())] if self._state is _State.OPEN else []
 
     def _answer_knock(self, connection: bytes, knock: Knock, now_ns: int) -> list[Output]:
@@ -262,9 +264,9 @@ class HostSession:
             case Status(session, counts) | End(session, counts):
                 if session != self._hello.session:
                     return []
-                lost = max(0, counts.sent - self._next_index) if connection == self._lanes[Lane.FRAMES] else 0
-                self._next_index += lost
-                return [Counted(counts, isinstance(message, End), lost)]
+                behind = connection == self._lanes[Lane.FRAMES]
+                lost = self._settle(counts) if behind else 0
+                return [Counted(counts, isinstance(message, End), lost, last=behind and self._leaving)]
             case _:
                 assert_never(message)
 
@@ -276,8 +278,15 @@ class HostSession:
             self._state = _State.SEEKING
             self._greeted.clear()
             self._hello_due_ns = now_ns + HELLO_RETRY_NS
+        lost = self._settle(counts) if connection == self._lanes.get(Lane.FRAMES) else 0
         # Answered, so that the board keeps the connection until its last words were read.
-        return [Outgoing(connection, Bye()), Counted(counts, ended=False), Vanished(orderly=True)]
+        return [Outgoing(connection, Bye()), Counted(counts, ended=False, lost=lost, last=True), Vanished(orderly=True)]
+
+    def _settle(self, counts: BoardCounts) -> int:
+        """Take an account that came behind the last frame: what it tells of and has not come is lost. Gives how many."""
+        lost = max(0, counts.sent - self._next_index)
+        self._next_index += lost
+        return lost
 
     def _ping(self) -> list[Output]:
         if not self._echoes_left:

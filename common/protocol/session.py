@@ -75,11 +75,12 @@ class Echo:
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """Host: the board's account of the running session; `ended` when no frame will follow; `lost` frames that it tells of never came."""
+    """Host: the board's account of the running session; `ended` when no frame will follow; `lost` frames that it tells of never came; `last` answers our goodbye."""
 
     counts: BoardCounts
     ended: bool
     lost: int = 0
+    last: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,15 +2,30 @@
 
 Invariants: both queues are sorted by stamp; after every call no two heads could still be paired or given up; each frame leaves exactly once,
 as half of a pair or as an orphan with its reason; pairs leave in the order of their stamps.
+
+Wanted are most pairs, and among those the least sum of time skews. Two facts make that possible without seeing the end. Pairing the two oldest
+frames whenever they are within tolerance, and else giving up the older one, never loses a pair (an exchange of partners in any other pairing gives
+this one). And where each camera's frames are further apart than twice the tolerance, no frame has a choice of partners, so this is the optimum, at
+once. Elsewhere the older head may be given up for its successor, if that is nearer to the other head and costs no pair: the other head's
+own successor would be no partner of it. Successors that have not come are taken to come after one period, and waited for only where that
+may gain something: one period of the slower camera at most.
+
+Two cameras half a period apart could pair either way all the time; as giving up a frame for a nearer successor would cost a pair then, whatever
+partner the stream began with (previous or next) stays. Only at a beginning (first frames, or after an outage), where the choice is free, the
+nearer alignment is taken.
 """
 
 from collections import deque
 from dataclasses import dataclass
 from enum import Enum
-from typing import Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 B = TypeVar("B")
 H = TypeVar("H")
+
+
+_OUTAGE_FRAMES: Final = 3
+"""So many frames in succession without partner are an outage, no single losses: a new beginning."""
 
 
 class OrphanReason(Enum):
@@ -62,6 +77,14 @@ class HostOrphan(Generic[H]):
     reason: OrphanReason
 
 
+class _Choice(Enum):
+    """What to do with two frames that are within tolerance."""
+
+    PAIR = 0
+    SKIP = 1
+    WAIT = 2
+
+
 Outcome = Paired[B, H] | BoardOrphan[B] | HostOrphan[H]
 
 
@@ -78,6 +101,8 @@ class Pairing(Generic[B, H]):
         self._host: deque[tuple[int, H]] = deque()
         self._last_board_ns = self._last_host_ns = -(2**63)
         self._undecided_since_ns: int | None = None
+        self._aligned = False
+        self._passed = 0
 
     @property
     def held_board(self) -> int:
@@ -130,12 +155,18 @@ class Pairing(Generic[B, H]):
         self._undecided_since_ns = None
         return [HostOrphan(self._host.popleft()[1], OrphanReason.EVICTED)] if self._host else []
 
+    def evict_oldest_board(self) -> list[Outcome[B, H]]:
+        """Give up the oldest board frame because memory is short."""
+        self._undecided_since_ns = None
+        return [BoardOrphan(self._board.popleft()[1], OrphanReason.EVICTED)] if self._board else []
+
     def restart(self, reason: OrphanReason) -> list[Outcome[B, H]]:
         """Give up all board frames and forget their last stamp: another board clock or session follows."""
         outcomes: list[Outcome[B, H]] = [BoardOrphan(frame, reason) for _, frame in self._board]
         self._board.clear()
         self._last_board_ns = -(2**63)
         self._undecided_since_ns = None
+        self._aligned = False
         return outcomes
 
     def finish(self) -> list[Outcome[B, H]]:
@@ -154,12 +185,17 @@ class Pairing(Generic[B, H]):
             if abs(skew_ns) > self._settings.tolerance_ns:
                 # Both streams only go on in time: the earlier head has been passed by.
                 outcomes.append(self._pop_earlier(skew_ns))
-            elif self._better_known(skew_ns):
-                outcomes.append(self._pop_earlier(skew_ns))
-            elif now_ns is not None and self._better_expected(skew_ns) and not self._waited(now_ns):
-                return outcomes
+                self._passed += 1
+                self._aligned = self._aligned and self._passed < _OUTAGE_FRAMES
             else:
-                outcomes.append(Paired(self._board.popleft()[1], self._host.popleft()[1], skew_ns))
+                choice = self._choice(skew_ns)
+                if choice is _Choice.WAIT and now_ns is not None and not self._waited(now_ns):
+                    return outcomes
+                if choice is _Choice.SKIP:
+                    outcomes.append(self._pop_earlier(skew_ns))
+                else:
+                    outcomes.append(Paired(self._board.popleft()[1], self._host.popleft()[1], skew_ns))
+                    self._aligned, self._passed = True, 0
             self._undecided_since_ns = None
         return outcomes
 
@@ -168,20 +204,20 @@ class Pairing(Generic[B, H]):
             return BoardOrphan(self._board.popleft()[1], OrphanReason.NO_PARTNER)
         return HostOrphan(self._host.popleft()[1], OrphanReason.NO_PARTNER)
 
-    def _better_known(self, skew_ns: int) -> bool:
-        """Whether the earlier head's successor has come and is nearer to the other head."""
-        earlier = self._board if skew_ns < 0 else self._host
-        later_ns = (self._host if skew_ns < 0 else self._board)[0][0]
-        return len(earlier) > 1 and abs(earlier[1][0] - later_ns) < abs(skew_ns)
-
-    def _better_expected(self, skew_ns: int) -> bool:
-        """Whether the earlier head's successor has not come yet and should be nearer to the other head."""
-        earlier, period_ns = (
-            (self._board, self._settings.board_period_ns)
-            if skew_ns < 0
-            else (self._host, self._settings.host_period_ns)
-        )
-        return len(earlier) == 1 and 2 * abs(skew_ns) > period_ns
+    def _choice(self, skew_ns: int) -> "_Choice":
+        """What to do with two heads within tolerance: whether the earlier one's successor would be a better partner of the later one."""
+        board = (self._board, self._settings.board_period_ns)
+        host = (self._host, self._settings.host_period_ns)
+        (earlier, earlier_period_ns), (later, later_period_ns) = (board, host) if skew_ns < 0 else (host, board)
+        successor_ns = earlier[1][0] if len(earlier) > 1 else earlier[0][0] + earlier_period_ns
+        gain_ns = abs(skew_ns) - abs(successor_ns - later[0][0])
+        if gain_ns <= 0:
+            return _Choice.PAIR
+        next_ns = later[1][0] if len(later) > 1 else later[0][0] + later_period_ns
+        costs_a_pair = abs(next_ns - successor_ns) <= self._settings.tolerance_ns
+        if costs_a_pair and self._aligned:
+            return _Choice.PAIR
+        return _Choice.SKIP if len(earlier) > 1 else _Choice.WAIT
 
     def _waited(self, now_ns: int) -> bool:
         """Whether the better partner has had its time: one period of the slower camera."""

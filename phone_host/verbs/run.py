@@ -3,6 +3,7 @@
 import argparse
 import json
 import logging
+import math
 import sys
 from contextlib import nullcontext
 from pathlib import Path
@@ -118,15 +119,15 @@ def run(options: argparse.Namespace) -> int:
         except BaseException:
             host.results.finish(build(host.facts("failed")))
             raise
+    host.results.flush()
     facts = host.facts(ended.value)
     report = build(facts)
     host.results.finish(report)
     print(json.dumps(report) if options.json else summary(facts))
-    if ended is EndReason.STOPPED:
-        return _INTERRUPTED if signals.interrupted else 0
-    if host.results.unwritten.cause or (options.pairs and ended is not EndReason.PAIRS_REACHED):
-        return _CHECK_FAILED
-    return 0
+    if signals.interrupted:
+        return _INTERRUPTED
+    too_few = options.pairs and ended is EndReason.STREAM_ENDED
+    return _CHECK_FAILED if too_few or not host.results.complete else 0
 
 
 def _level(name: str) -> int:
@@ -141,7 +142,7 @@ def _check_numbers(options: argparse.Namespace, settings: PhoneHostSettings) -> 
         ("--save-every", options.save_every),
         ("--tolerance", settings.tolerance),
     ):
-        if value < 0:
-            raise SettingsError(f"{name} {value} is negative", "give 0 or more")
-    if options.wait is not None and options.wait < 0:
-        raise SettingsError(f"--wait {options.wait} is negative", "give seconds, 0 or more")
+        if not (math.isfinite(value) and value >= 0):
+            raise SettingsError(f"{name} {value}", "give 0 or more")
+    if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
+        raise SettingsError(f"--wait {options.wait}", "give seconds, 0 or more; leave it out to wait for ever")

@@ -100,10 +100,11 @@ class WatchedHost(Host):
             self._keep,
         )
 
-    def _frame_arrived(self, exposed_ns: int) -> None:
+    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
+        """Take the age of each frame as it comes."""
         now_ns = now.monotonic_ns()
         self.link_ages.append((now_ns, now_ns - exposed_ns))
-        super()._frame_arrived(exposed_ns)
+        super().frame_arrived(exposed_ns, index)
 
     def _keep(self, processed: Processed, ledger: PairLedger) -> None:
         del processed

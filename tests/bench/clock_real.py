@@ -20,6 +20,7 @@ from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings
 from tests.bench.machine import be_quiet, may_use_fifo
 from tests.bench.payloads import write_raw
+from tests.support.unheard import Unheard
 
 _PERIOD_NS = 33_000_000
 _LENGTH_S = 13.0
@@ -108,9 +109,7 @@ def _measured(load: str, folder: Path, fps: int, runs: int, *, fifo: bool) -> Re
 def _session(address: str) -> Iterator[tuple[float, int, ClockEstimate]]:
     """A host that comes, learns and goes; (seconds since the first echo, host's time, estimate)."""
     queue = PairQueue(FifoSettings(), None, _PERIOD_NS)
-    receiver = Receiver(
-        open_link(parse_link(address, listens_by_default=False)), now.random_id(), queue, lambda _exposed_ns: None
-    )
+    receiver = Receiver(open_link(parse_link(address, listens_by_default=False)), now.random_id(), queue, Unheard())
     receiver.start()
     start_ns = 0
     while (age_s := (now.monotonic_ns() - start_ns) / 1e9) < _LENGTH_S or not start_ns:

@@ -20,6 +20,7 @@ import msgpack
 import zmq
 
 from tests.bench.machine import be_quiet
+from tests.support.unheard import Unheard
 
 _SILENCE_S = 3.0
 _TCP_HEAD = struct.Struct("<qqI")
@@ -278,7 +279,7 @@ def receive_tandemscan(job: Job) -> Tally:
 
     queue = NoPairing(FifoSettings(), None, 1_000_000_000 // job.fps)
     link = open_link(parse_link(job.address, listens_by_default=False))
-    receiver = Stamping(link, now.random_id(), queue, lambda _exposed_ns: None)
+    receiver = Stamping(link, now.random_id(), queue, Unheard())
     receiver.start()
     while not receiver.ended and receiver.failure is None:
         time.sleep(0.1)

@@ -197,8 +197,8 @@ def test_on_demand_stamps_are_first_plus_k_over_fps(tmp_path: Path) -> None:
     for anchor_ns in (None, 777):
         camera = open_camera(f"replay:{tmp_path}?fps=24&pace=demand&loop=1", CLOCK, START_NS)
         if anchor_ns is not None:
-            camera.anchor(anchor_ns)
-            camera.anchor(anchor_ns + 1)  # the first one counts
+            camera.anchor(anchor_ns + 5, 3)
+            camera.anchor(anchor_ns, 0)  # the last one counts
         first_ns = START_NS + 5 if anchor_ns is None else anchor_ns
         for k in range(2 * IMAGES):
             [frame] = camera.read(START_NS + 5 + k * k * 10**8)

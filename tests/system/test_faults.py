@@ -252,9 +252,11 @@ def test_signals_end_both_programs_with_their_summary(number: signal.Signals, co
     assert account["grabbed"] == account["sent"] + sum(account["dropped"].values())
     (session,) = report["sessions"]
     assert session["tail"] == "known"  # the board said goodbye with its account
+    assert session["grabbed"] == session["sent"] + sum(session["dropped"].values()) + session["waiting"]
     assert session["sent"] == session["received"] + session["lost"]
     assert report["pairs"] == len(ledgers(out))
-    assert report["pairs_account"]["not_processed"] == 0
+    pairs = report["pairs_account"]
+    assert pairs["paired"] == pairs["processed"] + pairs["undecodable"] + pairs["dropped_fifo"] + pairs["stopped"]
 
 
 _IN_SMALL_DISK = """

@@ -36,7 +36,7 @@ def host_frame(sequence: int, exposed_ns: int, payload: bytes = b"") -> Frame:
 def queue_of(depth: int = 1, overflow: Overflow = Overflow.DROP_OLDEST) -> PairQueue:
     """A queue whose board session has begun."""
     queue = PairQueue(FifoSettings(depth, overflow), None, PERIOD_NS)
-    queue.begin(PERIOD_NS)
+    queue.begin(PERIOD_NS, on_demand=False)
     return queue
 
 
@@ -69,7 +69,7 @@ def test_account_holds_after_every_call(depth: int, overflow: Overflow, acts: li
             case "t":
                 queue.tick()
             case _:
-                queue.begin(PERIOD_NS + step)
+                queue.begin(PERIOD_NS + step, on_demand=False)
         counts = queue.counts
         check(counts)
         assert counts.waiting <= depth
@@ -172,12 +172,12 @@ def test_a_new_session_orphans_what_the_old_one_left() -> None:
     queue = queue_of()
     start_ns = now.monotonic_ns()
     queue.add_board(board_frame(5, start_ns + 5 * PERIOD_NS))
-    queue.begin(PERIOD_NS)
+    queue.begin(PERIOD_NS, on_demand=False)
     assert queue.counts.held_board == 0
     assert dict(queue.counts.board_orphans) == {"stream_ended": 1}
     queue.add_host(host_frame(5, start_ns + 5 * PERIOD_NS))
     assert queue.counts.held_host == 1
-    queue.begin(PERIOD_NS)
+    queue.begin(PERIOD_NS, on_demand=False)
     queue.add_board(board_frame(0, start_ns + 5 * PERIOD_NS))  # older than the last one of the session before
     assert queue.counts.paired == 1
 

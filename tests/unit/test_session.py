@@ -262,16 +262,17 @@ def test_a_silent_board_is_given_up() -> None:
 
 
 def test_a_boards_goodbye_gives_its_last_account() -> None:
-    """A board that leaves on purpose is known as such, with its final counts, and is sought again."""
+    """A board that leaves on purpose is known as such, with its final counts and what they show as lost, and is sought again."""
     world = World()
     world.settle(300 * MS)
     host = world.hosts[0]
-    counts = BoardCounts(100, 90)
+    sent = world.counts.sent
+    counts = BoardCounts(sent + 9, sent + 3)
     [goodbye] = world.board.leave(counts)
     assert goodbye.message == Bye(counts)
-    control = host.names[Lane.CONTROL]
-    outputs = host.session.receive(control, goodbye.message, world.now_ns)
-    assert outputs == [Outgoing(control, Bye()), Counted(counts, ended=False), Vanished(orderly=True)]
+    frames = host.names[Lane.FRAMES]
+    outputs = host.session.receive(frames, goodbye.message, world.now_ns)
+    assert outputs == [Outgoing(frames, Bye()), Counted(counts, ended=False, lost=3, last=True), Vanished(orderly=True)]
     assert not host.session.is_open
     world.settle(1000 * MS)
     assert host.session.is_open
@@ -287,7 +288,7 @@ def test_a_goodbye_counts_also_when_the_other_lane_broke_first() -> None:
     control = host.names[Lane.CONTROL]
     assert host.session.receive(control, Bye(BoardCounts(1, 1)), world.now_ns) == []
     outputs = host.session.receive(control, Bye(counts), world.now_ns)
-    assert outputs == [Outgoing(control, Bye()), Counted(counts, ended=False), Vanished(orderly=True)]
+    assert outputs == [Outgoing(control, Bye()), Counted(counts, ended=False, last=True), Vanished(orderly=True)]
 
 
 def test_the_end_is_said_until_it_is_heard() -> None:
