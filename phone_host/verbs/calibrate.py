@@ -5,8 +5,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from common.errors import DataError, UnavailableError
+from common.errors import DataError
 from phone_host.formats.json_text import json_text
+from phone_host.verbs.outputs import require_file, unwritable
 
 if TYPE_CHECKING:
     from phone_host.stereo.board_views import BoardViews
@@ -46,6 +47,7 @@ def run(options: argparse.Namespace) -> int:
     from phone_host.stereo.view_files import pair_files  # noqa: PLC0415
 
     board = parse_board(options.board, options.square)
+    require_file(options.out)
     files = pair_files(options.left, options.right)
     views = _look(files, board)
     try:
@@ -162,7 +164,7 @@ def _write_rig(out: Path, calibration: "Calibration") -> None:
         else:
             write_rig(out, calibration.rig, calibration.rectification)
     except OSError as error:
-        raise _unwritable(out, error) from error
+        raise unwritable(out, error) from error
 
 
 def _write_report(out: Path, report: dict[str, Any]) -> None:
@@ -172,11 +174,7 @@ def _write_report(out: Path, report: dict[str, Any]) -> None:
         out.parent.mkdir(parents=True, exist_ok=True)
         write_text(out.with_name("report.json"), json_text(report, indent=2) + "\n")
     except OSError as error:
-        raise _unwritable(out, error) from error
-
-
-def _unwritable(out: Path, error: OSError) -> UnavailableError:
-    return UnavailableError(f"{out} cannot be written ({error.strerror})", "free the disk, or name another --out")
+        raise unwritable(out, error) from error
 
 
 def _rejections(rejected: tuple["Rejected", ...]) -> str:

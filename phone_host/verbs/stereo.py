@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common import now
-from common.errors import SettingsError, UnavailableError
+from common.errors import SettingsError
 from phone_host.formats.json_text import json_text
+from phone_host.verbs.outputs import require_folder, unwritable
 
 if TYPE_CHECKING:
     from phone_host.model import CloudImage, Disparity, RectifiedPair
@@ -47,6 +48,7 @@ def run(options: argparse.Namespace) -> int:
             "neither --calibration nor --rectified is given",
             "give the rig.yaml of `phone-host calibrate`, or --rectified --disparities N",
         )
+    require_folder(options.out)
     watch = _StopWatch()
     left, right = read_pair(options.left, options.right)
     if options.rectified:
@@ -145,7 +147,7 @@ def _write(out: Path, pair: "RectifiedPair", disparity: "Disparity", cloud: "Clo
             return None
         return write_ply(out / "cloud.ply", cloud, pair.left)
     except OSError as error:
-        raise _unwritable(out, error) from error
+        raise unwritable(out, error) from error
 
 
 def _write_report(out: Path, report: dict[str, Any]) -> None:
@@ -154,13 +156,7 @@ def _write_report(out: Path, report: dict[str, Any]) -> None:
     try:
         write_text(out / "report.json", json_text(report, indent=2) + "\n")
     except OSError as error:
-        raise _unwritable(out, error) from error
-
-
-def _unwritable(out: Path, error: OSError) -> UnavailableError:
-    return UnavailableError(
-        f"results cannot be written to {out} ({error.strerror})", "free the disk, or name another --out"
-    )
+        raise unwritable(out, error) from error
 
 
 def _summary(report: dict[str, Any], out: Path) -> str:

@@ -151,6 +151,20 @@ def test_usage_errors_are_exit_2(boards: Path, tmp_path: Path) -> None:
         assert "Traceback" not in done.stderr
 
 
+def test_what_is_no_file_is_not_replaced(boards: Path, tmp_path: Path) -> None:
+    """--out that is a folder or a pipe, or lies in a file, is exit 3 at once; it stays what it was."""
+    (tmp_path / "file").write_text("no folder")
+    os.mkfifo(tmp_path / "pipe")
+    for out, said in (("", "is no file"), ("pipe", "pipe is no file"), ("file/rig.yaml", "file is no folder")):
+        done = _phone_host(
+            "calibrate", boards / "left", boards / "right", "--board", "9x6", "--square", 25, "--out", tmp_path / out
+        )
+        assert done.returncode == 3, done.stderr
+        assert done.stderr.count("\n") == 1
+        assert said in done.stderr
+    assert (tmp_path / "pipe").is_fifo()
+
+
 def _scan_data() -> Path:
     folder = os.environ.get("SCAN_DATA")
     if not folder:

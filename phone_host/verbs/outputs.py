@@ -1,0 +1,47 @@
+"""Where a verb's results go: what cannot be is said before the work, what fails while writing with its remedy."""
+
+from pathlib import Path
+
+from common.errors import UnavailableError
+
+
+def require_folder(out: Path) -> None:
+    """Refuse an --out that is there and is no folder.
+
+    Raises:
+        UnavailableError: it is something else, or lies in something else.
+    """
+    _require_folder(out, out)
+
+
+def require_file(out: Path) -> None:
+    """Refuse an --out that is there and is no regular file: replacing it would take a folder, a device or a pipe away.
+
+    Raises:
+        UnavailableError: it is something else, or lies in something that is no folder.
+    """
+    _require_folder(out.parent, out)
+    if out.exists() and not out.is_file():
+        raise UnavailableError(f"{out} is no file", "name another --out")
+
+
+def unwritable(out: Path, error: OSError) -> UnavailableError:
+    """What to say when results cannot be written.
+
+    Args:
+        out: what the user gave.
+        error: what the operating system said.
+
+    Returns:
+        The error to raise.
+    """
+    return UnavailableError(f"{out} cannot be written ({error.strerror})", "free the disk, or name another --out")
+
+
+def _require_folder(folder: Path, out: Path) -> None:
+    try:
+        there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    except OSError as error:
+        raise unwritable(out, error) from None
+    if not there.is_dir():
+        raise UnavailableError(f"{there} is no folder", "name another --out")
