@@ -66,16 +66,17 @@ def pair_files(left: str, right: str) -> ViewFiles:
 
 
 def _images(given: str, side: str) -> list[Path]:
-    """Image files of a folder or a glob, numbers in names as numbers."""
+    """Image files of a folder or a glob, without hidden ones, numbers in names as numbers."""
     if Path(given).is_dir():
-        files = [path for path in Path(given).iterdir() if path.suffix.lower() in _SUFFIXES and path.is_file()]
+        found = [path for path in Path(given).iterdir() if path.suffix.lower() in _SUFFIXES]
     else:
-        files = [Path(name) for name in glob.glob(given) if Path(name).is_file()]  # noqa: PTH207 - a pattern may be absolute
+        found = [Path(name) for name in glob.glob(given)]  # noqa: PTH207 - a pattern may be absolute
+    files = [path for path in found if path.is_file() and not path.name.startswith(".")]
     if not files:
         raise DataError(
             f"{side} {given!r} names no image", "give a folder of images or a quoted glob such as 'left*.png'"
         )
-    return sorted((path for path in files if not path.name.startswith(".")), key=_natural)
+    return sorted(files, key=_natural)
 
 
 def _natural(path: Path) -> tuple[list[tuple[int, str]], str]:

@@ -62,3 +62,12 @@ def test_a_side_without_images_is_named(tmp_path: Path, name: str) -> None:
     good = _touch(tmp_path / "good", "a1.png")
     with pytest.raises(DataError, match="RIGHT"):
         pair_files(str(good), str(tmp_path / name))
+
+
+@pytest.mark.parametrize("name", ["hidden", "hidden/.*.png"])
+def test_hidden_files_alone_are_no_images(name: str, tmp_path: Path) -> None:
+    """A folder or a glob that has nothing but hidden files is refused by side, like an empty one."""
+    _touch(tmp_path / "hidden", ".a1.png")
+    good = _touch(tmp_path / "good", "a1.png")
+    with pytest.raises(DataError, match="LEFT .* names no image"):
+        pair_files(str(tmp_path / name), str(good))
