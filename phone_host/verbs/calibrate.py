@@ -54,6 +54,7 @@ def run(options: argparse.Namespace) -> int:
         calibration = calibrate(list(views.pairs), board, views.sizes_px, Side(options.board_side))
     except DataError as error:
         report = _failed(files, views, error)
+        _write_rig(options.out, None)
         _write_report(options.out, report)
         if options.json:
             print(json_text(report))
@@ -153,13 +154,13 @@ def _figures(calibration: "Calibration") -> dict[str, Any]:
     }
 
 
-def _write_rig(out: Path, calibration: "Calibration") -> None:
-    """Write rig.yaml; a rig that cannot be rectified has none, and one of an earlier run must not be taken for it."""
+def _write_rig(out: Path, calibration: "Calibration | None") -> None:
+    """Write rig.yaml; where there is no rig, or none that can be rectified, one of an earlier run must not be taken for it."""
     from phone_host.formats.rig_yaml import write_rig  # noqa: PLC0415
 
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        if calibration.rectification is None:
+        if calibration is None or calibration.rectification is None:
             out.unlink(missing_ok=True)
         else:
             write_rig(out, calibration.rig, calibration.rectification)

@@ -96,7 +96,8 @@ def test_the_table_names_every_pair(boards: Path, tmp_path: Path) -> None:
 
 
 def test_swapped_sides_are_exit_4_with_the_remedy_and_a_report(boards: Path, tmp_path: Path) -> None:
-    """LEFT and RIGHT swapped: verdict reject, the remedy says so, no rig.yaml that could be used by mistake."""
+    """LEFT and RIGHT swapped: verdict reject, the remedy says so, no rig.yaml that could be used by mistake, not even an old one."""
+    (tmp_path / "rig.yaml").write_text("of an earlier run")
     done = _phone_host(
         "calibrate", boards / "right", boards / "left", "--board", "9x6", "--square", "25mm",
         "--out", tmp_path / "rig.yaml", "--json",
@@ -110,7 +111,8 @@ def test_swapped_sides_are_exit_4_with_the_remedy_and_a_report(boards: Path, tmp
 
 
 def test_too_few_pairs_are_exit_4_with_a_report(boards: Path, tmp_path: Path) -> None:
-    """A wrong --board finds nothing: one line on stderr, the reasons as JSON on stdout and in report.json."""
+    """A wrong --board finds nothing: one line on stderr, the reasons as JSON on stdout and in report.json, an old rig is gone."""
+    (tmp_path / "rig.yaml").write_text("of an earlier run")
     done = _phone_host(
         "calibrate", boards / "left", boards / "right", "--board", "12x9", "--square", "25mm",
         "--out", tmp_path / "rig.yaml", "--json",
@@ -122,6 +124,8 @@ def test_too_few_pairs_are_exit_4_with_a_report(boards: Path, tmp_path: Path) ->
     assert report["verdict"] == "reject"
     assert report["remedy"]
     assert len(report["pairs"]["rejected"]) == 12
+    assert report == json.loads((tmp_path / "report.json").read_text())
+    assert not (tmp_path / "rig.yaml").exists()
 
 
 def test_views_that_contradict_each_other_are_rejected_with_files(boards: Path, tmp_path: Path) -> None:
