@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.protocol.session import Echo
-from phone_host.sync.hull import Hull, widening_ns
+from phone_host.sync.hull import SKEW_CHANGE, Hull, widening_ns
 from phone_host.sync.strip import MAX_SKEW, Allowed, Belief, Spacing, allowed_lines, believe
 
 __all__ = ["ASYMMETRY", "MAX_SKEW", "ClockEstimate", "ClockEstimator", "HostTime"]
@@ -27,11 +27,11 @@ __all__ = ["ASYMMETRY", "MAX_SKEW", "ClockEstimate", "ClockEstimator", "HostTime
 ASYMMETRY: Final = 0.04
 """Error per least round trip that an unequal pair of least delays may make: half of their difference (bench_clock, real processes)."""
 
-WAVES: Final = 96
-"""Waves whose scatter is looked at: 48 s when old, more than the widening lets matter on any link of this project."""
+WAVES: Final = 64
+"""Waves whose scatter is looked at: 32 s when old; at twice that the widening is as large as the scatter of a slow link."""
 
-_SMALLEST: Final = 8
-"""The spacing is that of so many smallest delays: fewer are chance, more are not near the least one any more."""
+_SMALLEST: Final = 12
+"""The spacing is that of so many smallest delays: with 8 the uncertainty was too small in 0.5 % on a serial line (bench_clock)."""
 
 _LEAST_SPACING_NS: Final = 500.0
 """Nobody takes a stamp more exactly than this in an interpreter."""
@@ -172,14 +172,14 @@ class _Learned:
         wave.round_trip_ns = min(wave.round_trip_ns, round_trip_ns)
 
     def _is_tight(self, echo: Echo) -> bool:
-        """Whether an echo came as close to the lines as the best few; of others only the first of a wave is worth the arithmetic."""
-        estimate, spacing = self.estimate, self._spacing
-        if estimate is None or spacing is None:
+        """Whether an echo came closer to the truth than all before; others become part of the estimate with the next wave."""
+        estimate = self.estimate
+        if estimate is None or self._spacing is None:
             return True
         delay_ns = estimate.round_trip_ns / 2
         there_ns = echo.t1_ns + estimate.offset_at(echo.t1_ns) - echo.t0_ns - delay_ns
         back_ns = echo.t3_ns - echo.t2_ns - estimate.offset_at(echo.t2_ns) - delay_ns
-        return there_ns < spacing.there_ns or back_ns < spacing.back_ns
+        return there_ns < 0 or back_ns < 0
 
     def _solved(self) -> ClockEstimate | None:
         """Make the estimate; None if the facts contradict each other."""
@@ -217,21 +217,25 @@ class _Learned:
     def _first_spacing(self, rows: list[Allowed]) -> Spacing:
         """A guess for the first wave: the delay above the least is a quarter of the round trip."""
         guess = max(_LEAST_SPACING_NS, max(row.high_ns - row.low_ns for row in rows) / 4 / len(self.waves))
-        return Spacing(guess, guess)
+        return Spacing(guess, guess, 1)
 
     def _measured_spacing(self, line: Allowed, reference_ns: int, origin_ns: int) -> Spacing | None:
         """Measure how close the waves' best echoes came to the touching lines; None while there are too few."""
         count = min(_SMALLEST, len(self.waves) // 2)
         if count < 2:
             return None
-        there, back = [], []
-        for wave in self.waves:
-            age = wave.lower[0] - reference_ns
-            there.append(line.low_ns + line.skew * age - (wave.lower[1] - origin_ns) + widening_ns(age))
-            age = wave.upper[0] - reference_ns
-            back.append(wave.upper[1] - origin_ns - line.high_ns - line.skew * age + widening_ns(age))
-        values = (sorted(side)[count] / (count - 1) for side in (there, back))
-        return Spacing(*(max(_LEAST_SPACING_NS, value) for value in values))
+        skew, half = line.skew, SKEW_CHANGE / 2
+        from_low, from_high = line.low_ns + origin_ns, line.high_ns + origin_ns
+        there = [
+            from_low + (skew + half * (x - reference_ns)) * (x - reference_ns) - y
+            for x, y in [wave.lower for wave in self.waves]
+        ]
+        back = [
+            y - from_high - (skew - half * (x - reference_ns)) * (x - reference_ns)
+            for x, y in [wave.upper for wave in self.waves]
+        ]
+        there_ns, back_ns = (max(_LEAST_SPACING_NS, sorted(side)[count] / (count - 1)) for side in (there, back))
+        return Spacing(there_ns, back_ns, count - 1)
 
 
 class ClockEstimator:
