@@ -69,5 +69,5 @@ def test_hidden_files_alone_are_no_images(name: str, tmp_path: Path) -> None:
     """A folder or a glob that has nothing but hidden files is refused by side, like an empty one."""
     _touch(tmp_path / "hidden", ".a1.png")
     good = _touch(tmp_path / "good", "a1.png")
-    with pytest.raises(DataError, match="LEFT .* names no image"):
+    with pytest.raises(DataError, match=r"LEFT .* names no image"):
         pair_files(str(tmp_path / name), str(good))
