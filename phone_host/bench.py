@@ -4,11 +4,7 @@ Root beside `host`: what is measured is the product itself over rendered films, 
 is left out of its statistics: caches, the clock estimate and credit settle there. Counts are of the whole run.
 """
 
-import json
-import subprocess
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -18,11 +14,12 @@ import numpy as np
 
 from common import now
 from common.camera.factory import open_camera
-from common.errors import SettingsError, UnavailableError
+from common.errors import SettingsError
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.demo import NEAR_M, free_port
+from phone_host.boardprocess import BoardAccount, board_process, free_port
+from phone_host.demo import NEAR_M
 from phone_host.film import Film, render_film
 from phone_host.host import Host, HostSettings
 from phone_host.model import Camera, Rig, StereoGeometry
@@ -46,7 +43,6 @@ _PATIENCE_S: Final = 15.0
 """For the board process to come up and the first pair to be done, on a small and busy machine."""
 
 _PATIENCE_NS: Final = round(_PATIENCE_S * 1e9)
-_GOODBYE_S: Final = 10.0
 _LEAST_PX, _MOST_PX = 64, 4096
 _MOST_HZ: Final = 240
 
@@ -72,21 +68,6 @@ class Case:
 
     def __str__(self) -> str:
         return f"{self.link} {self.size} {self.rate_hz}/s"
-
-
-@dataclass(frozen=True, slots=True)
-class BoardAccount:
-    """What the board process said of its frames at its end: grabbed = sent + all dropped.
-
-    Attributes:
-        grabbed: frames in all.
-        sent: given to the link.
-        dropped: those that were not, by reason.
-    """
-
-    grabbed: int
-    sent: int
-    dropped: tuple[tuple[str, int], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,51 +267,3 @@ def _core(size: Size, matcher: MatcherName) -> StereoCore:
     geometry = StereoGeometry(focal_px, -float(rig.t_right_left_m[0]), cx_px, cy_px)
     disparities = disparities_for_near(geometry, NEAR_M, size.width_px)
     return StereoCore(create_matcher(MatchSettings(matcher, disparities)), None, geometry)
-
-
-class BoardProcess:
-    """A running board-agent process."""
-
-    def __init__(self, process: subprocess.Popen[bytes]) -> None:
-        self._process = process
-
-    def check(self) -> None:
-        """Raise UnavailableError with the process's own last word if it is gone."""
-        if self._process.poll() is not None:
-            words = self._process.communicate()[1].decode(errors="replace").strip().splitlines()
-            raise UnavailableError(
-                f"board-agent ended with exit code {self._process.returncode}", words[-1] if words else "run it by hand"
-            )
-
-    def stop(self) -> BoardAccount:
-        """Ask it to end; gives its account."""
-        self.check()
-        self._process.terminate()
-        try:
-            said = json.loads(self._process.communicate(timeout=_GOODBYE_S)[0])
-        except (subprocess.TimeoutExpired, ValueError):
-            raise UnavailableError("board-agent did not end with its account", "run it by hand with --json") from None
-        return BoardAccount(said["grabbed"], said["sent"], tuple(sorted(said["dropped"].items())))
-
-
-@contextmanager
-def board_process(camera: str, address: str) -> Iterator[BoardProcess]:
-    """A board-agent process for the length of a block; whatever happens, it is gone afterwards."""
-    # -P: a folder named `common` where the user happens to stand must not be taken for ours.
-    command = [sys.executable, "-P", "-m", "board_agent.cli", "run", "--camera", camera, "--link", address]
-    process = subprocess.Popen(
-        [*command, "--log-level", "warning", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
-    try:
-        yield BoardProcess(process)
-    finally:
-        if process.poll() is None:
-            process.terminate()
-            try:
-                process.wait(_GOODBYE_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-        for pipe in (process.stdout, process.stderr):
-            if pipe is not None:
-                pipe.close()

@@ -1,11 +1,7 @@
 """The demo: a rendered moving scene, a real board-agent process and the host on this machine, checked against the scene's truth."""
 
 import math
-import socket
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -14,10 +10,10 @@ import numpy as np
 
 from common import now
 from common.camera.factory import open_camera
-from common.errors import UnavailableError
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
+from phone_host.boardprocess import board_process, free_port
 from phone_host.film import Film
 from phone_host.formats.ply import write_ply
 from phone_host.formats.preview import write_preview
@@ -130,13 +126,10 @@ class DemoRun:
         Raises:
             UnavailableError: the board process did not come up or died.
         """
-        with board_process(self._film, self.address) as board:
+        with board_process(self._film.replay_uri(self._film.left), self.address) as board:
 
             def finished() -> bool:
-                if board.poll() is not None:
-                    raise UnavailableError(
-                        f"board-agent ended with exit code {board.returncode}", "look at its message above"
-                    )
+                board.check()
                 first_ns = self.host.first_done_ns
                 return stop() or (first_ns > 0 and now.monotonic_ns() - first_ns > seconds * 1e9)
 
@@ -181,7 +174,7 @@ class DemoRun:
 
     def _keep(self, processed: Processed, ledger: PairLedger) -> None:
         self.ledgers.append(ledger)
-        if len(self.ledgers) % _CHECK_EVERY:
+        if (len(self.ledgers) - 1) % _CHECK_EVERY:
             return
         host_exposed_ns = ledger.board.exposed_ns - ledger.time_skew_ns
         # The board's stamp is known on this clock to some 50 us; the images are 1 / 15 s apart.
@@ -189,50 +182,6 @@ class DemoRun:
         self._checked.append(CheckedPair(processed, ledger, *indices))
         if len(self._checked) > _CHECKED_PAIRS:
             del self._checked[0]
-
-
-@contextmanager
-def board_process(film: Film, address: str) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a board-agent over a film's left images; it ends with the block.
-
-    Args:
-        film: what it replays.
-        address: where it listens.
-    """
-    # -P: a folder named `common` where the user happens to stand must not be taken for ours.
-    command = [
-        sys.executable,
-        "-P",
-        "-m",
-        "board_agent.cli",
-        "run",
-        "--camera",
-        film.replay_uri(film.left),
-        "--link",
-        address,
-    ]
-    process = subprocess.Popen([*command, "--log-level", "warning"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    try:
-        yield process
-    finally:
-        process.terminate()
-        try:
-            process.wait(10)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        assert process.stderr is not None
-        complaints = process.stderr.read().decode(errors="replace")
-        process.stderr.close()
-        if process.returncode:
-            sys.stderr.write(complaints)
-
-
-def free_port() -> int:
-    """A TCP port of the loopback interface that nobody has now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def truth_json(errors: DepthErrors) -> dict[str, float | int | None]:

@@ -12,8 +12,12 @@ from common.errors import SettingsError, UnavailableError
 from common.signals import StopSignals
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from phone_host.demo import DepthErrors
     from phone_host.film import Film
+    from phone_host.model import Rig
+    from phone_host.stereo.scene import Scene
 
 EXAMPLES = """  phone-host demo
   phone-host demo --seconds 30 --out scan-demo
@@ -34,17 +38,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Render, stream, measure, compare with the truth."""
     from rich.console import Console  # noqa: PLC0415 - OpenCV and rich, only now
-    from rich.progress import Progress  # noqa: PLC0415
 
-    from phone_host.demo import FPS, DemoRun, truth_json  # noqa: PLC0415
+    from phone_host.demo import DemoRun, truth_json  # noqa: PLC0415
     from phone_host.demo_page import demo_page  # noqa: PLC0415
-    from phone_host.film import render_film  # noqa: PLC0415
     from phone_host.formats.atomic import write_text  # noqa: PLC0415
     from phone_host.formats.rig_yaml import write_rig  # noqa: PLC0415
     from phone_host.live import LiveTable  # noqa: PLC0415
     from phone_host.report import build, summary  # noqa: PLC0415
     from phone_host.stereo.rectify import rectify_rig  # noqa: PLC0415
-    from phone_host.stereo.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, demo_scene, unlike_rig  # noqa: PLC0415
+    from phone_host.stereo.scene import demo_scene, unlike_rig  # noqa: PLC0415
 
     if not 1 <= options.seconds <= 3600:
         raise SettingsError(f"--seconds {options.seconds:g}", "give 1 to 3600")
@@ -53,45 +55,79 @@ def run(options: argparse.Namespace) -> int:
     console = Console(stderr=True)
     out: Path = options.out
     rig, scene = unlike_rig(), demo_scene()
+
     try:
         out.mkdir(parents=True, exist_ok=True)
-        with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
-            task = progress.add_task("rendering a moving scene for two cameras", total=2 * FPS * DEMO_PERIOD_S)
-            film = render_film(
-                scene,
-                rig,
-                (WEBCAM_LOOK, PHONE_LOOK),
-                out / "film",
-                fps=FPS,
-                seconds=DEMO_PERIOD_S,
-                advance=lambda: progress.advance(task),
-            )
+        film = _render(scene, rig, out / "film", console, signals)
         write_rig(out / "rig.yaml", rig, rectify_rig(rig))
+        demo = DemoRun(film, rig, out)
+        live = LiveTable(demo.host, console, options.seconds) if console.is_terminal else None
+        try:
+            with live or nullcontext():
+                demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
+        except BaseException:
+            demo.host.results.finish(build(demo.host.facts("failed")))
+            raise
+        facts = demo.host.facts("stopped" if signals.stop else "time_over")
+        errors = demo.check(scene)
+        report = build(facts) | {"truth": truth_json(errors)}
+        demo.host.results.finish(report)
+        demo.write_pictures(out)
+        write_text(out / "index.html", demo_page(facts, errors, demo.last, demo.ledgers))
+    except _StoppedError:
+        return _INTERRUPTED if signals.interrupted else 0
     except OSError as error:
         raise UnavailableError(
-            f"{error.filename or out} cannot be written ({error.strerror})", "give another folder with --out"
+            f"{error.filename or out} cannot be written ({error.strerror})",
+            "make room, or give another folder with --out",
         ) from None
-    demo = DemoRun(film, rig, out)
-    live = LiveTable(demo.host, console, options.seconds) if console.is_terminal else None
-    with live or nullcontext():
-        demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
-    facts = demo.host.facts("stopped" if signals.stop else "time_over")
-    errors = demo.check(scene)
-    report = build(facts) | {"truth": truth_json(errors)}
-    demo.host.results.finish(report)
-    demo.write_pictures(out)
-    write_text(out / "index.html", demo_page(facts, errors, demo.last, demo.ledgers))
     print(json.dumps(report) if options.json else summary(facts))
     print(_closing(out, film, errors), file=sys.stderr)
-    if signals.interrupted:
-        return _INTERRUPTED
-    return 0 if errors.pairs and not errors.wrong_pairs else _CHECK_FAILED
+    if signals.stop:
+        return _INTERRUPTED if signals.interrupted else 0
+    return 0 if errors.pairs and not errors.wrong_pairs and demo.host.results.complete else _CHECK_FAILED
+
+
+class _StoppedError(Exception):
+    """The way out of a rendering that is not wanted any more."""
+
+
+def _render(scene: "Scene", rig: "Rig", folder: Path, console: "Console", signals: StopSignals) -> "Film":
+    """Render the film with a progress bar.
+
+    Raises:
+        _StoppedError: a signal came.
+        OSError: the folder cannot be written to.
+    """
+    from rich.progress import Progress  # noqa: PLC0415
+
+    from phone_host.demo import FPS  # noqa: PLC0415
+    from phone_host.film import render_film  # noqa: PLC0415
+    from phone_host.stereo.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK  # noqa: PLC0415
+
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("rendering a moving scene for two cameras", total=2 * FPS * DEMO_PERIOD_S)
+
+        def advance() -> None:
+            progress.advance(task)
+            if signals.stop:
+                raise _StoppedError
+
+        looks = (WEBCAM_LOOK, PHONE_LOOK)
+        return render_film(scene, rig, looks, folder, fps=FPS, seconds=DEMO_PERIOD_S, advance=advance)
 
 
 def _closing(out: Path, film: "Film", errors: "DepthErrors") -> str:
     board = f"board-agent run --camera '{film.replay_uri(film.left)}'"
     host = f"phone-host run --camera '{film.replay_uri(film.right)}' --calibration {out}/rig.yaml --out scan"
-    return f"""depth against the known scene: {errors.depth_mm:.1f} mm median error ({errors.depth_percent:.2f} %), {errors.at_1_m_mm:.1f} mm at 1 m, {errors.at_2_m_mm:.1f} mm at 2 m, {errors.density:.0%} of the pixels
+    if not errors.pairs:
+        return f"no pair was processed in that time, so nothing could be checked: give more --seconds; see {out}/index.html"
+    wrong = (
+        f"\nWRONG: {errors.wrong_pairs} of {errors.pairs} checked pairs show two different moments"
+        if errors.wrong_pairs
+        else ""
+    )
+    return f"""depth against the known scene: {errors.depth_mm:.1f} mm median error ({errors.depth_percent:.2f} %), {errors.at_1_m_mm:.1f} mm at 1 m, {errors.at_2_m_mm:.1f} mm at 2 m, {errors.density:.0%} of the pixels{wrong}
 
 look at   {out}/index.html       the scene, its depth and every delay
           {out}/cloud.ply        the point cloud, in any 3D viewer

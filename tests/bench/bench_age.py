@@ -27,8 +27,7 @@ from common.camera.factory import open_camera
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.bench import board_process
-from phone_host.demo import free_port
+from phone_host.boardprocess import board_process, free_port
 from phone_host.host import Host, HostSettings
 from phone_host.model import Disparity, RectifiedPair
 from phone_host.pipeline import Processed

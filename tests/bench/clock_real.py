@@ -12,8 +12,7 @@ import numpy as np
 
 from common import now
 from common.link.factory import open_link, parse_link
-from phone_host.bench import board_process
-from phone_host.demo import free_port
+from phone_host.boardprocess import board_process, free_port
 from phone_host.pairqueue import PairQueue
 from phone_host.receiver import Receiver
 from phone_host.sync.clock import ClockEstimate

@@ -15,7 +15,6 @@ from common.protocol.message import BoardCounts
 from phone_host.bench import (
     LINKS,
     WARM_UP_S,
-    BoardAccount,
     Case,
     CaseResult,
     Size,
@@ -27,6 +26,7 @@ from phone_host.bench import (
     rig_of,
 )
 from phone_host.bench_report import Conditions, as_json, losses, page, rows
+from phone_host.boardprocess import BoardAccount
 from phone_host.delays import DELAYS, STAGES
 from phone_host.pairqueue import PairCounts
 from phone_host.receiver import LinkAccount, SessionAccount

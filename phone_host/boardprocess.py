@@ -1,0 +1,85 @@
+"""A board-agent process on this machine, for the demo and the delay benchmark."""
+
+import json
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Final
+
+from common.errors import UnavailableError
+
+_GOODBYE_S: Final = 10.0
+"""A board that was asked to end gets this long; it needs 0.3 s at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class BoardAccount:
+    """What the board process said of its frames at its end: grabbed = sent + all dropped.
+
+    Attributes:
+        grabbed: frames in all.
+        sent: given to the link.
+        dropped: those that were not, by reason.
+    """
+
+    grabbed: int
+    sent: int
+    dropped: tuple[tuple[str, int], ...]
+
+
+class BoardProcess:
+    """A running board-agent process."""
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        self._process = process
+
+    def check(self) -> None:
+        """Raise UnavailableError with the process's own last word if it is gone."""
+        if self._process.poll() is not None:
+            words = self._process.communicate()[1].decode(errors="replace").strip().splitlines()
+            raise UnavailableError(
+                f"board-agent ended with exit code {self._process.returncode}", words[-1] if words else "run it by hand"
+            )
+
+    def stop(self) -> BoardAccount:
+        """Ask it to end; gives its account."""
+        self.check()
+        self._process.terminate()
+        try:
+            said = json.loads(self._process.communicate(timeout=_GOODBYE_S)[0])
+        except (subprocess.TimeoutExpired, ValueError):
+            raise UnavailableError("board-agent did not end with its account", "run it by hand with --json") from None
+        return BoardAccount(said["grabbed"], said["sent"], tuple(sorted(said["dropped"].items())))
+
+
+@contextmanager
+def board_process(camera: str, address: str) -> Iterator[BoardProcess]:
+    """A board-agent process for the length of a block; whatever happens, it is gone afterwards."""
+    # -P: a folder named `common` where the user happens to stand must not be taken for ours.
+    command = [sys.executable, "-P", "-m", "board_agent.cli", "run", "--camera", camera, "--link", address]
+    process = subprocess.Popen(
+        [*command, "--log-level", "warning", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    try:
+        yield BoardProcess(process)
+    finally:
+        if process.poll() is None:
+            process.terminate()
+            try:
+                process.wait(_GOODBYE_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        for pipe in (process.stdout, process.stderr):
+            if pipe is not None:
+                pipe.close()
+
+
+def free_port() -> int:
+    """A TCP port of the loopback interface that nobody has now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
