@@ -15,12 +15,12 @@ from board_agent.settings import ENVIRONMENT_PREFIX, BoardSettings
 from board_agent.status import StatusLine
 from common import logs, now
 from common.camera.base import CameraHealth
-from common.camera.factory import EXAMPLE, open_camera
+from common.camera.factory import EXAMPLE, open_camera, parse_camera
 from common.commandline import INTERRUPTED, ExamplesFirstParser, run_command
 from common.errors import SettingsError
 from common.link.factory import open_link, parse_link
 from common.protocol.message import BoardCounts
-from common.settings import Resolved, resolve
+from common.settings import Resolved, listing, log_level, resolve
 from common.signals import StopSignals
 from common.stamp import board_clock
 
@@ -86,13 +86,24 @@ def _resolve(options: argparse.Namespace) -> Resolved[BoardSettings]:
 
 def _settings(options: argparse.Namespace) -> int:
     resolved = _resolve(options)
-    rows = [(name, getattr(resolved.values, name), origin) for name, origin in resolved.origins]
-    if options.json:
-        print(json.dumps({name: {"value": value, "origin": origin} for name, value, origin in rows}))
-    else:
-        for name, value, origin in rows:
-            print(f"{name:12} {' '.join(value) if isinstance(value, tuple) else value!s:40} {origin}")
+    _check(resolved.values)
+    print(listing(resolved, as_json=options.json))
     return 0
+
+
+def _check(settings: BoardSettings) -> None:
+    """Refuse values that `run` could not use, as far as that can be said without opening anything.
+
+    Raises:
+        SettingsError: one makes no sense.
+    """
+    log_level(settings.log_level)
+    if settings.camera:
+        parse_camera(settings.camera, "")
+    for uri in settings.link:
+        parse_link(uri, listens_by_default=True)
+    if not 0 <= settings.idle_after < _LONGEST_IDLE_S:
+        raise SettingsError(f"idle_after is {settings.idle_after}", "give seconds, 0 for never")
 
 
 def _cameras(options: argparse.Namespace) -> int:
@@ -105,13 +116,10 @@ def _cameras(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     settings = _resolve(options).values
-    if settings.log_level.upper() not in logging.getLevelNamesMapping():
-        raise SettingsError(f"log_level is {settings.log_level!r}", "give debug, info, warning or error")
-    logs.set_up(logging.getLevelNamesMapping()[settings.log_level.upper()])
+    _check(settings)
+    logs.set_up(log_level(settings.log_level))
     if not settings.camera:
         raise SettingsError("no camera is given", f"use --camera {EXAMPLE}")
-    if not 0 <= settings.idle_after < _LONGEST_IDLE_S:
-        raise SettingsError(f"idle_after is {settings.idle_after}", "give seconds, 0 for never")
     signals = StopSignals()
     summary = _serve(settings, signals)
     session, counts = summary.session, {"grabbed": summary.counts.grabbed, "sent": summary.counts.sent}

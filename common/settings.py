@@ -4,6 +4,8 @@ A daemon declares its settings as one frozen dataclass whose fields are texts, n
 `doc` in its metadata. Keys in the file are the field names; in the environment PREFIX_FIELD.
 """
 
+import json
+import logging
 import os
 import tomllib
 from collections.abc import Mapping
@@ -70,6 +72,38 @@ def resolve(kind: type[T], prefix: str, file: Path | None, options: Mapping[str,
         values[item.name] = value
         origins.append((item.name, origin))
     return Resolved(kind(**values), tuple(origins))
+
+
+def listing(resolved: Resolved[Any], *, as_json: bool) -> str:
+    """What a `settings` verb prints: each setting with its value and origin.
+
+    Args:
+        resolved: the settings.
+        as_json: whether as one JSON object, by name; else as a table, a line for each.
+
+    Returns:
+        The text, without a newline at its end.
+    """
+    rows = [(name, getattr(resolved.values, name), origin) for name, origin in resolved.origins]
+    if as_json:
+        return json.dumps({name: {"value": value, "origin": origin} for name, value, origin in rows})
+    shown = [
+        (name, " ".join(value) if isinstance(value, tuple) else str(value), origin) for name, value, origin in rows
+    ]
+    widths = [max(len(row[column]) for row in shown) for column in (0, 1)]
+    return "\n".join(f"{name:{widths[0]}}  {value:{widths[1]}}  {origin}" for name, value, origin in shown)
+
+
+def log_level(name: str) -> int:
+    """Read the name of a log level.
+
+    Raises:
+        SettingsError: there is none of that name.
+    """
+    levels = {"debug": logging.DEBUG, "info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
+    if name.lower() not in levels:
+        raise SettingsError(f"log_level is {name!r}", f"give one of {', '.join(levels)}")
+    return levels[name.lower()]
 
 
 def _read(file: Path, known: set[str]) -> dict[str, Any]:

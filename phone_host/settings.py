@@ -1,8 +1,12 @@
 """What the host's owner may set once for all runs; every one is an option of `phone-host run` too."""
 
+import math
 from dataclasses import dataclass
 
-from common.settings import setting
+from common.camera.factory import parse_camera
+from common.errors import SettingsError
+from common.link.factory import parse_link
+from common.settings import log_level, setting
 
 ENVIRONMENT_PREFIX = "PHONE_HOST"
 
@@ -18,3 +22,24 @@ class PhoneHostSettings:
     tolerance: float = setting(0.0, "greatest time skew of a pair, ms; 0 = half of the longer frame period")
     fifo: str = setting("1:drop-oldest", "DEPTH:POLICY of the queue before the stereo pipeline")
     log_level: str = setting("warning", "debug, info, warning or error")
+
+
+def check(settings: PhoneHostSettings) -> None:
+    """Refuse values that `run` could not use, as far as that can be said without opening anything.
+
+    Raises:
+        SettingsError: one makes no sense.
+    """
+    from phone_host.stereo.match import MatcherName  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
+
+    log_level(settings.log_level)
+    if settings.camera:
+        parse_camera(settings.camera, "")
+    parse_link(settings.link, listens_by_default=False)
+    FifoSettings.parse(settings.fifo)
+    matchers = [name.value for name in MatcherName]
+    if settings.matcher not in matchers:
+        raise SettingsError(f"matcher {settings.matcher!r} is unknown", f"give {' or '.join(matchers)}")
+    if not (math.isfinite(settings.tolerance) and settings.tolerance >= 0):
+        raise SettingsError(f"tolerance is {settings.tolerance:g}", "give ms, 0 or more")

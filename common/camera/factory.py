@@ -1,12 +1,16 @@
 """Camera URI to camera."""
 
 from fractions import Fraction
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl
 
 from common.camera.base import Camera
 from common.camera.replay import ReplayCamera, ReplaySettings
 from common.errors import SettingsError
 from common.protocol.message import Pacing
+
+if TYPE_CHECKING:
+    from common.camera.v4l2_stream import V4l2Settings
 
 EXAMPLE = "v4l2:/dev/video0[?size=640x480&fps=30&format=mjpeg] or replay:PATH[?fps=30&loop=1&pace=clock|demand]"
 
@@ -27,16 +31,36 @@ def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
         UnavailableError: there is no such device or folder.
         DataError: a replay's images are bad.
     """
+    settings = parse_camera(uri, clock)
+    if isinstance(settings, ReplaySettings):
+        return ReplayCamera(settings, now_ns)
+    from common.camera.v4l2 import V4l2Camera  # noqa: PLC0415 - ctypes and the kernel's structures only where they are of use
+
+    return V4l2Camera(settings, now_ns)
+
+
+def parse_camera(uri: str, clock: str) -> "ReplaySettings | V4l2Settings":
+    """Read a camera URI without opening anything.
+
+    Args:
+        uri: see EXAMPLE.
+        clock: name of this machine's clock, for the stamps.
+
+    Returns:
+        The settings of the camera that is meant.
+
+    Raises:
+        SettingsError: the URI makes no sense.
+    """
     scheme, found, rest = uri.partition(":")
     if not found or scheme not in {"replay", "v4l2"} or (scheme == "replay" and not rest):
         raise SettingsError(f"camera {uri!r} is of no known kind", f"give {EXAMPLE}")
     path, options = _split(uri, rest)
     if scheme == "v4l2":
-        from common.camera.v4l2 import V4l2Camera  # noqa: PLC0415 - ctypes and the kernel's structures only where they are of use
-        from common.camera.v4l2_uri import v4l2_settings  # noqa: PLC0415
+        from common.camera.v4l2_uri import v4l2_settings  # noqa: PLC0415 - as above
 
-        return V4l2Camera(v4l2_settings(uri, path, options, clock), now_ns)
-    return ReplayCamera(_replay_settings(uri, path, options, clock), now_ns)
+        return v4l2_settings(uri, path, options, clock)
+    return _replay_settings(uri, path, options, clock)
 
 
 def _split(uri: str, rest: str) -> tuple[str, dict[str, str]]:

@@ -1,28 +1,34 @@
 """phone-host settings: print each setting with its origin."""
 
 import argparse
-import json
+from dataclasses import fields
 from pathlib import Path
 
+from common.settings import listing
+from phone_host.settings import PhoneHostSettings, check
 from phone_host.verbs.run import resolve_settings
 
 EXAMPLES = """  phone-host settings
+  phone-host settings --config host.toml --tolerance 5
   PHONE_HOST_FIFO=2:block phone-host settings --json
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's options."""
+    """Declare the verb's options: an option for each setting."""
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
+    for item in fields(PhoneHostSettings):
+        parser.add_argument(
+            f"--{item.name.replace('_', '-')}",
+            type=type(item.default),
+            metavar=item.name.rpartition("_")[2].upper(),
+            help=item.metadata["doc"].replace("%", "%%"),
+        )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the settings."""
+    """Print the settings; those that `run` would refuse are refused here too."""
     resolved = resolve_settings(options)
-    rows = [(name, getattr(resolved.values, name), origin) for name, origin in resolved.origins]
-    if options.json:
-        print(json.dumps({name: {"value": value, "origin": origin} for name, value, origin in rows}))
-    else:
-        for name, value, origin in rows:
-            print(f"{name:12} {value!s:40} {origin}")
+    check(resolved.values)
+    print(listing(resolved, as_json=options.json))
     return 0

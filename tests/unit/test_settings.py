@@ -1,12 +1,14 @@
 """Settings: each origin stronger than the one before, and mistakes named with their place."""
 
+import json
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from common.errors import SettingsError
-from common.settings import resolve, setting
+from common.settings import listing, log_level, resolve, setting
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,3 +122,29 @@ def test_an_unreadable_file_is_named(content: bytes | None, tmp_path: Path) -> N
         resolve(Sample, "SAMPLE", file, {})
     with pytest.raises(SettingsError, match=tmp_path.name):
         resolve(Sample, "SAMPLE", tmp_path, {})
+
+
+def test_the_listing_has_straight_columns_whatever_the_names_and_values(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Values and origins begin in one column each, also beside a value longer than any other, and lists are joined by blanks."""
+    monkeypatch.setenv("SAMPLE_NAME", "x" * 60)
+    lines = listing(resolve(Sample, "SAMPLE", None, {"depth": 4}), as_json=False).splitlines()
+    assert [line.split()[0] for line in lines] == list(VALUES)
+    starts = {line.rindex(line.split()[-1]) for line in lines}
+    assert starts == {len("loop_forever") + 2 + 60 + 2}
+    assert {line.index(value) for line, value in zip(lines, ("xxx", "4", "0.5", "False", "a b"), strict=True)} == {14}
+    assert lines[1].endswith(" --depth")
+
+
+def test_the_listing_as_json_keeps_types(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each name leads to its value, of its own type, and its origin."""
+    monkeypatch.setenv("SAMPLE_DEPTH", "3")
+    shown = json.loads(listing(resolve(Sample, "SAMPLE", None, {}), as_json=True))
+    assert shown["depth"] == {"value": 3, "origin": "SAMPLE_DEPTH"}
+    assert shown["links"] == {"value": ["a", "b"], "origin": "default"}
+
+
+def test_log_levels_go_by_name() -> None:
+    """The four names are known in any case; others are refused by name."""
+    assert log_level("Warning") == logging.WARNING
+    with pytest.raises(SettingsError, match="loud"):
+        log_level("loud")
