@@ -1,6 +1,10 @@
 """What the best pairing of two streams is, found offline by dynamic programming: the judge of the pairing that has to decide at once."""
 
 from dataclasses import dataclass
+from typing import Final
+
+_PAIR: Final = 1 << 62
+"""A pair is worth more than all time skew there can be, so that one integer orders both."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -13,13 +17,41 @@ class Score:
 
 def best_score(board_ns: list[int], host_ns: list[int], tolerance_ns: int) -> Score:
     """The best that an ordered one-to-one pairing within the tolerance can reach."""
-    best = [Score(0, 0)] * (len(host_ns) + 1)
+    value = _table(board_ns, host_ns, tolerance_ns)[-1][-1]
+    pairs = -(-value // _PAIR)
+    return Score(pairs, value - pairs * _PAIR)
+
+
+def forbidden_pairs(
+    pairs: list[tuple[int, int]], board_ns: list[int], host_ns: list[int], tolerance_ns: int
+) -> list[tuple[int, int]]:
+    """Those of some pairs that no best pairing contains."""
+    before = _table(board_ns, host_ns, tolerance_ns)
+    behind = _table([-b for b in reversed(board_ns)], [-h for h in reversed(host_ns)], tolerance_ns)
+    board_at = {stamp: index for index, stamp in enumerate(board_ns)}
+    host_at = {stamp: index for index, stamp in enumerate(host_ns)}
+    forbidden = []
+    for board, host in pairs:
+        i, j = board_at[board], host_at[host]
+        rest = before[i][j] + behind[len(board_ns) - i - 1][len(host_ns) - j - 1]
+        if abs(board - host) > tolerance_ns or rest + _PAIR - abs(board - host) < before[-1][-1]:
+            forbidden.append((board, host))
+    return forbidden
+
+
+def _table(board_ns: list[int], host_ns: list[int], tolerance_ns: int) -> list[list[int]]:
+    """Best values of all pairs of prefixes."""
+    rows = [[0] * (len(host_ns) + 1)]
     for board in board_ns:
-        row = [Score(0, 0)]
+        above = rows[-1]
+        row = [0]
+        left = 0
         for j, host in enumerate(host_ns):
-            options = [best[j + 1], row[j]]
-            if abs(board - host) <= tolerance_ns:
-                options.append(Score(best[j].pairs + 1, best[j].minus_skew_ns - abs(board - host)))
-            row.append(max(options))
-        best = row
-    return best[-1]
+            value = above[j + 1]
+            left = max(left, value)
+            skew = abs(board - host)
+            if skew <= tolerance_ns:
+                left = max(left, above[j] + _PAIR - skew)
+            row.append(left)
+        rows.append(row)
+    return rows

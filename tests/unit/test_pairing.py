@@ -1,5 +1,6 @@
 """Pairing of two streams: unique, ordered, within tolerance, nothing lost, and as good as it can be."""
 
+import random
 from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
 from typing import assert_never
@@ -9,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phone_host.sync.pairing import BoardOrphan, HostOrphan, OrphanReason, Outcome, Paired, Pairing, PairingSettings
-from tests.support.pairing_judge import Score, best_score
+from tests.support.pairing_judge import Score, best_score, forbidden_pairs
 
 MS = 1_000_000
+PERIOD_NS = 33_333_333
 Outcomes = list[Outcome[int, int]]
 
 
@@ -172,6 +174,90 @@ def test_of_two_rates_each_slow_frame_gets_the_nearest_fast_one(
     for stamp_ns in slow:
         if fast[0] <= stamp_ns <= fast[-1]:
             assert abs(chosen[stamp_ns] - stamp_ns) == min(abs(other - stamp_ns) for other in fast)
+
+
+@dataclass(frozen=True, slots=True)
+class Cameras:
+    """Two equally fast cameras: tolerance in periods, jitter and transport delays at random."""
+
+    tolerance: float
+    phase: float
+    loss: float
+    seed: int
+
+    def streams(self) -> tuple[list[int], list[int], list[tuple[int, bool, int]]]:
+        """Stamps of the board and the host, and (arrival, from the board?, stamp) in order of arrival."""
+        chance = random.Random(self.seed)
+        sides = []
+        for first_ns in (round(self.phase * PERIOD_NS), 0):
+            stamps = [first_ns + k * PERIOD_NS + chance.randint(-MS // 2, MS // 2) for k in range(150)]
+            sides.append([stamp for stamp in stamps if chance.random() >= self.loss])
+        arrivals = [(stamp + 40 * MS, True, stamp) for stamp in sides[0]]
+        arrivals += [(stamp + 5 * MS, False, stamp) for stamp in sides[1]]
+        return sides[0], sides[1], sorted(arrivals)
+
+
+def paired(cameras: Cameras) -> tuple[list[tuple[int, int]], int]:
+    """What our pairing makes of them: pairs, and the longest time from the arrival of a pair's later frame to its forming."""
+    _, _, arrivals = cameras.streams()
+    pairing: Pairing[int, int] = Pairing(PairingSettings(round(cameras.tolerance * PERIOD_NS), PERIOD_NS, PERIOD_NS))
+    account, longest_ns = Account(), 0
+    came = {(from_board, stamp_ns): now_ns for now_ns, from_board, stamp_ns in arrivals}
+    moments = [(now_ns, 1, from_board, stamp_ns) for now_ns, from_board, stamp_ns in arrivals]
+    moments += [(now_ns, 0, False, 0) for now_ns in range(0, arrivals[-1][0], MS)]
+    for now_ns, is_frame, from_board, stamp_ns in sorted(moments):
+        add = pairing.add_board if from_board else pairing.add_host
+        formed = account.take(add(stamp_ns, stamp_ns, now_ns) if is_frame else pairing.decide(now_ns))
+        for board, host in account.pairs[len(account.pairs) - formed :]:
+            longest_ns = max(longest_ns, now_ns - max(came[True, board], came[False, host]))
+    account.take(pairing.finish())
+    return account.pairs, longest_ns
+
+
+@given(st.floats(0.2, 1.0), st.floats(0, 1), st.sampled_from([0.0, 0.02, 0.1]), st.integers(0, 2**32))
+@settings(deadline=None, max_examples=100)
+def test_dense_streams_lose_hardly_a_pair_and_wait_a_period_at_most(
+    tolerance: float, phase: float, loss: float, seed: int
+) -> None:
+    """Whatever the tolerance, the phase and the losses: at least 98 % of the optimum's pairs over five seconds, and no wait beyond a period."""
+    cameras = Cameras(tolerance, phase, loss, seed)
+    board, host, _ = cameras.streams()
+    pairs, longest_ns = paired(cameras)
+    best = best_score(board, host, round(tolerance * PERIOD_NS))
+    assert len(pairs) >= 0.98 * best.pairs - 1
+    assert longest_ns <= PERIOD_NS + MS
+
+
+@given(st.floats(0.1, 0.48), st.floats(0, 1), st.sampled_from([0.0, 0.1]), st.integers(0, 2**32))
+@settings(deadline=None, max_examples=50)
+def test_no_pair_is_one_that_the_optimum_forbids(tolerance: float, phase: float, loss: float, seed: int) -> None:
+    """With frames further apart than twice the tolerance every pair belongs to the best pairing, and none has waited."""
+    cameras = Cameras(tolerance, phase, loss, seed)
+    board, host, _ = cameras.streams()
+    pairs, longest_ns = paired(cameras)
+    assert forbidden_pairs(pairs, board, host, round(tolerance * PERIOD_NS)) == []
+    assert longest_ns == 0
+
+
+@pytest.mark.parametrize("tolerance", [0.55, 0.6, 0.75])
+def test_at_half_a_period_the_partner_does_not_flip(tolerance: float) -> None:
+    """Cameras exactly half a period apart: jitter favours now the previous, now the next frame, but all pairs stay with one of the two."""
+    for seed in range(20):
+        pairs, _ = paired(Cameras(tolerance, 0.5, 0.0, seed))
+        assert len({board > host for board, host in pairs}) == 1
+        assert len(pairs) >= 149
+
+
+def test_after_an_outage_the_nearer_alignment_is_taken() -> None:
+    """A board that was away for a second begins anew with the nearer partner, not with the one that happened to be first."""
+    pairing: Pairing[int, int] = Pairing(PairingSettings(25, 33, 33))
+    account = Account()
+    for k in range(60):
+        account.take(pairing.add_host(33 * k, 33 * k, 33 * k))
+        if not 10 <= k < 40:
+            account.take(pairing.add_board(33 * k + 20, 33 * k + 20, 33 * k + 21))
+    late = [board - host for board, host in account.pairs if board > 33 * 41]
+    assert set(late) == {20 - 33}
 
 
 def undecided() -> Pairing[int, int]:
