@@ -23,7 +23,7 @@ PERIOD_NS = 1_000_000_000 // FPS
 
 @pytest.mark.parametrize("fifo", ["1:drop-oldest", "1:drop-newest", "1:block", "3:drop-oldest"])
 def test_pairs_do_not_get_older_on_a_slow_host(fifo: str, tmp_path: Path) -> None:
-    """Pairs are as fresh at the end as at the beginning, the board grabs every image of the film, and the account closes."""
+    """No pair waits longer than its policy says, the board goes on grabbing at its own pace, and the account closes."""
     film, link = write_film(tmp_path / "film", 60), f"ipc://{tmp_path}/link"
     uri, policy = f"replay:{film}?fps={FPS}&loop=1", FifoSettings.parse(fifo)
     kept: list[PairLedger] = []
@@ -45,13 +45,14 @@ def test_pairs_do_not_get_older_on_a_slow_host(fifo: str, tmp_path: Path) -> Non
         assert host.run(lambda: False) is EndReason.PAIRS_REACHED
         assert sender.stop() == 0
         account = sender.json()
-    # A queue without bound would be 12 x 9 periods = 3.6 s behind by now; the policies allow their depth of pairs or processing times
-    # and one pair in the hands of each thread. Half a second on top is for a busy machine.
-    worst_ns = max(ledger.dequeued_ns - ledger.board.exposed_ns for ledger in kept[1:])
-    assert worst_ns < (policy.depth + 1) * slow_ns + 500_000_000
+    # Age is told by what happened, not by a clock: while a pair waits, at most as many others are finished as the FIFO is deep. In a queue
+    # without bound the last of these twelve would have waited for all the others.
+    for ledger in kept:
+        finished_meanwhile = sum(ledger.queued_ns < other.done_ns <= ledger.dequeued_ns for other in kept)
+        assert finished_meanwhile <= policy.depth
     assert account["grabbed"] == account["sent"] + sum(account["dropped"].values())
-    shown = (kept[-1].board.exposed_ns - kept[0].board.exposed_ns) / PERIOD_NS
-    assert kept[-1].sequence - kept[0].sequence == round(shown)  # every image of the film was grabbed in its time
+    assert account["camera"]["missed"] == 0
+    assert account["grabbed"] > kept[-1].sequence
     counts = host.queue.counts
     assert counts.received == counts.paired + counts.held_board + sum(n for _, n in counts.board_orphans)
     assert counts.paired == counts.taken + counts.dropped + counts.waiting
