@@ -142,7 +142,8 @@ def summary(facts: RunFacts) -> str:
             lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value / _MS:9.3f}" for value in values))
     if facts.estimate is not None:
         lines.append(
-            f"clock known to +-{facts.estimate.uncertainty_ns / 1000:.0f} us, skew {facts.estimate.skew * 1e6:+.1f} ppm"
+            f"clock known to +-{facts.estimate.uncertainty_ns / 1000:.0f} us"
+            f" (+-{facts.estimate.bound_ns / 1000:.0f} us whatever the link does), skew {facts.estimate.skew * 1e6:+.1f} ppm"
         )
     lines += _losses(facts)
     return "\n".join(lines)
@@ -189,6 +190,7 @@ def _clock(facts: RunFacts) -> dict[str, object]:
         "offset_ns": estimate.offset_ns,
         "skew_ppm": estimate.skew * 1e6,
         "uncertainty_us": estimate.uncertainty_ns / 1e3,
+        "bound_us": estimate.bound_ns / 1e3,
         "round_trip_us": estimate.round_trip_ns / 1e3,
         "uncertainty_at_pairs_us": {
             k: None if v is None else v * 1e3
