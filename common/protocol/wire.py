@@ -239,7 +239,12 @@ def _counts_fields(counts: BoardCounts) -> list[Any]:
 
 def _read(kind: type, reader: "_Reader") -> Message:  # noqa: PLR0911 - one line for each kind of message
     if kind is Ping:
-        wave, _, _, t0_ns = reader.count(), reader.time_ns(), reader.time_ns(), reader.time_ns()  # filling in the middle
+        wave, _, _, t0_ns = (
+            reader.count(),
+            reader.time_ns(),
+            reader.time_ns(),
+            reader.time_ns(),
+        )  # filling in the middle
         return Ping(wave, t0_ns)
     if kind is Pong:
         return Pong(reader.count(), reader.time_ns(), reader.time_ns(), reader.time_ns())

@@ -38,7 +38,8 @@ def reproject(disparity: Disparity, geometry: StereoGeometry) -> CloudImage:
         geometry: of the rectified pair.
 
     Returns:
-        (H, W, 3) float32, m; NaN in all three where there is no disparity or d + doffs <= 0 (behind infinity).
+        (H, W, 3) float32, m; NaN in all three where there is no disparity, d + doffs <= 0 (behind infinity) or the depth is
+        beyond 1e30 m.
     """
     height, width = disparity.shape
     columns, rows = _rays(geometry, width, height)

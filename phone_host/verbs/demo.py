@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from common import logs
+from common.commandline import INTERRUPTED
 from common.errors import SettingsError, UnavailableError
 from common.signals import StopSignals
 
@@ -23,7 +24,6 @@ EXAMPLES = """  phone-host demo
   phone-host demo --seconds 30 --out scan-demo
 """
 
-_INTERRUPTED = 130
 _CHECK_FAILED = 4
 
 
@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
         demo.write_pictures(out)
         write_text(out / "index.html", demo_page(facts, errors, demo.last, demo.ledgers))
     except _StoppedError:
-        return _INTERRUPTED if signals.interrupted else 0
+        return INTERRUPTED if signals.interrupted else 0
     except OSError as error:
         raise UnavailableError(
             f"{error.filename or out} cannot be written ({error.strerror})",
@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
     print(json.dumps(report) if options.json else summary(facts))
     print(_closing(out, film, errors), file=sys.stderr)
     if signals.stop:
-        return _INTERRUPTED if signals.interrupted else 0
+        return INTERRUPTED if signals.interrupted else 0
     return 0 if errors.pairs and not errors.wrong_pairs and demo.host.results.complete else _CHECK_FAILED
 
 

@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import logging
 import math
 import sys
 from contextlib import nullcontext
@@ -10,12 +9,13 @@ from pathlib import Path
 
 from common import logs, now
 from common.camera.factory import EXAMPLE, open_camera
+from common.commandline import INTERRUPTED
 from common.errors import SettingsError
 from common.link.factory import open_link, parse_link
-from common.settings import Resolved, resolve
+from common.settings import Resolved, log_level, resolve
 from common.signals import StopSignals
 from common.stamp import HOST_CLOCK
-from phone_host.settings import ENVIRONMENT_PREFIX, PhoneHostSettings
+from phone_host.settings import ENVIRONMENT_PREFIX, PhoneHostSettings, check
 
 EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --calibration rig.yaml --out scan
   phone-host run --link ipc:///tmp/board --camera 'replay:right?pace=demand' --rectified --disparities 64 --pairs 20 --out scan
@@ -23,7 +23,6 @@ EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:ri
 """
 
 _CHECK_FAILED = 4
-_INTERRUPTED = 130
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -84,10 +83,11 @@ def run(options: argparse.Namespace) -> int:
     from phone_host.verbs.stereo_options import build_core  # noqa: PLC0415
 
     settings = resolve_settings(options).values
-    logs.set_up(_level(settings.log_level))
+    check(settings)
+    logs.set_up(log_level(settings.log_level))
     if not settings.camera:
         raise SettingsError("no own camera is given", f"use --camera {EXAMPLE}")
-    _check_numbers(options, settings)
+    _check_numbers(options)
     fifo = FifoSettings.parse(settings.fifo)
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns())
     size_px = (camera.description.width_px, camera.description.height_px)
@@ -125,24 +125,14 @@ def run(options: argparse.Namespace) -> int:
     host.results.finish(report)
     print(json.dumps(report) if options.json else summary(facts))
     if signals.interrupted:
-        return _INTERRUPTED
+        return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     return _CHECK_FAILED if too_few or not host.results.complete else 0
 
 
-def _level(name: str) -> int:
-    if name.upper() not in logging.getLevelNamesMapping():
-        raise SettingsError(f"log_level is {name!r}", "give debug, info, warning or error")
-    return logging.getLevelNamesMapping()[name.upper()]
-
-
-def _check_numbers(options: argparse.Namespace, settings: PhoneHostSettings) -> None:
-    for name, value in (
-        ("--pairs", options.pairs),
-        ("--save-every", options.save_every),
-        ("--tolerance", settings.tolerance),
-    ):
-        if not (math.isfinite(value) and value >= 0):
+def _check_numbers(options: argparse.Namespace) -> None:
+    for name, value in (("--pairs", options.pairs), ("--save-every", options.save_every)):
+        if value < 0:
             raise SettingsError(f"{name} {value}", "give 0 or more")
     if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
         raise SettingsError(f"--wait {options.wait}", "give seconds, 0 or more; leave it out to wait for ever")

@@ -78,7 +78,9 @@ def test_sphere_is_nearest_where_its_centre_is_seen(x: float, y: float, z: float
     # The outline stands at the angle asin(r / distance); (u, v) is that angle's tangent away from the middle.
     v, u = np.mgrid[-60:61, -80:81] / 200.0
     outline = math.tan(math.asin(radius / distance))
-    assert np.array_equal(found.background, np.hypot(u, v) > outline)
+    angle = np.hypot(u, v)
+    clear = np.abs(angle - outline) > 1e-12  # a ray along the very outline may round either way
+    assert np.array_equal(found.background[clear], (angle > outline)[clear])
 
 
 def frame_with_third(z: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
