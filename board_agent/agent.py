@@ -198,10 +198,10 @@ class Agent:
             Whether the camera's descriptor is readable.
         """
         self._watch_camera()
-        link_due_ns = min(link.due_ns for link in self._links)
-        wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - min(due_ns, link_due_ns)) // 1_000_000)))
+        due_ns = min(due_ns, *(link.due_ns for link in self._links))
+        wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
         ready = self._poller.poll(wait_ms)
-        if not ready and now.monotonic_ns() < link_due_ns:
+        if not ready and now.monotonic_ns() < min(link.due_ns for link in self._links):
             return False
         woken = [item for item, _ in ready]
         if self._wake.fileno() in woken:

@@ -43,9 +43,6 @@ _MOST_UNDER_WAY: Final = 4
 _UNKNOWN_NS: Final = 2**62
 """Transit time of a frame before the first one has come: no link is taken for swift before it was measured."""
 
-_AT_ONCE: Final = 8
-"""Frames granted at once on a swift link. After a stall so many may come in a burst: within two periods, as the link is swift."""
-
 _SWIFT: Final = 4
 """A link is swift while a frame takes less than this part of a period: then it has come before the next one is grabbed."""
 
@@ -251,7 +248,7 @@ class Receiver:
             # A swift link never has two frames under way, whatever the credit: then several are granted at once, which spares the
             # board most wake-ups (a fifth of its CPU time a frame, bench_link).
             swift = self._transit_ns * _SWIFT < hello.camera.period_ns
-            self._handle(self._session.grant(_AT_ONCE if swift else needed), now_ns)
+            self._handle(self._session.grant(_MOST_UNDER_WAY if swift else needed), now_ns)
 
     def _handle(self, outputs: list[Output], now_ns: int) -> None:
         for output in outputs:
