@@ -169,6 +169,8 @@ class Agent:
             now_ns = now.monotonic_ns()
             if camera_ready or self._on_demand or now_ns >= self._camera.due_ns(now_ns):
                 self._grab(now_ns)
+            if later_ns := self._session.take_steering():
+                self._camera.steer(later_ns, now_ns)
             self._flush()
             now_ns = now.monotonic_ns()
             if now_ns >= self._session.due_ns:

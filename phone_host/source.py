@@ -10,7 +10,7 @@ import zmq
 from common import now
 from common.camera.base import Camera, Ended, Grab, Skipped, Spoiled
 from common.frame import Frame
-from common.protocol.message import Pacing
+from common.protocol.message import Pacing, Steering
 
 _LONGEST_WAIT_MS: Final = 100
 """What the end of a run waits for this thread at most, and how late a stall may be noticed."""
@@ -31,6 +31,7 @@ class Source:
         self._wants: queue.SimpleQueue[tuple[int, int, int | None] | None] = queue.SimpleQueue()
         self._life = 0
         self._expected: int | None = None
+        self._later_ns = 0
         self._reading = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
         self.spoiled = 0
@@ -56,6 +57,15 @@ class Source:
                 with a clock of its own: then the camera counts its stamps from the first frame that asked.
         """
         self._wants.put((self._life, exposed_ns, index))
+
+    @property
+    def steering(self) -> Steering:
+        """How the camera's phase can be moved."""
+        return self._camera.description.steering
+
+    def steer(self, later_ns: int) -> None:
+        """Let the camera expose later from its next reading on; safe from any thread."""
+        self._later_ns = later_ns
 
     def forget(self) -> None:
         """Drop what was asked for: another board session begins, whose stamps begin anew. No image asked for before comes after this."""
@@ -93,6 +103,9 @@ class Source:
             self._read()
 
     def _read(self) -> None:
+        if self._later_ns:
+            later_ns, self._later_ns = self._later_ns, 0
+            self._camera.steer(later_ns, now.monotonic_ns())
         for grab in self._camera.read(now.monotonic_ns()):
             if not self._stop.is_set():
                 self._take(grab)

@@ -109,6 +109,14 @@ class Camera(Protocol):
     def anchor(self, exposed_ns: int, index: int) -> None:
         """Let a demand-paced camera's next image be number `index`, exposed at `exposed_ns`; other cameras take no notice."""
 
+    def steer(self, later_ns: int, now_ns: int) -> None:
+        """Expose later from now on, as `description.steering` says; a camera that cannot takes no notice.
+
+        Args:
+            later_ns: by how much, less than a period, ns.
+            now_ns: CLOCK_MONOTONIC now, ns.
+        """
+
     @property
     def health(self) -> CameraHealth:
         """How it has fared; values, for summaries and for those who watch."""

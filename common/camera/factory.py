@@ -75,14 +75,17 @@ def _split(uri: str, rest: str) -> tuple[str, dict[str, str]]:
 
 
 def _replay_settings(uri: str, path: str, options: dict[str, str], clock: str) -> ReplaySettings:
-    if unknown := set(options) - {"fps", "loop", "pace"}:
+    if unknown := set(options) - {"fps", "loop", "pace", "phase_ms"}:
         raise SettingsError(f"camera {uri!r} has an unknown option {min(unknown)!r}", f"give {EXAMPLE}")
     try:
         fps = Fraction(options.get("fps", "30"))
         loop = {"0": False, "1": True}[options.get("loop", "0")]
         pacing = Pacing[options.get("pace", "clock").upper()]
+        phase_ns = round(Fraction(options.get("phase_ms", "0")) * 1_000_000)
     except (ValueError, ZeroDivisionError, KeyError):
         raise SettingsError(f"camera {uri!r} has an option of no use", f"give {EXAMPLE}") from None
     if not Fraction(1, 100) <= fps <= 1000:
         raise SettingsError(f"camera {uri!r} has fps={options.get('fps')}", "give a rate between 0.01 and 1000")
-    return ReplaySettings(path, fps, loop, pacing, clock)
+    if phase_ns and pacing is Pacing.DEMAND:
+        raise SettingsError(f"camera {uri!r} has phase_ms and pace=demand", "leave one out: demand knows no clock")
+    return ReplaySettings(path, fps, loop, pacing, clock, phase_ns)

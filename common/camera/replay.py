@@ -1,7 +1,7 @@
 """A camera that shows a folder of images, in name order, on a clock or on demand.
 
 pace=clock: at any moment the image is number floor(t * fps) of CLOCK_MONOTONIC, exposed exactly at k / fps; so two replays on one machine
-agree whenever they were started. pace=demand: one image for each read, nothing dropped, stamps first + k / fps.
+agree whenever they were started; `phase_ms` makes all its exposures so much later than that. pace=demand: one image for each read, nothing dropped, stamps first + k / fps.
 """
 
 import re
@@ -14,7 +14,7 @@ from common.camera.base import CameraHealth, Ended, Grab, Skipped, Spoiled
 from common.camera.imagefile import SUFFIXES, ImageFile, load
 from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import Frame, FrameFault, find_fault
-from common.protocol.message import CameraDescription, Pacing
+from common.protocol.message import CameraDescription, Pacing, Steering
 from common.stamp import Stamp
 
 _FAR_FUTURE: Final = 2**63 - 1
@@ -32,6 +32,7 @@ class ReplaySettings:
         loop: begin again after the last.
         pacing: by the clock or on demand.
         clock: name of the clock of the stamps.
+        phase_ns: on the clock, every exposure is so much later than k / fps: a camera that is out of step with others.
     """
 
     path: str
@@ -39,6 +40,7 @@ class ReplaySettings:
     loop: bool = False
     pacing: Pacing = Pacing.CLOCK
     clock: str = "host"
+    phase_ns: int = 0
 
 
 def name_order(path: Path) -> tuple[list[tuple[int, int | str]], str]:
@@ -117,7 +119,9 @@ class ReplayCamera:
         self._period_ns = self._step // self._rate
         name = Path(settings.path).name
         size = (first.width_px, first.height_px, first.pixel_format)
-        self.description = CameraDescription(f"replay {name}", *size, self._period_ns, settings.pacing)
+        steering = Steering.GRID if settings.pacing is Pacing.CLOCK else Steering.NONE
+        self.description = CameraDescription(f"replay {name}", *size, self._period_ns, settings.pacing, steering)
+        self._phase_ns = settings.phase_ns
         self.pollable: int | None = None
         self.health = CameraHealth()
         self._next = self._index_at(now_ns) + 1 if settings.pacing is Pacing.CLOCK else 0
@@ -137,6 +141,13 @@ class ReplayCamera:
             self._first_ns = 0
             self._first_ns = exposed_ns - self._time_of(index)
             self._next = index
+
+    def steer(self, later_ns: int, now_ns: int) -> None:
+        """Show all images that are still to come later by so much; what they show stays as it is, only a real camera sees a later moment."""
+        del now_ns
+        if self._settings.pacing is Pacing.CLOCK:
+            self._phase_ns += later_ns
+            self._due_ns = self._time_of(self._next)
 
     def read(self, now_ns: int) -> list[Grab]:
         """Give the images that have become due; of several missed ones all, so that each is accounted for.
@@ -191,12 +202,12 @@ class ReplayCamera:
         )
 
     def _time_of(self, index: int) -> int:
-        start = 0 if self._settings.pacing is Pacing.CLOCK else self._first_ns or 0
+        start = self._phase_ns if self._settings.pacing is Pacing.CLOCK else self._first_ns or 0
         return start + (2 * index * self._step + self._rate) // (2 * self._rate)  # rounded to the nearest ns
 
     def _index_at(self, now_ns: int) -> int:
         # Rounding to ns may put an exposure just before or just after its exact time: half a ns on decides as `_time_of` does.
-        index = (2 * now_ns + 1) * self._rate // (2 * self._step)
+        index = (2 * (now_ns - self._phase_ns) + 1) * self._rate // (2 * self._step)
         return index if self._time_of(index) <= now_ns else index - 1
 
     def _load(self, position: int) -> tuple[ImageFile, FrameFault | None]:

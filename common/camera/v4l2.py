@@ -17,8 +17,9 @@ from common.camera.v4l2_formats import Wanted
 from common.camera.v4l2_ring import RING_BUFFERS
 from common.camera.v4l2_stream import Stream, Tally, V4l2Settings
 from common.errors import TandemError, UnavailableError
+from common.frame import Frame
 from common.logs import event
-from common.protocol.message import CameraDescription, Pacing
+from common.protocol.message import CameraDescription, Pacing, Steering
 
 _LOG = logging.getLogger(__name__)
 
@@ -36,6 +37,9 @@ _FIRST_FRAME_NS: Final = 3_000_000_000
 
 _SETTLE_NS: Final = 2_000_000_000
 """Automatic exposure and white balance of webcams settle within one to two seconds from the first frame."""
+
+_REST_NS: Final = 20_000_000
+"""Between the end of a stream and its new start at the soonest: what switching off takes."""
 
 _AUTO_EXPOSURE_NS: Final = 1_000_000_000
 """An exposure time that the camera changes by itself, or whose changes the driver does not tell, is read once a second."""
@@ -68,6 +72,9 @@ class V4l2Camera:
         self._known_problem = ""
         self._rate_is_off = False
         self._is_coming_back = False
+        self._restart_ns: int | None = None
+        self._latency_ns: int | None = None
+        self._exposed_ns = 0
         try:
             stream = self._open()
             # From now on exactly this is asked for, whatever a camera that is plugged in later may prefer.
@@ -75,7 +82,7 @@ class V4l2Camera:
             wanted = Wanted(stream.choice.size_px, settings.wanted.fps, stream.choice.pixel_format)
             self._settings = replace(settings, wanted=wanted)
             self.description = CameraDescription(
-                stream.name, width_px, height_px, stream.pixel_format, stream.period_ns, Pacing.CLOCK
+                stream.name, width_px, height_px, stream.pixel_format, stream.period_ns, Pacing.CLOCK, Steering.RESTART
             )
             self._begin(stream, now_ns)
         except OSError as error:
@@ -104,7 +111,9 @@ class V4l2Camera:
     @property
     def pollable(self) -> int | None:
         """The device while it streams: readable with a frame, urgent with a changed control, in error when it is lost."""
-        return self._stream.fd if self._stream is not None and self._wanted else None
+        if self._stream is None or not self._wanted or self._restart_ns is not None:
+            return None
+        return self._stream.fd
 
     @property
     def health(self) -> CameraHealth:
@@ -134,10 +143,30 @@ class V4l2Camera:
             return self._retry_ns
         if not self._wanted:
             return self._look_ns
+        if self._restart_ns is not None:
+            return self._restart_ns
         return min(self._stall_ns, self._settle_ns or _FAR_FUTURE, self._exposure_due_ns)
 
     def anchor(self, exposed_ns: int, index: int) -> None:
         """A camera with a clock of its own takes no notice."""
+
+    def steer(self, later_ns: int, now_ns: int) -> None:
+        """Switch the stream off, and on again when its exposures will be `later_ns` later within their period.
+
+        A camera whose sensor runs only while it streams exposes first a fixed time after the start; that time is taken from the stream that
+        ends here. A sensor that runs on by itself takes no notice.
+        """
+        if self._stream is None or not self._wanted or self._latency_ns is None:
+            return
+        try:
+            self._stream.stop()
+        except OSError as error:
+            self._lose(error, now_ns)
+            return
+        period_ns = self._tally.rate.period_ns or self._stream.period_ns
+        start_ns = self._exposed_ns + later_ns - self._latency_ns
+        self._restart_ns = now_ns + _REST_NS + (start_ns - now_ns - _REST_NS) % period_ns
+        _LOG.info(event("camera_steered", camera=self._path, later_ms=round(later_ns / 1e6, 1)))
 
     def read(self, now_ns: int) -> list[Grab]:
         """Give what has come; a device that fails is closed here and opened anew, now or later."""
@@ -148,7 +177,11 @@ class V4l2Camera:
         if not self._wanted:
             self._look(now_ns)
             return []
+        if self._restart_ns is not None and now_ns < self._restart_ns:
+            return []
         try:
+            if self._restart_ns is not None:
+                self._begin(self._stream, now_ns)
             grabs = self._take(self._stream, now_ns)
         except OSError as error:
             self._lose(error, now_ns)
@@ -164,6 +197,7 @@ class V4l2Camera:
         if not self._wanted:
             return
         self._wanted = False
+        self._restart_ns = None
         self._look_ns = 0
         if self._stream is not None:
             with contextlib.suppress(OSError):  # a camera that has just vanished is noticed by the next look
@@ -198,6 +232,7 @@ class V4l2Camera:
     def _begin(self, stream: Stream, now_ns: int) -> None:
         """Start a stream and make it the current one."""
         self._stream = stream
+        self._restart_ns = self._latency_ns = None
         stream.start()
         self._stall_ns = now_ns + max(_FIRST_FRAME_NS, _STALL_PERIODS * stream.period_ns)
         self._settle_ns = None
@@ -213,6 +248,11 @@ class V4l2Camera:
             not grabs and stream.has_events()
         ):  # woken for something else: asking for events with each frame costs an ioctl
             stream.read_exposure()
+        for grab in grabs:
+            if isinstance(grab, Frame):
+                self._exposed_ns = grab.exposed.ns
+                if self._latency_ns is None:
+                    self._latency_ns = self._exposed_ns - stream.started_ns
         if grabs:
             self._stall_ns = now_ns + max(_STALL_NS, _STALL_PERIODS * stream.period_ns)
             self._note_back()
@@ -273,6 +313,7 @@ class V4l2Camera:
         if self._stream is not None:
             self._stream.close()
             self._stream = None
+        self._restart_ns = None
         self._is_coming_back = True
         self._locked = not self._wishes.lock
         self._retry_ns = now_ns

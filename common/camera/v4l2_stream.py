@@ -85,6 +85,7 @@ class Stream:
         period_ns: nominal time between frames, ns.
         exposure_ns: exposure time as last read, ns; None where the camera does not tell.
         tells_exposure: whether the driver tells of each change of the exposure time.
+        started_ns: when the stream was last started, CLOCK_MONOTONIC, ns.
 
     Args:
         path: node or link.
@@ -122,7 +123,7 @@ class Stream:
             raise
         self._last_sequence: int | None = None
         self._sound = False
-        self._started_ns = 0
+        self.started_ns = 0
         self._taken = 0
         self._broken: OSError | None = None
 
@@ -159,7 +160,7 @@ class Stream:
         """
         self._last_sequence, self._sound, self._taken = None, False, 0
         self._tally.rate.restart()
-        self._started_ns = now.monotonic_ns()
+        self.started_ns = now.monotonic_ns()
         self._ring.start()
 
     def stop(self) -> None:
@@ -341,7 +342,7 @@ class Stream:
     def _fault(self, filled: Filled, view: memoryview) -> FrameFault | None:
         if filled.flags & abi.BUF_FLAG_ERROR:
             return FrameFault.FLAGGED
-        if not self._sound and self._taken <= len(self._ring) and filled.stamp_ns < self._started_ns:
+        if not self._sound and self._taken <= len(self._ring) and filled.stamp_ns < self.started_ns:
             return FrameFault.STALE
         return find_fault(self.choice.pixel_format, view, self._packing.least_bytes)
 

@@ -22,6 +22,7 @@ from common.protocol.message import (
     Refusal,
     RefusalReason,
     Status,
+    Steer,
 )
 from common.protocol.session import HELLO_RETRY_NS, SILENCE_NS, STATUS_NS, TAKEOVER_NS, Outgoing
 
@@ -60,6 +61,7 @@ class BoardSession:
         self._host: _Host | None = None
         self._sent = 0
         self._ended = False
+        self._later_ns = 0
 
     @property
     def has_host(self) -> bool:
@@ -71,7 +73,9 @@ class BoardSession:
         """Whether the next frame may be sent now."""
         return self._host is not None and Lane.FRAMES in self._host.lanes and self._sent < self._host.below_index
 
-    def receive(self, connection: bytes, message: Message, now_ns: int, counts: BoardCounts) -> list[Outgoing]:
+    def receive(  # noqa: PLR0911 - one line for each kind of message
+        self, connection: bytes, message: Message, now_ns: int, counts: BoardCounts
+    ) -> list[Outgoing]:
         """Take one message from a connection.
 
         Args:
@@ -96,6 +100,9 @@ class BoardSession:
             case Credit(below_index):
                 host.below_index = max(host.below_index, below_index)
                 return []
+            case Steer(later_ns):
+                self._later_ns = later_ns % self._camera.period_ns
+                return []
             case Bye():
                 # The last account goes behind the last frame, so that what it tells of and has not come is lost.
                 farewell = Status(self.session, counts)
@@ -105,6 +112,11 @@ class BoardSession:
                 return []  # a board's words from a host: nothing a sound host sends
             case _:
                 assert_never(message)
+
+    def take_steering(self) -> int:
+        """Give by how much the host wants the camera to expose later, ns, once; 0: it wants nothing."""
+        later_ns, self._later_ns = self._later_ns, 0
+        return later_ns
 
     def tick(self, now_ns: int, counts: BoardCounts) -> list[Outgoing]:
         """Do what time demands: account to the host, give up a silent one, knock where this side has dialled."""

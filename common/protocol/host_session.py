@@ -18,6 +18,7 @@ from common.protocol.message import (
     Pong,
     Refusal,
     Status,
+    Steer,
 )
 from common.protocol.session import (
     HELLO_RETRY_NS,
@@ -136,7 +137,7 @@ class HostSession:
                 return self._accept(connection, message, now_ns)
             case FrameMessage():
                 return self._take_frame(message, now_ns)
-            case HostHello() | Ping() | Credit():
+            case HostHello() | Ping() | Credit() | Steer():
                 return []  # a host's words from a board: nothing a sound board sends
             case Pong() | Status() | End():
                 return self._attend(connection, message, now_ns)
@@ -180,6 +181,14 @@ class HostSession:
             return []
         self._below_index = below_index
         return [Outgoing(self._lanes[Lane.CONTROL], Credit(below_index))]
+
+    def steer(self, later_ns: int) -> list[Output]:
+        """Ask the board's camera to expose later.
+
+        Args:
+            later_ns: by how much, less than its period.
+        """
+        return [Outgoing(self._lanes[Lane.CONTROL], Steer(later_ns))] if self._state is _State.OPEN else []
 
     def interrupted(self, now_ns: int) -> list[Output]:
         """Take note that a connection broke: what was under way on it is gone, so both lanes are greeted anew."""

@@ -11,7 +11,8 @@ from enum import Enum
 from common.frame import Buffer, PixelFormat
 from common.ledger import BoardMarks
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
+"""2: a camera says whether it can be steered, and `Steer` asks for it."""
 
 
 class Lane(Enum):
@@ -26,6 +27,14 @@ class Pacing(Enum):
 
     CLOCK = 0
     DEMAND = 1
+
+
+class Steering(Enum):
+    """How a camera can be made to expose later within its period, if at all: by moving the grid of its stamps, or by starting its stream anew."""
+
+    NONE = 0
+    GRID = 1
+    RESTART = 2
 
 
 class DropReason(Enum):
@@ -65,6 +74,7 @@ class CameraDescription:
         pixel_format: encoding of the frames.
         period_ns: nominal time between frames, ns.
         pacing: its own clock or the host's demand.
+        steering: how its phase can be moved.
     """
 
     name: str
@@ -73,6 +83,7 @@ class CameraDescription:
     pixel_format: PixelFormat
     period_ns: int
     pacing: Pacing
+    steering: Steering = Steering.NONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,4 +185,11 @@ class Bye:
     counts: BoardCounts = BoardCounts()
 
 
-Message = HostHello | BoardHello | Knock | Refusal | Credit | FrameMessage | Ping | Pong | Status | End | Bye
+@dataclass(frozen=True, slots=True)
+class Steer:
+    """Host: let your camera expose later by so much, from now on. Less than a period; whether it did is seen in the stamps."""
+
+    later_ns: int
+
+
+Message = HostHello | BoardHello | Knock | Refusal | Credit | FrameMessage | Ping | Pong | Status | End | Bye | Steer

@@ -34,6 +34,8 @@ from common.protocol.message import (
     Refusal,
     RefusalReason,
     Status,
+    Steer,
+    Steering,
 )
 
 MAX_HEADER_BYTES: Final = 2048
@@ -62,6 +64,7 @@ _KINDS: Final[tuple[type, ...]] = (
     Status,
     End,
     Bye,
+    Steer,
 )
 _KIND_OF: Final = {kind: index for index, kind in enumerate(_KINDS)}
 _PIXEL_FORMATS: Final = tuple(PixelFormat)
@@ -219,6 +222,8 @@ def _fields(message: Message) -> list[Any]:  # noqa: PLR0911 - one line for each
             return [session, *_counts_fields(counts)]
         case Bye(counts):
             return _counts_fields(counts)
+        case Steer(later_ns):
+            return [later_ns]
         case _:
             assert_never(message)
 
@@ -226,7 +231,15 @@ def _fields(message: Message) -> list[Any]:  # noqa: PLR0911 - one line for each
 def _camera_fields(camera: CameraDescription) -> list[Any]:
     encoding = _PIXEL_FORMATS.index(camera.pixel_format)
     name = camera.name.encode("utf-8", "replace").decode()[:_MAX_TEXT]  # a folder's name need not be UTF-8
-    return [name, camera.width_px, camera.height_px, encoding, camera.period_ns, camera.pacing.value]
+    return [
+        name,
+        camera.width_px,
+        camera.height_px,
+        encoding,
+        camera.period_ns,
+        camera.pacing.value,
+        camera.steering.value,
+    ]
 
 
 def _counts_fields(counts: BoardCounts) -> list[Any]:
@@ -262,6 +275,8 @@ def _read(kind: type, reader: "_Reader") -> Message:  # noqa: PLR0911 - one line
         return Status(reader.text(), reader.counts())
     if kind is End:
         return End(reader.text(), reader.counts())
+    if kind is Steer:
+        return Steer(reader.later_ns())
     return Bye(reader.counts())
 
 
@@ -307,6 +322,9 @@ class _Reader:
     def time_ns(self) -> int:
         return self._integer(-_NS, _NS)
 
+    def later_ns(self) -> int:
+        return self._integer(0, _NS)
+
     def size_px(self) -> int:
         return self._integer(1, MAX_SIZE_PX)
 
@@ -328,7 +346,13 @@ class _Reader:
     def camera(self) -> CameraDescription:
         name, width_px, height_px = self.text(), self.size_px(), self.size_px()
         return CameraDescription(
-            name, width_px, height_px, self.choice(_PIXEL_FORMATS), self._integer(1, _NS), self.enum(Pacing)
+            name,
+            width_px,
+            height_px,
+            self.choice(_PIXEL_FORMATS),
+            self._integer(1, _NS),
+            self.enum(Pacing),
+            self.enum(Steering),
         )
 
     def counts(self) -> BoardCounts:

@@ -13,7 +13,7 @@ from common.camera.base import Camera, CameraState, Ended, Grab, Spoiled
 from common.camera.factory import open_camera
 from common.errors import DataError, TandemError, UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat, find_fault
-from common.protocol.message import Pacing
+from common.protocol.message import Pacing, Steering
 from tests.support.pictures import encoded, jpeg, picture
 
 CLOCK = "board:test"
@@ -239,6 +239,17 @@ def spoil_nothing(folder: Path) -> None:
     """No image at all."""
     for path in folder.iterdir():
         path.unlink()
+
+
+def test_steering_moves_the_grid_of_exposures(opened: Set) -> None:
+    """A camera that says its grid can be moved exposes later by just so much from then on; any other one takes no notice."""
+    period_ns = opened.camera.description.period_ns
+    before = [grab for grab in opened.take(2) if isinstance(grab, Frame)]
+    opened.camera.steer(period_ns // 3, opened.now_ns)
+    after = next(grab for grab in opened.take(1) if isinstance(grab, Frame))
+    asked_ns = period_ns // 3 if opened.camera.description.steering is Steering.GRID else 0
+    moved_ns = (after.exposed.ns - before[-1].exposed.ns - asked_ns) % period_ns
+    assert min(moved_ns, period_ns - moved_ns) <= 2
 
 
 def spoil_size(folder: Path) -> None:

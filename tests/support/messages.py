@@ -23,6 +23,8 @@ from common.protocol.message import (
     Refusal,
     RefusalReason,
     Status,
+    Steer,
+    Steering,
 )
 
 NUMBERS = st.integers(0, 2**53)
@@ -44,6 +46,7 @@ CAMERAS = st.builds(
     st.sampled_from(PixelFormat),
     st.integers(1, 2**62),
     st.sampled_from(Pacing),
+    st.sampled_from(Steering),
 )
 FRAMES = st.builds(
     FrameMessage,
@@ -71,4 +74,5 @@ MESSAGES: st.SearchStrategy[Message] = st.one_of(
     st.builds(Status, TEXTS, COUNTS),
     st.builds(End, TEXTS, COUNTS),
     st.builds(Bye, COUNTS),
+    st.builds(Steer, st.integers(0, 2**62)),
 )

@@ -171,3 +171,23 @@ def test_a_long_stall_costs_bounded_work(tmp_path: Path) -> None:
     last = grabs[-1]
     assert isinstance(last, Frame)
     assert (last.sequence, last.exposed.ns) == (3600 * 30 - 1, 3600 * 10**9)
+
+
+def test_a_phase_puts_every_exposure_later(tmp_path: Path) -> None:
+    """Of two replays of one folder the one with phase_ms shows the same images, each just so much later."""
+    fill(tmp_path / "film", "0.jpg", "1.jpg", "2.jpg")
+    shown = []
+    for options in ("", "&phase_ms=12.5"):
+        camera = open_camera(f"replay:{tmp_path}/film?fps=20&loop=1{options}", "host", 10**9)
+        shown.append([grab for grab in camera.read(2 * 10**9) if isinstance(grab, Frame)])
+    common = {bytes(frame.payload): frame.exposed.ns % 150_000_000 for frame in shown[0]}
+    assert len(common) == 3
+    for frame in shown[1]:
+        assert (frame.exposed.ns - common[bytes(frame.payload)]) % 150_000_000 == 12_500_000
+
+
+def test_a_phase_on_demand_is_refused(tmp_path: Path) -> None:
+    """A camera without a clock of its own has no phase."""
+    fill(tmp_path / "film", "0.jpg")
+    with pytest.raises(SettingsError, match="phase_ms"):
+        open_camera(f"replay:{tmp_path}/film?pace=demand&phase_ms=3", "host", 10**9)

@@ -26,6 +26,7 @@ from common.protocol.message import (
     Refusal,
     RefusalReason,
     Status,
+    Steer,
 )
 from common.protocol.session import (
     MS,
@@ -40,7 +41,7 @@ from common.protocol.session import (
     Vanished,
 )
 from common.protocol.wire import decode, encode_stamped
-from tests.support.session_world import World
+from tests.support.session_world import CAMERA, World
 
 
 class What(Enum):
@@ -383,3 +384,17 @@ def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, e
             t0_ns, now_ns, heard = now_ns, now_ns + round_trip_ns, heard + 1
             outputs = host.session.receive(control, Pong(pings[0].wave, t0_ns, 1, 2), now_ns)
         assert heard == expected
+
+
+def test_a_wish_to_steer_is_given_once() -> None:
+    """What the host asks for reaches the board's camera once, and never more than a period, whoever asks."""
+    world = World(board_dials=False)
+    world.settle()
+    host = world.hosts[0]
+    connection = next(name for name, (_, lane, _) in world.wires.items() if lane is Lane.CONTROL)
+    (asked,) = host.session.steer(7 * MS)
+    assert isinstance(asked, Outgoing)
+    for message, given_ns in ((asked.message, 7 * MS), (Steer(CAMERA.period_ns * 5 + 3), 3)):
+        world.board.receive(connection, message, world.now_ns, BoardCounts())
+        assert world.board.take_steering() == given_ns
+        assert world.board.take_steering() == 0
