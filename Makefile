@@ -34,7 +34,7 @@ test: $(READY) ## unit, contract and system tests, with the minutes of each part
 $(PARTS:%=test-%): test-%: $(READY) # one part alone: make test-unit
 	@.ci/test $*
 
-test-board: $(READY) ## tests on a booted virtual board (the first time builds its image: apt and root)
+test-board: $(READY) ## tests on booted virtual boards (the first time builds their images: apt and root)
 	@.ci/board
 	@.ci/test vm
 

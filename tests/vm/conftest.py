@@ -1,15 +1,15 @@
 """The booted board that all tests here share. `make test-board` builds its image; without one they are skipped."""
 
-import shlex
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
-from tests.vm.guest import Guest, Image
+from tests.vm.guest import Architecture, Guest, image_of
 from tests.vm.stream import FPS, Film, Skew, webcam_skew, write_film
 from tests.vm.webcam import Webcam
 
@@ -18,21 +18,12 @@ READOUT_MS = 20
 CAMERA = f"v4l2:auto?size=320x240&fps={FPS}&readout_ms={READOUT_MS}"
 
 
-def _image() -> Image:
-    """The image that .ci/board has built from the present scripts.
-
-    Its folder is named by them, so that a changed script never meets an old image.
-    """
-    named = subprocess.run([ROOT / ".ci" / "board", "folder"], capture_output=True, text=True, check=True)
-    return Image(Path(named.stdout.strip()))
-
-
-@pytest.fixture(scope="session")
-def bare_guest() -> Iterator[Guest]:
-    """A booted board without the package."""
-    image = _image()
-    if not shutil.which("qemu-system-x86_64"):
-        pytest.skip("qemu-system-x86_64 is missing: run make test-board")
+@contextmanager
+def booted(architecture: Architecture) -> Iterator[Guest]:
+    """A booted board without the package, for the length of a block; skips the test where there is no image of one."""
+    image = image_of(architecture)
+    if not shutil.which(image.emulator):
+        pytest.skip(f"{image.emulator} is missing: run make test-board")
     if not image.built:
         pytest.skip(f"no image of a board in {image.folder}: run make test-board")
     # Not pytest's folder: the path of ssh's socket must be short.
@@ -43,6 +34,13 @@ def bare_guest() -> Iterator[Guest]:
             yield guest
         finally:
             guest.stop()
+
+
+@pytest.fixture(scope="session")
+def bare_guest() -> Iterator[Guest]:
+    """A booted board without the package."""
+    with booted(Architecture.AMD64) as guest:
+        yield guest
 
 
 @pytest.fixture(scope="session")
@@ -66,9 +64,8 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Film:
 @pytest.fixture(scope="module")
 def guest(bare_guest: Guest, package: Path) -> Guest:
     """The board with its package installed, its camera's settings given, and its link open to everybody."""
-    bare_guest.put(package, "/root")
-    bare_guest.sh(f"dpkg -i /root/{package.name}")
-    configure(bare_guest, CAMERA)
+    bare_guest.install(package)
+    bare_guest.configure(CAMERA)
     return bare_guest
 
 
@@ -85,15 +82,3 @@ def webcam(guest: Guest, film: Film) -> Iterator[Webcam]:
 def skew(webcam: Webcam) -> Skew:
     """The truth about pairs: what the webcam knows of its own exposures."""
     return webcam_skew(webcam.late_ns)
-
-
-def configure(guest: Guest, camera: str) -> None:
-    """Set the service's camera, open its link to everybody, and restart it."""
-    edits = (f'camera = "{camera}"', 'link = ["tcp://*:5555"]')
-    script = " ".join(f"-e {shlex.quote(f's|^{edit.split()[0]} = .*|{_literal(edit)}|')}" for edit in edits)
-    guest.sh(f"sed -i {script} /etc/tandemscan/board-agent.toml && systemctl restart board-agent")
-
-
-def _literal(text: str) -> str:
-    """Text as the replacement of sed's `s|…|…|`."""
-    return text.replace("&", "\\&")
