@@ -15,7 +15,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test $(PARTS:%=test-%) test-board deb lint types bench lock clean
+.PHONY: help venv demo test $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -53,7 +53,14 @@ bench: .venv/.ready-bench ## the figures: every benchmark in tests/bench prints 
 	@for bench in $(BENCHES); do $(BIN)/python -m tests.bench.$$bench || exit; done
 
 .venv/.ready-bench: $(READY) requirements/bench.txt
-	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: -r requirements/bench.txt
+	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: --no-binary cobs --no-build-isolation -r requirements/bench.txt
+	@touch $@
+
+fuzz: .venv/.ready-fuzz ## hostile bytes for every reader, guided by coverage (BYTES=1e9, MINUTES=10, TARGETS="deframer wire")
+	@$(BIN)/python -m tests.fuzz $(if $(BYTES),--bytes $(BYTES)) $(if $(MINUTES),--minutes $(MINUTES)) $(TARGETS)
+
+.venv/.ready-fuzz: $(READY) requirements/fuzz.txt
+	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: -r requirements/fuzz.txt
 	@touch $@
 
 lock: ## pin again what no longer fits pyproject.toml (UPGRADE=1: everything to its newest)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl
 
 from common.camera.base import Camera
+from common.camera.options import exact
 from common.camera.replay import ReplayCamera, ReplaySettings
 from common.errors import SettingsError
 from common.protocol.message import Pacing
@@ -78,7 +79,7 @@ def _replay_settings(uri: str, path: str, options: dict[str, str], clock: str) -
     if unknown := set(options) - {"fps", "loop", "pace", "phase_ms"}:
         raise SettingsError(f"camera {uri!r} has an unknown option {min(unknown)!r}", f"give {EXAMPLE}")
     try:
-        fps = Fraction(options.get("fps", "30"))
+        fps = exact(options.get("fps", "30"))
         loop = {"0": False, "1": True}[options.get("loop", "0")]
         pacing = Pacing[options.get("pace", "clock").upper()]
         phase_ns = round(Fraction(options.get("phase_ms", "0")) * 1_000_000)

@@ -49,7 +49,27 @@ def load(path: Path) -> ImageFile:
     Raises:
         DataError: the file cannot be read, its header is none of these, or no link takes an image of that size.
     """
-    image = _parse(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{path} cannot be read ({error.strerror})", "check the file and its permissions") from None
+    return read_image(path, data)
+
+
+def read_image(path: Path, data: bytes) -> ImageFile:
+    """Read the content of an image file.
+
+    Args:
+        path: its name, for errors.
+        data: its bytes, from anybody.
+
+    Returns:
+        The bytes as they are sent, and what the header says.
+
+    Raises:
+        DataError: the header is of none of these kinds, or no link takes an image of that size.
+    """
+    image = _parse(path, data)
     if not (1 <= image.width_px <= MAX_SIZE_PX and 1 <= image.height_px <= MAX_SIZE_PX):
         raise DataError(
             f"{path} is {image.width_px}x{image.height_px}", f"give images of 1 to {MAX_SIZE_PX} px in width and height"
@@ -62,11 +82,7 @@ def load(path: Path) -> ImageFile:
     return image
 
 
-def _parse(path: Path) -> ImageFile:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path} cannot be read ({error.strerror})", "check the file and its permissions") from None
+def _parse(path: Path, data: bytes) -> ImageFile:
     if data[:2] == b"\xff\xd8":
         return ImageFile(PixelFormat.MJPEG, *_jpeg_size(path, data), data)
     if data[:8] == b"\x89PNG\r\n\x1a\n" and len(data) >= 24:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Final, TypeVar
 
+from common.camera.options import exact, milliseconds
 from common.camera.v4l2_controls import Axis, ControlWishes, PowerLine
 from common.camera.v4l2_formats import Wanted
 from common.camera.v4l2_pack import SendPart
@@ -78,8 +79,8 @@ def v4l2_settings(uri: str, path: str, options: Mapping[str, str], clock: str) -
             tuple(held), read("power_line", _POWER_LINES.__getitem__, None), read("lock", _TRUTHS.__getitem__, _LOCK)
         ),
         part=read("send", SendPart, SendPart.WHOLE),
-        readout_ns=read("readout_ms", _milliseconds, None),
-        latency_ns=read("latency_ms", _milliseconds, 0),
+        readout_ns=read("readout_ms", milliseconds, None),
+        latency_ns=read("latency_ms", milliseconds, 0),
         clock=clock,
     )
 
@@ -101,7 +102,7 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def _rate(text: str) -> Fraction:
-    rate_hz = Fraction(text)
+    rate_hz = exact(text)
     if not Fraction(1, 100) <= rate_hz <= 1000:
         raise ValueError(text)
     return rate_hz
@@ -116,7 +117,7 @@ def _format(text: str) -> PixelFormat:
 
 def _exposure(text: str) -> int:
     """Milliseconds to the control's unit of 100 us, at least one."""
-    units = round(Fraction(text) * 10)
+    units = round(exact(text) * 10)
     if not 1 <= units <= _LARGEST:
         raise ValueError(text)
     return units
@@ -127,10 +128,3 @@ def _whole(text: str) -> int:
     if abs(value) > _LARGEST:
         raise ValueError(text)
     return value
-
-
-def _milliseconds(text: str) -> int:
-    value_ns = round(Fraction(text) * 1_000_000)
-    if not 0 <= value_ns <= 1_000_000_000:
-        raise ValueError(text)
-    return value_ns

@@ -113,6 +113,8 @@ class _Reader:
             self._storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         except (cv2.error, SystemError) as error:
             raise self._no_storage() from error
+        if not self._storage.root().isMap():  # a list, or nothing: OpenCV aborts when it is asked for a key
+            raise self._no_storage()
 
     def _no_storage(self) -> DataError:
         return DataError(f"{self._path} is no OpenCV FileStorage YAML", "give the rig.yaml of `phone-host calibrate`")

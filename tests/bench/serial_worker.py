@@ -79,7 +79,7 @@ def send_bare(framing: str, device: str, frames: int, frame: bytes) -> dict[str,
     os.read(descriptor, 1)  # the receiver is there
     before = cpu_s()
     if framing == "cobs":
-        from cobs import cobs  # type: ignore[import-not-found]  # noqa: PLC0415 - only where it is asked for
+        from cobs import cobs  # noqa: PLC0415 - only where it is asked for
 
         for _ in range(frames):
             write_all(descriptor, cobs.encode(frame + _CRC.pack(crc32(frame))) + b"\0")

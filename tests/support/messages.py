@@ -1,4 +1,6 @@
-"""Strategies for every message of the protocol, each field over its whole allowed range."""
+"""Strategies for every message of the protocol, each field over its whole allowed range; and how headers are spoiled."""
+
+import random
 
 from hypothesis import strategies as st
 
@@ -76,3 +78,24 @@ MESSAGES: st.SearchStrategy[Message] = st.one_of(
     st.builds(Bye, COUNTS),
     st.builds(Steer, st.integers(0, 2**62)),
 )
+
+
+def mutated(header: bytes, chance: random.Random) -> bytes:
+    """A header with some bytes changed, left out, put in, doubled or cut off."""
+    data = bytearray(header)
+    for _ in range(chance.randint(1, 4)):
+        at = chance.randrange(len(data) + 1)
+        match chance.randrange(6):
+            case 0:
+                data[at : at + 1] = bytes([chance.randrange(256)])
+            case 1:
+                del data[at : at + chance.randint(1, 3)]
+            case 2:
+                data[at:at] = chance.randbytes(chance.randint(1, 5))
+            case 3:
+                data[at:at] = data[: chance.randint(1, 20)]
+            case 4 if data:
+                data[at % len(data)] ^= 1 << chance.randrange(8)
+            case _:
+                del data[at:]
+    return bytes(data)

@@ -73,7 +73,7 @@ def test_packages_are_typed(package: str) -> None:
     assert (ROOT / package / "py.typed").is_file()
 
 
-@pytest.mark.parametrize("name", ["dev.txt", "bench.txt"])
+@pytest.mark.parametrize("name", ["dev.txt", "bench.txt", "fuzz.txt"])
 def test_pins_have_hashes_and_no_address(name: str) -> None:
     """Every requirement is one exact version with hashes, and no line names an index or a path of some machine."""
     text = (ROOT / "requirements" / name).read_text(encoding="utf-8")
@@ -101,19 +101,18 @@ def test_pins_satisfy_the_ranges(markers: dict[str, str]) -> None:
         assert version != "none" and wanted.specifier.contains(version), f"{wanted}: pinned {version}; run make lock"  # noqa: PT018
 
 
-def test_benchmark_pins_agree_with_the_rest() -> None:
-    """What the benchmarks add never changes the version of a package the product was tested with."""
+@pytest.mark.parametrize("name", ["bench.txt", "fuzz.txt"])
+def test_other_pins_agree_with_the_rest(name: str) -> None:
+    """What benchmarks and fuzzing add never changes the version of a package the product was tested with."""
     tested = {str(without_hashes(line)).split(";")[0].strip() for line in pinned("dev.txt")}
-    own = {
-        canonicalize_name(Requirement(text).name) for text in pyproject()["project"]["optional-dependencies"]["bench"]
-    }
-    for requirement in map(without_hashes, pinned("bench.txt")):
-        assert str(requirement).split(";")[0].strip() in tested or canonicalize_name(requirement.name) in own
+    names = {Requirement(text).name for text in tested}
+    for requirement in map(without_hashes, pinned(name)):
+        assert requirement.name not in names or str(requirement).split(";")[0].strip() in tested
 
 
 def test_only_one_opencv_is_pinned() -> None:
     """Two OpenCV distributions overwrite each other's files, so exactly one is ever installed."""
-    names = {without_hashes(line).name for name in ("dev.txt", "bench.txt") for line in pinned(name)}
+    names = {without_hashes(line).name for name in ("dev.txt", "bench.txt", "fuzz.txt") for line in pinned(name)}
     assert {name for name in names if "opencv" in name} == {"opencv-python-headless"}
 
 

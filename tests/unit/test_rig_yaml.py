@@ -99,7 +99,9 @@ def test_an_edited_file_is_checked(tmp_path: Path, old: str, new: str, message: 
         read_rig(path)
 
 
-@pytest.mark.parametrize("content", [b"", b"hello", b'{"M1": 1}', b"%YAML:1.0\nM1: [", b"\xff\xfe\x00"])
+@pytest.mark.parametrize(
+    "content", [b"", b"hello", b'{"M1": 1}', b"%YAML:1.0\nM1: [", b"%YAML:1.0\n---\n- 1\n", b"\xff\xfe\x00"]
+)
 def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
     """What is no FileStorage YAML is refused in one line, by name."""
     path = tmp_path / "rig.yaml"

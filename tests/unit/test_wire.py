@@ -36,31 +36,10 @@ from common.protocol.wire import (
     encode,
     encode_for_any_version,
 )
-from tests.support.messages import MESSAGES
+from tests.support.messages import MESSAGES, mutated
 
 MUTATIONS = 80
 """For each of 150 messages: 12000 mutated headers in all."""
-
-
-def mutated(header: bytes, chance: random.Random) -> bytes:
-    """A header with some bytes changed, left out, put in, doubled or cut off."""
-    data = bytearray(header)
-    for _ in range(chance.randint(1, 4)):
-        at = chance.randrange(len(data) + 1)
-        match chance.randrange(6):
-            case 0:
-                data[at : at + 1] = bytes([chance.randrange(256)])
-            case 1:
-                del data[at : at + chance.randint(1, 3)]
-            case 2:
-                data[at:at] = chance.randbytes(chance.randint(1, 5))
-            case 3:
-                data[at:at] = data[: chance.randint(1, 20)]
-            case 4 if data:
-                data[at % len(data)] ^= 1 << chance.randrange(8)
-            case _:
-                del data[at:]
-    return bytes(data)
 
 
 def is_refused_or_read(header: bytes, payload: bytes = b"") -> None:

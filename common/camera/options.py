@@ -1,0 +1,34 @@
+"""Numbers in the options of a camera URI. Bounded before they are computed with: `fps=1e999999999` is a billion digits to a fraction."""
+
+import re
+from fractions import Fraction
+from typing import Final
+
+_NUMBER: Final = re.compile(
+    r"[+-]?\d{1,12}(\.\d{0,12})?(e[+-]?\d{1,2})?|[+-]?\.\d{1,12}|\d{1,12}/\d{1,12}", re.ASCII | re.IGNORECASE
+)
+
+
+def exact(text: str) -> Fraction:
+    """Read a decimal number or a ratio, such as 29.97 or 30000/1001.
+
+    Raises:
+        ValueError: it is none, or longer than any sensible one.
+        ZeroDivisionError: a ratio to nothing.
+    """
+    if not _NUMBER.fullmatch(text):
+        raise ValueError(text)
+    return Fraction(text)
+
+
+def milliseconds(text: str) -> int:
+    """Read a time from 0 to 1000 ms; gives ns.
+
+    Raises:
+        ValueError: it is none.
+        ZeroDivisionError: a ratio to nothing.
+    """
+    value_ns = round(exact(text) * 1_000_000)
+    if not 0 <= value_ns <= 1_000_000_000:
+        raise ValueError(text)
+    return value_ns
