@@ -35,6 +35,7 @@ _EXAMPLES = """examples:
   board-agent run --camera 'replay:frames?pace=demand' --link ipc:///tmp/board
   board-agent run --config /etc/tandemscan/board-agent.toml
   board-agent cameras
+  board-agent doctor
   board-agent settings --json
 """
 
@@ -48,9 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: without the program's name; None for those of the process.
 
     Returns:
-        The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout not to be had, 4 bad data, 130 interrupted.
+        The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout not to be had, 4 bad data or a failed check, 130 interrupted.
     """
-    verbs = {"run": _run, "settings": _settings, "cameras": _cameras}
+    verbs = {"run": _run, "settings": _settings, "cameras": _cameras, "doctor": _doctor}
     return run_command(_parser(), arguments, lambda options: verbs[options.verb](options))
 
 
@@ -60,10 +61,11 @@ def _parser() -> argparse.ArgumentParser:
     run = verbs.add_parser("run", help="serve frames until stopped", description=_EXAMPLES)
     show = verbs.add_parser("settings", help="print each setting with its origin", description=_EXAMPLES)
     cameras = verbs.add_parser("cameras", help="list formats, rates and controls", description=_EXAMPLES)
-    for verb in (run, show, cameras):
+    doctor = verbs.add_parser("doctor", help="check camera, links, clocks, disk and power", description=_EXAMPLES)
+    for verb in (run, show, cameras, doctor):
         verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
         verb.add_argument("--debug", action="store_true", help="show tracebacks")
-    for verb in (run, show):
+    for verb in (run, show, doctor):
         verb.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
         verb.add_argument("--camera", metavar="URI", help=EXAMPLE.replace("%", "%%"))
         verb.add_argument(
@@ -112,6 +114,21 @@ def _cameras(options: argparse.Namespace) -> int:
     found = list_cameras()
     print(json.dumps(values(found)) if options.json else table(found))
     return 0
+
+
+def _doctor(options: argparse.Namespace) -> int:
+    """Check what `run` would use; without any choice that is what the service uses, where it is installed."""
+    from board_agent.doctor import SERVICE_SETTINGS, examine  # noqa: PLC0415 - needed by this verb alone
+    from common.doctor.finding import exit_code, table, values  # noqa: PLC0415
+
+    if not (options.config or options.camera or options.link) and SERVICE_SETTINGS.is_file():
+        options.config = SERVICE_SETTINGS
+    settings = _resolve(options).values
+    _check(settings)
+    logs.set_up(logging.ERROR)  # the findings say it all
+    findings = examine(settings, options.config)
+    print(json.dumps(values(findings)) if options.json else table(findings))
+    return exit_code(findings)
 
 
 def _run(options: argparse.Namespace) -> int:

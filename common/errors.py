@@ -39,6 +39,10 @@ class UnavailableError(TandemError):
     exit_code = 3
 
 
+class TakenError(UnavailableError):
+    """Raised when another program has the device. Nobody's fault; the other one must let go first."""
+
+
 class DataError(TandemError):
     """Raised when a file, image or result is bad, or a check failed. The input's fault."""
 

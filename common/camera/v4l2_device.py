@@ -16,7 +16,7 @@ from typing import Final, Self
 from common.camera import v4l2_abi as abi
 from common.camera.v4l2_controls import Control
 from common.camera.v4l2_formats import FormatOffer, Rates, SizeRange
-from common.errors import UnavailableError
+from common.errors import TakenError, UnavailableError
 
 _BY_ID: Final = Path("/dev/v4l/by-id")
 _BY_PATH: Final = Path("/dev/v4l/by-path")
@@ -74,12 +74,21 @@ def ioctl(fd: int, request: int, argument: ctypes.Structure | ctypes.c_int) -> N
         return
 
 
+def taken(path: Path) -> TakenError:
+    """The error for a camera that another program streams from (EBUSY)."""
+    return TakenError(f"camera {path} is in use by another program", "end that program, or use another camera")
+
+
+def video_nodes() -> list[Path]:
+    """All nodes of the kernel's V4L2 devices by number, whatever they give and whoever may open them."""
+    return sorted(Path("/dev").glob("video[0-9]*"), key=lambda path: (len(path.name), path.name))
+
+
 def capture_nodes() -> list[Path]:
     """All capture nodes, those with a name in /dev/v4l/by-id first, in name order; metadata and output nodes are left out."""
     named = sorted(_BY_ID.glob("*")) if _BY_ID.is_dir() else []
-    numbered = sorted(Path("/dev").glob("video*"), key=lambda path: (len(path.name), path.name))
     nodes: dict[Path, Path] = {}
-    for path in (*named, *numbered):
+    for path in (*named, *video_nodes()):
         nodes.setdefault(path.resolve(), path)
     return [path for path in nodes.values() if _captures(path)]
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.camera import v4l2_abi as abi
-from common.camera.v4l2_device import Device, ioctl
-from common.errors import UnavailableError
+from common.camera.v4l2_device import Device, ioctl, taken
 
 RING_BUFFERS: Final = 4
 """Least that never starves a driver: one is being filled, one is next, one is read here, one spare for a late reader. DESIGN's issue asks for 4."""
@@ -40,7 +39,7 @@ class Ring:
         device: the device; must outlive the ring.
 
     Raises:
-        UnavailableError: another program has the camera.
+        TakenError: another program has the camera.
         OSError: the driver refuses.
     """
 
@@ -51,9 +50,7 @@ class Ring:
             ioctl(self._fd, abi.REQBUFS, request)
         except OSError as error:
             if error.errno == errno.EBUSY:
-                raise UnavailableError(
-                    f"camera {device.path} is in use by another program", "end that program, or use another camera"
-                ) from None
+                raise taken(device.path) from None
             raise
         self._maps: list[mmap.mmap] = []
         self._views: list[memoryview] = []

@@ -12,12 +12,13 @@ from common import now
 from common.camera import v4l2_abi as abi
 from common.camera.base import Grab, Skipped, Spoiled
 from common.camera.v4l2_controls import Axis, ControlPlan, ControlWishes, Step
-from common.camera.v4l2_device import Device, PixelFormatSet
+from common.camera.v4l2_device import Device, PixelFormatSet, taken
 from common.camera.v4l2_formats import Choice, Wanted, choose, choose_rate, rate_text
 from common.camera.v4l2_pack import Packing, SendPart
 from common.camera.v4l2_ring import Filled, Ring
 from common.camera.v4l2_stamps import (
     RateMeter,
+    StampClock,
     StampSource,
     Timing,
     estimated_readout_ns,
@@ -62,13 +63,14 @@ class V4l2Settings:
 
 @dataclass(slots=True)
 class Tally:
-    """Counts that outlive the device."""
+    """Counts that outlive the device; `stamps` is the clock that the last frame's flags named, None before one."""
 
     grabs: int = 0
     missed: int = 0
     distrusted: int = 0
     refused: int = 0
     faults: dict[FrameFault, int] = field(default_factory=dict)
+    stamps: StampClock | None = None
     rate: RateMeter = field(default_factory=RateMeter)
 
     def number(self) -> int:
@@ -141,6 +143,11 @@ class Stream:
     def name(self) -> str:
         """The camera's name, for people."""
         return f"{self._device.identity.card} ({self._device.identity.driver})"
+
+    @property
+    def driver(self) -> str:
+        """The kernel driver's name."""
+        return self._device.identity.driver
 
     @property
     def pixel_format(self) -> PixelFormat:
@@ -249,7 +256,12 @@ class Stream:
         return found
 
     def _set_format(self, choice: Choice) -> PixelFormatSet:
-        made = self._device.set_format(choice.letters, choice.size_px)
+        try:
+            made = self._device.set_format(choice.letters, choice.size_px)
+        except OSError as error:
+            if error.errno == errno.EBUSY:
+                raise taken(self._device.path) from None
+            raise
         if (made.letters, made.size_px) != (choice.letters, choice.size_px):
             asked, got = f"{choice.letters} {_size(choice.size_px)}", f"{made.letters} {_size(made.size_px)}"
             raise UnavailableError(
@@ -347,7 +359,8 @@ class Stream:
         return find_fault(self.choice.pixel_format, view, self._packing.least_bytes)
 
     def _exposed_ns(self, filled: Filled, grabbed_ns: int) -> int:
-        if is_trusted(filled.stamp_ns, stamp_clock(filled.flags), grabbed_ns):
+        self._tally.stamps = stamp_clock(filled.flags)
+        if is_trusted(filled.stamp_ns, self._tally.stamps, grabbed_ns):
             stamp_ns, source = filled.stamp_ns, stamp_source(filled.flags, self._timing.driver)
         else:
             self._tally.distrusted += 1

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from common.errors import UnavailableError
+from common.errors import TakenError, UnavailableError
 from common.link.stream import StreamLink
 from common.protocol.framing import Side
 
@@ -106,7 +106,7 @@ def _explained(path: str, error: Exception) -> UnavailableError:
     number = getattr(error, "errno", None)
     problem = f"serial:{path} cannot be opened ({os.strerror(number) if number else error})"
     if number in _TAKEN:
-        return UnavailableError(f"serial:{path} is taken", "stop what uses it (a getty, a terminal, ModemManager)")
+        return TakenError(f"serial:{path} is taken", "stop what uses it (a getty, a terminal, ModemManager)")
     if number in {errno.EACCES, errno.EPERM}:
         group = _group(path)
         return UnavailableError(problem, f"sudo usermod -aG {group} $USER, then log in again")

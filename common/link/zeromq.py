@@ -13,7 +13,7 @@ from typing import Final
 
 import zmq
 
-from common.errors import SettingsError, UnavailableError
+from common.errors import SettingsError, TakenError, UnavailableError
 from common.frame import Buffer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.protocol.message import Lane
@@ -224,7 +224,9 @@ class ZeroMqDialer(_AlwaysReady):
 
 def _explained(address: str, error: zmq.ZMQError, remedy: str) -> SettingsError | UnavailableError:
     """Sort ZeroMQ's refusal of an address by whose fault it is."""
-    if error.errno in {zmq.EADDRINUSE, zmq.EADDRNOTAVAIL, errno.ENODEV} or isinstance(error, zmq.ZMQBindError):
+    if error.errno == zmq.EADDRINUSE:
+        return TakenError(f"{address} cannot be had ({error.strerror})", remedy)
+    if error.errno in {zmq.EADDRNOTAVAIL, errno.ENODEV} or isinstance(error, zmq.ZMQBindError):
         return UnavailableError(f"{address} cannot be had ({error.strerror})", remedy)
     if error.errno in {errno.EPERM, errno.ENOENT, errno.EACCES}:  # the folder of an ipc path, or a port below 1024
         return UnavailableError(
@@ -252,7 +254,8 @@ def _free_path(path: str) -> None:
 
     Raises:
         SettingsError: the path is too long for a Unix socket.
-        UnavailableError: somebody listens there.
+        TakenError: somebody listens there.
+        UnavailableError: it is no socket, or may not be touched.
     """
     if len(os.fsencode(path)) > _UNIX_PATH_MAX:
         raise SettingsError(
@@ -269,4 +272,4 @@ def _free_path(path: str) -> None:
             raise UnavailableError(
                 f"ipc://{path} cannot be opened ({error.strerror})", "choose another path with --link"
             ) from None
-    raise UnavailableError(f"ipc://{path} is taken", "stop what listens there, or choose another path with --link")
+    raise TakenError(f"ipc://{path} is taken", "stop what listens there, or choose another path with --link")

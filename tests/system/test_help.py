@@ -8,7 +8,7 @@ from tests.support.programs import program
 
 COMMANDS = [
     ("board_agent.cli", []),
-    *(("board_agent.cli", [verb]) for verb in ("run", "settings", "cameras")),
+    *(("board_agent.cli", [verb]) for verb in ("run", "settings", "cameras", "doctor")),
     ("phone_host.cli", []),
     *(("phone_host.cli", [verb]) for verb in ("demo", "run", "calibrate", "stereo", "settings")),
     ("phone_host.bench_cli", []),

@@ -1,0 +1,99 @@
+"""Whether a user may open a device, and who has it open already. Pure."""
+
+from dataclasses import dataclass
+
+from common.doctor.finding import Finding, fail, ok
+
+_READ_AND_WRITE = 0o6
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """A user.
+
+    Attributes:
+        name: for people.
+        uid: number; 0 may everything.
+        groups: ids of all groups.
+        is_me: whether it is the user who asks.
+    """
+
+    name: str
+    uid: int
+    groups: frozenset[int]
+    is_me: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A device node.
+
+    Attributes:
+        path: of the node itself, not of a link to it.
+        uid: owner.
+        gid: group.
+        group: the group's name.
+        mode: permission bits.
+        open_to_me: whether the user who asks may open it, access lists (logind's, for one) included.
+    """
+
+    path: str
+    uid: int
+    gid: int
+    group: str
+    mode: int
+    open_to_me: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """A process that has something open.
+
+    Attributes:
+        pid: its id.
+        name: its command.
+    """
+
+    pid: int
+    name: str
+
+    def __str__(self) -> str:
+        return f"{self.name} (pid {self.pid})"
+
+
+def may_open(node: Node, account: Account) -> bool:
+    """Whether a user may read and write a node, as far as owner, group and mode tell."""
+    if account.uid == 0:
+        return True
+    if account.is_me:
+        return node.open_to_me
+    if node.uid == account.uid:
+        bits = node.mode >> 6
+    elif node.gid in account.groups:
+        bits = node.mode >> 3
+    else:
+        bits = node.mode
+    return bits & _READ_AND_WRITE == _READ_AND_WRITE
+
+
+def check_access(what: str, node: Node, account: Account) -> Finding:
+    """Judge whether a user may open a device.
+
+    Args:
+        what: the thing checked.
+        node: the device.
+        account: who is to open it.
+    """
+    state = f"{node.path} (group {node.group}, mode {node.mode:03o})"
+    if may_open(node, account):
+        return ok(what, f"user {account.name} may open {state}")
+    if node.mode >> 3 & _READ_AND_WRITE != _READ_AND_WRITE or node.gid == 0:
+        return fail(
+            what,
+            f"user {account.name} may not open {state}",
+            f"a udev rule or a program has changed it: plug it in again, or chmod 660 {node.path}",
+        )
+    again = "log in again" if account.is_me else "restart the service"
+    return fail(
+        what, f"user {account.name} may not open {state}", f"sudo usermod -aG {node.group} {account.name}, then {again}"
+    )

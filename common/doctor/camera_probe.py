@@ -1,0 +1,193 @@
+"""Asks a camera, streams from it for a moment, and lets the checks judge. Uses the very code that `run` uses."""
+
+import select
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from common import now
+from common.camera.base import Skipped, Spoiled
+from common.camera.factory import open_camera, parse_camera
+from common.camera.replay import ReplaySettings
+from common.camera.v4l2_device import Device, capture_nodes, lasting_name, video_nodes
+from common.camera.v4l2_formats import Wanted, choose
+from common.camera.v4l2_stream import Stream, Tally, V4l2Settings
+from common.doctor import machine
+from common.doctor.access import Account, Node, check_access
+from common.doctor.camera_checks import (
+    Offered,
+    Sample,
+    check_absence,
+    check_bus,
+    check_format,
+    check_stream,
+    check_taken,
+    raw_frame_bytes,
+)
+from common.doctor.finding import Finding, Verdict, fail, ok
+from common.doctor.unit_check import Unit
+from common.errors import TakenError, TandemError
+from common.frame import Frame
+
+_SAMPLE_NS: Final = 1_000_000_000
+"""How long frames are taken, from the first one on."""
+
+_FEW: Final = 9
+"""Frames that a slow camera is waited for: so many give a rate."""
+
+_LONGEST_NS: Final = 6_000_000_000
+"""Webcams begin within 2 s; nine frames of the slowest useful one take 4 s more."""
+
+
+def examine_camera(uri: str, account: Account, unit: Unit) -> list[Finding]:
+    """Check a camera from its node to its frames.
+
+    Args:
+        uri: the camera.
+        account: who is to open it.
+        unit: our own service, which may have it.
+
+    Returns:
+        The findings; those that stand on one that failed are left out.
+
+    Raises:
+        SettingsError: the URI makes no sense.
+    """
+    settings = parse_camera(uri, "")
+    if isinstance(settings, ReplaySettings):
+        return [_replay(uri)]
+    nodes = video_nodes()
+    if settings.path:
+        path = lasting_name(Path(settings.path))
+    elif found := capture_nodes():
+        path = lasting_name(found[0])
+    else:
+        absent = check_absence(len(nodes), machine.read_usb_cameras())
+        return [absent, *_denied(nodes, account)]
+    return list(_examine(path, settings, account, unit))
+
+
+def _replay(uri: str) -> Finding:
+    try:
+        camera = open_camera(uri, "", now.monotonic_ns())
+    except TandemError as error:
+        return fail("camera", error.problem, error.remedy)
+    camera.close()
+    return ok("camera", f"{uri} shows images of {camera.description.width_px}x{camera.description.height_px}")
+
+
+def _denied(nodes: list[Path], account: Account) -> Iterator[Finding]:
+    """What stands in the way of nodes that gave nothing."""
+    for path in nodes:
+        node = machine.read_node(path)
+        if node is not None and (finding := check_access("permission", node, account)).verdict is Verdict.FAIL:
+            yield finding
+
+
+def _examine(path: Path, settings: V4l2Settings, account: Account, unit: Unit) -> Iterator[Finding]:
+    node = machine.read_node(path)
+    if node is None:
+        yield fail(
+            "camera", f"{path} is not there", "plug it in, or give one of those that `board-agent cameras` lists"
+        )
+        return
+    access = check_access("permission", node, account)
+    try:
+        with Device(path) as device:
+            device.require_capture()
+            offered = _ask(device, settings.wanted)
+            identity = device.identity
+    except TandemError as error:
+        yield fail("camera", error.problem, error.remedy)
+        yield access
+        return
+    except OSError as error:
+        yield fail("camera", f"{path} failed ({error.strerror})", "unplug it and plug it in again")
+        return
+    yield ok("camera", f"{identity.card} ({identity.driver}) at {path}")
+    yield access
+    possible = check_format(str(path), offered, settings.wanted)
+    yield possible
+    if possible.verdict is not Verdict.FAIL:
+        yield from _streamed(path, node, settings, offered, unit)
+
+
+def _streamed(path: Path, node: Node, settings: V4l2Settings, offered: Offered, unit: Unit) -> Iterator[Finding]:
+    """What streaming shows: the proof that the bus carries what is asked."""
+    try:
+        sample = _stream(path, settings)
+    except TakenError:
+        holders, all_seen = machine.holders_of(node.path)
+        yield check_taken(holders, unit.pid, unit.status, all_seen=all_seen)
+        return
+    except TandemError as error:
+        yield fail("stream", error.problem, error.remedy)
+        return
+    except OSError as error:
+        remedy = "no room on the USB bus, or a bad cable: another port, format=mjpeg, a smaller size"
+        yield fail("stream", f"{path} does not stream ({error.strerror})", remedy)
+        return
+    frame_bytes = sample.frame_bytes or raw_frame_bytes(offered, settings.wanted)
+    bus = machine.read_usb_bus(path)
+    if bus is not None and frame_bytes:
+        yield check_bus(bus, frame_bytes, 1e9 / sample.nominal_ns)
+    yield from check_stream(sample)
+
+
+def _ask(device: Device, wanted: Wanted) -> Offered:
+    """The driver's formats, and the rates of the one that would be chosen."""
+    formats = device.formats()
+    try:
+        choice = choose(formats, wanted, "")
+    except TandemError:
+        return Offered(formats, {})
+    where = choice.letters, choice.size_px
+    return Offered(formats, {where: device.rates(*where)})
+
+
+def _stream(path: Path, settings: V4l2Settings) -> Sample:
+    """Stream for a second from the first frame on.
+
+    Raises:
+        TandemError: it cannot be had.
+        OSError: the driver failed.
+    """
+    tally = Tally()
+    # Nothing is locked: a moment is too short for the automatisms, and the next one to open it begins anew anyhow.
+    stream = Stream(path, settings, replace(settings.wishes, lock=False), tally)
+    frames = total_bytes = first_ns = 0
+    try:
+        stream.start()
+        started_ns = now.monotonic_ns()
+        poller = select.poll()
+        poller.register(stream.fd, select.POLLIN)
+        while (elapsed_ns := now.monotonic_ns() - started_ns) < _LONGEST_NS:
+            if first_ns and elapsed_ns - first_ns >= _SAMPLE_NS and frames >= _FEW:
+                break
+            poller.poll((_LONGEST_NS - elapsed_ns) // 1_000_000 + 1)
+            for grab in stream.take():
+                match grab:
+                    case Frame():
+                        frames += 1
+                        total_bytes += len(grab.payload)
+                        first_ns = first_ns or now.monotonic_ns() - started_ns
+                    case Skipped() | Spoiled():
+                        pass  # the tally has the spoiled ones; one that was passed over is nothing bad
+                    case _:
+                        pass
+    finally:
+        stream.close()
+    return Sample(
+        frames=frames,
+        spoiled=tuple((fault.value, count) for fault, count in tally.faults.items()),
+        missed=tally.missed,
+        distrusted=tally.distrusted,
+        nominal_ns=stream.period_ns,
+        period_ns=tally.rate.period_ns,
+        frame_bytes=total_bytes // frames if frames else 0,
+        first_ns=first_ns,
+        stamps=tally.stamps,
+        driver=stream.driver,
+        refused=tally.refused,
+    )

@@ -1,0 +1,77 @@
+"""A check's result and how a list of them is printed. Pure.
+
+A check takes readings and gives findings; it opens nothing. What could not be read is a warning with the way to read it, never silence.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+CHECK_FAILED: Final = 4
+
+
+class Verdict(Enum):
+    """How a check came out."""
+
+    OK = "ok"
+    WARN = "warn"
+    FAIL = "fail"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What one check found.
+
+    Attributes:
+        what: the thing checked.
+        verdict: fail: nothing will work; warn: something works badly, or could not be seen.
+        text: the finding.
+        remedy: what to do about it; empty where nothing is to be done.
+    """
+
+    what: str
+    verdict: Verdict
+    text: str
+    remedy: str = ""
+
+
+def ok(what: str, text: str) -> Finding:
+    """A thing that is as it should be."""
+    return Finding(what, Verdict.OK, text)
+
+
+def warn(what: str, text: str, remedy: str) -> Finding:
+    """A thing that works badly, or could not be seen."""
+    return Finding(what, Verdict.WARN, text, remedy)
+
+
+def fail(what: str, text: str, remedy: str) -> Finding:
+    """A thing without which nothing works."""
+    return Finding(what, Verdict.FAIL, text, remedy)
+
+
+def table(findings: Sequence[Finding]) -> str:
+    """The findings as text: a line for each."""
+    width = max((len(item.what) for item in findings), default=0)
+    return "\n".join(
+        f"{item.verdict.value:4}  {item.what:{width}}  {item.text}" + (f" -> {item.remedy}" if item.remedy else "")
+        for item in findings
+    )
+
+
+def values(findings: Sequence[Finding]) -> dict[str, Any]:
+    """The findings as one JSON object."""
+    return {
+        "failed": sum(item.verdict is Verdict.FAIL for item in findings),
+        "warnings": sum(item.verdict is Verdict.WARN for item in findings),
+        "checks": [
+            {"what": item.what, "verdict": item.verdict.value, "finding": item.text, "remedy": item.remedy}
+            for item in findings
+        ],
+    }
+
+
+def exit_code(findings: Sequence[Finding]) -> int:
+    """The command's exit code: 0 when nothing failed, warnings or not, else 4."""
+    return CHECK_FAILED if any(item.verdict is Verdict.FAIL for item in findings) else 0

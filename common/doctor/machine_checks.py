@@ -1,0 +1,240 @@
+"""Disk, power, USB trouble, clocks and Bluetooth of a machine, judged from readings. Pure."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from common.doctor.finding import Finding, fail, ok, warn
+
+_MB: Final = 1_000_000
+
+_LITTLE_BYTES: Final = 50 * _MB
+"""A day's journal of a board in trouble, or ten saved pairs with their clouds."""
+
+_COARSE_NS: Final = 100_000
+"""A clock that moves in steps longer than this (jiffies: 1 to 10 ms) cannot tell which frames belong together."""
+
+_UNDER_VOLTAGE: Final = re.compile(
+    r"under-?voltage detected", re.IGNORECASE
+)  # Raspberry Pi: rpi_volt, raspberrypi-firmware
+_OVER_CURRENT: Final = re.compile(r"over-?current (change|condition)", re.IGNORECASE)  # usb hub.c
+_USB_ERROR: Final = re.compile(
+    r"usb \S+: (reset \S+ USB device|device descriptor read/\S+ error|device not accepting address|can't set config)"
+    r"|unable to enumerate USB device|Non-zero status \(-\d+\) in video completion"
+)
+"""What the kernel's hub.c and uvc_video.c say when cable, supply or hub fail."""
+
+_USB_DISCONNECT: Final = re.compile(r"usb \S+: USB disconnect")
+
+_THROTTLED_NOW, _THROTTLED_BEFORE = 1 << 0, 1 << 16
+"""Under-voltage bits of the Raspberry Pi firmware's get_throttled."""
+
+
+@dataclass(frozen=True, slots=True)
+class Disk:
+    """A file system.
+
+    Attributes:
+        path: where it was asked for.
+        free_bytes: for those who are not root.
+        free_files: inodes left; 0 also where the file system does not count them.
+        counts_files: whether it does.
+        read_only: whether it is mounted so.
+    """
+
+    path: str
+    free_bytes: int
+    free_files: int
+    counts_files: bool
+    read_only: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LogLine:
+    """A line of the kernel's log.
+
+    Attributes:
+        age_s: how long ago, s.
+        text: without stamp.
+    """
+
+    age_s: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class KernelLog:
+    """The kernel's log of this boot.
+
+    Attributes:
+        readable: whether it could be read.
+        lines: oldest first.
+    """
+
+    readable: bool
+    lines: tuple[LogLine, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Supply:
+    """What the firmware of a board says of its supply.
+
+    Attributes:
+        sensor: where it says so; empty for boards that do not.
+        low_now: whether the voltage is too low now.
+        low_before: whether it was since the boot.
+    """
+
+    sensor: str = ""
+    low_now: bool = False
+    low_before: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Clocks:
+    """The machine's clocks.
+
+    Attributes:
+        date_s: the date, seconds since 1970.
+        program_s: when the newest file of this program was made, seconds since 1970: no true date lies before it.
+        synchronised: whether the kernel takes the date for synchronised (adjtimex).
+        source: the kernel's clock source.
+        resolution_ns: step of CLOCK_MONOTONIC.
+    """
+
+    date_s: float
+    program_s: float
+    synchronised: bool
+    source: str
+    resolution_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Bluetooth:
+    """What there is of Bluetooth.
+
+    Attributes:
+        in_python: whether this Python has Bluetooth sockets.
+        adapters: names such as hci0.
+        blocked: those that are switched off (rfkill).
+    """
+
+    in_python: bool
+    adapters: tuple[str, ...]
+    blocked: tuple[str, ...] = ()
+
+
+def check_disk(disk: Disk) -> Finding:
+    """Judge a file system: space, inodes, whether it can be written to."""
+    if disk.read_only:
+        return warn(
+            "disk",
+            f"{disk.path} is read-only",
+            "if that is not meant so, the card is failing: look for I/O errors in dmesg",
+        )
+    if disk.counts_files and disk.free_files == 0:
+        return warn("disk", f"{disk.path} takes no further file (no inode is left)", "remove what is not needed")
+    room = f"{disk.path} has {disk.free_bytes / _MB:.0f} MB free"
+    if disk.free_bytes < _LITTLE_BYTES:
+        return warn(
+            "disk", room, "make room (journalctl --vacuum-size=20M, apt clean); frames go on, logs and results don't"
+        )
+    return ok("disk", room)
+
+
+def throttled(bits: int, sensor: str) -> Supply:
+    """Read the bits of the Raspberry Pi firmware's get_throttled."""
+    return Supply(sensor, bool(bits & _THROTTLED_NOW), bool(bits & _THROTTLED_BEFORE))
+
+
+def check_power(log: KernelLog, supply: Supply) -> Finding:
+    """Judge the supply: what the firmware says now, and what the kernel has said since the boot."""
+    remedy = "a stronger supply and a shorter cable; the camera on a hub with its own supply"
+    if supply.low_now:
+        return fail("power", f"the supply's voltage is too low now ({supply.sensor})", remedy)
+    low = _matching(log, _UNDER_VOLTAGE)
+    if low:
+        return warn("power", f"under-voltage {_times(low)} in the kernel's log", remedy)
+    if over := _matching(log, _OVER_CURRENT):
+        return warn("power", f"USB over-current {_times(over)} in the kernel's log", remedy)
+    if supply.low_before:
+        return warn("power", f"the voltage was too low since the boot ({supply.sensor})", remedy)
+    if not log.readable:
+        return _unreadable("power")
+    return ok("power", "no under-voltage in the kernel's log" + (f" nor in {supply.sensor}" if supply.sensor else ""))
+
+
+def check_usb_log(log: KernelLog) -> Finding:
+    """Judge what the kernel has said of USB devices since the boot."""
+    if not log.readable:
+        return _unreadable("usb-log")
+    errors, pulled = _matching(log, _USB_ERROR), _matching(log, _USB_DISCONNECT)
+    if errors:
+        said = f"USB errors or resets {_times(errors)}; the last: {errors[-1].text}"
+        return warn("usb-log", said, "another cable or port; a hub with its own supply; a shorter way")
+    if pulled:
+        return ok("usb-log", f"no USB error; a device was unplugged {_times(pulled)}")
+    return ok("usb-log", "no USB error since the boot")
+
+
+def check_clocks(clocks: Clocks) -> list[Finding]:
+    """Judge the clocks. Only CLOCK_MONOTONIC counts for pairs; a wrong date spoils no more than the journal's dates."""
+    if clocks.resolution_ns > _COARSE_NS:
+        step = f"CLOCK_MONOTONIC moves in steps of {clocks.resolution_ns / 1e6:g} ms (clock source {clocks.source})"
+        steady = fail("clock", step, "boot a kernel with high-resolution timers; no pair can be told without")
+    else:
+        steady = ok(
+            "clock", f"CLOCK_MONOTONIC runs in steps of {clocks.resolution_ns} ns (clock source {clocks.source})"
+        )
+    if clocks.date_s < clocks.program_s:
+        date = warn(
+            "date",
+            "the date lies before this program was made: the machine has no clock of its own and met no time server",
+            "does pairs no harm; for true dates in logs: timedatectl set-ntp true, and a network",
+        )
+    else:
+        said = "synchronised" if clocks.synchronised else "not synchronised, which does pairs no harm"
+        date = ok("date", f"the date is {said}")
+    return [steady, date]
+
+
+def check_bluetooth(bluetooth: Bluetooth, *, wanted: bool) -> Finding:
+    """Judge whether links over Bluetooth are possible.
+
+    Args:
+        bluetooth: what there is.
+        wanted: whether a link asks for it.
+    """
+    judge = fail if wanted else warn
+    if not bluetooth.in_python:
+        return judge("bluetooth", "this Python has no Bluetooth sockets", "use Debian's python3 (apt install python3)")
+    if not bluetooth.adapters:
+        if not wanted:
+            return ok("bluetooth", "no adapter, and no link asks for one")
+        return fail(
+            "bluetooth", "no adapter was found", "plug one in; rfkill and dmesg tell of one that is switched off"
+        )
+    usable = [name for name in bluetooth.adapters if name not in bluetooth.blocked]
+    if not usable:
+        return judge("bluetooth", f"{', '.join(bluetooth.adapters)} is switched off", "rfkill unblock bluetooth")
+    return ok("bluetooth", f"adapter {', '.join(usable)}")
+
+
+def _unreadable(what: str) -> Finding:
+    return warn(what, "the kernel's log may not be read", "ask again as root: sudo")
+
+
+def _matching(log: KernelLog, pattern: re.Pattern[str]) -> list[LogLine]:
+    return [line for line in log.lines if pattern.search(line.text)]
+
+
+def _times(lines: Sequence[LogLine]) -> str:
+    count = "once" if len(lines) == 1 else f"{len(lines)} times"
+    return f"{count}, {'' if len(lines) == 1 else 'the last '}{_ago(lines[-1].age_s)}"
+
+
+def _ago(age_s: float) -> str:
+    if age_s < 120:
+        return f"{age_s:.0f} s ago"
+    return f"{age_s / 60:.0f} min ago" if age_s < 7200 else f"{age_s / 3600:.0f} h ago"

@@ -1,0 +1,83 @@
+"""The doctor's verbs as real processes on this machine: no camera needed."""
+
+import json
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from tests.support.numbered import write_film
+from tests.support.programs import board, until
+
+
+def doctor(module: str, *arguments: str) -> tuple[int, dict[str, Any]]:
+    """Run a doctor to its end; gives the exit code, and the checks by what they checked."""
+    command = [sys.executable, "-P", "-m", module, "doctor", "--json", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert "Traceback" not in done.stderr
+    found: dict[str, Any] = {}
+    for check in json.loads(done.stdout)["checks"]:
+        found.setdefault(check["what"], check)
+    return done.returncode, found
+
+
+def test_a_sound_board_is_exit_0(tmp_path: Path) -> None:
+    """With images to show and a free link nothing fails, each check is named, and every warning has a remedy."""
+    write_film(tmp_path / "film", 3)
+    code, checks = doctor("board_agent.cli", "--camera", f"replay:{tmp_path}/film", "--link", f"ipc://{tmp_path}/link")
+    assert code == 0
+    assert {"settings", "service", "camera", "link", "clock", "date", "disk", "power", "usb-log"} <= set(checks)
+    assert all(check["remedy"] for check in checks.values() if check["verdict"] != "ok")
+
+
+def test_a_missing_camera_is_exit_4(tmp_path: Path) -> None:
+    """A camera that is not there fails with its remedy, and the other checks are made all the same."""
+    code, checks = doctor("board_agent.cli", "--camera", f"v4l2:{tmp_path}/none", "--link", f"ipc://{tmp_path}/link")
+    assert code == 4
+    assert checks["camera"]["verdict"] == "fail"
+    assert checks["camera"]["remedy"]
+    assert checks["link"]["verdict"] == "ok"
+
+
+def test_a_taken_port_names_who_has_it(tmp_path: Path) -> None:
+    """A port that this very test listens on fails with its process; the port is left as it was."""
+    write_film(tmp_path / "film", 3)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        code, checks = doctor(
+            "board_agent.cli", "--camera", f"replay:{tmp_path}/film", "--link", f"tcp://127.0.0.1:{port}"
+        )
+    assert code == 4
+    assert "pid" in checks["link"]["finding"]
+
+
+def test_a_running_board_keeps_its_link(tmp_path: Path) -> None:
+    """The doctor finds a running agent's ipc link taken and does not steal its path: the agent goes on listening there."""
+    write_film(tmp_path / "film", 3)
+    arguments = ["--camera", f"replay:{tmp_path}/film?loop=1", "--link", f"ipc://{tmp_path}/link"]
+    with board(["run", *arguments], tmp_path) as agent:
+        until(lambda: "serving" in agent.stderr, "the agent serves")
+        code, checks = doctor("board_agent.cli", *arguments)
+        assert code == 4
+        assert checks["link"]["verdict"] == "fail"
+        with socket.socket(socket.AF_UNIX) as probe:
+            probe.connect(str(tmp_path / "link"))
+        assert agent.stop() == 0
+
+
+def test_settings_that_make_no_sense_are_exit_2(tmp_path: Path) -> None:
+    """A bad URI is a settings mistake like with run: exit 2, one line, no checks."""
+    command = [sys.executable, "-P", "-m", "board_agent.cli", "doctor", "--camera", "v4l2:auto?size=big"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_the_table_has_a_line_for_each_check(tmp_path: Path) -> None:
+    """Without --json each line begins with its verdict, and what is not ok ends with a remedy."""
+    command = [sys.executable, "-P", "-m", "board_agent.cli", "doctor", "--camera", f"v4l2:{tmp_path}/none"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    lines = done.stdout.splitlines()
+    assert all(line.split()[0] in {"ok", "warn", "fail"} for line in lines)
+    assert all("->" in line for line in lines if not line.startswith("ok"))

@@ -1,0 +1,344 @@
+"""The doctor's verdicts: each reading gives the finding that a person would give, with a remedy wherever something is wrong."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.camera.v4l2_formats import FormatOffer, Rates, Wanted
+from common.camera.v4l2_stamps import StampClock
+from common.doctor.access import Account, Holder, Node, check_access, may_open
+from common.doctor.camera_checks import (
+    Offered,
+    Sample,
+    UsbBus,
+    UsbCamera,
+    check_absence,
+    check_bus,
+    check_format,
+    check_stream,
+    check_taken,
+)
+from common.doctor.finding import Finding, Verdict, exit_code, fail, ok, table, values, warn
+from common.doctor.link_checks import LinkReadings, check_link
+from common.doctor.machine_checks import (
+    Bluetooth,
+    Clocks,
+    Disk,
+    KernelLog,
+    LogLine,
+    Supply,
+    check_bluetooth,
+    check_clocks,
+    check_disk,
+    check_power,
+    check_usb_log,
+    throttled,
+)
+from common.doctor.unit_check import Unit, check_unit
+from common.frame import PixelFormat
+
+OK, WARN, FAIL = Verdict.OK, Verdict.WARN, Verdict.FAIL
+SERVICE = Account("tandemscan", 995, frozenset({995, 44, 20}), is_me=False)
+ME = Account("me", 1000, frozenset({1000}), is_me=True)
+VIDEO = Node("/dev/video0", 0, 44, "video", 0o660, open_to_me=False)
+
+MJPG = FormatOffer("MJPG", "Motion-JPEG", ((640, 480), (320, 240)))
+OFFERED = Offered((MJPG,), {("MJPG", (640, 480)): Rates((Fraction(30), Fraction(10)))})
+
+SOUND = Sample(
+    frames=30,
+    spoiled=(),
+    missed=0,
+    distrusted=0,
+    nominal_ns=33_333_333,
+    period_ns=33_400_000,
+    frame_bytes=50_000,
+    first_ns=120_000_000,
+    stamps=StampClock.MONOTONIC,
+    driver="uvcvideo",
+)
+
+
+def log(*texts: str) -> KernelLog:
+    """A kernel log; the last line is 30 s old."""
+    return KernelLog(readable=True, lines=tuple(LogLine(30.0 * (len(texts) - i), text) for i, text in enumerate(texts)))
+
+
+def test_every_finding_is_one_line_and_the_exit_code_follows_the_worst() -> None:
+    """A line each, remedy behind an arrow; only a failed check makes exit 4; the object counts both kinds."""
+    findings = [ok("disk", "50 MB"), warn("usb-log", "a reset", "another cable")]
+    assert table(findings).splitlines() == ["ok    disk     50 MB", "warn  usb-log  a reset -> another cable"]
+    assert exit_code(findings) == 0
+    worse = [*findings, fail("camera", "none", "plug one in")]
+    assert exit_code(worse) == 4
+    assert (values(worse)["failed"], values(worse)["warnings"], len(values(worse)["checks"])) == (1, 1, 3)
+
+
+@pytest.mark.parametrize(
+    ("node", "account", "may"),
+    [
+        (VIDEO, SERVICE, True),
+        (VIDEO, Account("nobody", 65534, frozenset({65534}), is_me=False), False),
+        (VIDEO, Account("root", 0, frozenset({0}), is_me=False), True),
+        (Node("/dev/video0", 0, 44, "video", 0o600, open_to_me=False), SERVICE, False),
+        (Node("/dev/video0", 0, 44, "video", 0o640, open_to_me=False), SERVICE, False),
+        (Node("/dev/video0", 995, 0, "root", 0o600, open_to_me=False), SERVICE, True),
+        (Node("/dev/video0", 0, 0, "root", 0o666, open_to_me=False), SERVICE, True),
+        (VIDEO, ME, False),
+        (Node("/dev/video0", 0, 44, "video", 0o660, open_to_me=True), ME, True),  # by an access list
+    ],
+)
+def test_access_follows_owner_group_and_mode(node: Node, account: Account, *, may: bool) -> None:
+    """Who may read and write a node is what the kernel would say; for the user who asks the kernel was asked."""
+    assert may_open(node, account) is may
+    assert check_access("permission", node, account).verdict is (OK if may else FAIL)
+
+
+def test_a_user_outside_the_group_is_told_to_join_and_a_changed_mode_is_named() -> None:
+    """Where the group would do, the remedy is usermod; where not even the group may, it is the node itself."""
+    outside = check_access("permission", VIDEO, Account("pi", 1000, frozenset({1000}), is_me=False))
+    assert "usermod -aG video pi" in outside.remedy
+    shut = check_access("permission", Node("/dev/video0", 0, 44, "video", 0o600, open_to_me=False), SERVICE)
+    assert "chmod 660 /dev/video0" in shut.remedy
+
+
+def test_an_absent_camera_is_told_from_one_without_driver() -> None:
+    """A camera that the USB bus sees and no driver has asks for the driver, no camera at all for one to be plugged in."""
+    assert "plug one in" in check_absence(0, ()).remedy
+    driverless = check_absence(0, (UsbCamera("HD Cam", has_driver=False),))
+    assert (driverless.verdict, "HD Cam" in driverless.text, "modprobe" in driverless.remedy) == (FAIL, True, True)
+    assert check_absence(2, (UsbCamera("HD Cam", has_driver=True),)).verdict is FAIL
+
+
+@pytest.mark.parametrize(
+    ("wanted", "verdict", "word"),
+    [
+        (Wanted(), OK, "MJPG 640x480 at 30"),
+        (Wanted((640, 480), Fraction(10)), OK, "at 10"),
+        (Wanted((800, 600)), FAIL, "640x480, 320x240"),
+        (Wanted((640, 480), Fraction(60)), FAIL, "30, 10"),
+        (Wanted(pixel_format=PixelFormat.YUYV), FAIL, "MJPG"),
+    ],
+)
+def test_what_is_asked_is_held_against_the_offer(wanted: Wanted, verdict: Verdict, word: str) -> None:
+    """An offered format is named; of one that is not the finding lists what is."""
+    finding = check_format("/dev/video0", OFFERED, wanted)
+    assert finding.verdict is verdict
+    assert word in finding.text + finding.remedy
+
+
+@pytest.mark.parametrize(
+    ("megabits", "cameras", "frame_bytes", "verdict"),
+    [
+        (480, 1, 50_000, OK),  # MJPEG: 1.5 of 24.6 MB/s
+        (480, 1, 640 * 480 * 2, OK),  # YUYV 640x480: 18.4 MB/s fits
+        (480, 2, 640 * 480 * 2, WARN),  # two of them do not
+        (480, 1, 1280 * 720 * 2, FAIL),  # 55 MB/s
+        (12, 1, 50_000, FAIL),  # 1.5 of 1.0 MB/s
+        (12, 1, 10_000, WARN),  # a slow port, but it is enough
+        (5000, 2, 1920 * 1080 * 2, OK),
+    ],
+)
+def test_the_bus_is_judged_by_bytes_a_second(megabits: float, cameras: int, frame_bytes: int, verdict: Verdict) -> None:
+    """30 frames a second against what USB 2.0 (5.6.3) gives one endpoint: 24.576 MB/s at high, 1.023 MB/s at full speed."""
+    assert check_bus(UsbBus("1-1", megabits, cameras), frame_bytes, 30.0).verdict is verdict
+
+
+@pytest.mark.parametrize(
+    ("sample", "verdict", "word"),
+    [
+        (SOUND, OK, "29.9 of 30"),
+        (replace(SOUND, frames=0, period_ns=None, frame_bytes=0, first_ns=0, stamps=None), FAIL, "no frame"),
+        (replace(SOUND, frames=0, spoiled=(("no_end", 9),), stamps=None), FAIL, "9 no_end"),
+        (replace(SOUND, spoiled=(("no_end", 3),)), WARN, "3 no_end"),
+        (replace(SOUND, period_ns=66_700_000), WARN, "15.0 of 30"),
+        (replace(SOUND, missed=9), WARN, "9 missed"),
+        (replace(SOUND, frames=3, period_ns=None, missed=1), OK, "too few to tell"),
+    ],
+)
+def test_a_second_of_frames_is_judged(sample: Sample, verdict: Verdict, word: str) -> None:
+    """No sound frame fails; spoiled, missed or slow ones warn; the rate is the measured one."""
+    finding = check_stream(sample)[0]
+    assert finding.verdict is verdict
+    assert word in finding.text
+    assert bool(finding.remedy) is (verdict is not OK)
+
+
+def test_stamps_and_refused_controls_have_lines_of_their_own() -> None:
+    """Stamps that cannot be true and controls that were refused are warnings; a camera without frames has neither line."""
+    assert [item.what for item in check_stream(SOUND)] == ["stream", "stamps"]
+    doubtful = check_stream(replace(SOUND, distrusted=30, stamps=StampClock.UNKNOWN, driver="vivid", refused=2))
+    assert [(item.what, item.verdict) for item in doubtful] == [("stream", OK), ("stamps", WARN), ("controls", WARN)]
+    assert "unnamed clock" in doubtful[1].text
+    assert len(check_stream(replace(SOUND, frames=0))) == 1
+
+
+AGENT, OTHER = Holder(412, "board-agent"), Holder(77, "motion")
+
+
+@pytest.mark.parametrize(
+    ("holders", "status", "all_seen", "verdict", "word"),
+    [
+        ((AGENT,), "30.0 fps, 512 sent to the host, 0 dropped", True, OK, "30.0 fps"),
+        ((AGENT,), "no frame from v4l2:auto for 4 s: is it plugged in?", True, FAIL, "no frame"),
+        ((OTHER,), "", True, FAIL, "motion (pid 77)"),
+        ((), "", False, WARN, "only root"),
+        ((), "", True, FAIL, "cannot be seen"),
+    ],
+)
+def test_a_taken_camera_is_judged_by_who_has_it(
+    holders: tuple[Holder, ...], status: str, verdict: Verdict, word: str, *, all_seen: bool
+) -> None:
+    """Our own service may have it, if it streams; another program is named; what only root may see is said to be so."""
+    finding = check_taken(holders, AGENT.pid, status, all_seen=all_seen)
+    assert finding.verdict is verdict
+    assert word in finding.text
+
+
+@pytest.mark.parametrize(
+    ("link", "verdict", "word"),
+    [
+        (LinkReadings("tcp://*:5555"), OK, "free"),
+        (LinkReadings("tcp://127.0.0.1:5555"), OK, "this machine only"),
+        (LinkReadings("tcp://*:5555", (AGENT,)), OK, "our own service"),
+        (LinkReadings("tcp://*:5555", (OTHER,)), FAIL, "motion (pid 77)"),
+        (LinkReadings("tcp://*:5555", all_seen=False, problem="in use", taken=True), WARN, "only root"),
+        (LinkReadings("tcp://*:5555", problem="no such address", remedy="ip address"), FAIL, "no such address"),
+        (LinkReadings("serial:/dev/ttyGS0", terminals=(Holder(9, "agetty"),)), FAIL, "serial-getty@ttyGS0"),
+        (LinkReadings("serial:/dev/ttyS0", terminals=(Holder(9, "bash"),)), FAIL, "two readers"),
+        (LinkReadings("serial:/dev/ttyS0", console=True), FAIL, "console=ttyS0"),
+    ],
+)
+def test_a_link_is_judged_by_who_has_it(link: LinkReadings, verdict: Verdict, word: str) -> None:
+    """Free, ours, another's, a getty's, the console's, or not to be had: each is told, and each fault has its remedy."""
+    finding = check_link(link, AGENT.pid)
+    assert finding.verdict is verdict
+    assert word in finding.text + finding.remedy
+
+
+@pytest.mark.parametrize(
+    ("disk", "verdict"),
+    [
+        (Disk("/", 10**9, 1000, counts_files=True, read_only=False), OK),
+        (Disk("/", 10**7, 1000, counts_files=True, read_only=False), WARN),
+        (Disk("/", 10**9, 0, counts_files=True, read_only=False), WARN),
+        (Disk("/", 10**9, 0, counts_files=False, read_only=False), OK),  # btrfs, vfat
+        (Disk("/", 10**9, 1000, counts_files=True, read_only=True), WARN),
+    ],
+)
+def test_a_full_or_read_only_disk_warns(disk: Disk, verdict: Verdict) -> None:
+    """Frames need no disk, so nothing here fails; what is short is named."""
+    assert check_disk(disk).verdict is verdict
+
+
+@pytest.mark.parametrize(
+    ("kernel", "supply", "verdict", "word"),
+    [
+        (log("usb 1-1: new high-speed USB device number 2"), Supply(), OK, "no under-voltage"),
+        (log("hwmon hwmon1: Undervoltage detected!", "x"), Supply(), WARN, "once, 60 s ago"),
+        (
+            log("Under-voltage detected! (0x00050005)", "Undervoltage detected!"),
+            Supply(),
+            WARN,
+            "2 times, the last 30 s",
+        ),
+        (log("usb usb1-port1: over-current change #3"), Supply(), WARN, "over-current"),
+        (log(), throttled(0x50005, "get_throttled"), FAIL, "too low now"),
+        (log(), throttled(0x50000, "get_throttled"), WARN, "since the boot"),
+        (log(), throttled(0, "get_throttled"), OK, "get_throttled"),
+        (KernelLog(readable=False), Supply(), WARN, "may not be read"),
+    ],
+)
+def test_power_is_judged_by_firmware_and_kernel_log(
+    kernel: KernelLog, supply: Supply, verdict: Verdict, word: str
+) -> None:
+    """Too low now fails, too low before warns with how often and when; what may not be read is said to be so."""
+    finding = check_power(kernel, supply)
+    assert finding.verdict is verdict
+    assert word in finding.text
+
+
+@pytest.mark.parametrize(
+    ("text", "verdict"),
+    [
+        ("usb 1-1: reset high-speed USB device number 3 using musb-hdrc", WARN),
+        ("usb 1-1: device descriptor read/64, error -71", WARN),
+        ("usb usb1-port1: unable to enumerate USB device", WARN),
+        ("uvcvideo 1-1:1.1: Non-zero status (-71) in video completion handler.", WARN),
+        ("usb 1-1: USB disconnect, device number 3", OK),
+        ("eth0: link up", OK),
+    ],
+)
+def test_usb_trouble_in_the_kernel_log_warns(text: str, verdict: Verdict) -> None:
+    """Resets and errors warn; pulling a device is nobody's fault."""
+    assert check_usb_log(log(text)).verdict is verdict
+
+
+def test_clocks() -> None:
+    """A coarse clock fails, a date before the program's own files warns, an unsynchronised one is no fault."""
+    good = Clocks(2e9, 1.7e9, synchronised=False, source="tsc", resolution_ns=1)
+    assert [item.verdict for item in check_clocks(good)] == [OK, OK]
+    assert "not synchronised" in check_clocks(good)[1].text
+    early = Clocks(3600.0, 1.7e9, synchronised=False, source="dmtimer", resolution_ns=42)
+    assert [item.verdict for item in check_clocks(early)] == [OK, WARN]
+    coarse = Clocks(2e9, 1.7e9, synchronised=True, source="jiffies", resolution_ns=4_000_000)
+    assert [item.verdict for item in check_clocks(coarse)] == [FAIL, OK]
+
+
+@pytest.mark.parametrize(
+    ("bluetooth", "wanted", "verdict"),
+    [
+        (Bluetooth(in_python=True, adapters=("hci0",)), True, OK),
+        (Bluetooth(in_python=True, adapters=("hci0",), blocked=("hci0",)), True, FAIL),
+        (Bluetooth(in_python=True, adapters=()), True, FAIL),
+        (Bluetooth(in_python=True, adapters=()), False, OK),
+        (Bluetooth(in_python=False, adapters=("hci0",)), True, FAIL),
+        (Bluetooth(in_python=False, adapters=("hci0",)), False, WARN),
+    ],
+)
+def test_bluetooth_fails_only_where_a_link_asks_for_it(bluetooth: Bluetooth, verdict: Verdict, *, wanted: bool) -> None:
+    """Python's sockets, an adapter, and that it is switched on."""
+    assert check_bluetooth(bluetooth, wanted=wanted).verdict is verdict
+
+
+def unit(**fields: object) -> Unit:
+    """An installed, running unit with some fields set."""
+    state = {
+        "load": "loaded",
+        "active": "active",
+        "sub": "running",
+        "enabled": "enabled",
+        "pid": 412,
+        "status": "30.0 fps",
+    }
+    return Unit("board-agent", **(state | fields))  # type: ignore[arg-type]  # names and types as in Unit
+
+
+@pytest.mark.parametrize(
+    ("state", "verdict", "word"),
+    [
+        (unit(), OK, "30.0 fps"),
+        (unit(restarts=3), OK, "restarted 3 times"),
+        (unit(active="activating", sub="auto-restart", result="exit-code"), FAIL, "journalctl"),
+        (unit(active="failed", result="watchdog"), FAIL, "watchdog"),
+        (unit(active="inactive", pid=0), WARN, "enable --now"),
+        (unit(enabled="disabled"), WARN, "systemctl enable"),
+        (Unit("board-agent", load="not-found"), OK, "not installed"),
+        (Unit("board-agent"), OK, "no systemd"),
+    ],
+)
+def test_the_service_is_judged_by_its_state(state: Unit, verdict: Verdict, word: str) -> None:
+    """A failing service fails with the way to its reason, a stopped one warns, none at all is fine."""
+    finding = check_unit(state)
+    assert finding.verdict is verdict
+    assert word in finding.text + finding.remedy
+
+
+@given(st.lists(st.tuples(st.sampled_from(Verdict), st.text(max_size=5))))
+def test_exit_code_and_counts_agree(drawn: list[tuple[Verdict, str]]) -> None:
+    """Exit 4 exactly when the object counts a failed check."""
+    findings = [Finding("x", verdict, text) for verdict, text in drawn]
+    assert (exit_code(findings) == 4) is (values(findings)["failed"] > 0)
