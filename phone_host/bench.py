@@ -1,12 +1,12 @@
-"""The delay benchmark: for each link, image size and rate a real board-agent process and a host, with every delay of every pair.
+"""The delay benchmark: for each interface, image size, quality and rate a real board-agent process and a host, with every delay of every pair.
 
-Root beside `host`: what is measured is the product itself over rendered films, nothing is simulated. The first second of a run (`WARM_UP_S`)
-is left out of its statistics: caches, the clock estimate and credit settle there. Counts are of the whole run.
+Root beside `host`: what is measured is the product itself over rendered films; only what carries the bytes may be an emulation, and is called
+one. The first second of a run (`WARM_UP_S`) is left out of its statistics: caches, the clock estimate and credit settle there. Counts are
+of the whole run.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from pathlib import Path
 from typing import Final
 
@@ -14,60 +14,33 @@ import numpy as np
 
 from common import now
 from common.camera.factory import open_camera
-from common.errors import SettingsError
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.boardprocess import BoardAccount, board_process, free_port
+from phone_host.bench_cases import Case, Size
+from phone_host.bench_links import Ends, ends_of
+from phone_host.boardprocess import BoardAccount
 from phone_host.demo import NEAR_M
-from phone_host.film import Film, render_film
+from phone_host.film import JPEG_QUALITY, Film, render_films
 from phone_host.host import Host, HostSettings
 from phone_host.model import Camera, Rig, StereoGeometry
 from phone_host.pairqueue import PairCounts
 from phone_host.pipeline import Processed
 from phone_host.receiver import LinkAccount
+from phone_host.relay import RelayAccount
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatcherName, MatchSettings, create_matcher
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.scene import DEMO_PERIOD_S, WEBCAM_LOOK, demo_scene, matched_rig
-
-LINKS: Final = ("tcp", "ipc")
-"""The kinds of link that can be measured."""
+from phone_host.sync.fifo import FifoSettings
 
 WARM_UP_S: Final = 1.0
 
 _FILM_FPS: Final = 8
 """Images of the film per second of its scene; a run shows them at its own rate, then the scene only moves faster."""
 
-_PATIENCE_S: Final = 15.0
+PATIENCE_NS: Final = 15_000_000_000
 """For the board process to come up and the first pair to be done, on a small and busy machine."""
-
-_PATIENCE_NS: Final = round(_PATIENCE_S * 1e9)
-_LEAST_PX, _MOST_PX = 64, 4096
-_MOST_HZ: Final = 240
-
-
-@dataclass(frozen=True, slots=True, order=True)
-class Size:
-    """An image size, px."""
-
-    width_px: int
-    height_px: int
-
-    def __str__(self) -> str:
-        return f"{self.width_px}x{self.height_px}"
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """One combination that is measured."""
-
-    link: str
-    size: Size
-    rate_hz: int
-
-    def __str__(self) -> str:
-        return f"{self.link} {self.size} {self.rate_hz}/s"
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,21 +51,25 @@ class CaseResult:
         case: which.
         ledgers: of the pairs after the warm-up, in the order in which they were done.
         measured_s: from the end of the warm-up to the last pair, s.
+        bound_ns: of the clock estimate at the run's end, hard; NaN without one.
         board: the board's account of the whole run.
         link: the receiver's account of it.
         counts: of frames and pairs on the host.
         processed: pairs that were done.
         undecodable: pairs whose bytes were no images.
+        relay: the account of the process that played the line; None where there was none.
     """
 
     case: Case
     ledgers: tuple[PairLedger, ...]
     measured_s: float
+    bound_ns: float
     board: BoardAccount
     link: LinkAccount
     counts: PairCounts
     processed: int
     undecodable: int
+    relay: RelayAccount | None = None
 
     @property
     def pairs_per_second(self) -> float:
@@ -100,61 +77,19 @@ class CaseResult:
         return len(self.ledgers) / self.measured_s if self.ledgers and self.measured_s > 0 else float("nan")
 
 
-def parse_links(text: str) -> tuple[str, ...]:
-    """Read names of links, for example `tcp,ipc`.
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """What is the same for all cases.
 
-    Raises:
-        SettingsError: one is not there.
+    Attributes:
+        matcher: of the stereo core.
+        fifo: depth and policy of the queue before it.
+        seconds: length of each run after its warm-up, s.
     """
-    names = _items(text)
-    for name in names:
-        if name not in LINKS:
-            raise SettingsError(f"--links names {name!r}, which is not there", f"the links are {', '.join(LINKS)}")
-    if not names:
-        raise SettingsError("--links names no link", f"the links are {', '.join(LINKS)}")
-    return names
 
-
-def parse_sizes(text: str) -> tuple[Size, ...]:
-    """Read image sizes, for example `320x240,640x480`.
-
-    Raises:
-        SettingsError: that is no size, or one of no use.
-    """
-    sizes = []
-    for item in _items(text):
-        width, _, height = item.partition("x")
-        if not all(
-            part.isascii() and part.isdigit() and _LEAST_PX <= int(part) <= _MOST_PX for part in (width, height)
-        ):
-            raise SettingsError(
-                f"--size {item!r}", f"give WIDTHxHEIGHT from {_LEAST_PX} to {_MOST_PX} px, for example 640x480"
-            )
-        sizes.append(Size(int(width), int(height)))
-    if not sizes:
-        raise SettingsError("--size names no size", "give WIDTHxHEIGHT, for example 640x480")
-    return tuple(sizes)
-
-
-def parse_rates(text: str) -> tuple[int, ...]:
-    """Read frame rates, for example `15,30`.
-
-    Raises:
-        SettingsError: that is no whole number from 1 to 240.
-    """
-    rates = []
-    for item in _items(text):
-        if not (item.isascii() and item.isdigit() and 1 <= int(item) <= _MOST_HZ):
-            raise SettingsError(f"--fps {item!r}", f"give whole numbers of frames per second from 1 to {_MOST_HZ}")
-        rates.append(int(item))
-    if not rates:
-        raise SettingsError("--fps names no rate", "give frames per second, for example 30")
-    return tuple(rates)
-
-
-def cases(links: Sequence[str], sizes: Sequence[Size], rates_hz: Sequence[int]) -> tuple[Case, ...]:
-    """All combinations; links side by side, so that a change of the machine's load touches all of them."""
-    return tuple(Case(link, size, rate_hz) for size, rate_hz, link in product(sizes, rates_hz, links))
+    matcher: MatcherName
+    fifo: FifoSettings
+    seconds: float
 
 
 def rig_of(size: Size) -> Rig:
@@ -167,78 +102,91 @@ def rig_of(size: Size) -> Rig:
     return replace(full, left=camera, right=camera)
 
 
-def render(size: Size, folder: Path, advance: Callable[[], None]) -> Film:
-    """Render the film of one size.
+def render(size: Size, qualities: Sequence[int], folder: Path, advance: Callable[[], None]) -> dict[int, Film]:
+    """Render the films of one size.
 
     Args:
         size: of the images.
-        folder: gets a folder for each camera.
+        qualities: of the JPEGs; for a remote board's BOARD_SETS the own camera's are of the usual quality.
+        folder: gets a folder for each quality and camera.
         advance: called after each of `film_images()` images.
+
+    Returns:
+        A film for each quality.
 
     Raises:
         OSError: the folder cannot be written to.
     """
     looks = (WEBCAM_LOOK, replace(WEBCAM_LOOK, seed=WEBCAM_LOOK.seed + 1))
-    return render_film(demo_scene(), rig_of(size), looks, folder, fps=_FILM_FPS, seconds=DEMO_PERIOD_S, advance=advance)
+    folders = {quality or JPEG_QUALITY: folder / str(quality) for quality in qualities}
+    films = render_films(
+        demo_scene(), rig_of(size), looks, folders, fps=_FILM_FPS, seconds=DEMO_PERIOD_S, advance=advance
+    )
+    made = dict(zip(folders, films, strict=True))
+    return {quality: made[quality or JPEG_QUALITY] for quality in qualities}
 
 
 def film_images() -> int:
-    """How many images a film has, over both cameras."""
+    """How many images are rendered for one size, over both cameras."""
     return 2 * round(_FILM_FPS * DEMO_PERIOD_S)
 
 
 def run_case(
-    case: Case, film: Film, folder: Path, matcher: MatcherName, *, seconds: float, stop: Callable[[], bool]
+    case: Case, film: Film, folder: Path, settings: RunSettings, *, stop: Callable[[], bool]
 ) -> CaseResult | None:
     """Measure one combination.
 
     Args:
         case: which.
-        film: of its size.
-        folder: for the socket of an ipc link.
-        matcher: for the stereo core.
-        seconds: how long, after the warm-up.
+        film: of its size and quality; of a remote board's case only the host's side is shown.
+        folder: for sockets and names of terminals.
+        settings: of all cases.
         stop: asked several times a second.
 
     Returns:
-        What was measured; None when `stop` ended it.
+        What was measured, perhaps over a shorter time because `stop` ended it; None when it ended it before the warm-up was over.
 
     Raises:
-        UnavailableError: the board process did not come up, or died.
+        UnavailableError: a process did not come up, or died.
     """
     shown = replace(film, fps=case.rate_hz)
-    address = f"ipc://{folder / 'board'}" if case.link == "ipc" else f"tcp://127.0.0.1:{free_port()}"
     ledgers: list[PairLedger] = []
 
     def keep(processed: Processed, ledger: PairLedger) -> None:
         del processed
         ledgers.append(ledger)
 
-    with board_process(shown.replay_uri(shown.left), address) as board:
+    with ends_of(case.interface, shown.replay_uri(shown.left), folder) as ends:
         host = Host(
-            HostSettings(wait_ns=_PATIENCE_NS, save_every=0),
+            HostSettings(wait_ns=PATIENCE_NS, save_every=0, fifo=settings.fifo),
             open_camera(shown.replay_uri(shown.right), HOST_CLOCK, now.monotonic_ns()),
-            open_link(parse_link(address, listens_by_default=False)),
-            _core(case.size, matcher),
+            open_link(parse_link(ends.address, listens_by_default=False)),
+            _core(case.size, settings.matcher),
             keep,
         )
-        run_ns = round((WARM_UP_S + seconds) * 1e9)
-
-        def finished() -> bool:
-            if stop():
-                return True
-            board.check()
-            now_ns = now.monotonic_ns()
-            begun_ns = host.first_done_ns
-            return now_ns - begun_ns > run_ns if begun_ns else now_ns - host.started_ns > run_ns + _PATIENCE_NS
-
-        host.run(finished)
-        if stop():
+        host.run(_finished(host, ends, settings.seconds, stop))
+        kept, measured_s = after_warm_up(ledgers)
+        if stop() and not kept:
             return None
-        account = board.stop()
-    kept, measured_s = after_warm_up(ledgers)
-    accounts = (host.receiver.account, host.queue.counts, host.processed, host.undecodable)
-    return CaseResult(case, kept, measured_s, account, *accounts)
+        board, relay = ends.stop(host.receiver.account)
+    estimate = host.receiver.estimate
+    bound_ns = float(estimate.bound_ns) if estimate is not None else float("nan")
+    accounts = (host.receiver.account, host.queue.counts, host.processed, host.undecodable, relay)
+    return CaseResult(case, kept, measured_s, bound_ns, board, *accounts)
+
+
+def _finished(host: Host, ends: Ends, seconds: float, stop: Callable[[], bool]) -> Callable[[], bool]:
+    run_ns = round((WARM_UP_S + seconds) * 1e9)
+
+    def finished() -> bool:
+        if stop():
+            return True
+        ends.check()
+        now_ns = now.monotonic_ns()
+        begun_ns = host.first_done_ns
+        return now_ns - begun_ns > run_ns if begun_ns else now_ns - host.started_ns > run_ns + PATIENCE_NS
+
+    return finished
 
 
 def after_warm_up(ledgers: Sequence[PairLedger]) -> tuple[tuple[PairLedger, ...], float]:
@@ -254,11 +202,6 @@ def after_warm_up(ledgers: Sequence[PairLedger]) -> tuple[tuple[PairLedger, ...]
         return (), 0.0
     begin_ns = ledgers[0].done_ns + round(WARM_UP_S * 1e9)
     return tuple(ledger for ledger in ledgers if ledger.done_ns > begin_ns), (ledgers[-1].done_ns - begin_ns) / 1e9
-
-
-def _items(text: str) -> tuple[str, ...]:
-    """The parts between commas, each once, in their order."""
-    return tuple(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
 
 
 def _core(size: Size, matcher: MatcherName) -> StereoCore:

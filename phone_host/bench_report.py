@@ -3,16 +3,18 @@
 import os
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Final
 
 import zmq
 
 from common import now
-from phone_host.bench import WARM_UP_S, CaseResult, Size
+from phone_host.bench import WARM_UP_S, CaseResult, RunSettings
+from phone_host.bench_cases import BOARD_SETS, Interface
 from phone_host.delays import DELAYS, STAGES, DelayStatistics, Spread
 from phone_host.plots import Budget, Part, Quantity, Strips, budgets, distributions, legend
 from phone_host.report_page import DelaySeries, delay_series, document, section, two_widths
+from phone_host.sync.fifo import FifoSettings
 
 PERCENTILES: Final = ("p50", "p95", "p99", "max")
 
@@ -25,20 +27,31 @@ class Conditions:
         machine: processor, system, versions.
         date: local wall time.
         matcher: of the stereo core.
+        fifo: depth and policy of the queue before it.
         seconds: length of each run after its warm-up, s.
+        not_run: interfaces that could not be measured, and why.
     """
 
     machine: str
     date: str
     matcher: str
+    fifo: FifoSettings
     seconds: float
+    not_run: tuple[tuple[Interface, str], ...] = ()
 
 
-def conditions(matcher: str, seconds: float) -> Conditions:
+def conditions(settings: RunSettings, not_run: Sequence[tuple[Interface, str]]) -> Conditions:
     """Look at this machine and the clock on its wall."""
     versions = f"Python {platform.python_version()}, pyzmq {zmq.pyzmq_version()}, libzmq {zmq.zmq_version()}"
     system = f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}"
-    return Conditions(f"{system}, {versions}", now.wall_time(), matcher, seconds)
+    return Conditions(
+        f"{system}, {versions}",
+        now.wall_time(),
+        settings.matcher.value,
+        settings.fifo,
+        settings.seconds,
+        tuple(not_run),
+    )
 
 
 def as_json(results: Sequence[CaseResult], under: Conditions) -> dict[str, object]:
@@ -54,7 +67,9 @@ def as_json(results: Sequence[CaseResult], under: Conditions) -> dict[str, objec
         "matcher": under.matcher,
         "measured_per_run_s": under.seconds,
         "left_out_warm_up_s": WARM_UP_S,
+        "fifo": f"{under.fifo.depth}:{under.fifo.overflow.value}",
         "runs": [_run(result) for result in results],
+        "not_run": [{"link": str(interface), "reason": reason} for interface, reason in under.not_run],
     }
 
 
@@ -97,10 +112,10 @@ def page(results: Sequence[CaseResult], under: Conditions) -> str:
 
 
 def grouped(results: Sequence[CaseResult]) -> list[list[CaseResult]]:
-    """Runs of one size and rate together, in their order."""
-    groups: dict[tuple[Size, int], list[CaseResult]] = {}
+    """Runs of the same images together, in their order."""
+    groups: dict[str, list[CaseResult]] = {}
     for result in results:
-        groups.setdefault((result.case.size, result.case.rate_hz), []).append(result)
+        groups.setdefault(result.case.images, []).append(result)
     return list(groups.values())
 
 
@@ -110,7 +125,7 @@ def rows(results: Sequence[CaseResult]) -> list[tuple[str, ...]]:
     Args:
         results: the runs to stand below each other, stage by stage.
     """
-    spreads = [(result.case.link, statistics_of(result)) for result in results]
+    spreads = [(str(result.case.interface), statistics_of(result)) for result in results]
     table = []
     for name in (*DELAYS[:6], *STAGES, *DELAYS[6:], "time_skew"):
         for index, (link, statistics) in enumerate(spreads):
@@ -128,19 +143,24 @@ def _run(result: CaseResult) -> dict[str, object]:
     case, statistics = result.case, statistics_of(result)
     uncertainty = statistics.spread("uncertainty")
     return {
-        "link": case.link,
+        "link": case.interface.link,
+        "emulated": case.interface.profile.name if case.interface.profile is not None else None,
         "width_px": case.size.width_px,
         "height_px": case.size.height_px,
+        "jpeg_quality_percent": None if case.quality_percent == BOARD_SETS else case.quality_percent,
         "camera_rate_hz": case.rate_hz,
         "pair_rate_hz": _number(result.pairs_per_second),
         "measured_s": result.measured_s,
         "measured_pairs": len(result.ledgers),
         "mean_frame_bytes": round(sum(ledger.bytes for ledger in result.ledgers) / max(1, len(result.ledgers))),
+        "least_frame_bytes": min((ledger.bytes for ledger in result.ledgers), default=0),
         "delays": {name: _spread(statistics.spread(name)) for name in DELAYS},
         "stages": {name: _spread(statistics.spread(name)) for name in STAGES},
         "time_skew": _spread(statistics.spread("time_skew")),
         "clock_uncertainty": {f"{key}_us": _number(value / 1e3) for key, value in _percentiles(uncertainty).items()},
+        "clock_bound_at_end_us": _number(result.bound_ns / 1e3),
         "whole_run": _counts(result),
+        "line": None if result.relay is None else asdict(result.relay),
     }
 
 
@@ -187,14 +207,18 @@ def _number(value: float) -> float | None:
 def _card(results: Sequence[CaseResult]) -> str:
     """The card of one size and rate: a bar for each link, then each delay and stage by itself."""
     case = results[0].case
-    title = f"{case.size} at {case.rate_hz} frames a second"
+    title = case.images
     measured = [(result.case, delay_series(result.ledgers)) for result in results if result.ledgers]
     if not measured:
         return section(title, "No pair was processed.", "")
     delays, stages = measured[0][1].delays, measured[0][1].stages
-    bars = [Budget(case.link, tuple(_mean(quantity) for quantity in series.delays)) for case, series in measured]
-    work = [Budget(case.link, tuple(_mean(quantity) for quantity in series.stages)) for case, series in measured]
-    strips = [Strips(case.link, _quantities(series)) for case, series in measured]
+    bars = [
+        Budget(str(case.interface), tuple(_mean(quantity) for quantity in series.delays)) for case, series in measured
+    ]
+    work = [
+        Budget(str(case.interface), tuple(_mean(quantity) for quantity in series.stages)) for case, series in measured
+    ]
+    strips = [Strips(str(case.interface), _quantities(series)) for case, series in measured]
     content = (
         legend([(quantity.label, quantity.colour) for quantity in delays])
         + two_widths(lambda width: budgets(bars, width))
@@ -204,7 +228,7 @@ def _card(results: Sequence[CaseResult]) -> str:
         + "<h3>Each by itself</h3>"
         + two_widths(lambda width: distributions(strips, width))
     )
-    rates = "; ".join(f"{result.case.link}: {summary_line(result)}" for result in results)
+    rates = "; ".join(f"{result.case.interface}: {summary_line(result)}" for result in results)
     return section(title, f"Means of all pairs, end to end. {rates}.", content)
 
 
@@ -212,7 +236,7 @@ def summary_line(result: CaseResult) -> str:
     """Rate, losses and clock of one run in a line."""
     lost = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in losses(result).items()) or "nothing"
     uncertainty_us = statistics_of(result).spread("uncertainty").p95_ns / 1e3
-    return f"{result.pairs_per_second:.1f} pairs/s, clock +-{uncertainty_us:.0f} us (p95), whole run lost: {lost}"
+    return f"{result.pairs_per_second:.1f} pairs/s, clock +-{uncertainty_us:.0f} us (p95), +-{result.bound_ns / 1e3:.0f} us whatever the link does, whole run lost: {lost}"
 
 
 def _quantities(series: DelaySeries) -> tuple[Quantity, ...]:

@@ -1,6 +1,6 @@
 """A rendered scene as two folders of JPEGs, one for each camera of a rig, to be replayed in a loop; it knows which image shows when."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -73,23 +73,65 @@ def render_film(
     Raises:
         OSError: the folder cannot be written to.
     """
-    film = Film(folder / "left", folder / "right", round(fps * seconds), fps)
-    poses = rig_poses(rig)
-    for camera, pose, look, target in (
-        (rig.left, poses[0], looks[0], film.left),
-        (rig.right, poses[1], looks[1], film.right),
-    ):
-        target.mkdir(parents=True, exist_ok=True)
-        _render(Renderer(scene, camera, pose, look), camera, target, film, advance)
+    (film,) = render_films(scene, rig, looks, {JPEG_QUALITY: folder}, fps=fps, seconds=seconds, advance=advance)
     return film
 
 
-def _render(renderer: Renderer, camera: Camera, target: Path, film: Film, advance: Callable[[], None]) -> None:
-    digits = len(str(film.frames))
-    for index in range(film.frames):
-        image = renderer.frame(index / film.fps)
+def render_films(
+    scene: Scene,
+    rig: Rig,
+    looks: tuple[Look, Look],
+    folders: Mapping[int, Path],
+    *,
+    fps: int,
+    seconds: float,
+    advance: Callable[[], None],
+) -> tuple[Film, ...]:
+    """Render a scene for both cameras once and compress it several times.
+
+    Args:
+        scene: what to show; it should repeat after `seconds`.
+        rig: the two cameras.
+        looks: of the left and right sensor.
+        folders: for each JPEG quality, 1 to 100, the folder that gets `left` and `right`.
+        fps: images per second.
+        seconds: length.
+        advance: called after each rendered image, twice `frames` times in all.
+
+    Returns:
+        The films, in the order of `folders`.
+
+    Raises:
+        OSError: a folder cannot be written to.
+    """
+    films = {
+        quality: Film(folder / "left", folder / "right", round(fps * seconds), fps)
+        for quality, folder in folders.items()
+    }
+    poses = rig_poses(rig)
+    left = {quality: film.left for quality, film in films.items()}
+    right = {quality: film.right for quality, film in films.items()}
+    for camera, pose, look, targets in ((rig.left, poses[0], looks[0], left), (rig.right, poses[1], looks[1], right)):
+        times_s = [index / fps for index in range(round(fps * seconds))]
+        _render(Renderer(scene, camera, pose, look), camera, targets, times_s, advance)
+    return tuple(films.values())
+
+
+def _render(
+    renderer: Renderer,
+    camera: Camera,
+    targets: Mapping[int, Path],
+    times_s: Sequence[float],
+    advance: Callable[[], None],
+) -> None:
+    for target in targets.values():
+        target.mkdir(parents=True, exist_ok=True)
+    digits = len(str(len(times_s)))
+    for index, time_s in enumerate(times_s):
+        image = renderer.frame(time_s)
         assert image.shape == (camera.height_px, camera.width_px, 3)
-        done, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-        assert done
-        write_bytes(target / f"{index:0{digits}d}.jpg", jpeg.tobytes())
+        for quality, target in targets.items():
+            done, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+            assert done
+            write_bytes(target / f"{index:0{digits}d}.jpg", jpeg.tobytes())
         advance()

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from tests.support.programs import Program, program, until
+from tests.support.numbered import write_film
+from tests.support.programs import Program, board, free_port, program, until
 
 SHORT = ["--links", "ipc", "--size", "320x240", "--fps", "15", "--seconds", "2"]
 
@@ -73,8 +74,12 @@ def test_every_delay_is_measured_and_every_frame_accounted_for(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        (["--links", "serial"], "tcp, ipc"),
-        (["--links", "tcp,carrier-pigeon"], "tcp, ipc"),
+        (["--links", "tcp,carrier-pigeon"], "tcp, ipc, serial, rfcomm"),
+        (["--links", "tcp://192.168.7.2"], "names no port"),
+        (["--emulate", "carrier-pigeon"], "bluetooth"),
+        (["--emulate", "wifi", "--links", "rfcomm"], "tcp or ipc or serial"),
+        (["--quality", "101"], "--quality"),
+        (["--fifo", "0"], "--fifo"),
         (["--size", "large"], "--size"),
         (["--fps", "0"], "--fps"),
         (["--seconds", "0"], "--seconds"),
@@ -87,6 +92,64 @@ def test_wrong_usage_is_one_line_and_exit_2(arguments: list[str], word: str, tmp
         assert running.wait() == 2
     assert word in running.stderr
     assert len(running.stderr.splitlines()) == 1
+
+
+def test_a_serial_line_is_made_where_there_is_none_and_a_missing_radio_is_said(tmp_path: Path) -> None:
+    """`--links serial,rfcomm`: pairs come over a pseudo terminal; without two Bluetooth adapters the report and one line say why not."""
+    with bench(["--links", "serial,rfcomm", *SHORT[2:], "--json"], tmp_path) as running:
+        assert running.wait() == 0, running.stderr
+    report = running.json()
+    assert {run["link"] for run in report["runs"]} | {one["link"] for one in report["not_run"]} == {"serial", "rfcomm"}
+    serial = report["runs"][0]
+    assert serial["measured_pairs"] > 0
+    # All bytes of the frames went through the line between the two processes.
+    assert serial["line"]["to_host_bytes"] > serial["measured_pairs"] * serial["mean_frame_bytes"]
+    for one in report["not_run"]:
+        assert "Bluetooth" in one["reason"]
+        assert one["reason"] in running.stderr
+
+
+def test_an_emulated_interface_is_as_slow_as_its_profile(tmp_path: Path) -> None:
+    """No frame over the emulated Bluetooth comes faster than its bytes take at 80 kB/s and its least delay, but for the clock's bound."""
+    with bench(["--emulate", "bluetooth", *SHORT[2:], "--seconds", "4", "--json"], tmp_path) as running:
+        assert running.wait() == 0, running.stderr
+    (run,) = running.json()["runs"]
+    assert (run["link"], run["emulated"]) == ("serial", "bluetooth")
+    least_ms = 3.75 + run["least_frame_bytes"] / 80
+    assert run["delays"]["propagation"]["p50_ms"] > least_ms - run["clock_bound_at_end_us"] / 1e3
+    assert run["line"]["to_host_bytes"] > run["measured_pairs"] * run["least_frame_bytes"]
+
+
+def test_a_board_elsewhere_is_measured_with_its_own_camera(tmp_path: Path) -> None:
+    """A board named by its URI shows what its camera shows; the command says that it is not set from here, and leaves the board alone."""
+    address = f"tcp://127.0.0.1:{free_port()}"
+    images = write_film(tmp_path / "images", 8)
+    with board(["run", "--camera", f"replay:{images}?fps=20&loop=1", "--link", address], tmp_path) as serving:
+        with bench(["--links", address, "--seconds", "2", "--json"], tmp_path) as running:
+            assert running.wait() == 0, running.stderr
+        assert serving.process.poll() is None
+        assert serving.stop() == 0
+    (run,) = running.json()["runs"]
+    assert (run["link"], run["camera_rate_hz"], run["jpeg_quality_percent"]) == (address, 20, None)
+    assert run["measured_pairs"] > 0
+    assert "not set from here" in running.stderr
+
+
+def test_an_absent_board_elsewhere_is_exit_3(tmp_path: Path) -> None:
+    """A board that is not there is named before anything is measured."""
+    address = f"tcp://127.0.0.1:{free_port()}"
+    with bench(["--links", f"ipc,{address}", *SHORT[2:]], tmp_path) as running:
+        assert running.wait() == 3
+    assert address in running.stderr.splitlines()[-1]
+
+
+def test_profiles_are_listed() -> None:
+    """`--emulate list` names every interface with its rate and where that comes from, also as one JSON object."""
+    command = [sys.executable, "-m", "phone_host.bench_cli", "--emulate", "list"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    listed = json.loads(subprocess.run([*command, "--json"], capture_output=True, text=True, check=True).stdout)
+    assert {"bluetooth", "wifi", "usb-serial", "ethernet"} <= {one["name"] for one in listed["profiles"]}
+    assert all(one["name"] in said and one["source"] in said for one in listed["profiles"])
 
 
 def test_a_folder_that_cannot_be_made_is_exit_3(tmp_path: Path) -> None:

@@ -12,27 +12,30 @@ from hypothesis import strategies as st
 from common.errors import SettingsError
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts
-from phone_host.bench import (
-    LINKS,
-    WARM_UP_S,
+from phone_host.bench import WARM_UP_S, CaseResult, after_warm_up, rig_of
+from phone_host.bench_cases import (
+    LOCAL_LINKS,
+    SHAPED_LINKS,
     Case,
-    CaseResult,
+    Interface,
     Size,
-    after_warm_up,
     cases,
+    interfaces,
     parse_links,
+    parse_qualities,
     parse_rates,
     parse_sizes,
-    rig_of,
 )
 from phone_host.bench_report import Conditions, as_json, losses, page, rows
 from phone_host.boardprocess import BoardAccount
 from phone_host.delays import DELAYS, STAGES
+from phone_host.emulate import PROFILES
 from phone_host.pairqueue import PairCounts
 from phone_host.receiver import LinkAccount, SessionAccount
+from phone_host.sync.fifo import FifoSettings
 
-UNDER = Conditions("a machine", "a date", "sgbm", 4.0)
-UNITS = ("_ms", "_us", "_ns", "_s", "_hz", "_px", "_bytes", "_frames", "_pairs")
+UNDER = Conditions("a machine", "a date", "sgbm", FifoSettings(), 4.0, ((Interface("rfcomm"), "no radio"),))
+UNITS = ("_ms", "_us", "_ns", "_s", "_hz", "_px", "_bytes", "_frames", "_pairs", "_percent", "stalls")
 
 
 def ledger(number: int, period_ns: int = 33_000_000) -> PairLedger:
@@ -66,7 +69,8 @@ def result(pairs: int = 100, link: str = "tcp") -> CaseResult:
     host = PairCounts(received=102, paired=101, dropped=1, taken=100, board_orphans=(("no_partner", 1),))
     kept, measured_s = after_warm_up([ledger(number) for number in range(pairs)])
     board = BoardAccount(108, 105, (("no_host", 3),))
-    return CaseResult(Case(link, Size(640, 480), 30), kept, measured_s, board, LinkAccount([account]), host, 100, 0)
+    case = Case(Interface(link), Size(640, 480), 80, 30)
+    return CaseResult(case, kept, measured_s, 70e3, board, LinkAccount([account]), host, 100, 0)
 
 
 def keys_of_numbers(value: Any, key: str = "") -> list[str]:
@@ -82,24 +86,24 @@ def keys_of_numbers(value: Any, key: str = "") -> list[str]:
     return [key] if isinstance(value, int | float) else []
 
 
-@given(st.lists(st.sampled_from(LINKS), min_size=1))
+@given(st.lists(st.sampled_from(LOCAL_LINKS), min_size=1))
 def test_links_are_each_measured_once(names: list[str]) -> None:
     """Links come out in the order in which they were first named, none twice."""
     assert parse_links(" , ".join(names)) == tuple(dict.fromkeys(names))
 
 
-@pytest.mark.parametrize("text", ["serial", "rfcomm", "tcp,foo", "", ",", "TCP"])
+@pytest.mark.parametrize("text", ["usb", "tcp,foo", "", ",", "TCP"])
 def test_a_link_that_is_not_there_is_refused_with_those_that_are(text: str) -> None:
     """The message of the refusal lists every link that can be measured."""
     with pytest.raises(SettingsError) as caught:
         parse_links(text)
-    assert all(name in caught.value.remedy for name in LINKS)
+    assert all(name in caught.value.remedy for name in LOCAL_LINKS)
 
 
 @given(st.text())
 def test_any_text_is_read_or_refused(text: str) -> None:
     """Whatever is typed for sizes, rates or links gives values or one SettingsError, nothing else."""
-    for parse in (parse_sizes, parse_rates, parse_links):
+    for parse in (parse_sizes, parse_rates, parse_qualities, parse_links):
         try:
             assert parse(text)
         except SettingsError as error:
@@ -122,15 +126,43 @@ def test_a_rate_of_no_use_is_refused(text: str) -> None:
         parse_rates(text)
 
 
+@pytest.mark.parametrize("text", ["0", "101", "80.5", "-1", "best", "", ","])
+def test_a_quality_of_no_use_is_refused(text: str) -> None:
+    """JPEG qualities are whole numbers from 1 to 100."""
+    with pytest.raises(SettingsError):
+        parse_qualities(text)
+
+
+@pytest.mark.parametrize("text", ["tcp://", "tcp://192.168.7.2", "pigeon:5555", "serial:"])
+def test_a_uri_of_no_link_is_refused(text: str) -> None:
+    """What has a colon is a board's address and is checked as one."""
+    with pytest.raises(SettingsError):
+        parse_links(text)
+
+
+def test_every_profile_is_carried_by_its_own_link_or_the_named_ones() -> None:
+    """Without names each profile has its own carrier; with names every link stands in for every profile; without profiles links are themselves."""
+    assert interfaces((), PROFILES) == tuple(Interface(one.carrier, one) for one in PROFILES)
+    assert len(interfaces(SHAPED_LINKS, PROFILES)) == len(SHAPED_LINKS) * len(PROFILES)
+    assert interfaces((), ()) == tuple(Interface(link) for link in LOCAL_LINKS)
+    assert [one.is_remote for one in interfaces(("tcp", "tcp://192.168.7.2:5555"), ())] == [False, True]
+
+
+@pytest.mark.parametrize("link", ["rfcomm", "tcp://192.168.7.2:5555"])
+def test_what_is_not_local_cannot_be_shaped(link: str) -> None:
+    """A real radio or a real board stands for itself only."""
+    with pytest.raises(SettingsError) as caught:
+        interfaces((link,), PROFILES)
+    assert link in caught.value.problem
+
+
 def test_cases_are_all_combinations_with_links_next_to_each_other() -> None:
     """Every link is measured with every size and rate, and the links of one size and rate follow each other."""
-    planned = cases(("tcp", "ipc"), (Size(320, 240), Size(640, 480)), (15, 30))
-    assert len(set(planned)) == len(planned) == 8
-    assert [case.link for case in planned] == ["tcp", "ipc"] * 4
-    assert all(
-        first.size == second.size and first.rate_hz == second.rate_hz
-        for first, second in zip(planned[::2], planned[1::2], strict=True)
-    )
+    measured = (Interface("tcp"), Interface("ipc"))
+    planned = cases(measured, (Size(320, 240), Size(640, 480)), (50, 80), (15, 30))
+    assert len(set(planned)) == len(planned) == 16
+    assert [case.interface.link for case in planned] == ["tcp", "ipc"] * 8
+    assert all(first.images == second.images for first, second in zip(planned[::2], planned[1::2], strict=True))
 
 
 @given(st.integers(64, 4096), st.integers(64, 4096))
@@ -245,10 +277,15 @@ def test_page_is_whole_html_and_refers_to_nothing_outside() -> None:
     checker = Checker()
     checker.open_tags = []
     text = page(
-        [result(), result(link="ipc"), dataclasses.replace(result(), case=Case("tcp", Size(320, 240), 15))], UNDER
+        [
+            result(),
+            result(link="ipc"),
+            dataclasses.replace(result(), case=Case(Interface("tcp"), Size(320, 240), 80, 15)),
+        ],
+        UNDER,
     )
     checker.feed(text)
     assert checker.open_tags == []
     assert checker.plots == 2 * 3 * 2
-    assert "640x480 at 30" in text
-    assert "320x240 at 15" in text
+    assert "640x480 JPEG 80 at 30" in text
+    assert "320x240 JPEG 80 at 15" in text

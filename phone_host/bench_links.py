@@ -1,0 +1,204 @@
+"""The two ends of every interface that the delay benchmark measures, put up on this machine; and boards that are elsewhere.
+
+Shell: starts real processes and takes them down again, whatever happens. What cannot be had says why in words.
+"""
+
+import fcntl
+import socket
+import struct
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from common import now
+from common.errors import SettingsError, UnavailableError
+from common.link.factory import open_link, parse_link
+from common.protocol.message import BoardHello, Pacing
+from phone_host.bench_cases import BOARD_SETS, Case, Interface, Size
+from phone_host.boardprocess import BoardAccount, BoardProcess, board_process, free_port
+from phone_host.emulate import NOTHING
+from phone_host.pairqueue import PairQueue
+from phone_host.receiver import LinkAccount, Receiver, refusal_text
+from phone_host.relay import RelayAccount, RelayProcess, relay_process
+from phone_host.sync.fifo import FifoSettings
+
+_CHANNEL: Final = 22
+"""For the benchmark's own RFCOMM listener: in the range that profiles do not use by themselves (1 to 30 exist)."""
+
+_STEP_S: Final = 0.05
+
+# include/net/bluetooth/hci_sock.h: _IOR('H', 211, int), and the head of struct hci_dev_info (92 bytes): number, name, address.
+_HCIGETDEVINFO: Final = 0x800448D3
+_DEVICE_INFO: Final = struct.Struct("=H8s6s")
+
+
+@dataclass(frozen=True, slots=True)
+class Ends:
+    """A case's link, ready to be dialled.
+
+    Attributes:
+        address: link URI for the host.
+        board: the board's process; None for a remote board.
+        relay: the line's process; None where there is none.
+    """
+
+    address: str
+    board: BoardProcess | None
+    relay: RelayProcess | None
+
+    def check(self) -> None:
+        """Raise UnavailableError if the board's process is gone."""
+        if self.board is not None:
+            self.board.check()
+
+    def stop(self, seen: LinkAccount) -> tuple[BoardAccount, RelayAccount | None]:
+        """End what was started.
+
+        Args:
+            seen: what the receiver saw; a remote board goes on, and its account is what it said of this time.
+        """
+        board = self.board.stop() if self.board is not None else _account_of(seen)
+        return board, self.relay.stop() if self.relay is not None else None
+
+
+@contextmanager
+def ends_of(interface: Interface, camera: str, folder: Path) -> Iterator[Ends]:
+    """Both ends of an interface for the length of a block.
+
+    Args:
+        interface: what to put up.
+        camera: URI of the board's camera.
+        folder: for sockets and names of terminals.
+
+    Raises:
+        UnavailableError: the board's process or the line did not come up.
+    """
+    if interface.is_remote:
+        yield Ends(interface.link, None, None)
+    elif interface.link == "rfcomm":
+        with board_process(camera, f"rfcomm://*/{_CHANNEL}") as board:
+            yield Ends(f"rfcomm://{_known_adapters()[0]}/{_CHANNEL}", board, None)
+    elif interface.link == "serial":
+        # A line of two terminals needs somebody who passes on the bytes, even one that adds nothing.
+        profile = interface.profile or NOTHING
+        with relay_process("serial", "-", folder, profile) as relay, board_process(camera, relay.board) as board:
+            yield Ends(relay.host, board, relay)
+    else:
+        address = f"ipc://{folder / 'board'}" if interface.link == "ipc" else f"tcp://127.0.0.1:{free_port()}"
+        with board_process(camera, address) as board:
+            if interface.profile is None:
+                yield Ends(address, board, None)
+                return
+            with relay_process(interface.link, address, folder, interface.profile) as relay:
+                yield Ends(relay.host, board, relay)
+
+
+def obstacle(interface: Interface) -> str:
+    """Why an interface cannot be measured here; empty if it can, as far as is known without trying."""
+    if interface.link != "rfcomm":
+        return ""
+    try:
+        parse_link(f"rfcomm://*/{_CHANNEL}", listens_by_default=True)
+    except SettingsError:
+        return "this version has no Bluetooth link"
+    if not hasattr(socket, "AF_BLUETOOTH"):
+        return "this Python was built without Bluetooth (Debian's own python3 has it)"
+    if len(adapters := _known_adapters()) < 2:
+        there = "no Bluetooth adapter" if not adapters else "one Bluetooth adapter, and its two ends need two"
+        return f"this machine has {there}; name a board instead, for example rfcomm://AA:BB:CC:DD:EE:FF/1"
+    return ""
+
+
+class _Silent:
+    """Listens to no frames: only the board's hello is wanted."""
+
+    def session_began(self) -> None:
+        """See BoardListener."""
+
+    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
+        """See BoardListener."""
+
+
+def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | None:
+    """Ask a remote board what its camera shows: that, and nothing else, can be measured there.
+
+    Args:
+        uri: its link.
+        patience_ns: how long an absent board is waited for.
+        stop: asked several times a second.
+
+    Returns:
+        The case; None when `stop` ended it.
+
+    Raises:
+        UnavailableError: there is no board, it is busy, or its images come on demand only.
+    """
+    link = open_link(parse_link(uri, listens_by_default=False))
+    receiver = Receiver(link, now.random_id(), PairQueue(FifoSettings(), None, 1), _Silent())
+    receiver.start()
+    try:
+        hello = _hello_of(receiver, uri, now.monotonic_ns() + patience_ns, stop)
+    finally:
+        receiver.stop()
+    if hello is None:
+        return None
+    camera = hello.camera
+    if camera.pacing is Pacing.DEMAND:
+        raise UnavailableError(
+            f"the board at {uri} shows images on demand", "start it with a camera, or a replay with pace=clock"
+        )
+    rate_hz = max(1, round(1e9 / camera.period_ns))
+    return Case(Interface(uri), Size(camera.width_px, camera.height_px), BOARD_SETS, rate_hz)
+
+
+def _hello_of(receiver: Receiver, uri: str, deadline_ns: int, stop: Callable[[], bool]) -> BoardHello | None:
+    pause = threading.Event()
+    while (hello := receiver.hello) is None and not stop():
+        if receiver.failure is not None:
+            raise receiver.failure
+        if now.monotonic_ns() > deadline_ns:
+            if receiver.refused is not None:
+                raise UnavailableError(*refusal_text(receiver.refused))
+            raise UnavailableError(f"no board at {uri}", "start board-agent there, or check --links")
+        pause.wait(_STEP_S)
+    return hello
+
+
+def _account_of(seen: LinkAccount) -> BoardAccount:
+    """What a board that goes on said of the time in which this host was there."""
+    grabbed = sent = 0
+    dropped: dict[str, int] = {}
+    for account in seen.sessions:
+        grabbed += account.latest.grabbed - account.first.grabbed
+        sent += account.latest.sent - account.first.sent
+        before = dict(account.first.dropped)
+        for reason, count in account.latest.dropped:
+            dropped[reason.value] = dropped.get(reason.value, 0) + count - before.get(reason, 0)
+    return BoardAccount(grabbed, sent, tuple(sorted(dropped.items())))
+
+
+def _adapters() -> list[str]:
+    """Addresses of this machine's Bluetooth adapters."""
+    addresses = []
+    with socket.socket(socket.AF_BLUETOOTH, socket.SOCK_RAW, socket.BTPROTO_HCI) as asker:
+        for path in sorted(Path("/sys/class/bluetooth").glob("hci*")):
+            number = path.name.removeprefix("hci")
+            if not number.isdigit():
+                continue  # a connection, for example hci0:256
+            info = bytearray(_DEVICE_INFO.pack(int(number), b"", b"") + bytes(76))
+            with suppress(OSError):  # unplugged meanwhile
+                fcntl.ioctl(asker, _HCIGETDEVINFO, info)
+                _, _, address = _DEVICE_INFO.unpack_from(info)
+                addresses.append(":".join(f"{byte:02X}" for byte in reversed(address)))
+    return addresses
+
+
+def _known_adapters() -> list[str]:
+    """The same; none where the kernel has no Bluetooth."""
+    try:
+        return _adapters()
+    except OSError:
+        return []
