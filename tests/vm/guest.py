@@ -197,6 +197,13 @@ class Guest:
             receiver.stdin.close()
             assert receiver.wait(PATIENCE_S) == 0
 
+    def get(self, path: str, target: Path) -> None:
+        """Copy a file of the guest to this machine."""
+        got = subprocess.run(
+            self._ssh_command(f"cat {shlex.quote(path)}"), capture_output=True, check=True, timeout=PATIENCE_S
+        )
+        target.write_bytes(got.stdout)
+
     def install(self, package: Path) -> None:
         """Install the board's package."""
         self.put(package, "/root")

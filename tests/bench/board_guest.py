@@ -1,0 +1,314 @@
+"""A booted armhf board under measurement: programs in it, what they cost, and who takes their frames on this machine.
+
+CPU time is what the guest's kernel gives for all threads of a process (/proc/PID/task/*/schedstat, ns on a processor), the kernel's work on
+its behalf included, what runs in kernel threads and interrupts not.
+"""
+
+import shlex
+import shutil
+import socket
+import subprocess
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Protocol
+
+import zmq
+
+from common import now
+from common.errors import UnavailableError
+from common.link.factory import open_link, parse_link
+from phone_host.model import BoardFrame
+from phone_host.pairqueue import PairQueue
+from phone_host.receiver import Receiver
+from phone_host.sync.fifo import FifoSettings
+from tests.support.unheard import Unheard
+from tests.vm.guest import LINK_PORT, UNIT, Architecture, Guest, image_of
+
+ROOT: Final = Path(__file__).resolve().parents[2]
+SOURCES: Final = Path(__file__).resolve().parent / "board"
+COMPILER: Final = "arm-linux-gnueabihf-gcc"
+_LIBZMQ: Final = "/usr/lib/arm-linux-gnueabihf/libzmq.so.5"
+_LEAST_FRAMES: Final = 30
+_PATIENCE_S: Final = 120.0
+
+
+class Counter(Protocol):
+    """Takes frames and counts them."""
+
+    frames: int
+    bytes: int
+
+    def close(self) -> None:
+        """Let go of the connection."""
+
+
+class OurHost:
+    """Our host up to the pairing: link, session, clock echoes, credit.
+
+    Args:
+        address: of the board's link.
+        period_ns: of its camera, ns.
+    """
+
+    def __init__(self, address: str, period_ns: int) -> None:
+        self.frames = self.bytes = 0
+        counter = self
+
+        class Counting(PairQueue):
+            """Ends the frames' way."""
+
+            def add_board(self, frame: BoardFrame) -> None:
+                counter.frames += 1
+                counter.bytes += len(frame.message.payload)
+
+        link = open_link(parse_link(address, listens_by_default=False))
+        queue = Counting(FifoSettings(), None, period_ns)
+        self._receiver = Receiver(link, now.random_id(), queue, Unheard())
+        self._receiver.start()
+
+    def close(self) -> None:
+        """Say goodbye."""
+        self._receiver.stop()
+
+
+class _Counting(threading.Thread):
+    """A counter with a thread of its own."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self.frames = self.bytes = 0
+        self.stopping = threading.Event()
+        self.start()
+
+    def close(self) -> None:
+        """Let go of the connection."""
+        self.stopping.set()
+        self.join()
+
+
+class Puller(_Counting):
+    """Takes the messages of the C program."""
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+        super().__init__()
+
+    def run(self) -> None:
+        """Pull until told to stop."""
+        with zmq.Context() as context, context.socket(zmq.PULL) as sock:
+            sock.setsockopt(zmq.RCVTIMEO, 100)
+            sock.setsockopt(zmq.LINGER, 0)
+            sock.connect(self._address)
+            while not self.stopping.is_set():
+                with suppress(zmq.Again):
+                    _, payload = sock.recv_multipart(copy=False)
+                    self.bytes += len(payload.buffer)
+                    self.frames += 1
+
+
+class HttpReader(_Counting):
+    """Takes ustreamer's stream: multipart over HTTP, each part with its length."""
+
+    def __init__(self, address: str) -> None:
+        host, _, port = address.removeprefix("tcp://").rpartition(":")
+        self._endpoint = (host, int(port))
+        super().__init__()
+
+    def run(self) -> None:
+        """Read until told to stop; a server that is not there yet is dialled again."""
+        while not self.stopping.is_set():
+            with suppress(OSError), socket.create_connection(self._endpoint, timeout=5) as sock:
+                sock.sendall(b"GET /stream HTTP/1.0\r\n\r\n")
+                with sock.makefile("rb") as stream:
+                    while not self.stopping.is_set() and (line := stream.readline()):
+                        if line.lower().startswith(b"content-length:"):
+                            length = int(line.partition(b":")[2])
+                            while stream.readline().strip():
+                                pass
+                            self.bytes += len(stream.read(length))
+                            self.frames += 1
+            time.sleep(0.2)
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What a program took while it streamed.
+
+    Attributes:
+        frames: that arrived here in the time.
+        seconds: that it was watched.
+        cpu_ns: CPU time of all its threads.
+        system_ns: the kernel's share of that (of coarser grain).
+        resident_bytes: its memory at the end.
+    """
+
+    frames: int
+    seconds: float
+    cpu_ns: int
+    system_ns: int
+    resident_bytes: int
+
+    @property
+    def frame_ms(self) -> float:
+        """CPU time a frame, ms."""
+        return self.cpu_ns / max(1, self.frames) / 1e6
+
+    @property
+    def share(self) -> float:
+        """Of one processor."""
+        return self.cpu_ns / 1e9 / self.seconds
+
+
+@dataclass(frozen=True, slots=True)
+class _Meter:
+    cpu_ns: int
+    system_ns: int
+    read_ns: int
+
+
+class Board:
+    """A booted board with our package, the C program and its counter of copies.
+
+    Args:
+        guest: booted, with the package installed.
+    """
+
+    def __init__(self, guest: Guest) -> None:
+        self.guest = guest
+
+    def interpreter_s(self) -> float:
+        """What the guest's Python takes for 10^6 rounds of `x += i`: the best of three, s."""
+        loop = (
+            "import timeit; print(min(timeit.repeat('for i in range(1000000): x += i', 'x = 0', number=1, repeat=3)))"
+        )
+        return float(self.guest.sh(f"python3 -c {shlex.quote(loop)}"))
+
+    def cost(self, pid: int, counter: Counter, seconds: float) -> Cost:
+        """Wait until frames come, then watch a process for a while."""
+        self.until_frames(counter)
+        return self.watch(pid, lambda: counter.frames, seconds)
+
+    def watch(self, pid: int, frames: Callable[[], int], seconds: float) -> Cost:
+        """Watch a process for a while.
+
+        Args:
+            pid: the process.
+            frames: how many have come here so far.
+            seconds: how long.
+        """
+        before, frames_before = self.meter(pid), frames()
+        time.sleep(seconds)
+        after, got = self.meter(pid), frames() - frames_before
+        resident = self.guest.sh(f"awk '/^VmRSS/ {{ print $2 }}' /proc/{pid}/status")
+        return Cost(
+            got,
+            (after.read_ns - before.read_ns) / 1e9,
+            after.cpu_ns - before.cpu_ns,
+            after.system_ns - before.system_ns,
+            int(resident) * 1024,
+        )
+
+    def until_frames(self, counter: Counter) -> None:
+        """Wait until a second's worth of frames has come.
+
+        Raises:
+            UnavailableError: none come.
+        """
+        wanted, deadline = counter.frames + _LEAST_FRAMES, time.monotonic() + _PATIENCE_S
+        while counter.frames < wanted:
+            if time.monotonic() > deadline:
+                raise UnavailableError(f"no frames within {_PATIENCE_S:.0f} s", "look at the guest's journal")
+            time.sleep(0.05)
+
+    def meter(self, pid: int) -> _Meter:
+        """CPU time of a process so far."""
+        said = self.guest.sh(
+            f"cat /proc/{pid}/task/*/schedstat | awk '{{ ns += $1 }} END {{ printf \"%.0f\\n\", ns }}'; awk '{{ print $15 }}' /proc/{pid}/stat; "
+            "getconf CLK_TCK"
+        ).split()
+        cpu_ns, system_ticks, ticks_hz = (int(word) for word in said)
+        return _Meter(cpu_ns, system_ticks * 1_000_000_000 // ticks_hz, time.monotonic_ns())
+
+    @property
+    def service_pid(self) -> int:
+        """Process id of the service."""
+        return int(self.guest.show("MainPID"))
+
+    def start_ms(self) -> float:
+        """Restart the service; gives the time from the start of its process to READY, by the guest's own systemd, ms."""
+        self.guest.sh(f"systemctl restart {UNIT}")
+        times = [
+            int(self.guest.show(name)) for name in ("ExecMainStartTimestampMonotonic", "ActiveEnterTimestampMonotonic")
+        ]
+        return (times[1] - times[0]) / 1000
+
+    @contextmanager
+    def running(self, command: str) -> Iterator[int]:
+        """Run a command in the guest for the length of a block; gives its process id."""
+        pid_file = "/run/bench.pid"
+        process = self.guest.popen(f"echo $$ > {pid_file}; exec {command} >/run/bench.log 2>&1")
+        try:
+            while not (said := self.guest.sh(f"cat {pid_file} 2>/dev/null || true").strip()):
+                time.sleep(0.1)
+            yield int(said)
+        finally:
+            self.guest.code(f"kill $(cat {pid_file}); rm -f {pid_file}")
+            with process:  # closes its pipes and waits
+                pass
+
+
+@contextmanager
+def booted_board() -> Iterator[Board]:
+    """Boot the armhf board and install our package and the programs to compare with, for the length of a block.
+
+    Raises:
+        UnavailableError: the image, the emulator or the cross compiler is missing.
+    """
+    image = image_of(Architecture.ARMHF)
+    if not image.built or not shutil.which(image.emulator):
+        raise UnavailableError("there is no image of an armhf board", "run .ci/board as root")
+    if not shutil.which(COMPILER):
+        raise UnavailableError(f"{COMPILER} is missing", "apt install gcc-arm-linux-gnueabihf")
+    with tempfile.TemporaryDirectory(prefix="board-") as name:
+        folder = Path(name)
+        guest = Guest(image, folder)
+        try:
+            guest.start()
+            package = subprocess.run(
+                [ROOT / "deploy/board/build-deb", folder], capture_output=True, text=True, check=True
+            )
+            guest.install(Path(package.stdout.strip()))
+            for program in _compile(guest, folder):
+                guest.put(program, "/opt/bench")
+            yield Board(guest)
+        finally:
+            guest.stop()
+
+
+def _compile(guest: Guest, folder: Path) -> tuple[Path, Path]:
+    """Compile for the guest: linked to its own libzmq, which is fetched from it."""
+    libzmq = folder / "libzmq.so.5"
+    guest.get(_LIBZMQ, libzmq)
+    forward, copies = folder / "forward", folder / "copies.so"
+    warnings = ("-Wall", "-Wextra", "-Werror")
+    subprocess.run(
+        [COMPILER, "-O2", *warnings, "-o", forward, SOURCES / "forward.c", libzmq, "-Wl,--allow-shlib-undefined"],
+        check=True,
+    )
+    # -fno-builtin: its own loops must not become calls of what they stand for.
+    subprocess.run(
+        [COMPILER, "-O2", *warnings, "-fno-builtin", "-shared", "-fPIC", "-o", copies, SOURCES / "copies.c"], check=True
+    )
+    return forward, copies
+
+
+FORWARD: Final = f"/opt/bench/forward {{device}} {{width}} {{height}} {{fps}} tcp://*:{LINK_PORT}"
+USTREAMER: Final = (
+    f"ustreamer --device={{device}} --resolution={{width}}x{{height}} --desired-fps={{fps}} --format=MJPEG --encoder=HW --host=0.0.0.0 --port={LINK_PORT} "
+    "--tcp-nodelay"
+)
