@@ -24,7 +24,9 @@ class TandemError(Exception):
         self.remedy = remedy
 
     def __str__(self) -> str:
-        return f"{self.problem}: {self.remedy}"
+        text = f"{self.problem}: {self.remedy}"
+        # One line, whatever the name or value that it quotes; and a foreign text shall not command the terminal.
+        return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
 
 
 class SettingsError(TandemError):

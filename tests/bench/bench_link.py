@@ -1,19 +1,25 @@
-"""One-way latency and CPU time of our link beside bare pyzmq, bare TCP and imagezmq: `python -m tests.bench.bench_link [--help]`.
+"""Every link in one table: our own over tcp, ipc and serial, beside bare pyzmq, bare TCP, imagezmq and NetGear: `python -m tests.bench.bench_link [--help]`.
 
-640x480 frames over loopback TCP at 30 per second, all transports in turns within one run, medians over the runs. Figures to reach for JPEGs of
-about 50 KB: one-way p50 at most 1.1 times that of bare pyzmq, the sender's CPU time at most 40 us a frame above it.
+640x480 frames at 30 per second over loopback, a Unix socket or a pseudo terminal, all transports in turns within one run, medians over the runs:
+one-way latency, CPU time a frame of both sides, loss. Then once more as fast as each goes: throughput. Figures to reach for JPEGs of about 50 KB:
+one-way p50 over tcp at most 1.1 times that of bare pyzmq, the sender's CPU time at most 40 us a frame above it.
 """
 
 import argparse
 import importlib.util
 import json
+import os
+import pty
 import statistics
 import subprocess
 import sys
 import tempfile
+import tty
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -21,22 +27,30 @@ from rich.progress import Progress
 from rich.table import Table
 
 from phone_host.boardprocess import free_port
-from tests.bench.link_worker import RECEIVERS, SENDERS
+from tests.bench.link_worker import receives
 from tests.bench.machine import machine, may_use_fifo
 from tests.bench.payloads import write_jpegs, write_raw
 
 _FPS = 30
 _CONNECT_S = 2.0
-_WARM_UP_S = {"tandemscan": 12.0}
+_LEARNING_S = 12.0
 """Left out: the time to connect; of our own link also the first ten seconds of a session, in which it learns the clock with more echoes."""
 
+_FULL_SPEED_BYTES = 200_000_000
 _NAMES = {
-    "tandemscan": "tandemscan link and protocol",
+    "tandemscan": "tandemscan over tcp",
+    "tandemscan-ipc": "tandemscan over ipc",
+    "tandemscan-serial": "tandemscan over serial (pty)",
     "pyzmq": "bare pyzmq PUSH/PULL",
     "tcp": "bare TCP socket",
     "imagezmq": "imagezmq REQ/REP",
+    "imagezmq-pub": "imagezmq PUB/SUB",
+    "netgear": "vidgear NetGear PAIR",
     "nothing": "pacing alone, nothing sent",
 }
+_EXTRAS = {"imagezmq": "imagezmq", "imagezmq-pub": "imagezmq", "netgear": "vidgear"}
+"""Transports that need a package of the extra `bench`."""
+
 _LATENCY_RATIO = 1.1
 _SENDER_US = 40.0
 _PAYLOADS: dict[str, Callable[[Path], int]] = {"jpeg": write_jpegs, "raw": write_raw}
@@ -52,7 +66,9 @@ class Rows:
         p99_us: the same.
         sender_us: CPU time a frame of the sender's process.
         receiver_us: the same of the receiver's.
-        lost: frames that never came, over all runs.
+        mb_per_s: throughput when frames come as fast as they are taken.
+        lost: frames that never came at the steady rate, over all runs.
+        lost_at_speed: share of those that never came at full speed.
     """
 
     p50_us: list[float] = field(default_factory=list)
@@ -60,38 +76,39 @@ class Rows:
     p99_us: list[float] = field(default_factory=list)
     sender_us: list[float] = field(default_factory=list)
     receiver_us: list[float] = field(default_factory=list)
+    mb_per_s: list[float] = field(default_factory=list)
+    lost_at_speed: list[float] = field(default_factory=list)
     lost: int = 0
 
-    def add(self, sender: dict[str, float], receiver: dict[str, list[int]] | None, measured: int) -> None:
-        """Take one run."""
+    def add(self, sender: dict[str, float], receiver: dict[str, Any] | None, measured: int) -> None:
+        """Take one run at the steady rate."""
         self.sender_us.append(sender["cpu_us_per_frame"])
         if receiver is None:
             return
         delays = receiver["delays_ns"]
         self.lost += measured - len(delays)
-        self.receiver_us.append(float(receiver["cpu_us_per_frame"]))  # type: ignore[arg-type]  # one number beside a list
+        self.receiver_us.append(receiver["cpu_us_per_frame"])
         for values, q in ((self.p50_us, 50), (self.p95_us, 95), (self.p99_us, 99)):
             values.append(float(np.percentile(delays, q)) / 1000 if delays else float("nan"))
 
+    def add_at_speed(self, receiver: dict[str, Any], measured: int) -> None:
+        """Take one run at full speed."""
+        self.mb_per_s.append(receiver["mb_per_s"])
+        self.lost_at_speed.append(1 - len(receiver["delays_ns"]) / measured)
+
     def medians(self) -> dict[str, float | int | None]:
         """Medians over the runs; None where nothing was measured."""
-        names = ("p50_us", "p95_us", "p99_us", "sender_us", "receiver_us")
+        names = ("p50_us", "p95_us", "p99_us", "sender_us", "receiver_us", "mb_per_s", "lost_at_speed")
         values: dict[str, list[float]] = {name: getattr(self, name) for name in names}
-        return {name: _median(row) for name, row in values.items()} | {
-            "p99_best_us": min(self.p99_us, default=None),
-            "lost_frames": self.lost,
-        }
+        return {name: _median(row) for name, row in values.items()} | {"lost_frames": self.lost}
 
 
 def main() -> None:
     """Run and print."""
     options = _options()
     runs = range(options.runs)
-    transports = [name for name in _NAMES if name in options.transports]
-    missing = {}
-    if "imagezmq" in transports and importlib.util.find_spec("imagezmq") is None:
-        transports.remove("imagezmq")
-        missing["imagezmq"] = "not installed (pip install tandemscan[bench])"
+    missing = _missing(options.transports)
+    transports = [name for name in _NAMES if name in options.transports and name not in missing]
     frames = round(options.seconds * _FPS)
     results: dict[str, dict[str, Rows]] = {}
     sizes = {}
@@ -108,8 +125,12 @@ def main() -> None:
             results[payload] = {name: Rows() for name in transports}
         for payload, _, name in ((p, r, t) for r in runs for p in options.payloads for t in transports):
             progress.update(task, description=f"{payload} over {name}")
-            sender, receiver = _run(name, Path(folder) / payload, frames)
-            results[payload][name].add(sender, receiver, frames)
+            row, target = results[payload][name], Path(folder) / payload
+            warm_up = round((_LEARNING_S if name.startswith("tandemscan") else _CONNECT_S) * _FPS)
+            row.add(*_run(name, target, _FPS, warm_up, frames), frames)
+            if receives(name):
+                fast = max(200, _FULL_SPEED_BYTES // sizes[payload])
+                row.add_at_speed(_run(name, target, 0, fast // 10, fast)[1] or {}, fast)
             progress.advance(task)
     scheduling = "both ends SCHED_FIFO" if may_use_fifo() else "ordinary scheduling (SCHED_FIFO needs root)"
     method = (
@@ -128,31 +149,63 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--seconds", type=float, default=5.0, help="measured time of each run (default 5)")
     parser.add_argument("--runs", type=int, default=5, help="runs of each transport (default 5)")
     parser.add_argument("--payloads", nargs="+", choices=list(_PAYLOADS), default=list(_PAYLOADS))
-    parser.add_argument("--transports", nargs="+", choices=list(_NAMES), default=list(_NAMES))
+    parser.add_argument("--transports", nargs="+", choices=[*_NAMES, "rfcomm"], default=[*_NAMES, "rfcomm"])
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     return parser.parse_args()
 
 
-def _run(transport: str, folder: Path, frames: int) -> tuple[dict[str, float], dict[str, list[int]] | None]:
-    address = f"tcp://127.0.0.1:{free_port()}"
-    warm_up = round(_WARM_UP_S.get(transport, _CONNECT_S) * _FPS)
+def _missing(wanted: list[str]) -> dict[str, str]:
+    """Why some of these transports are not measured here."""
+    absent = {
+        name: f"{name}: {_EXTRAS[name]} is not installed (make bench does it)" for name in wanted if name in _EXTRAS
+    }
+    missing = {name: why for name, why in absent.items() if importlib.util.find_spec(_EXTRAS[name]) is None}
+    if "rfcomm" in wanted:
+        adapters = len(list(Path("/sys/class/bluetooth").glob("hci*")))
+        missing["rfcomm"] = (
+            f"rfcomm: both ends on one machine need two Bluetooth adapters, here are {adapters}; see make test-board"
+        )
+    return missing
 
-    def start(role: str) -> subprocess.Popen[bytes]:
-        module = [sys.executable, "-m", "tests.bench.link_worker", role, transport, address, str(folder)]
-        return subprocess.Popen([*module, str(_FPS), str(warm_up), str(warm_up + frames)], stdout=subprocess.PIPE)
 
-    receiver = start("receive") if transport in RECEIVERS else None
-    assert transport in SENDERS
-    sender = start("send")
-    try:
-        limit_s = (warm_up + frames) / _FPS + 30
-        sent = sender.communicate(timeout=limit_s)[0]
-        received = receiver.communicate(timeout=limit_s)[0] if receiver else b"null"
-    finally:
-        for process in (sender, *([receiver] if receiver else [])):
-            process.kill()
-            process.wait()
+Result = tuple[dict[str, float], dict[str, Any] | None]
+
+
+def _run(transport: str, folder: Path, fps: int, warm_up: int, frames: int) -> Result:
+    """Both ends in processes of their own; gives what the sender and the receiver saw."""
+    with ExitStack() as stack:
+        addresses, descriptors = _addresses(transport, stack)
+        numbers = [str(fps), str(warm_up), str(warm_up + frames)]
+
+        def start(role: str) -> subprocess.Popen[bytes]:
+            module = [sys.executable, "-m", "tests.bench.link_worker", role, transport, addresses[role], str(folder)]
+            return subprocess.Popen([*module, *numbers], stdout=subprocess.PIPE, pass_fds=descriptors)
+
+        receiver = start("receive") if receives(transport) else None
+        sender = start("send")
+        try:
+            limit_s = (warm_up + frames) / (fps or _FPS) + 60
+            sent = sender.communicate(timeout=limit_s)[0]
+            received = receiver.communicate(timeout=limit_s)[0] if receiver else b"null"
+        finally:
+            for process in (sender, *([receiver] if receiver else [])):
+                process.kill()
+                process.wait()
     return json.loads(sent), json.loads(received)
+
+
+def _addresses(transport: str, stack: ExitStack) -> tuple[dict[str, str], tuple[int, ...]]:
+    """Where each role's end is, and the descriptors that the processes inherit."""
+    if transport == "tandemscan-ipc":
+        folder = stack.enter_context(tempfile.TemporaryDirectory())
+        return dict.fromkeys(("send", "receive"), f"ipc://{folder}/board"), ()
+    if transport == "tandemscan-serial":
+        master, slave = pty.openpty()
+        stack.callback(os.close, master)
+        stack.callback(os.close, slave)
+        tty.setraw(slave)
+        return {"send": f"serial:{os.ttyname(slave)}", "receive": f"fd:{master}"}, (master,)
+    return dict.fromkeys(("send", "receive"), f"tcp://127.0.0.1:{free_port()}"), ()
 
 
 def _median(values: list[float]) -> float | None:
@@ -181,16 +234,18 @@ def _as_json(
 def _print(payload: str, size: int, rows: dict[str, Rows], missing: dict[str, str]) -> None:
     table = Table(title=f"{payload}, 640x480, {size / 1000:.0f} KB, {_FPS} frames/s", title_justify="left")
     table.add_column("transport")
-    for title in ("p50 us", "p95 us", "p99 us", "best p99 us", "sender us/frame", "receiver us/frame", "lost"):
+    for title in ("p50 us", "p95 us", "p99 us", "sender us/frame", "receiver us/frame", "lost", "MB/s", "lost at that"):
         table.add_column(title, justify="right")
     for name, row in rows.items():
         values = row.medians()
-        keys = ("p50_us", "p95_us", "p99_us", "p99_best_us", "sender_us", "receiver_us")
+        keys = ("p50_us", "p95_us", "p99_us", "sender_us", "receiver_us")
         cells = ["-" if values[key] is None else f"{values[key]:.0f}" for key in keys]
-        table.add_row(_NAMES[name], *cells, str(row.lost) if row.p50_us else "-")
-    for name, why in missing.items():
-        table.add_row(_NAMES[name], why)
+        fast = [(values["mb_per_s"], ".0f"), (values["lost_at_speed"], ".1%")]
+        speed = ["-" if value is None or value != value else format(value, form) for value, form in fast]  # noqa: PLR0124 - NaN
+        table.add_row(_NAMES[name], *cells, str(row.lost) if row.p50_us else "-", *speed)
     Console(width=150).print(table)
+    for why in missing.values():
+        print(why)
     if payload == "jpeg" and {"tandemscan", "pyzmq"} <= rows.keys():
         ours, bare = rows["tandemscan"], rows["pyzmq"]
         ratio = statistics.median(ours.p50_us) / statistics.median(bare.p50_us)

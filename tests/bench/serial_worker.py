@@ -29,6 +29,7 @@ from common.protocol.host_session import HostSession
 from common.protocol.message import FrameMessage, Lane
 from common.protocol.session import Arrived, Echo, Outgoing, Output
 from common.protocol.wire import decode, encode_stamped
+from tests.bench.link_ours import OpenLine
 from tests.bench.machine import be_quiet
 
 _CRC = struct.Struct("<I")
@@ -46,29 +47,6 @@ def write_all(descriptor: int, data: bytes) -> None:
     view = memoryview(data)
     while view:
         view = view[os.write(descriptor, view) :]
-
-
-class OpenLine:
-    """A descriptor that is open already, as a line."""
-
-    def __init__(self, descriptor: int) -> None:
-        os.set_blocking(descriptor, False)
-        self._descriptor = descriptor
-
-    def fileno(self) -> int:
-        """The descriptor."""
-        return self._descriptor
-
-    def is_drained(self) -> bool:
-        """Nothing is known."""
-        return True
-
-    def discard_output(self) -> None:
-        """Nothing can be done."""
-
-    def close(self) -> None:
-        """Close it."""
-        os.close(self._descriptor)
 
 
 def send_bare(framing: str, device: str, frames: int, frame: bytes) -> dict[str, float]:

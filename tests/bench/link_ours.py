@@ -1,0 +1,114 @@
+"""Our own link and protocol as transports of the link benchmark: board-agent's agent and phone-host's receiver, whole."""
+
+import os
+import socket
+import time
+from fractions import Fraction
+
+from board_agent.agent import Agent
+from common import now
+from common.camera.base import Ended, Grab
+from common.camera.replay import ReplayCamera, ReplaySettings
+from common.link.base import Link
+from common.link.factory import open_link, parse_link
+from common.link.stream import StreamLink
+from common.protocol.framing import Side
+from common.protocol.message import FrameMessage, Pacing
+from phone_host.model import BoardFrame
+from phone_host.pairqueue import PairQueue
+from phone_host.receiver import Receiver
+from phone_host.sync.fifo import FifoSettings
+from tests.bench.link_job import Job, Tally
+from tests.support.unheard import Unheard
+
+_SLOTS = 8
+"""Free places that the host tells of when frames go as fast as they can: more than one, so that the link is never idle."""
+
+
+class OpenLine:
+    """The end of a pseudo terminal that is open already, as a line."""
+
+    def __init__(self, descriptor: int) -> None:
+        os.set_blocking(descriptor, False)
+        self._descriptor = descriptor
+
+    def fileno(self) -> int:
+        """The descriptor."""
+        return self._descriptor
+
+    def is_drained(self) -> bool:
+        """Nothing is known."""
+        return True
+
+    def discard_output(self) -> None:
+        """Nothing can be done."""
+
+    def close(self) -> None:
+        """Close it."""
+        os.close(self._descriptor)
+
+
+def send_tandemscan(job: Job) -> Tally:
+    """Our board: the whole agent with a replay camera, as `board-agent run` puts it together."""
+    tally = job.tally()
+
+    class Metered(ReplayCamera):
+        """Reads the meter where the other senders do, and ends after the last frame."""
+
+        _shown = -1
+
+        def read(self, now_ns: int) -> list[Grab]:
+            if self._shown >= job.frames - 1:
+                tally.passed(self._shown)
+                return [Ended()]
+            grabs = super().read(now_ns)
+            for _ in grabs:
+                tally.passed(self._shown)
+                self._shown += 1
+            return grabs
+
+    pacing = Pacing.CLOCK if job.fps else Pacing.DEMAND
+    settings = ReplaySettings(str(job.folder), Fraction(job.fps or 30), loop=True, pacing=pacing)
+    camera = Metered(settings, now.monotonic_ns())
+    link = open_link(parse_link(job.address, listens_by_default=True))
+    reader, writer = socket.socketpair()
+    with reader, writer:
+        Agent(camera, [link], now.random_id(), now.boot_id(), reader).run()
+    link.close()
+    return tally
+
+
+def receive_tandemscan(job: Job) -> Tally:
+    """Our host: the receiver with session, clock and credit."""
+    tally = job.tally()
+
+    class Stamping(Receiver):
+        """Stamps frames when they are decoded and the session has taken them."""
+
+        def _accept_frame(self, frame: FrameMessage, lost: int, now_ns: int) -> None:
+            tally.arrived(frame.sequence, frame.marks.sent_ns, len(frame.payload))
+            super()._accept_frame(frame, lost, now_ns)
+
+    class NoPairing(PairQueue):
+        """Ends the frames' way: pairing is no part of a link."""
+
+        def add_board(self, frame: BoardFrame) -> None:
+            pass
+
+    queue = NoPairing(FifoSettings(_SLOTS), None, 1_000_000_000 // (job.fps or 30))
+    receiver = Stamping(_open(job.address), now.random_id(), queue, Unheard())
+    receiver.start()
+    while not receiver.ended and receiver.failure is None:
+        time.sleep(0.1)
+    receiver.stop()
+    if receiver.failure is not None:
+        raise receiver.failure
+    return tally
+
+
+def _open(address: str) -> Link:
+    """The host's end: a URI, or `fd:N` for the end of a pseudo terminal."""
+    if address.startswith("fd:"):
+        descriptor = int(address.removeprefix("fd:"))
+        return StreamLink("serial", Side.DIALLER, lambda: OpenLine(descriptor))
+    return open_link(parse_link(address, listens_by_default=False))
