@@ -13,6 +13,7 @@ _VERBS = {
     "run": "pair a board's frames with the own camera's, compute depth, measure every delay",
     "calibrate": "calibrate two cameras from pictures of a chessboard",
     "stereo": "disparity and point cloud of one pair of images",
+    "doctor": "check Python, camera, link, rig and disk",
     "settings": "print each setting with its origin",
 }
 

@@ -206,19 +206,16 @@ def check_bluetooth(bluetooth: Bluetooth, *, wanted: bool) -> Finding:
         bluetooth: what there is.
         wanted: whether a link asks for it.
     """
-    judge = fail if wanted else warn
-    if not bluetooth.in_python:
-        return judge("bluetooth", "this Python has no Bluetooth sockets", "use Debian's python3 (apt install python3)")
-    if not bluetooth.adapters:
-        if not wanted:
-            return ok("bluetooth", "no adapter, and no link asks for one")
-        return fail(
-            "bluetooth", "no adapter was found", "plug one in; rfkill and dmesg tell of one that is switched off"
-        )
     usable = [name for name in bluetooth.adapters if name not in bluetooth.blocked]
-    if not usable:
-        return judge("bluetooth", f"{', '.join(bluetooth.adapters)} is switched off", "rfkill unblock bluetooth")
-    return ok("bluetooth", f"adapter {', '.join(usable)}")
+    if not bluetooth.in_python:
+        text, remedy = "this Python has no Bluetooth sockets", "use Debian's python3 (apt install python3)"
+    elif not bluetooth.adapters:
+        text, remedy = "no adapter was found", "plug one in; dmesg tells of one whose firmware is missing"
+    elif not usable:
+        text, remedy = f"{', '.join(bluetooth.adapters)} is switched off", "rfkill unblock bluetooth"
+    else:
+        return ok("bluetooth", f"adapter {', '.join(usable)}")
+    return fail("bluetooth", text, remedy) if wanted else ok("bluetooth", f"{text}; no link asks for one")
 
 
 def _unreadable(what: str) -> Finding:

@@ -1,6 +1,7 @@
 """The doctor's verbs as real processes on this machine: no camera needed."""
 
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -8,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.support.numbered import write_film
-from tests.support.programs import board, until
+from tests.support.programs import board, free_port, until
 
 
 def doctor(module: str, *arguments: str) -> tuple[int, dict[str, Any]]:
@@ -81,3 +82,43 @@ def test_the_table_has_a_line_for_each_check(tmp_path: Path) -> None:
     lines = done.stdout.splitlines()
     assert all(line.split()[0] in {"ok", "warn", "fail"} for line in lines)
     assert all("->" in line for line in lines if not line.startswith("ok"))
+
+
+def test_a_host_asks_the_board(tmp_path: Path) -> None:
+    """A board that runs answers with its camera and its clock's uncertainty; with none there the port is said to be shut."""
+    write_film(tmp_path / "film", 3)
+    uri = f"tcp://127.0.0.1:{free_port()}"
+    own = f"replay:{tmp_path}/film?loop=1"
+    with board(["run", "--camera", own, "--link", uri], tmp_path) as agent:
+        until(lambda: "serving" in agent.stderr, "the agent serves")
+        code, checks = doctor("phone_host.cli", "--link", uri, "--camera", own, "--wait", "30", "--out", str(tmp_path))
+        assert code == 0, checks
+        assert "clock known to" in checks["board"]["finding"]
+        assert agent.stop() == 0
+    code, checks = doctor("phone_host.cli", "--link", uri, "--wait", "0.5", "--out", str(tmp_path))
+    assert code == 4
+    assert "nobody listens" in checks["board"]["finding"]
+
+
+def test_a_host_without_anything_given_is_judged_by_itself(tmp_path: Path) -> None:
+    """Python and its packages are named with their versions, no board is asked, and a rig that is none fails."""
+    code, checks = doctor("phone_host.cli", "--out", str(tmp_path))
+    assert code == 0, checks
+    assert {"python", "numpy", "cv2", "camera", "serial", "bluetooth", "board", "disk"} <= set(checks)
+    (tmp_path / "rig.yaml").write_text("baseline: 3\n")
+    code, checks = doctor("phone_host.cli", "--calibration", str(tmp_path / "rig.yaml"))
+    assert code == 4
+    assert "rig.yaml" in checks["rig"]["finding"]
+
+
+def test_two_wheels_of_opencv_are_found(tmp_path: Path) -> None:
+    """With the folder of a second OpenCV distribution on the path the conflict is named and fails."""
+    other = tmp_path / "site" / "opencv_python-4.10.0.84.dist-info"
+    other.mkdir(parents=True)
+    (other / "METADATA").write_text("Metadata-Version: 2.1\nName: opencv-python\nVersion: 4.10.0.84\n")
+    command = [sys.executable, "-P", "-m", "phone_host.cli", "doctor", "--json"]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, env=environment)
+    assert done.returncode == 4, done.stderr
+    (check,) = (check for check in json.loads(done.stdout)["checks"] if check["what"] == "cv2")
+    assert "side by side" in check["finding"]

@@ -1,0 +1,184 @@
+"""What a host needs beside camera and link, judged from readings: Python, its packages, the rig, the board's answer. Pure."""
+
+import re
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from common.doctor.finding import Finding, fail, ok, warn
+
+OPENCV_WHEELS: Final = (
+    "opencv-python-headless",
+    "opencv-python",
+    "opencv-contrib-python",
+    "opencv-contrib-python-headless",
+)
+"""All of them own the one folder `cv2`: side by side they overwrite each other's files, and removing one breaks the other."""
+
+_USABLE_PX: Final = 1.0
+"""A stereo RMS above a pixel leaves rows that do not meet: no matcher finds much then."""
+
+
+@dataclass(frozen=True, slots=True)
+class Package:
+    """A Python package that the host imports.
+
+    Attributes:
+        name: of the module.
+        version: as the module says; empty when it cannot be imported.
+        problem: why it cannot.
+        least: lowest version.
+        below: first version that is too new; empty: none is.
+        wheels: distributions that brought it.
+    """
+
+    name: str
+    version: str
+    problem: str
+    least: str
+    below: str = ""
+    wheels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RigReadings:
+    """A rig file.
+
+    Attributes:
+        path: the file.
+        problem: what is wrong with it; empty when it could be read and rectified.
+        remedy: what to do about that.
+        rms_px: stereo RMS; NaN = unknown.
+        baseline_m: distance of the cameras, m.
+        host_size_px: size of the own camera's images in the rig.
+        asked_size_px: size that the own camera is asked for; None where the URI does not say.
+    """
+
+    path: str
+    problem: str = ""
+    remedy: str = ""
+    rms_px: float = float("nan")
+    baseline_m: float = float("nan")
+    host_size_px: tuple[int, int] = (0, 0)
+    asked_size_px: tuple[int, int] | None = None
+
+
+class Answer(Enum):
+    """What became of the question to the board."""
+
+    BOARD = "board"
+    BUSY = "busy"
+    OTHER_VERSION = "other version"
+    REFUSED = "refused"
+    SILENT = "silent"
+    NO_WAY = "no way"
+    UNKNOWN_NAME = "unknown name"
+
+
+@dataclass(frozen=True, slots=True)
+class BoardReadings:
+    """What a board has answered.
+
+    Attributes:
+        uri: the link.
+        answer: what became of it.
+        waited_s: how long it was waited for, s.
+        camera: the board's camera.
+        round_trip_ns: shortest round trip; 0 where unknown.
+        uncertainty_ns: of its clock; 0 where unknown.
+    """
+
+    uri: str
+    answer: Answer
+    waited_s: float
+    camera: str = ""
+    round_trip_ns: int = 0
+    uncertainty_ns: int = 0
+
+
+def check_python(version: tuple[int, int, int], platform: str) -> Finding:
+    """Judge the interpreter."""
+    text = f"Python {'.'.join(map(str, version))} on {platform}"
+    if version < (3, 11, 0):
+        return fail("python", text, "install Python 3.11 or newer")
+    return ok("python", text)
+
+
+def check_package(package: Package) -> Finding:
+    """Judge a package: can it be imported, is it of the range, is there one of it only."""
+    if len(package.wheels) > 1:
+        keep = package.wheels[0]
+        remove = " ".join(wheel for wheel in package.wheels if wheel != keep)
+        both = f"{' and '.join(package.wheels)} are installed side by side and overwrite each other's files"
+        return fail(package.name, both, f"pip uninstall {remove}, then pip install --force-reinstall --no-deps {keep}")
+    if not package.version:
+        return fail(package.name, f"cannot be imported ({package.problem})", "make venv; on Termux pkg install it")
+    text = f"{package.name} {package.version}" + (f" ({package.wheels[0]})" if package.wheels else "")
+    found = _numbers(package.version)
+    if found < _numbers(package.least) or (package.below and found >= _numbers(package.below)):
+        span = f"{package.least} or newer" + (f", below {package.below}" if package.below else "")
+        return warn(package.name, text, f"tested with {span}: make venv installs it")
+    return ok(package.name, text)
+
+
+def check_rig(rig: RigReadings) -> Finding:
+    """Judge a rig file."""
+    if rig.problem:
+        return fail("rig", rig.problem, rig.remedy)
+    width_px, height_px = rig.host_size_px
+    text = f"{rig.path}: baseline {rig.baseline_m * 1000:.1f} mm, own camera {width_px}x{height_px}"
+    if rig.rms_px == rig.rms_px:
+        text += f", stereo RMS {rig.rms_px:.2f} px"
+    asked_px = rig.asked_size_px
+    if asked_px is not None and asked_px != rig.host_size_px:
+        asked = f"{asked_px[0]}x{asked_px[1]}"
+        remedy = f"ask for size={width_px}x{height_px}, or calibrate at {asked}"
+        return fail("rig", f"{text}, but the camera is asked for {asked}", remedy)
+    if rig.rms_px > _USABLE_PX:
+        return warn("rig", text, "calibrate again with sharper pictures of a flat board")
+    return ok("rig", text)
+
+
+def check_board(board: BoardReadings) -> Finding:  # noqa: PLR0911 - one for each answer
+    """Judge the board's answer."""
+    match board.answer:
+        case Answer.BOARD:
+            clock = f", round trip {board.round_trip_ns / 1e6:.2f} ms, clock known to +-{board.uncertainty_ns / 1000:.0f} us"
+            return ok("board", f"{board.uri}: {board.camera}{clock if board.round_trip_ns else ''}")
+        case Answer.BUSY:
+            return warn("board", f"{board.uri}: a board serves another host", "stop that one first: one host at a time")
+        case Answer.OTHER_VERSION:
+            return fail(
+                "board", f"{board.uri}: the board speaks another protocol version", "update the older of the two"
+            )
+        case Answer.REFUSED:
+            remedy = "start board-agent there; its link must be on that address, not on 127.0.0.1 of the board"
+            return fail("board", f"{board.uri}: nobody listens at that port", remedy)
+        case Answer.NO_WAY:
+            return fail("board", f"{board.uri}: no way there", "check cable or Wi-Fi and the address: ping it")
+        case Answer.UNKNOWN_NAME:
+            return fail("board", f"{board.uri}: no machine of that name", "give its address; .local names need avahi")
+        case Answer.SILENT:
+            remedy = "run board-agent doctor there; is it the right port, and the right end of the cable?"
+            return fail("board", f"{board.uri}: no answer within {board.waited_s:g} s", remedy)
+
+
+def check_ports(ports: tuple[str, ...], problem: str) -> Finding:
+    """List the serial ports.
+
+    Args:
+        ports: names with what hangs there.
+        problem: why they could not be listed; empty when they could.
+    """
+    if problem:
+        return warn("serial", f"no serial links ({problem})", "pip install pyserial, or use another link")
+    return ok("serial", ", ".join(ports) if ports else "no USB or Bluetooth serial port is there now")
+
+
+def check_out(folder: str, *, writable: bool) -> list[Finding]:
+    """Judge whether results can be written to a folder; nothing is said where they can, the disk's line names it."""
+    return [] if writable else [fail("out", f"{folder} cannot be written to", "choose another folder with --out")]
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in re.findall(r"\d+", version)[:3])

@@ -1,0 +1,84 @@
+"""The host doctor's own verdicts: Python, packages, rig and the board's answer."""
+
+import pytest
+
+from common.doctor.finding import Verdict
+from phone_host.doctor_checks import (
+    Answer,
+    BoardReadings,
+    Package,
+    RigReadings,
+    check_board,
+    check_out,
+    check_package,
+    check_ports,
+    check_python,
+    check_rig,
+)
+
+OK, WARN, FAIL = Verdict.OK, Verdict.WARN, Verdict.FAIL
+
+
+@pytest.mark.parametrize(("version", "verdict"), [((3, 11, 0), OK), ((3, 14, 1), OK), ((3, 10, 12), FAIL)])
+def test_python_must_be_3_11(version: tuple[int, int, int], verdict: Verdict) -> None:
+    """Older interpreters fail."""
+    assert check_python(version, "linux").verdict is verdict
+
+
+@pytest.mark.parametrize(
+    ("package", "verdict", "word"),
+    [
+        (Package("cv2", "4.10.0", "", "4.10", "5", ("opencv-python-headless",)), OK, "4.10.0"),
+        (Package("cv2", "4.9.0", "", "4.10", "5"), WARN, "4.10 or newer"),
+        (Package("cv2", "5.0.0-pre", "", "4.10", "5"), WARN, "below 5"),
+        (Package("cv2", "", "ImportError: libGL.so.1", "4.10", "5"), FAIL, "libGL.so.1"),
+        (
+            Package("cv2", "4.10.0", "", "4.10", "5", ("opencv-python-headless", "opencv-python")),
+            FAIL,
+            "pip uninstall opencv-python,",
+        ),
+        (Package("numpy", "1.26.4", "", "1.24"), OK, "1.26.4"),
+    ],
+)
+def test_packages_are_judged_by_version_and_company(package: Package, verdict: Verdict, word: str) -> None:
+    """In range is fine, out of range warns, broken or twice fails; the remedy keeps the headless wheel."""
+    finding = check_package(package)
+    assert finding.verdict is verdict
+    assert word in finding.text + finding.remedy
+
+
+@pytest.mark.parametrize(
+    ("rig", "verdict", "word"),
+    [
+        (RigReadings("rig.yaml", rms_px=0.2, baseline_m=0.1, host_size_px=(640, 480)), OK, "100.0 mm"),
+        (RigReadings("rig.yaml", baseline_m=0.1, host_size_px=(640, 480)), OK, "640x480"),
+        (RigReadings("rig.yaml", rms_px=2.5, baseline_m=0.1, host_size_px=(640, 480)), WARN, "2.50 px"),
+        (
+            RigReadings("rig.yaml", baseline_m=0.1, host_size_px=(640, 480), asked_size_px=(1280, 720)),
+            FAIL,
+            "size=640x480",
+        ),
+        (RigReadings("rig.yaml", "rig.yaml: T is 80 m long", "T is in metres"), FAIL, "metres"),
+    ],
+)
+def test_a_rig_must_be_sound_and_fit_the_camera(rig: RigReadings, verdict: Verdict, word: str) -> None:
+    """A good rig names its baseline; a bad file, another image size or a large error are told with the remedy."""
+    finding = check_rig(rig)
+    assert finding.verdict is verdict
+    assert word in finding.text + finding.remedy
+
+
+@pytest.mark.parametrize("answer", Answer)
+def test_every_answer_of_a_board_is_judged(answer: Answer) -> None:
+    """Only a board that answers is fine, a busy one warns, everything else fails with a remedy."""
+    finding = check_board(BoardReadings("tcp://board:5555", answer, 5.0, "Cam", 400_000, 20_000))
+    assert finding.verdict is {Answer.BOARD: OK, Answer.BUSY: WARN}.get(answer, FAIL)
+    assert bool(finding.remedy) is (answer is not Answer.BOARD)
+
+
+def test_ports_and_folder() -> None:
+    """No serial port is no fault, no pyserial warns; a folder that cannot be written to fails."""
+    assert check_ports((), "").verdict is OK
+    assert check_ports((), "No module named 'serial'").verdict is WARN
+    assert check_out("scan", writable=True) == []
+    assert check_out("/proc", writable=False)[0].verdict is FAIL
