@@ -72,7 +72,7 @@ def _parser() -> argparse.ArgumentParser:
             "--link",
             action="append",
             metavar="URI",
-            help="tcp://HOST:PORT, ipc://PATH or serial:DEVICE; may be given again",
+            help="tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://*; may be given again",
         )
         verb.add_argument(
             "--log-level", choices=("debug", "info", "warning", "error"), help="how much to log to stderr"

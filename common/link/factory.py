@@ -1,7 +1,7 @@
 """Link URI to link. Transports are imported only when they are asked for."""
 
 from dataclasses import dataclass
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl, unquote, urlsplit
 
 from common.errors import SettingsError, UnavailableError
 from common.link.base import Link
@@ -9,7 +9,12 @@ from common.link.base import Link
 _MAX_BAUD = 20_000_000
 """The fastest adapters reach 12 Mbaud."""
 
-_EXAMPLES = "give tcp://HOST:PORT, ipc://PATH or serial:DEVICE"
+_MAX_CHANNEL = 30
+"""RFCOMM has channels 1 to 30."""
+
+_MORE_OPTIONS = {"serial": ", and baud=N", "rfcomm": ", and unpaired=1"}
+
+_EXAMPLES = "give tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE"
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,19 +25,21 @@ class LinkUri:
         address: what the transport takes, without options.
         listens: whether this side waits to be dialled.
         baud: speed of a serial port that has one; None: the usual.
+        unpaired: whether Bluetooth devices will do that were never paired with.
     """
 
     address: str
     listens: bool
     baud: int | None = None
+    unpaired: bool = False
 
 
 def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
     """Read a link URI.
 
     Args:
-        uri: `tcp://HOST:PORT`, `ipc://PATH` or `serial:DEVICE`, with `?bind=1` or `?connect=1` to swap who listens; a serial port also takes
-            `baud=N`.
+        uri: `tcp://HOST:PORT`, `ipc://PATH`, `serial:DEVICE` or `rfcomm://DEVICE[/CHANNEL]`, with `?bind=1` or `?connect=1` to swap who
+            listens; a serial port also takes `baud=N`, a Bluetooth device `unpaired=1`.
         listens_by_default: true on the board, which binds; false on the host, which connects.
 
     Returns:
@@ -44,19 +51,24 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
     address, _, query = uri.partition("?")
     is_serial = address.startswith("serial:")
     scheme, found, rest = address.partition(":" if is_serial else "://")
-    if not found or scheme not in {"tcp", "ipc", "serial"} or not rest:
+    if not found or scheme not in {"tcp", "ipc", "serial", "rfcomm"} or not rest:
         raise SettingsError(f"link {uri!r} is of no known kind", _EXAMPLES)
     if scheme == "tcp":
         _check_port(uri, address)
+    if scheme == "rfcomm":
+        _check_channel(uri, rest)
     options = dict(parse_qsl(query, keep_blank_values=True))
     baud = _baud(uri, options.pop("baud")) if is_serial and "baud" in options else None
+    unpaired = scheme == "rfcomm" and options.get("unpaired") == "1"
+    if unpaired:
+        del options["unpaired"]
     unknown = set(options) - {"bind", "connect"}
     if unknown or set(options.values()) - {"1"} or len(options) > 1:
         raise SettingsError(
             f"link {uri!r} has options {query!r}",
-            "?bind=1 and ?connect=1 are the only ones, one at a time" + (", and baud=N" if is_serial else ""),
+            "?bind=1 and ?connect=1 are the only ones, one at a time" + _MORE_OPTIONS.get(scheme, ""),
         )
-    return LinkUri(address, listens_by_default if not options else "bind" in options, baud)
+    return LinkUri(address, listens_by_default if not options else "bind" in options, baud, unpaired)
 
 
 def open_link(uri: LinkUri) -> Link:
@@ -74,6 +86,8 @@ def open_link(uri: LinkUri) -> Link:
     """
     if uri.address.startswith("serial:"):
         return _open_serial(uri)
+    if uri.address.startswith("rfcomm:"):
+        return _open_rfcomm(uri)
     from common.link.zeromq import ZeroMqDialer, ZeroMqListener  # noqa: PLC0415 - only the transport that is used is loaded
 
     if not uri.listens and "//*:" in uri.address:
@@ -96,6 +110,14 @@ def _check_port(uri: str, address: str) -> None:
         )
 
 
+def _check_channel(uri: str, rest: str) -> None:
+    device, slash, channel = rest.partition("/")
+    if not device:
+        raise SettingsError(f"link {uri!r} names no device", "give its address or name, or * to listen")
+    if slash and not (channel.isascii() and channel.isdigit() and 1 <= int(channel) <= _MAX_CHANNEL):
+        raise SettingsError(f"link {uri!r} has the channel {channel!r}", f"leave it out, or give 1 to {_MAX_CHANNEL}")
+
+
 def _baud(uri: str, text: str) -> int:
     if not text.isascii() or not text.isdigit() or not 0 < int(text) <= _MAX_BAUD:
         raise SettingsError(f"link {uri!r} has a baud rate of {text!r}", "give a number, for example ?baud=115200")
@@ -110,3 +132,17 @@ def _open_serial(uri: LinkUri) -> Link:
             f"{uri.address} cannot be opened ({error})", "install pyserial (apt: python3-serial)"
         ) from None
     return SerialLink(uri.address.removeprefix("serial:"), uri.baud or DEFAULT_BAUD, listens=uri.listens)
+
+
+def _open_rfcomm(uri: LinkUri) -> Link:
+    from common.link.rfcomm import ANYONE, RfcommDialler, RfcommListener, is_address  # noqa: PLC0415 - as above
+
+    device, _, number = uri.address.removeprefix("rfcomm://").partition("/")
+    device, channel = unquote(device), int(number or 0)
+    if not uri.listens:
+        if device == ANYONE:
+            raise SettingsError(f"link {uri.address!r} names no device to connect to", "give its name or address")
+        return RfcommDialler(uri.address, device, channel, unpaired=uri.unpaired)
+    if device != ANYONE and not is_address(device):
+        raise SettingsError(f"link {uri.address!r} cannot be listened on", "give rfcomm://* or an adapter's address")
+    return RfcommListener(uri.address, device, channel, unpaired=uri.unpaired)

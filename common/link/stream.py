@@ -10,6 +10,8 @@ import os
 import select
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 from common import now
@@ -52,13 +54,27 @@ class Line(Protocol):
         """Let go of it without waiting."""
 
 
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """A line that is not open yet.
+
+    Attributes:
+        descriptor: when it is ready, it is to be asked again; -1: in a while.
+        events: for epoll.
+    """
+
+    descriptor: int = -1
+    events: int = select.EPOLLOUT
+
+
 class StreamLink:
     """Speaks over a line and opens it again whenever it was lost.
 
     Args:
         kind: the transport's name.
         side: which of the two this side plays.
-        open_line: opens the line; raises UnavailableError.
+        open_line: opens the line, or tells that this takes time; raises UnavailableError.
+        frame_bytes: the transport carries bytes in frames of so many; 1: it does not.
 
     Raises:
         UnavailableError: the line cannot be had now.
@@ -66,17 +82,19 @@ class StreamLink:
 
     self_paced: Final = True
 
-    def __init__(self, kind: str, side: Side, open_line: Callable[[], Line]) -> None:
+    def __init__(self, kind: str, side: Side, open_line: Callable[[], Line | Opening], frame_bytes: int = 1) -> None:
         self.kind = kind
         self._dials = side is Side.DIALLER
         self.dialled = {lane: lane.name.encode() for lane in Lane} if self._dials else {}
         self._open_line = open_line
-        self._line: Line | None = open_line()
-        self._epoll = select.epoll()
+        self._line: Line | None = None
+        self._opening = Opening()
+        self._reopen_ns = 0
         self._events = select.EPOLLIN
-        self._epoll.register(self._line.fileno(), self._events)
-        self._reopen_ns = _NEVER
-        self._duplex = Duplex(side, int.from_bytes(os.urandom(4), "little"))
+        opened = open_line()
+        self._epoll = select.epoll()
+        self._duplex = Duplex(side, int.from_bytes(os.urandom(4), "little"), frame_bytes)
+        self._begin(opened)
         self._incoming: deque[Incoming] = deque()
         self._pending = memoryview(b"")
         self._names = dict(self.dialled)
@@ -92,8 +110,13 @@ class StreamLink:
         if self._incoming:
             return 0
         if self._line is None:
-            return self._reopen_ns
+            return self._reopen_ns if self._opening.descriptor < 0 else _NEVER
         return _NEVER if self._pending else self._duplex.due_ns
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the line is there now."""
+        return self._line is not None
 
     @property
     def bytes_per_s(self) -> float:
@@ -164,15 +187,25 @@ class StreamLink:
 
     def _reopen(self) -> None:
         now_ns = now.monotonic_ns()
-        if now_ns < self._reopen_ns:
+        if self._opening.descriptor >= 0:
+            with suppress(OSError):  # who opens it may have closed it
+                self._epoll.unregister(self._opening.descriptor)
+            self._opening = Opening()
+        elif now_ns < self._reopen_ns:
             return
-        try:
-            self._line = self._open_line()
-        except UnavailableError:
-            self._reopen_ns = now_ns + _REOPEN_NS
+        self._reopen_ns = now_ns + _REOPEN_NS
+        with suppress(UnavailableError):
+            self._begin(self._open_line())
+
+    def _begin(self, opened: Line | Opening) -> None:
+        """Wait for what is open now, or for what is not yet."""
+        if isinstance(opened, Opening):
+            self._opening = opened
+            if opened.descriptor >= 0:
+                self._epoll.register(opened.descriptor, opened.events)
             return
-        self._events = select.EPOLLIN
-        self._epoll.register(self._line.fileno(), self._events)
+        self._line, self._events = opened, select.EPOLLIN
+        self._epoll.register(opened.fileno(), self._events)
 
     def _lose(self) -> None:
         """The device is gone, or was pulled and must be opened anew."""
@@ -230,7 +263,9 @@ class StreamLink:
             except BlockingIOError:
                 break
             except OSError:
-                self._lose()
+                self._read(_READS)  # the peer's last words, when it was the peer who closed
+                if self._line is not None:
+                    self._lose()
                 return
             self._pending = self._pending[written:]
             if self._pending:

@@ -71,14 +71,15 @@ class Cutter:
 
     Args:
         side: this side.
+        frame_bytes: the line carries bytes in frames of so many; 1: it does not.
     """
 
-    def __init__(self, side: Side) -> None:
+    def __init__(self, side: Side, frame_bytes: int = 1) -> None:
         self._side = side
         self._queues: dict[Lane, deque[_Parcel]] = {lane: deque() for lane in Lane}
         self._numbers = dict.fromkeys(Lane, 0)
         self._acknowledge: int | None = None
-        self._window = Window()
+        self._window = Window(frame_bytes)
         self._abandoned = 0
 
     @property

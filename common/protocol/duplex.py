@@ -49,16 +49,18 @@ class Duplex:
     Args:
         side: which end.
         number: random below 2^32.
+        frame_bytes: the line carries bytes in frames of so many; 1: it does not.
     """
 
-    def __init__(self, side: Side, number: int) -> None:
+    def __init__(self, side: Side, number: int, frame_bytes: int = 1) -> None:
         self._side = side
+        self._frame_bytes = frame_bytes
         self._contact = Contact(side, number)
         self._deframer = Deframer(side.peer)
         self._heard_ns = 0
         self._told_garbage_bytes = 0
         self._past = DuplexCounts()
-        self._cutter = Cutter(side)
+        self._cutter = Cutter(side, frame_bytes)
         self._joiner = Joiner()
 
     @property
@@ -143,7 +145,7 @@ class Duplex:
         """Forget all that belonged to the contact."""
         counts = self.counts
         self._past = DuplexCounts(0, counts.broken, counts.abandoned)
-        self._cutter = Cutter(self._side)
+        self._cutter = Cutter(self._side, self._frame_bytes)
         self._joiner = Joiner()
 
     def _accept(self, units: list[Unit], now_ns: int) -> list[Whole | Change]:

@@ -24,8 +24,6 @@ _CHUNK_NS: Final = 2_500_000
 """A chunk takes this long on the line: a quarter of the slack, so that the line does not run empty between two acknowledgements."""
 
 _SLACK_NS: Final = 10 * MS
-_LEAST_UNIT_BYTES: Final = MIN_CHUNK_BYTES + UNIT_OVERHEAD_BYTES
-_FLOOR_BYTES: Final = 2 * _LEAST_UNIT_BYTES
 
 _RATE_SPAN_NS: Final = 1000 * MS
 """The rate is the largest of this span and the one before: a line that has become slower is believed after two seconds."""
@@ -57,9 +55,15 @@ class _UnderWay:
 
 
 class Window:
-    """The bound on unacknowledged bytes of one direction of a line."""
+    """The bound on unacknowledged bytes of one direction of a line.
 
-    def __init__(self) -> None:
+    Args:
+        frame_bytes: the line carries bytes in frames of so many (RFCOMM), so units fill whole frames or even parts of one; 1: it does not.
+    """
+
+    def __init__(self, frame_bytes: int = 1) -> None:
+        self._frame_bytes = frame_bytes
+        self._least_unit_bytes = fill(MIN_CHUNK_BYTES + UNIT_OVERHEAD_BYTES, frame_bytes)
         self._under_way: deque[_UnderWay] = deque()
         self._under_way_bytes = 0
         self._delivered_bytes = 0
@@ -86,20 +90,21 @@ class Window:
     @property
     def chunk_bytes(self) -> int:
         """How large a chunk's body is to be now."""
-        return min(MAX_BODY_BYTES, max(MIN_CHUNK_BYTES, int(max(self._rate_before, self._rate_now) * _CHUNK_NS)))
+        body = min(MAX_BODY_BYTES, max(MIN_CHUNK_BYTES, int(max(self._rate_before, self._rate_now) * _CHUNK_NS)))
+        return fill(body + UNIT_OVERHEAD_BYTES, self._frame_bytes) - UNIT_OVERHEAD_BYTES
 
     @property
     def limit_bytes(self) -> int:
         """How many bytes may be under way now."""
         if self._probing:
             return 1
-        rate = max(self._rate_before, self._rate_now)
+        rate, least_bytes = max(self._rate_before, self._rate_now), self._least_unit_bytes
         if self._backoff > 1 or not rate:
-            return _FLOOR_BYTES
+            return 2 * least_bytes
         own_bytes = min(self._round_trip_bytes, rate * _SLACK_NS / 2)
-        limit = max(_FLOOR_BYTES, int(rate * (self._round_trip_ns + _SLACK_NS) - own_bytes))
+        limit = max(2 * least_bytes, int(rate * (self._round_trip_ns + _SLACK_NS) - own_bytes))
         # On a slow line the slack is less than a chunk: without a whole one more than is known to fit, no higher rate would ever be seen.
-        return limit if self.chunk_bytes > MIN_CHUNK_BYTES else -(-limit // _LEAST_UNIT_BYTES) * _LEAST_UNIT_BYTES
+        return limit if self.chunk_bytes + UNIT_OVERHEAD_BYTES > least_bytes else -(-limit // least_bytes) * least_bytes
 
     @property
     def acknowledged_ns(self) -> int:
@@ -191,3 +196,16 @@ class Window:
         if now_ns - self._rate_since_ns >= _RATE_SPAN_NS:
             self._rate_before, self._rate_now, self._rate_since_ns = self._rate_now, 0.0, now_ns
         self._rate_now = max(self._rate_now, rate)
+
+
+def fill(unit_bytes: int, frame_bytes: int) -> int:
+    """Give the size of a unit that leaves no frame half full.
+
+    Args:
+        unit_bytes: how large it was to be.
+        frame_bytes: what one frame of the line carries.
+
+    Returns:
+        A multiple of the frame, at most `unit_bytes`; for less than a frame its next greater even part.
+    """
+    return unit_bytes // frame_bytes * frame_bytes or frame_bytes // (frame_bytes // unit_bytes)

@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--link",
         metavar="URI",
-        help="the board: tcp://HOST:PORT, ipc://PATH or serial:DEVICE (default tcp://127.0.0.1:5555)",
+        help="the board: tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE (default tcp://127.0.0.1:5555)",
     )
     parser.add_argument("--camera", metavar="URI", help=f"the own camera: {EXAMPLE}")
     add_stereo_arguments(parser)
