@@ -145,8 +145,10 @@ class StreamLink:
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Hand a packet over. A frame is FULL while the one before it is still being written, and all is before the peer was met."""
         lane = self._lane(connection)
-        if lane is None or self._line is None:
+        if lane is None or (self._line is None and not self._dials):
             return SendResult.UNREACHABLE
+        if self._line is None:
+            return SendResult.FULL  # it dials again by itself
         if len(header) > MAX_HEADER_BYTES or len(payload) > MAX_PAYLOAD_BYTES:
             self._duplex.leave()
             self._tell_broken()

@@ -35,9 +35,29 @@ def test_serial_ports() -> None:
     assert fast == LinkUri("serial:/dev/ttyUSB0", listens=True, baud=3_000_000)
 
 
+def test_bluetooth_devices() -> None:
+    """A Bluetooth device is named by address or name, with or without a channel; whether strangers will do is an option."""
+    for address in ("rfcomm://*", "rfcomm://*/1", "rfcomm://AA:BB:CC:DD:EE:FF/30", "rfcomm://my%20board"):
+        assert parse_link(address, listens_by_default=True) == LinkUri(address, listens=True)
+        assert parse_link(f"{address}?connect=1&unpaired=1", listens_by_default=True) == LinkUri(
+            address, listens=False, unpaired=True
+        )
+
+
 @pytest.mark.parametrize(
     "uri",
     [
+        "rfcomm:",
+        "rfcomm://",
+        "rfcomm:///1",
+        "rfcomm://*/",
+        "rfcomm://*/0",
+        "rfcomm://*/31",
+        "rfcomm://*/one",
+        "rfcomm://AA:BB:CC:DD:EE:FF/1/2",
+        "rfcomm://*?unpaired=0",
+        "rfcomm://*?baud=9600",
+        "tcp://host:5555?unpaired=1",
         "",
         "tcp",
         "tcp:",
