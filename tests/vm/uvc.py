@@ -26,6 +26,9 @@ class Control:
     Attributes:
         size: bytes.
         least, most, step, default: its range.
+        automatism: (unit, selector) of the control that rules this one, if there is one.
+        automatic: values of that control with which it does.
+        found: the value that the automatism finds.
     """
 
     size: int
@@ -33,6 +36,9 @@ class Control:
     most: int
     step: int
     default: int
+    automatism: tuple[int, int] | None = None
+    automatic: tuple[int, ...] = ()
+    found: int = 0
 
     def answer(self, request: int, current: int) -> bytes:
         """What a GET request yields."""
@@ -45,27 +51,36 @@ class Control:
         }
         if request == GET_LEN:
             return struct.pack("<H", self.size)
-        if request == GET_INFO:
-            return b"\x03"  # may be read and set
+        if request == GET_INFO:  # D0 may be read, D1 may be set, D3 changes by itself (table 4-3)
+            return b"\x0b" if self.automatism else b"\x03"
         return values[request].to_bytes(self.size, "little")
 
 
+EXPOSURE_MODE: Final = (_CAMERA, 0x02)
+EXPOSURE_PRIORITY: Final = (_CAMERA, 0x03)
 EXPOSURE: Final = (_CAMERA, 0x04)
+FOCUS: Final = (_CAMERA, 0x06)
+FOCUS_AUTO: Final = (_CAMERA, 0x08)
+POWER_LINE: Final = (_PROCESSING, 0x05)
+WHITE_BALANCE: Final = (_PROCESSING, 0x0A)
+WHITE_BALANCE_AUTO: Final = (_PROCESSING, 0x0B)
 CONTROLS: Final = {
-    (_CAMERA, 0x02): Control(
-        1, 0, 8, 9, 8
-    ),  # exposure mode; as a bit map its "step" tells: 1 manual, 8 aperture priority
-    (_CAMERA, 0x03): Control(1, 0, 1, 1, 1),  # exposure priority: may the rate fall in the dark
-    EXPOSURE: Control(4, 1, 2000, 1, 100),  # exposure time, 100 us
+    EXPOSURE_MODE: Control(1, 0, 8, 9, 8),  # as a bit map its "step" tells: 1 manual, 8 aperture priority
+    EXPOSURE_PRIORITY: Control(1, 0, 1, 1, 1),  # may the rate fall in the dark
+    EXPOSURE: Control(4, 1, 2000, 1, 100, EXPOSURE_MODE, (2, 8), 100),  # 100 us
+    FOCUS: Control(2, 0, 250, 5, 0, FOCUS_AUTO, (1,), 45),
+    FOCUS_AUTO: Control(1, 0, 1, 1, 1),
     (_PROCESSING, 0x02): Control(2, 0, 255, 1, 128),  # brightness
     (_PROCESSING, 0x04): Control(2, 0, 255, 1, 64),  # gain
-    (_PROCESSING, 0x05): Control(1, 0, 2, 1, 1),  # power line frequency
-    (_PROCESSING, 0x0A): Control(2, 2800, 6500, 10, 4600),  # white balance temperature, K
-    (_PROCESSING, 0x0B): Control(1, 0, 1, 1, 1),  # white balance temperature, automatic
+    POWER_LINE: Control(1, 0, 2, 1, 2),  # off, 50 Hz, 60 Hz
+    WHITE_BALANCE: Control(2, 2800, 6500, 10, 4600, WHITE_BALANCE_AUTO, (1,), 5100),  # K
+    WHITE_BALANCE_AUTO: Control(1, 0, 1, 1, 1),
 }
 """By (unit, selector); 1.0a, tables 4-6 and following."""
 
-_CAMERA_BITS: Final = 0b1110  # D1 exposure mode, D2 priority, D3 exposure time: table 3-6
+_CAMERA_BITS: Final = (
+    1 << 1 | 1 << 2 | 1 << 3 | 1 << 5 | 1 << 17
+)  # exposure mode, priority, time; focus, its auto: table 3-6
 _PROCESSING_BITS: Final = 1 << 0 | 1 << 6 | 1 << 9 | 1 << 10 | 1 << 12  # table 3-8
 
 

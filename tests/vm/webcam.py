@@ -60,6 +60,10 @@ class Webcam:
         self.starts = 0
         """How often a driver has started the stream."""
         self.streaming = False
+        self.settings: dict[tuple[int, int], int] = {}
+        """Its controls as they stand, by (unit, selector)."""
+        self.set_requests: list[tuple[tuple[int, int], int]] = []
+        """Every control that a driver has set, with the value, in order."""
         self._frames, self._fps, self._readout_ns = frames, fps, readout_ns
         self._model = model or uvc.Model()
         self._listener = socket.create_server(("127.0.0.1", 0))
@@ -116,7 +120,7 @@ class _Device:
     def __init__(self, camera: Webcam, connection: socket.socket) -> None:
         self._camera, self._socket = camera, connection
         self._waiting: deque[tuple[int, int]] = deque()  # (sequence number, bytes) of transfers that want image data
-        self._controls = {where: control.default for where, control in uvc.CONTROLS.items()}
+        self._controls = camera.settings = {where: control.default for where, control in uvc.CONTROLS.items()}
         self._probe = self._commit = camera._model.probe(1, 333333)
         self._streaming = False
         self._odd = False
@@ -173,8 +177,11 @@ class _Device:
         control = uvc.CONTROLS.get((unit, selector))
         if control is None:
             return None
+        if control.automatism is not None and self._controls[control.automatism] in control.automatic:
+            self._controls[unit, selector] = control.found
         if request == uvc.SET_CUR:
             self._controls[unit, selector] = int.from_bytes(out, "little")
+            self._camera.set_requests.append(((unit, selector), self._controls[unit, selector]))
             return b""
         return control.answer(request, self._controls[unit, selector])[:length]
 

@@ -1,0 +1,108 @@
+"""Exposure, white balance and focus are held for stereo, in the order that the driver demands, on a webcam that has all of them."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.support.programs import until
+from tests.vm import uvc
+from tests.vm.conftest import CAMERA
+from tests.vm.guest import Guest
+from tests.vm.stream import Film, Skew, check_journal, streaming
+from tests.vm.webcam import Webcam
+
+pytestmark = pytest.mark.timeout(600)  # the first test boots the board
+
+AUTOMATISMS = {
+    uvc.EXPOSURE: (uvc.EXPOSURE_MODE, 1),
+    uvc.WHITE_BALANCE: (uvc.WHITE_BALANCE_AUTO, 0),
+    uvc.FOCUS: (uvc.FOCUS_AUTO, 0),
+}
+"""By value: its automatism, and the value that switches it off."""
+
+
+@pytest.fixture(autouse=True)
+def _sound_afterwards(guest: Guest, webcam: Webcam) -> Iterator[None]:
+    """After each test the service is up with its usual camera, its books balance and it has never shown a traceback."""
+    assert webcam.plugged
+    yield
+    guest.configure(CAMERA)
+    check_journal(guest)
+
+
+def as_new(webcam: Webcam, guest: Guest) -> None:
+    """Take the camera's power away: its controls are as they were made."""
+    webcam.unplug()
+    until(lambda: guest.code("test -e /dev/video0") != 0, "the node is gone")
+    webcam.set_requests = []
+    webcam.plug(guest)
+
+
+def check_order(requests: list[tuple[tuple[int, int], int]]) -> None:
+    """Each value was set after its automatism had been switched off, and dynamic frame rate before any of them."""
+    order = [where for where, _ in requests]
+    assert order.index(uvc.EXPOSURE_PRIORITY) < min(order.index(value) for value in AUTOMATISMS)
+    for value, (automatism, off) in AUTOMATISMS.items():
+        assert requests.index((automatism, off)) < order.index(value), requests
+
+
+def test_the_driver_refuses_what_an_automatism_rules(guest: Guest, webcam: Webcam) -> None:
+    """The driver refuses to set the focus while it is automatic (EACCES): the order that is tested here is demanded."""
+    as_new(webcam, guest)
+    refuse = (
+        "from common.camera.v4l2_device import Device, capture_nodes; "
+        "Device(capture_nodes()[0]).set_control(0x009A090A, 30)"
+    )
+    said = guest.sh(f'cd /usr/lib/tandemscan && python3 -c "{refuse}" 2>&1; true')
+    assert "PermissionError" in said
+    assert "in set_control" in said
+    assert uvc.FOCUS not in [where for where, _ in webcam.set_requests]
+
+
+def test_what_the_automatisms_found_is_held(
+    guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
+) -> None:
+    """Two seconds into the stream all automatisms are off and the values are those that they had found; a replugged camera gets them, too."""
+    as_new(webcam, guest)
+    guest.configure(CAMERA)
+    with streaming(guest, film.right, tmp_path / "out") as stream:
+        until(lambda: webcam.settings[uvc.FOCUS_AUTO] == 0, "the focus is held")
+        stream.more(10, "with controls held")
+        check_order(webcam.set_requests)
+        as_new(webcam, guest)
+        stream.more(10, "after the plug")
+        stream.finish(skew)
+    check_order(webcam.set_requests)
+    assert webcam.settings[uvc.EXPOSURE_PRIORITY] == 0
+    for value, (automatism, off) in AUTOMATISMS.items():
+        assert webcam.settings[automatism] == off
+        assert webcam.settings[value] == uvc.CONTROLS[value].found
+    assert "control_refused" not in guest.journal()
+
+
+def test_what_the_user_sets_is_set_before_the_first_frame(guest: Guest, webcam: Webcam) -> None:
+    """Exposure, white balance, focus and mains of the URI stand in the camera when its stream begins, each within its step."""
+    as_new(webcam, guest)
+    before = webcam.starts
+    guest.configure(f"{CAMERA}&exposure_ms=20&white_balance=3997&focus=33&power_line=50")
+    until(lambda: webcam.starts > before and webcam.streaming, "the service starts the stream")
+    check_order(webcam.set_requests)
+    assert "control_refused" not in guest.journal()
+    assert webcam.settings[uvc.EXPOSURE] == 200  # 100 us
+    assert webcam.settings[uvc.WHITE_BALANCE] == 4000  # in steps of 10 K
+    assert webcam.settings[uvc.FOCUS] == 35  # in steps of 5
+    assert webcam.settings[uvc.POWER_LINE] == 1
+
+
+def test_without_lock_the_automatisms_stay_on(
+    guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
+) -> None:
+    """lock=0 leaves exposure, white balance and focus to the camera, also after the time in which they would be held."""
+    as_new(webcam, guest)
+    guest.configure(f"{CAMERA}&lock=0")
+    with streaming(guest, film.right, tmp_path / "out") as stream:
+        stream.more(40, "of four seconds")
+        stream.finish(skew)
+    assert webcam.settings[uvc.FOCUS_AUTO] == webcam.settings[uvc.WHITE_BALANCE_AUTO] == 1
+    assert webcam.settings[uvc.EXPOSURE_MODE] == 8
