@@ -12,6 +12,7 @@ _VERBS = {
     "demo": "both programs on this machine, a rendered scene with known truth, a full report",
     "run": "pair a board's frames with the own camera's, compute depth, measure every delay",
     "calibrate": "calibrate two cameras from pictures of a chessboard",
+    "calibrate-time": "measure what lies between the two cameras' stamps, with a screen, a lamp or a moving scene",
     "stereo": "disparity and point cloud of one pair of images",
     "doctor": "check Python, camera, link, rig and disk",
     "settings": "print each setting with its origin",
@@ -61,7 +62,7 @@ def _parser(asked: str) -> argparse.ArgumentParser:
 
 
 def _module(verb: str) -> ModuleType:
-    return importlib.import_module(f"phone_host.verbs.{verb}")
+    return importlib.import_module(f"phone_host.verbs.{verb.replace('-', '_')}")
 
 
 if __name__ == "__main__":

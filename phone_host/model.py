@@ -5,6 +5,7 @@ Conventions: camera axes x right, y down, z forward; pixel centres are integers 
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +80,23 @@ class Camera:
     distortion: NDArray[np.float64]
 
 
+UNMEASURED_NS: Final = 16_700_000
+"""How far two cameras' stamps may differ while nobody has measured it: one readout, taken as half of the period of 30 frames a second."""
+
+
+@dataclass(frozen=True, slots=True)
+class TimeOffset:
+    """The stamp of the host's camera minus that of the board's camera for one and the same moment, both on the host's clock.
+
+    Attributes:
+        offset_ns: added to the board's stamps before frames are paired.
+        uncertainty_ns: contains the truth in 99.9 %.
+    """
+
+    offset_ns: int = 0
+    uncertainty_ns: int = UNMEASURED_NS
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
     """Two calibrated cameras, possibly of different size, and how they stand to each other.
@@ -95,6 +113,7 @@ class Rig:
         rms_left_px: reprojection RMS of the left camera alone, px; NaN = not measured.
         rms_right_px: the same for the right camera.
         rms_stereo_px: reprojection RMS of the stereo calibration, px; NaN = not measured.
+        time_offset: between the two cameras' stamps.
     """
 
     left: Camera
@@ -105,6 +124,7 @@ class Rig:
     rms_left_px: float = float("nan")
     rms_right_px: float = float("nan")
     rms_stereo_px: float = float("nan")
+    time_offset: TimeOffset = TimeOffset()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,7 +2,8 @@
 
 Keys: left_image_width, left_image_height, right_image_width, right_image_height (px); M1 D1 M2 D2 (camera matrices and
 distortion, left and right); R T (right from left, T in metres); R1 R2 P1 P2 Q (rectification); rectified_image_width,
-rectified_image_height (the size P1 and P2 belong to); board_side; rms_left rms_right rms_stereo (px, .Nan = unknown).
+rectified_image_height (the size P1 and P2 belong to); board_side; rms_left rms_right rms_stereo (px, .Nan = unknown);
+time_offset_ns, time_offset_uncertainty_ns (host's stamp minus board's; absent: not measured).
 Reading takes the rig and makes its own rectification from it: R1 to Q are there for other programs.
 """
 
@@ -15,13 +16,14 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.formats.atomic import write_text
-from phone_host.model import Camera, Rectification, Rig, Side
+from phone_host.model import Camera, Rectification, Rig, Side, TimeOffset
 
 _DISTORTION_LENGTHS = (4, 5, 8, 12, 14)  # those OpenCV's model defines
 _LARGEST_IMAGE_PX = 100_000
 _ROTATION_TOLERANCE = 1e-6  # files hold 16 digits; a matrix typed with 6 digits is off by as much
 # No two cameras of one scanner stand farther apart; a larger number is a T in millimetres.
 _LARGEST_BASELINE_M = 10.0
+_LARGEST_OFFSET_NS = 2e9  # no camera with its driver is seconds behind another one
 
 
 def write_rig(path: Path, rig: Rig, rectification: Rectification) -> None:
@@ -60,7 +62,29 @@ def write_rig(path: Path, rig: Rig, rectification: Rectification) -> None:
     storage.write("rms_left", rig.rms_left_px)
     storage.write("rms_right", rig.rms_right_px)
     storage.write("rms_stereo", rig.rms_stereo_px)
+    storage.writeComment(
+        "the host camera's stamp minus the board camera's for one moment, ns, and what contains it in 99.9 %"
+    )
+    # Real numbers: FileStorage's integers have 32 bits, 2 s.
+    storage.write("time_offset_ns", float(rig.time_offset.offset_ns))
+    storage.write("time_offset_uncertainty_ns", float(rig.time_offset.uncertainty_ns))
     write_text(path, storage.releaseAndGetString())
+
+
+def write_time_offset(path: Path, offset: TimeOffset) -> None:
+    """Put a time offset into a rig.yaml; all else in it stays as it is.
+
+    Args:
+        path: a file that `read_rig` takes.
+        offset: what was measured.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    lines = path.read_text(encoding="utf-8").splitlines()
+    kept = [line for line in lines if not line.startswith(("time_offset_ns:", "time_offset_uncertainty_ns:"))]
+    values = [f"time_offset_ns: {offset.offset_ns}.", f"time_offset_uncertainty_ns: {offset.uncertainty_ns}."]
+    write_text(path, "\n".join([*kept, *values]) + "\n")
 
 
 def read_rig(path: Path) -> Rig:
@@ -90,6 +114,7 @@ def read_rig(path: Path) -> Rig:
         rms_left_px=reader.number("rms_left"),
         rms_right_px=reader.number("rms_right"),
         rms_stereo_px=reader.number("rms_stereo"),
+        time_offset=reader.time_offset(),
     )
 
 
@@ -192,6 +217,19 @@ class _Reader:
         """A figure that may be missing (NaN)."""
         node = self._storage.getNode(key)
         return float(node.real()) if node.isReal() or node.isInt() else math.nan
+
+    def time_offset(self) -> TimeOffset:
+        """What was measured, or that nothing was."""
+        offset_ns, uncertainty_ns = self.number("time_offset_ns"), self.number("time_offset_uncertainty_ns")
+        if math.isnan(offset_ns) and math.isnan(uncertainty_ns):
+            return TimeOffset()
+        if not abs(offset_ns) <= _LARGEST_OFFSET_NS:
+            raise self.problem("time_offset_ns", f"is {offset_ns:g}", "measure it: phone-host calibrate-time")
+        if not 0 < uncertainty_ns <= _LARGEST_OFFSET_NS:
+            raise self.problem(
+                "time_offset_uncertainty_ns", f"is {uncertainty_ns:g}", "measure it: phone-host calibrate-time"
+            )
+        return TimeOffset(round(offset_ns), round(uncertainty_ns))
 
     def text(self, key: str, default: str) -> str:
         """A word, or its default."""

@@ -14,6 +14,7 @@ class StereoCore:
     """From two images to a point cloud image, stage by stage.
 
     Attributes:
+        rig: the cameras; None when the images come rectified.
         geometry: what turns disparity into metres; None when the images come rectified and nobody said.
 
     Args:
@@ -28,6 +29,7 @@ class StereoCore:
         if rectifier is not None and geometry is not None:
             raise ValueError("the rectifier brings its own geometry")
         self._matcher = matcher
+        self.rig = None if rectifier is None else rectifier.rig
         self._rectifier = rectifier
         self.geometry = geometry if rectifier is None else rectifier.geometry
 

@@ -44,8 +44,23 @@ def decode_frames(left: EncodedImage, right: EncodedImage) -> tuple[Image, Image
         DataError: one of the two is spoiled.
     """
     if _is_raw(left) or _is_raw(right):
-        return _decode_one(left), _decode_one(right)
+        return decode_frame(left), decode_frame(right)
     return decode_pair(left.payload, right.payload, left.name, right.name)
+
+
+def decode_frame(image: EncodedImage) -> Image:
+    """Decode one frame.
+
+    Args:
+        image: of any encoding.
+
+    Returns:
+        (H, W) grey or (H, W, 3) BGR, uint8.
+
+    Raises:
+        DataError: it is spoiled.
+    """
+    return decode_raw(image) if _is_raw(image) else decode(image.payload, image.name)
 
 
 def decode_raw(image: EncodedImage) -> Image:
@@ -83,7 +98,3 @@ def decode_raw(image: EncodedImage) -> Image:
 
 def _is_raw(image: EncodedImage) -> bool:
     return raw_bytes(image.pixel_format, image.width_px, image.height_px) is not None
-
-
-def _decode_one(image: EncodedImage) -> Image:
-    return decode_raw(image) if _is_raw(image) else decode(image.payload, image.name)

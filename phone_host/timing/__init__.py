@@ -1,0 +1,1 @@
+"""What a stamp means: the constant between the stamps of two cameras, measured from what both of them filmed. Pure: images and stamps in, figures out."""

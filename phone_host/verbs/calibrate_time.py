@@ -1,0 +1,224 @@
+"""phone-host calibrate-time: measure what lies between the two cameras' stamps, and store it in rig.yaml."""
+
+import argparse
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from common import logs, now
+from common.camera.factory import EXAMPLE, open_camera
+from common.commandline import INTERRUPTED
+from common.errors import SettingsError
+from common.link.factory import open_link, parse_link
+from common.settings import log_level
+from common.signals import StopSignals
+from common.stamp import HOST_CLOCK
+from phone_host.formats.json_text import json_text
+from phone_host.verbs.outputs import require_file, require_folder, unwritable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from phone_host.footage import Footage
+    from phone_host.model import Rig
+    from phone_host.timing.shots import Measured, Shot, Times
+
+EXAMPLES = """  phone-host calibrate-time --pattern pattern.html     (open it full screen in a browser, in view of both cameras)
+  phone-host calibrate-time --by screen --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
+  phone-host calibrate-time --by lamp --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
+  phone-host calibrate-time --by scene --frames timing --calibration rig.yaml --out timing
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's options."""
+    parser.add_argument("--pattern", type=Path, metavar="FILE.html", help="write the screen's page, and nothing else")
+    parser.add_argument(
+        "--by",
+        choices=("screen", "lamp", "scene"),
+        default="screen",
+        help="what both cameras film: the page of --pattern, a lamp or LED switched at irregular moments, or, with a calibrated rig,"
+        " anything with texture that moves up and down (default screen)",
+    )
+    parser.add_argument("--link", default="tcp://127.0.0.1:5555", metavar="URI", help="the board (default %(default)s)")
+    parser.add_argument("--camera", metavar="URI", help=f"the own camera: {EXAMPLE}")
+    parser.add_argument("--frames", type=Path, metavar="DIR", help="instead of both: frames kept by an earlier run")
+    parser.add_argument("--seconds", type=float, default=20.0, metavar="S", help="how long to film (default 20)")
+    parser.add_argument("--wait", type=float, metavar="S", help="wait this long for an absent board, then exit 3")
+    parser.add_argument("--calibration", type=Path, metavar="rig.yaml", help="gets the result; needed for --by scene")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for report.json and time-offset.svg")
+    parser.add_argument("--keep", action="store_true", help="keep the frames in --out, for --frames")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Film or read, measure, store."""
+    if options.pattern is not None:
+        return _write_pattern(options)
+    _check(options)
+    from phone_host.formats.rig_yaml import read_rig  # noqa: PLC0415 - OpenCV, only now
+
+    logs.set_up(log_level("warning"))
+    rig = None if options.calibration is None else read_rig(options.calibration)
+    if options.out is not None:
+        require_folder(options.out)
+    signals = StopSignals()
+    footage = _footage(options, signals)
+    if signals.interrupted:
+        return INTERRUPTED
+    measured = _measure(options.by, footage, rig)
+    report = _report(options, measured, footage)
+    _store(options, measured, report)
+    print(json_text(report) if options.json else _summary(report))
+    return 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    if (options.frames is None) == (options.camera is None):
+        raise SettingsError(
+            "give either --camera or --frames", f"--camera {EXAMPLE}, or --frames DIR of an earlier --keep"
+        )
+    if options.by == "scene" and options.calibration is None:
+        raise SettingsError(
+            "--by scene without --calibration", "a scene says nothing without a calibrated rig: use --by screen or lamp"
+        )
+    if not (math.isfinite(options.seconds) and 0 < options.seconds <= 600):
+        raise SettingsError(f"--seconds {options.seconds:g}", "give 1 to 600")
+    if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
+        raise SettingsError(f"--wait {options.wait}", "give seconds, 0 or more; leave it out to wait for ever")
+    if options.keep and (options.out is None or options.frames is not None):
+        raise SettingsError("--keep has nothing to keep", "give it with --camera and --out")
+
+
+def _write_pattern(options: argparse.Namespace) -> int:
+    from phone_host.formats.atomic import write_text  # noqa: PLC0415
+    from phone_host.timing.screen_page import pattern_page  # noqa: PLC0415
+
+    require_file(options.pattern)
+    try:
+        options.pattern.parent.mkdir(parents=True, exist_ok=True)
+        write_text(options.pattern, pattern_page())
+    except OSError as error:
+        raise unwritable(options.pattern, error) from error
+    print(json_text({"pattern": str(options.pattern)}) if options.json else f"written to {options.pattern}")
+    return 0
+
+
+def _progress(text: str) -> "tuple[Any, Callable[[float], None]]":
+    """A progress bar of shares, on stderr when someone watches."""
+    from rich.console import Console  # noqa: PLC0415
+    from rich.progress import Progress  # noqa: PLC0415
+
+    console = Console(stderr=True)
+    progress = Progress(console=console, transient=True, disable=not console.is_terminal)
+    task = progress.add_task(text, total=1.0)
+    return progress, lambda share: progress.update(task, completed=share)
+
+
+def _footage(options: argparse.Namespace, signals: StopSignals) -> "Footage":
+    from phone_host.footage import film, keep, read  # noqa: PLC0415
+
+    if options.frames is not None:
+        return read(options.frames)
+    camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns())
+    link = open_link(parse_link(options.link, listens_by_default=False))
+    progress, advance = _progress("filming")
+    wait_ns = None if options.wait is None else round(options.wait * 1e9)
+    with progress:
+        footage = film(link, camera, options.seconds, wait_ns, stop=lambda: signals.stop, advance=advance)
+    if options.keep:
+        try:
+            keep(footage, options.out)
+        except OSError as error:
+            raise unwritable(options.out, error) from error
+    return footage
+
+
+def _measure(by: str, footage: "Footage", rig: "Rig | None") -> "Measured":
+    from phone_host.stereo.raw_images import decode_frame  # noqa: PLC0415
+    from phone_host.timing.shots import require_shots, to_seconds  # noqa: PLC0415
+
+    require_shots(len(footage.board), len(footage.host))
+    progress, advance = _progress("measuring")
+    with progress:
+        if by == "scene":
+            from phone_host.stereo.rectify import Rectifier  # noqa: PLC0415
+            from phone_host.timing.scene import measure_scene  # noqa: PLC0415
+
+            assert rig is not None
+            look = lambda shot: decode_frame(shot.image)  # noqa: E731 - shorter than a function of one line
+            return measure_scene(footage.board, footage.host, Rectifier(rig), look, advance)
+        board_s, host_s, _ = to_seconds(*([shot.exposed_ns for shot in side] for side in (footage.board, footage.host)))
+        total = len(footage.board) + len(footage.host)
+        if by == "lamp":
+            return _by_lamp(footage, board_s, host_s, lambda done: advance(done / total))
+        return _by_screen(footage, board_s, host_s, lambda done: advance(done / total))
+
+
+def _by_lamp(footage: "Footage", board_s: "Times", host_s: "Times", done: "Callable[[int], None]") -> "Measured":
+    import numpy as np  # noqa: PLC0415
+
+    from phone_host.timing.lamp import Brightness, brightness, measure_lamp  # noqa: PLC0415
+
+    levels = [brightness(image) for image in _images((*footage.board, *footage.host), done)]
+    split = len(footage.board)
+    return measure_lamp(Brightness(board_s, np.array(levels[:split])), Brightness(host_s, np.array(levels[split:])))
+
+
+def _by_screen(footage: "Footage", board_s: "Times", host_s: "Times", done: "Callable[[int], None]") -> "Measured":
+    from phone_host.timing.screen import PatternReader, counted, measure_screen  # noqa: PLC0415
+
+    reader = PatternReader()
+    readings = [reader.read(image) for image in _images((*footage.board, *footage.host), done)]
+    split = len(footage.board)
+    return measure_screen(counted(board_s, readings[:split]), counted(host_s, readings[split:]))
+
+
+def _images(shots: "tuple[Shot, ...]", done: "Callable[[int], None]") -> Any:  # noqa: ANN401 - an iterator of images
+    from phone_host.stereo.raw_images import decode_frame  # noqa: PLC0415
+
+    for index, shot in enumerate(shots):
+        yield decode_frame(shot.image)
+        done(index + 1)
+
+
+def _report(options: argparse.Namespace, measured: "Measured", footage: "Footage") -> dict[str, Any]:
+    return {
+        "method": measured.method.value,
+        "time_offset_ns": measured.offset.offset_ns,
+        "uncertainty_ns": measured.offset.uncertainty_ns,
+        "samples": measured.samples,
+        "frames": {"board": len(footage.board), "host": len(footage.host)},
+        "stored_in": None if options.calibration is None else str(options.calibration),
+        "meaning": "stamp of the host's camera minus stamp of the board's camera for one moment; middle row of both images",
+    }
+
+
+def _store(options: argparse.Namespace, measured: "Measured", report: dict[str, Any]) -> None:
+    from phone_host.formats.atomic import write_text  # noqa: PLC0415
+    from phone_host.formats.rig_yaml import write_time_offset  # noqa: PLC0415
+    from phone_host.misfit_plot import misfit_svg  # noqa: PLC0415
+
+    where = options.out or options.calibration
+    try:
+        if options.out is not None:
+            options.out.mkdir(parents=True, exist_ok=True)
+            write_text(options.out / "report.json", json_text(report, indent=2) + "\n")
+            write_text(options.out / "time-offset.svg", misfit_svg(measured))
+        if options.calibration is not None:
+            where = options.calibration
+            write_time_offset(options.calibration, measured.offset)
+        else:
+            print("phone-host: no --calibration: the result is stored nowhere", file=sys.stderr)
+    except OSError as error:
+        assert where is not None
+        raise unwritable(where, error) from error
+
+
+def _summary(report: dict[str, Any]) -> str:
+    offset_ms, uncertainty_ms = report["time_offset_ns"] / 1e6, report["uncertainty_ns"] / 1e6
+    stored = f"; stored in {report['stored_in']}" if report["stored_in"] else ""
+    return (
+        f"host's stamps minus board's: {offset_ms:+.3f} +- {uncertainty_ms:.3f} ms"
+        f" (by {report['method']}, {report['samples']} samples){stored}"
+    )

@@ -1,0 +1,243 @@
+"""The time offset of two cameras, from a screen, a lamp and a scene whose truth is known; and what is said where nothing can be measured."""
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+
+from common.errors import DataError
+from common.frame import PixelFormat
+from phone_host.misfit_plot import misfit_svg
+from phone_host.model import Image, Side
+from phone_host.stereo.raw_images import EncodedImage
+from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.scene import (
+    PHONE_LOOK,
+    WEBCAM_LOOK,
+    Path,
+    Renderer,
+    Scene,
+    demo_scene,
+    rig_poses,
+    unlike_rig,
+)
+from phone_host.timing.lamp import Brightness, brightness, measure_lamp
+from phone_host.timing.scene import measure_scene
+from phone_host.timing.screen import COUNT, HEIGHT, WIDTH, PatternReader, Reading, counted, draw, measure_screen
+from phone_host.timing.shots import Measured, Method, Shot, Times
+
+REFRESH_S = 1 / 59.94
+START_S = 12.3
+
+
+def stamps(seconds: float, fps: float, phase_s: float) -> Times:
+    """Moments at which a camera exposes."""
+    return np.arange(0.0, seconds, 1 / fps) + phase_s
+
+
+def offset_ms(measured: Measured) -> tuple[float, float]:
+    """Offset and uncertainty, ms."""
+    return measured.offset.offset_ns / 1e6, measured.offset.uncertainty_ns / 1e6
+
+
+# A screen.
+
+
+@cache
+def shown(number: int) -> Image:
+    """The pattern on a screen, drawn once."""
+    return draw(number % COUNT, 16)
+
+
+def filmed(moment_s: float, exposure_s: float, *, host: bool) -> Image:
+    """A screen in a room as a camera sees it: slanted, blurred, with less light, and mixed where a refresh falls into the exposure."""
+    corners = np.array([[0, 0], [WIDTH, 0], [WIDTH, HEIGHT], [0, HEIGHT]], dtype=np.float32) * 16
+    seen = [[150, 95], [455, 120], [450, 370], [165, 355]] if host else [[120, 130], [520, 110], [505, 365], [130, 370]]
+    turn = cv2.getPerspectiveTransform(corners, np.array(seen, dtype=np.float32))
+    first, last = (math.floor((moment_s + way * exposure_s / 2) / REFRESH_S) for way in (-1, 1))
+    light: np.ndarray = np.zeros((480, 640))
+    for number in range(first, last + 1):
+        begin_s = max(moment_s - exposure_s / 2, number * REFRESH_S)
+        end_s = min(moment_s + exposure_s / 2, (number + 1) * REFRESH_S)
+        picture = cv2.warpPerspective(shown(number), turn, (640, 480), flags=cv2.INTER_AREA, borderValue=(70,))
+        light += np.asarray(picture, dtype=np.float64) * ((end_s - begin_s) / exposure_s)
+    noise = np.random.default_rng(round(moment_s * 1e6)).normal(0, 3, light.shape)
+    return np.asarray(np.clip(cv2.GaussianBlur(25 + 0.6 * light, (0, 0), 1.2) + noise, 0, 255), dtype=np.uint8)
+
+
+def film_screen(offset_s: float, board_fps: float, host_fps: float) -> Measured:
+    """Film the counting screen with both cameras; the host's stamps are late by `offset_s`."""
+    reader, sides = PatternReader(), []
+    for host, fps, phase_s, late_s in ((False, board_fps, 0.004, 0.0), (True, host_fps, 0.017, offset_s)):
+        moments = stamps(8.0, fps, phase_s) + START_S
+        readings = [reader.read(filmed(float(t), 0.008, host=host)) for t in moments]
+        sides.append(counted(moments + late_s - START_S, readings))
+    return measure_screen(*sides)
+
+
+def test_every_number_is_read() -> None:
+    """Numbers over the whole range are read from a slanted, noisy image of a screen at rest, and their row is near the middle."""
+    reader = PatternReader()
+    for number in (0, 1, 2, 3, 511, 2048, 3000, COUNT - 1):
+        reading = reader.read(filmed((number + 0.5) * REFRESH_S, 0.001, host=True))
+        assert reading is not None
+        assert reading.number == number
+        assert 0.4 < reading.row < 0.6
+
+
+@pytest.mark.parametrize(
+    ("offset", "board_fps", "host_fps", "most_ms"),
+    [(0.0, 29.6, 29.75, 2), (0.021, 29.6, 30.2, 2), (-0.0605, 29.6, 24.1, 2), (0.02, 30.0, 30.0, 18)],
+)
+def test_a_screen_gives_the_offset(offset: float, board_fps: float, host_fps: float, most_ms: float) -> None:
+    """Stamps that are late by a known time are found late by it, within an uncertainty that is small if all of a refresh was seen in 8 s."""
+    measured = film_screen(offset, board_fps, host_fps)
+    found, doubt = offset_ms(measured)
+    assert measured.method is Method.SCREEN
+    assert abs(found - offset * 1e3) <= doubt < most_ms
+    best = measured.offsets_s[int(measured.misfits.argmin())]
+    assert abs(best - offset) < REFRESH_S
+
+
+def test_a_camera_in_step_with_the_screen_is_doubted() -> None:
+    """Where a camera sees each refresh at the same moment of it always, half a refresh is left open and said so."""
+    numbers = np.arange(240) * 2
+    times = numbers / 60.0
+    locked = counted(times + 0.003, [read_as(int(n)) for n in numbers])
+    sweeping = counted(np.arange(240) / 29.7, [read_as(int(t * 60)) for t in np.arange(240) / 29.7])
+    found, doubt = offset_ms(measure_screen(sweeping, locked))
+    assert doubt >= 1000 / 60 / 2 * 0.9
+    assert abs(found) <= doubt
+
+
+def read_as(number: int) -> Reading:
+    """A reading in the middle of the image."""
+    return Reading(number % COUNT, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("count", "moves", "words"),
+    [(10, True, "too short"), (60, False, "did not count"), (60, None, "saw the pattern in 0 of 60")],
+)
+def test_a_screen_that_cannot_serve_is_named(count: int, moves: bool | None, words: str) -> None:  # noqa: FBT001
+    """Too few frames, a still pattern and none at all are three different errors, each with its remedy."""
+    times = stamps(count / 30, 30, 0)[:count]
+    readings = [None if moves is None else read_as(int(t * 60) if moves else 7) for t in times]
+    with pytest.raises(DataError, match=words) as caught:
+        measure_screen(counted(times, readings), counted(times, readings))
+    assert caught.value.remedy
+
+
+# A lamp.
+
+
+def film_lamp(offset_s: float, switches: Times, host_fps: float, exposure_s: float) -> Measured:
+    """Film a lamp that changes at these moments, in the corner of one image and the middle of the other."""
+    sides = []
+    for host, fps, phase_s, late_s in ((False, 30.0, 0.003, 0.0), (True, host_fps, 0.019, offset_s)):
+        moments = stamps(float(switches[-1]) + 0.5, fps, phase_s)
+        chance = np.random.default_rng(int(host))
+        cells = []
+        for moment in moments:
+            inside = np.linspace(moment - exposure_s / 2, moment + exposure_s / 2, 50)
+            light = float(np.mean(np.searchsorted(switches, inside) % 2))
+            image = np.full((96, 128), 60.0)
+            place = (slice(40, 56), slice(50, 70)) if host else (slice(0, 96), slice(0, 30))
+            image[place] += 90 * light
+            cells.append(
+                brightness(np.asarray(np.clip(image + chance.normal(0, 4, image.shape), 0, 255), dtype=np.uint8))
+            )
+        sides.append(Brightness(moments + late_s, np.array(cells)))
+    return measure_lamp(*sides)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.013, -0.070])
+@pytest.mark.parametrize(("host_fps", "exposure_s"), [(30.0, 0.001), (30.0, 0.02), (24.0, 0.01)])
+def test_a_lamp_gives_the_offset(offset: float, host_fps: float, exposure_s: float) -> None:
+    """Sixty changes of a lamp at random moments give the offset within the stated uncertainty, whatever rates and exposure times."""
+    chance = np.random.default_rng(5)
+    switches = np.cumsum(chance.uniform(0.12, 0.6, 60))
+    measured = film_lamp(offset, switches, host_fps, exposure_s)
+    found, doubt = offset_ms(measured)
+    assert measured.samples > 40
+    assert abs(found - offset * 1e3) <= doubt < 20
+
+
+@pytest.mark.parametrize("pause_s", [10 / 30, 0.347])
+def test_a_lamp_that_blinks_regularly_is_refused(pause_s: float) -> None:
+    """Such a lamp may keep step with the frames, and then every change would be off by the same unknown time."""
+    with pytest.raises(DataError, match="regularly"):
+        film_lamp(0.0, np.linspace(pause_s, 40 * pause_s, 40) + 0.021, 30.0, 0.001)
+
+
+@pytest.mark.parametrize(("switches", "words"), [(3, "only 3 changes"), (0, "saw no lamp")])
+def test_a_lamp_that_says_too_little_is_named(switches: int, words: str) -> None:
+    """Too few changes and a lamp that was not seen are told apart."""
+    moments = np.array([1.0, 2.2, 3.1][:switches] + ([] if switches else [100.0]))
+    if not switches:
+        still = Brightness(stamps(4, 30, 0), np.random.default_rng(1).normal(60, 0.2, (120, 108)))
+        with pytest.raises(DataError, match=words):
+            measure_lamp(still, still)
+        return
+    with pytest.raises(DataError, match=words):
+        film_lamp(0.0, moments, 30.0, 0.005)
+
+
+# A scene.
+
+
+def moving(amplitude_m: tuple[float, float, float], spin_rad_s: float = 0.3) -> Scene:
+    """The demo's scene with a cube and a ball that swing and turn."""
+    swing = Path(amplitude_m, (0.5, 0.0, 0.0), 1.6, (0.0, 1.0, 0.0), spin_rad_s)
+    base = demo_scene()
+    names = {"wall", "table", "poster", "cube", "ball"}
+    bodies = [replace(body, path=swing) if body.path.moves else body for body in base.bodies if body.name in names]
+    return Scene(tuple(bodies), base.light)
+
+
+def film_scene(scene: Scene, offset_s: float, board_side: Side, frames: int) -> Measured:
+    """Film a scene with the demo's rig; the host's stamps are late by `offset_s`, and it exposes 9 ms after the board."""
+    rig = replace(unlike_rig(), board_side=board_side)
+    images: dict[str, Image] = {}
+    sides: dict[Side, list[Shot]] = {Side.LEFT: [], Side.RIGHT: []}
+    for side, camera, pose, look in zip(
+        Side, (rig.left, rig.right), rig_poses(rig), (WEBCAM_LOOK, PHONE_LOOK), strict=True
+    ):
+        renderer = Renderer(scene, camera, pose, look)
+        is_host = side is not board_side
+        for k in range(frames):
+            t_s = k / 30 + (0.009 if is_host else 0.0)
+            name = f"{side.value} {k}"
+            images[name] = renderer.frame(t_s)
+            late_s = offset_s if is_host else 0.0
+            image = EncodedImage(b"", PixelFormat.MJPEG, camera.width_px, camera.height_px, name)
+            sides[side].append(Shot(10**14 + round((t_s + late_s) * 1e9), image))
+    progress: list[float] = []
+    rectifier = Rectifier(rig)
+    found = measure_scene(
+        sides[board_side], sides[board_side.other], rectifier, lambda shot: images[shot.image.name], progress.append
+    )
+    assert progress == sorted(progress)
+    return found
+
+
+@pytest.mark.parametrize(("offset", "board_side"), [(0.013, Side.LEFT), (-0.024, Side.RIGHT)])
+def test_a_moving_scene_gives_the_offset(offset: float, board_side: Side) -> None:
+    """From a rendered scene that moves up and down the known offset is found within the stated uncertainty, whichever side the board is."""
+    measured = film_scene(moving((0.05, 0.10, 0.0)), offset, board_side, 40)
+    found, doubt = offset_ms(measured)
+    assert abs(found - offset * 1e3) <= doubt < 3
+    best = measured.offsets_s[int(measured.misfits.argmin())]
+    assert abs(best - offset) < 0.004
+    assert np.all(np.diff(measured.offsets_s) > 0)
+    assert misfit_svg(measured).startswith("<svg")
+
+
+def test_motion_along_the_rows_is_not_enough() -> None:
+    """A scene that moves sideways only says nothing of time: the error says so, with what to do."""
+    with pytest.raises(DataError, match="motion up or down") as caught:
+        film_scene(moving((0.10, 0.0, 0.0), spin_rad_s=0.0), 0.01, Side.LEFT, 32)
+    assert "up and down" in caught.value.remedy
