@@ -16,7 +16,7 @@ from common.link.base import Link
 from common.logs import event
 from common.protocol.message import Pacing, RefusalReason
 from phone_host.delays import DelayStatistics
-from phone_host.model import FramePair, Side
+from phone_host.model import FramePair, Side, TimeOffset
 from phone_host.pairqueue import PairQueue
 from phone_host.pipeline import Pipeline, Processed
 from phone_host.receiver import Receiver, refusal_text
@@ -59,6 +59,7 @@ class HostSettings:
         wait_ns: an absent board is waited for this long; None for ever.
         out: folder for results; None to write none.
         save_every: every which pair is saved; 0 for none.
+        time_offset: between the two cameras' stamps.
     """
 
     board_side: Side = Side.LEFT
@@ -68,6 +69,7 @@ class HostSettings:
     wait_ns: int | None = None
     out: Path | None = None
     save_every: int = 30
+    time_offset: TimeOffset = field(default_factory=TimeOffset)
 
 
 class Host:
@@ -94,7 +96,13 @@ class Host:
         self.results = Results(settings.out, settings.save_every)
         own = camera.description
         on_demand = own.pacing is Pacing.DEMAND
-        self.queue = PairQueue(settings.fifo, settings.tolerance_ns, own.period_ns, on_demand=on_demand)
+        self.queue = PairQueue(
+            settings.fifo,
+            settings.tolerance_ns,
+            own.period_ns,
+            on_demand=on_demand,
+            time_offset_ns=settings.time_offset.offset_ns,
+        )
         self.source = Source(camera, self.queue.add_host)
         self.receiver = Receiver(link, now.random_id(), self.queue, self)
         self._pipeline = Pipeline(core, settings.board_side, now.monotonic_ns)
@@ -153,6 +161,7 @@ class Host:
             unwritten=self.results.unwritten,
             spoiled=self.source.spoiled,
             skipped=self.source.skipped,
+            time_offset=self.settings.time_offset,
         )
 
     def _watch(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:

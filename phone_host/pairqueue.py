@@ -60,10 +60,18 @@ class PairQueue:
         fifo: depth and overflow policy.
         tolerance_ns: greatest time skew; None for half of the longer frame period.
         host_period_ns: time between two frames of the own camera.
+        on_demand: whether the own camera shows images on demand.
+        time_offset_ns: added to the board's stamps before they are compared with the host's.
     """
 
     def __init__(
-        self, fifo: FifoSettings, tolerance_ns: int | None, host_period_ns: int, *, on_demand: bool = False
+        self,
+        fifo: FifoSettings,
+        tolerance_ns: int | None,
+        host_period_ns: int,
+        *,
+        on_demand: bool = False,
+        time_offset_ns: int = 0,
     ) -> None:
         self._settings = fifo
         self._fifo: Fifo[FramePair] = Fifo(fifo)
@@ -74,6 +82,7 @@ class PairQueue:
         self._changed = threading.Condition()
         self._closed = False
         self._timeless = on_demand
+        self._time_offset_ns = time_offset_ns
         self._received = self._host_frames = self._paired = self._dropped = self._taken = 0
         self._board_orphans: dict[str, int] = {}
         self._host_orphans: dict[str, int] = {}
@@ -129,7 +138,8 @@ class PairQueue:
             # The study of links found bursts up to twice the usual delay; the slow decay follows a link that gets faster.
             self._host_wait_ns = min(_SLOWEST_NS, max(delay_ns, self._host_wait_ns * 63 // 64))
             self._board_bytes += len(frame.message.payload)
-            self._settle(self._pairing.add_board(frame.marks.exposed_ns, frame, now.monotonic_ns()))
+            exposed_ns = frame.marks.exposed_ns + self._time_offset_ns
+            self._settle(self._pairing.add_board(exposed_ns, frame, now.monotonic_ns()))
             while self._board_bytes > _SIDE_BYTES:
                 self._settle(self._pairing.evict_oldest_board())
 

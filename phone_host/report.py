@@ -1,9 +1,10 @@
 """A run in figures: the report.json object and the summary for people. Pure."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Final
 
 from phone_host.delays import DELAYS, STAGES, DelayStatistics, Spread
+from phone_host.model import TimeOffset
 from phone_host.pairqueue import PairCounts
 from phone_host.receiver import LinkAccount
 from phone_host.results import Unwritten
@@ -31,6 +32,7 @@ class RunFacts:
         unwritten: what the disk did not take.
         spoiled: own frames that were no whole images.
         skipped: own frames that a newer one had replaced before they were looked at.
+        time_offset: between the two cameras' stamps, as it was applied.
     """
 
     ended: str
@@ -46,6 +48,7 @@ class RunFacts:
     unwritten: Unwritten
     spoiled: int
     skipped: int
+    time_offset: TimeOffset = field(default_factory=TimeOffset)
 
     @property
     def stopped(self) -> int:
@@ -72,6 +75,11 @@ def build(facts: RunFacts) -> dict[str, object]:
         "stages_ms": {name: spread_ms(facts.delays.spread(name)) for name in STAGES},
         "time_skew_ms": spread_ms(facts.delays.spread("time_skew")),
         "clock": _clock(facts),
+        "time_offset_ms": {
+            "applied": facts.time_offset.offset_ns / _MS,
+            "uncertainty": facts.time_offset.uncertainty_ns / _MS,
+            "measured": facts.time_offset != TimeOffset(),
+        },
         "fifo": {"depth": facts.fifo.depth, "overflow": facts.fifo.overflow.value, "age_bound": age_bound(facts)},
         "tolerance_ms": facts.tolerance_ns / _MS,
         "sessions": [_session(facts, index) for index in range(len(facts.link.sessions))],
@@ -145,8 +153,16 @@ def summary(facts: RunFacts) -> str:
             f"clock known to +-{facts.estimate.uncertainty_ns / 1000:.0f} us"
             f" (+-{facts.estimate.bound_ns / 1000:.0f} us whatever the link does), skew {facts.estimate.skew * 1e6:+.1f} ppm"
         )
+    lines.append(_offset_text(facts.time_offset))
     lines += _losses(facts)
     return "\n".join(lines)
+
+
+def _offset_text(offset: TimeOffset) -> str:
+    known = f"+-{offset.uncertainty_ns / _MS:.2f} ms"
+    if offset == TimeOffset():
+        return f"the cameras' stamps agree to {known}: not measured (phone-host calibrate-time)"
+    return f"the cameras' stamps differ by {offset.offset_ns / _MS:+.2f} {known}, which is taken out"
 
 
 def _losses(facts: RunFacts) -> list[str]:

@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
     """Run until stopped, the pairs are reached or a stream ends."""
     from phone_host.host import EndReason, Host, HostSettings  # noqa: PLC0415 - OpenCV, only now
     from phone_host.live import LiveTable  # noqa: PLC0415
-    from phone_host.model import Side  # noqa: PLC0415
+    from phone_host.model import Side, TimeOffset  # noqa: PLC0415
     from phone_host.report import build, summary  # noqa: PLC0415
     from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
     from phone_host.verbs.stereo_options import build_core  # noqa: PLC0415
@@ -108,6 +108,7 @@ def run(options: argparse.Namespace) -> int:
         wait_ns=None if options.wait is None else round(options.wait * 1e9),
         out=options.out,
         save_every=options.save_every,
+        time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
     )
     link = open_link(parse_link(settings.link, listens_by_default=False))
     signals = StopSignals()

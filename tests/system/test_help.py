@@ -10,7 +10,10 @@ COMMANDS = [
     ("board_agent.cli", []),
     *(("board_agent.cli", [verb]) for verb in ("run", "settings", "cameras", "doctor")),
     ("phone_host.cli", []),
-    *(("phone_host.cli", [verb]) for verb in ("demo", "run", "calibrate", "stereo", "doctor", "settings")),
+    *(
+        ("phone_host.cli", [verb])
+        for verb in ("demo", "run", "calibrate", "calibrate-time", "stereo", "doctor", "settings")
+    ),
     ("phone_host.bench_cli", []),
 ]
 

@@ -213,3 +213,17 @@ def test_the_end_releases_a_waiting_worker() -> None:
     worker.join(60)
     assert ended == [None]
     assert queue.take() is None
+
+
+@pytest.mark.parametrize("offset_ns", [-11 * MS, 0, 14 * MS])
+def test_a_time_offset_is_taken_out_before_pairing(offset_ns: int) -> None:
+    """Two cameras whose stamps of one moment differ by a known time pair as if they agreed, and the board's own marks stay as they were."""
+    queue = PairQueue(FifoSettings(1, Overflow.DROP_OLDEST), 5 * MS, PERIOD_NS, time_offset_ns=offset_ns)
+    queue.begin(PERIOD_NS, on_demand=False)
+    start_ns = now.monotonic_ns()
+    queue.add_host(host_frame(0, start_ns + offset_ns))
+    queue.add_board(board_frame(0, start_ns))
+    pair = queue.take()
+    assert pair is not None
+    assert pair.time_skew_ns == 0
+    assert pair.board.marks.exposed_ns == start_ns

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
-from phone_host.formats.rig_yaml import read_rig, write_rig
-from phone_host.model import Rig, Side
+from phone_host.formats.rig_yaml import read_rig, write_rig, write_time_offset
+from phone_host.model import UNMEASURED_NS, Rig, Side, TimeOffset
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.rigs import unlike_rig
 
@@ -114,3 +114,30 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
     """A missing file is a DataError with the command that makes one."""
     with pytest.raises(DataError, match="phone-host calibrate"):
         read_rig(tmp_path / "rig.yaml")
+
+
+def test_a_time_offset_comes_back_and_leaves_all_else(tmp_path: Path) -> None:
+    """A measured offset is read as it was written, other lines stay as they were, and without the keys nothing counts as measured."""
+    path = _written(tmp_path, time_offset=TimeOffset(-12_345_678_901 // 10, 250_001))
+    assert read_rig(path).time_offset == TimeOffset(-1_234_567_891, 250_001)
+    with path.open("a") as file:
+        file.write("foreign: 7\n")
+    before = [line for line in path.read_text().splitlines() if not line.startswith("time_offset")]
+    write_time_offset(path, TimeOffset(5_000_000, 1_000_000))
+    assert read_rig(path).time_offset == TimeOffset(5_000_000, 1_000_000)
+    after = path.read_text().splitlines()
+    assert [line for line in after if not line.startswith("time_offset")] == before
+    path.write_text("\n".join(before) + "\n")
+    assert read_rig(path).time_offset == TimeOffset(0, UNMEASURED_NS)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("time_offset_ns", "9.e9"), ("time_offset_uncertainty_ns", "0."), ("time_offset_uncertainty_ns", "-3.")],
+)
+def test_a_time_offset_of_no_use_is_named(tmp_path: Path, key: str, value: str) -> None:
+    """An offset of seconds or an uncertainty of nothing is refused with the key's name."""
+    path = _written(tmp_path, time_offset=TimeOffset(1, 1))
+    path.write_text(re.sub(rf"^{key}:.*$", f"{key}: {value}", path.read_text(), flags=re.MULTILINE))
+    with pytest.raises(DataError, match=key):
+        read_rig(path)
