@@ -11,13 +11,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from board_agent.sd_notify import Notifier
-from board_agent.settings import ENVIRONMENT_PREFIX, BoardSettings
+from board_agent.settings import ENVIRONMENT_PREFIX, BoardSettings, key_folder
 from board_agent.status import StatusLine
 from common import logs, now
 from common.camera.base import CameraHealth
 from common.camera.factory import EXAMPLE, open_camera, parse_camera
 from common.commandline import INTERRUPTED, ExamplesFirstParser, run_command
 from common.errors import SettingsError
+from common.keys import change
+from common.keys import listing as keys_listing
 from common.link.factory import open_link, parse_link
 from common.protocol.message import BoardCounts
 from common.settings import Resolved, listing, log_level, resolve
@@ -35,6 +37,8 @@ _EXAMPLES = """examples:
   board-agent run --camera 'replay:frames?pace=demand' --link ipc:///tmp/board
   board-agent run --config /etc/tandemscan/board-agent.toml
   board-agent cameras
+  sudo board-agent pair
+  sudo board-agent keys --forget phone
   board-agent doctor
   board-agent settings --json
 """
@@ -51,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout not to be had, 4 bad data or a failed check, 130 interrupted.
     """
-    verbs = {"run": _run, "settings": _settings, "cameras": _cameras, "doctor": _doctor}
+    verbs = {"run": _run, "settings": _settings, "cameras": _cameras, "doctor": _doctor, "keys": _keys, "pair": _pair}
     return run_command(_parser(), arguments, lambda options: verbs[options.verb](options))
 
 
@@ -62,11 +66,18 @@ def _parser() -> argparse.ArgumentParser:
     show = verbs.add_parser("settings", help="print each setting with its origin", description=_EXAMPLES)
     cameras = verbs.add_parser("cameras", help="list formats, rates and controls", description=_EXAMPLES)
     doctor = verbs.add_parser("doctor", help="check camera, links, clocks, disk and power", description=_EXAMPLES)
-    for verb in (run, show, cameras, doctor):
+    keys = verbs.add_parser("keys", help="show or change this board's key and its hosts", description=_EXAMPLES)
+    pair = verbs.add_parser("pair", help="show a code with which a new host may connect", description=_EXAMPLES)
+    _add_keys_options(keys, pair)
+    for verb in (run, show, cameras, doctor, keys, pair):
         verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
         verb.add_argument("--debug", action="store_true", help="show tracebacks")
-    for verb in (run, show, doctor):
+    for verb in (run, show, doctor, keys, pair):
         verb.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
+        verb.add_argument(
+            "--keys", metavar="DIR", help="folder of keys (default /var/lib/tandemscan or ~/.config/tandemscan)"
+        )
+    for verb in (run, show, doctor):
         verb.add_argument("--camera", metavar="URI", help=EXAMPLE.replace("%", "%%"))
         verb.add_argument(
             "--link",
@@ -80,9 +91,43 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _add_keys_options(keys: argparse.ArgumentParser, pair: argparse.ArgumentParser) -> None:
+    what = keys.add_mutually_exclusive_group()
+    what.add_argument("--forget", metavar="NAME", help="let this host in no longer")
+    what.add_argument("--new", action="store_true", help="make a new key; every host must be paired again")
+    what.add_argument("--add", nargs=2, metavar=("NAME", "KEY"), help="let in a host without pairing")
+    pair.add_argument("--seconds", type=float, default=300.0, metavar="S", help="wait so long for a host (default 300)")
+    for verb in (keys, pair):
+        verb.set_defaults(camera=None, link=None, log_level=None)
+
+
+def _keys(options: argparse.Namespace) -> int:
+    folder = key_folder(_resolve(options).values.keys)
+    change(folder, forget=options.forget, new=options.new, add=options.add, address="", when=now.wall_time())
+    print(keys_listing(folder, as_json=options.json))
+    if options.new or options.forget:
+        print("board-agent: a running service keeps its key and its connections until it is restarted", file=sys.stderr)
+    return 0
+
+
+def _pair(options: argparse.Namespace) -> int:
+    from board_agent.pair import follow  # noqa: PLC0415 - needed by this verb alone
+
+    name = ""
+    for state in follow(key_folder(_resolve(options).values.keys), options.seconds):
+        name = state.paired
+        if state.code and not name:
+            asks = f"{state.asking} asks; " if state.asking else ""
+            print(
+                f"{asks}type this code on the host: {state.code}", file=sys.stderr if options.json else None, flush=True
+            )
+    print(json.dumps({"paired": name}) if options.json else f"paired with {name}")
+    return 0
+
+
 def _resolve(options: argparse.Namespace) -> Resolved[BoardSettings]:
     link = tuple(options.link) if options.link else None
-    given = {"camera": options.camera, "link": link, "log_level": options.log_level}
+    given = {"camera": options.camera, "link": link, "keys": options.keys, "log_level": options.log_level}
     return resolve(BoardSettings, ENVIRONMENT_PREFIX, options.config, given)
 
 
@@ -183,7 +228,8 @@ def _serve(settings: BoardSettings, signals: StopSignals) -> "Summary":
         if camera is None:
             return Summary(session, BoardCounts(), 0, ended=False, camera=CameraHealth())
         opened.enter_context(closing(camera))
-        links = [opened.enter_context(closing(open_link(uri))) for uri in uris]
+        keys = key_folder(settings.keys)
+        links = [opened.enter_context(closing(open_link(uri, keys, takes_in=True))) for uri in uris]
         _LOG.info(logs.event("serving", session=session, camera=settings.camera, links=",".join(settings.link)))
         idle_ns = round(settings.idle_after * 1e9) or None
         status = StatusLine(settings.camera, camera.description.pacing, settings.link, now.monotonic_ns())

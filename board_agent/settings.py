@@ -1,7 +1,10 @@
 """What the board's owner may set."""
 
+import os
 from dataclasses import dataclass
+from pathlib import Path
 
+from common.keys import KeyFolder, default_folder
 from common.settings import setting
 
 ENVIRONMENT_PREFIX = "BOARD_AGENT"
@@ -19,4 +22,17 @@ class BoardSettings:
     idle_after: float = setting(
         10.0, "seconds without a host after which the camera's stream is switched off; 0: never"
     )
+    keys: str = setting(
+        "",
+        "folder of this machine's key and those that may connect; empty: /var/lib/tandemscan or ~/.config/tandemscan",
+    )
     log_level: str = setting("info", "debug, info, warning or error")
+
+
+def key_folder(keys: str) -> KeyFolder:
+    """Give the folder of keys that a setting means.
+
+    Args:
+        keys: the setting; empty for the usual place.
+    """
+    return KeyFolder(Path(keys).expanduser() if keys else default_folder(os.environ, service=True))

@@ -14,6 +14,8 @@ _VERBS = {
     "calibrate": "calibrate two cameras from pictures of a chessboard",
     "calibrate-time": "measure what lies between the two cameras' stamps, with a screen, a lamp or a moving scene",
     "stereo": "disparity and point cloud of one pair of images",
+    "pair": "get to know a board by the code that it shows",
+    "keys": "show or change this host's key and the boards that it knows",
     "doctor": "check Python, camera, link, rig and disk",
     "settings": "print each setting with its origin",
 }

@@ -1,10 +1,13 @@
 """What the host's owner may set once for all runs; every one is an option of `phone-host run` too."""
 
 import math
+import os
 from dataclasses import dataclass
+from pathlib import Path
 
 from common.camera.factory import parse_camera
 from common.errors import SettingsError
+from common.keys import KeyFolder, default_folder
 from common.link.factory import parse_link
 from common.settings import log_level, setting
 
@@ -21,6 +24,7 @@ class PhoneHostSettings:
     matcher: str = setting("sgbm", "stereo matcher")
     tolerance: float = setting(0.0, "greatest time skew of a pair, ms; 0 = half of the longer frame period")
     fifo: str = setting("1:drop-oldest", "DEPTH:POLICY of the queue before the stereo pipeline")
+    keys: str = setting("", "folder of this machine's key and the boards that it knows; empty: ~/.config/tandemscan")
     log_level: str = setting("warning", "debug, info, warning or error")
 
 
@@ -43,3 +47,12 @@ def check(settings: PhoneHostSettings) -> None:
         raise SettingsError(f"matcher {settings.matcher!r} is unknown", f"give {' or '.join(matchers)}")
     if not (math.isfinite(settings.tolerance) and settings.tolerance >= 0):
         raise SettingsError(f"tolerance is {settings.tolerance:g}", "give ms, 0 or more")
+
+
+def key_folder(keys: str) -> KeyFolder:
+    """Give the folder of keys that a setting means.
+
+    Args:
+        keys: the setting; empty for the usual place.
+    """
+    return KeyFolder(Path(keys).expanduser() if keys else default_folder(os.environ, service=False))

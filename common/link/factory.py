@@ -1,10 +1,16 @@
-"""Link URI to link. Transports are imported only when they are asked for."""
+"""Link URI to link, open or with keys. Transports are imported only when they are asked for."""
 
+import ipaddress
+import logging
 from dataclasses import dataclass
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from common.errors import SettingsError, UnavailableError
+from common.keys import KeyFolder, Peer, peer_at
 from common.link.base import Link
+from common.logs import event
+
+_LOG = logging.getLogger(__name__)
 
 _MAX_BAUD = 20_000_000
 """The fastest adapters reach 12 Mbaud."""
@@ -12,7 +18,7 @@ _MAX_BAUD = 20_000_000
 _MAX_CHANNEL = 30
 """RFCOMM has channels 1 to 30."""
 
-_MORE_OPTIONS = {"serial": ", and baud=N", "rfcomm": ", and unpaired=1"}
+_MORE_OPTIONS = {"serial": ", and baud=N", "rfcomm": ", and unpaired=1", "tcp": ", and insecure=1"}
 
 _EXAMPLES = "give tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE"
 
@@ -26,12 +32,14 @@ class LinkUri:
         listens: whether this side waits to be dialled.
         baud: speed of a serial port that has one; None: the usual.
         unpaired: whether Bluetooth devices will do that were never paired with.
+        insecure: whether a tcp link is to be open to everybody on every network.
     """
 
     address: str
     listens: bool
     baud: int | None = None
     unpaired: bool = False
+    insecure: bool = False
 
 
 def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
@@ -39,7 +47,8 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
 
     Args:
         uri: `tcp://HOST:PORT`, `ipc://PATH`, `serial:DEVICE` or `rfcomm://DEVICE[/CHANNEL]`, with `?bind=1` or `?connect=1` to swap who
-            listens; a serial port also takes `baud=N`, a Bluetooth device `unpaired=1`.
+            listens; a serial port also takes `baud=N`, a Bluetooth device `unpaired=1`, tcp `insecure=1`: no keys, whoever reaches the
+            address sees the camera.
         listens_by_default: true on the board, which binds; false on the host, which connects.
 
     Returns:
@@ -62,39 +71,80 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
     unpaired = scheme == "rfcomm" and options.get("unpaired") == "1"
     if unpaired:
         del options["unpaired"]
+    insecure = scheme == "tcp" and options.get("insecure") == "1" and bool(options.pop("insecure"))
     unknown = set(options) - {"bind", "connect"}
     if unknown or set(options.values()) - {"1"} or len(options) > 1:
         raise SettingsError(
             f"link {uri!r} has options {query!r}",
             "?bind=1 and ?connect=1 are the only ones, one at a time" + _MORE_OPTIONS.get(scheme, ""),
         )
-    return LinkUri(address, listens_by_default if not options else "bind" in options, baud, unpaired)
+    return LinkUri(address, listens_by_default if not options else "bind" in options, baud, unpaired, insecure)
 
 
-def open_link(uri: LinkUri) -> Link:
-    """Open the link.
+def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, takes_in: bool = False) -> Link:
+    """Open the link: with keys where tcp leaves this machine, or where the peer at an address is known.
 
     Args:
         uri: what to open.
+        keys: this machine's key and those that it trusts; None where only open links can be had.
+        takes_in: whether a link with keys also takes in new peers that prove a code (the board's do).
 
     Returns:
         The open link; a dialled peer may still be absent.
 
     Raises:
-        SettingsError: the address makes no sense.
-        UnavailableError: the port or path is taken, or the device is missing.
+        SettingsError: the address makes no sense, or needs keys and there is no folder of them.
+        UnavailableError: the port or path is taken, the device is missing, or the peer is not known.
+        DataError: the files of keys are bad.
     """
     if uri.address.startswith("serial:"):
         return _open_serial(uri)
     if uri.address.startswith("rfcomm:"):
         return _open_rfcomm(uri)
+    if uri.insecure:
+        _LOG.warning(event("link_insecure", address=uri.address, meaning="no keys: whoever reaches it sees the camera"))
     from common.link.zeromq import ZeroMqDialer, ZeroMqListener  # noqa: PLC0415 - only the transport that is used is loaded
 
     if not uri.listens and "//*:" in uri.address:
         raise SettingsError(
             f"link {uri.address!r} names no host to connect to", "give its name or address in place of *"
         )
-    return ZeroMqListener(uri.address) if uri.listens else ZeroMqDialer(uri.address)
+    if uri.listens:
+        secured = _keys(uri, keys) if needs_keys(uri) else None
+        return ZeroMqListener(uri.address, secured, takes_in=takes_in)
+    return ZeroMqDialer(uri.address, keys, _peer(uri, keys))
+
+
+def needs_keys(uri: LinkUri) -> bool:
+    """Whether a link is for known keys only: tcp that other machines can reach, unless it is said to be insecure."""
+    if not uri.address.startswith("tcp://") or uri.insecure:
+        return False
+    host = uri.address.removeprefix("tcp://").rpartition(":")[0].strip("[]")
+    try:
+        return not (host == "localhost" or ipaddress.ip_address(host).is_loopback)
+    except ValueError:  # a name, an interface, *
+        return True
+
+
+def _keys(uri: LinkUri, keys: KeyFolder | None) -> KeyFolder:
+    if keys is None:
+        raise SettingsError(f"{uri.address} leaves this machine", "name a folder of keys, or add ?insecure=1")
+    return keys
+
+
+def _peer(uri: LinkUri, keys: KeyFolder | None) -> Peer | None:
+    """Who must answer at an address; None on an open link. A loopback address may lead to a known board (a forwarded port)."""
+    if uri.insecure or not uri.address.startswith("tcp://"):
+        return None
+    if not needs_keys(uri):
+        return next((peer for peer in keys.peers() if peer.address == uri.address), None) if keys else None
+    peers = _keys(uri, keys).peers()
+    if found := peer_at(peers, uri.address):
+        return found
+    known = f" (known: {', '.join(f'{peer.name} at {peer.address}' for peer in peers)})" if peers else ""
+    raise UnavailableError(
+        f"no known board is at {uri.address}{known}", f"pair with it: phone-host pair --link {uri.address}"
+    )
 
 
 def _check_port(uri: str, address: str) -> None:

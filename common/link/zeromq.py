@@ -1,13 +1,15 @@
-"""ZeroMQ over tcp:// and ipc://. One side binds a ROUTER, the other dials one DEALER for each lane.
+"""ZeroMQ over tcp:// and ipc://, open or with CURVE. One side binds a ROUTER, the other dials one DEALER for each lane.
 
 Frames and control thus travel on TCP connections of their own and a clock echo never waits behind image bytes. Socket options are set before
 anything is accepted. A high-water mark does not bound the age of frames; credit does (session), so the marks here are only a fence.
 """
 
 import errno
+import logging
 import os
 import socket
 import stat
+import struct
 from collections.abc import Iterator, Sequence
 from typing import Final
 
@@ -15,9 +17,15 @@ import zmq
 
 from common.errors import SettingsError, TakenError, UnavailableError
 from common.frame import Buffer
+from common.keys import KeyFolder, Peer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
+from common.link.curve import Guard, secure_dialler, secure_listener
+from common.link.pairing_door import Door
+from common.logs import event
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
+
+_LOG = logging.getLogger(__name__)
 
 _SOCKET_BUFFER_BYTES: Final = 256 * 1024
 """About five 50 KB JPEGs in the kernel at most, so that a frame is not sent long before it can leave."""
@@ -41,6 +49,22 @@ _UNIX_PATH_MAX: Final = 107
 _NOW: Final = int(zmq.DONTWAIT)
 _NOW_AND_MORE: Final = int(zmq.DONTWAIT | zmq.SNDMORE)
 _READABLE: Final = int(zmq.POLLIN)
+
+_WATCHED: Final = int(
+    zmq.EVENT_DISCONNECTED
+    | zmq.EVENT_HANDSHAKE_SUCCEEDED
+    | zmq.EVENT_HANDSHAKE_FAILED_AUTH
+    | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL
+    | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
+)
+_NEWS: Final = struct.Struct("=HI")
+"""A monitor's event and its value, zmq_socket_monitor(3); pyzmq's own reader would bring asyncio in."""
+
+_MECHANISM_MISMATCH: Final = 0x11000002
+"""ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH in zmq.h: one side wants keys, the other one does not."""
+
+_HANG_UPS: Final = 5
+"""Handshakes that the peer may break off before it is told of: a board that restarts, or a port that is forwarded to nobody yet."""
 
 
 def _configure(sock: zmq.Socket[bytes]) -> None:
@@ -106,7 +130,11 @@ class _AlwaysReady:
     """ZeroMQ works in a thread of its own: it needs no calls in time, and tells that it is full only when it is tried."""
 
     self_paced: Final = False
-    due_ns: Final = 2**63 - 1
+
+    @property
+    def due_ns(self) -> int:
+        """When `receive` wants to be called even if nothing is readable: never."""
+        return 2**63 - 1
 
     def ready(self, connection: bytes) -> bool:  # noqa: ARG002 - the contract of `Link`
         """Whether a frame would be taken now, as far as is known without trying."""
@@ -118,20 +146,27 @@ class ZeroMqListener(_AlwaysReady):
 
     Args:
         address: `tcp://HOST:PORT` (`*` for every interface) or `ipc://PATH`.
+        keys: holds this side's key and those that may connect; None: anybody may.
+        takes_in: whether new peers can be paired by a code, at the port behind this one.
 
     Raises:
         SettingsError: the address makes no sense.
-        UnavailableError: the port or path is taken.
+        UnavailableError: the port or path is taken, or the folder of keys cannot be used.
+        DataError: the files of keys are bad.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, keys: KeyFolder | None = None, *, takes_in: bool = False) -> None:
+        own = keys.own() if keys else None
         self.kind = address.partition(":")[0]
         self.dialled: dict[Lane, bytes] = {}
         if self.kind == "ipc":
             _free_path(address.removeprefix("ipc://"))
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._guard = Guard(self._context, keys) if keys else None
         self._socket = self._context.socket(zmq.ROUTER)
         _configure(self._socket)
+        if own:
+            secure_listener(self._socket, own)
         self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # a vanished host is told of instead of swallowing frames
         before = os.umask(0o177)  # an ipc path is for its owner only
         try:
@@ -141,15 +176,26 @@ class ZeroMqListener(_AlwaysReady):
             raise _explained(address, error, "stop what listens there, or choose another with --link") from None
         finally:
             os.umask(before)
+        self._door = Door(self._context, address, keys, self._guard) if takes_in and keys and self._guard else None
         self._readable = _poller((self._socket,))
 
     @property
     def pollables(self) -> Sequence[zmq.Socket[bytes]]:
-        """The one socket."""
-        return (self._socket,)
+        """The one socket, the guard's and the door's."""
+        guard = (self._guard.socket,) if self._guard else ()
+        return (self._socket, *guard, *(self._door.pollables if self._door else ()))
+
+    @property
+    def due_ns(self) -> int:
+        """When `receive` wants to be called even if nothing is readable."""
+        return self._door.due_ns if self._door else super().due_ns
 
     def receive(self) -> Iterator[Incoming]:
-        """Give all packets that have come in."""
+        """Give all packets that have come in; lets in those whose keys are known."""
+        if self._guard:
+            self._guard.answer()
+        if self._door:
+            self._door.answer()
         while self._readable.poll(0):
             yield _receive(self._socket, self._socket.recv(_NOW))
 
@@ -167,21 +213,30 @@ class ZeroMqDialer(_AlwaysReady):
 
     Args:
         address: `tcp://HOST:PORT` or `ipc://PATH`.
+        keys: holds this side's key; None on an open link.
+        peer: who must answer; None on an open link.
 
     Raises:
         SettingsError: the address makes no sense.
+        UnavailableError: the folder of keys cannot be used.
+        DataError: the files of keys are bad.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, keys: KeyFolder | None = None, peer: Peer | None = None) -> None:
+        own = keys.own() if keys and peer else None
+        self._address, self._peer = address, peer
         self.kind = address.partition(":")[0]
         self.dialled = {lane: lane.name.encode() for lane in Lane}
+        self._hang_ups = dict.fromkeys(self.dialled.values(), 0)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._sockets: dict[bytes, zmq.Socket[bytes]] = {}
         self._monitors: dict[bytes, zmq.Socket[bytes]] = {}
         for connection in self.dialled.values():
             sock = self._context.socket(zmq.DEALER)
             _configure(sock)
-            self._monitors[connection] = sock.get_monitor_socket(zmq.EVENT_DISCONNECTED)
+            if own and peer:
+                secure_dialler(sock, own, peer)
+            self._monitors[connection] = sock.get_monitor_socket(_WATCHED)
             self._sockets[connection] = sock
             try:
                 sock.connect(address)
@@ -199,17 +254,51 @@ class ZeroMqDialer(_AlwaysReady):
         return (*self._sockets.values(), *self._monitors.values())
 
     def receive(self) -> Iterator[Incoming]:
-        """Give all packets that have come in, frames first, then the news of broken connections: a peer's last words come before its end."""
+        """Give all packets that have come in, frames first, then the news of broken connections: a peer's last words come before its end.
+
+        Raises:
+            UnavailableError: the peer does not talk to us, or only with keys; ZeroMQ dials no more.
+        """
         broken = []
         while ready := [sock for sock, _ in self._readable.poll(0)]:
             for sock, connection in self._lanes:
                 if sock in ready:
                     yield _receive(sock, connection)
             for connection, monitor in self._monitors.items():
-                if monitor in ready:
-                    monitor.recv_multipart(_NOW)
+                if monitor in ready and self._is_broken(connection, monitor.recv_multipart(_NOW)):
                     broken.append(Broken(connection))
         yield from broken
+
+    def _is_broken(self, connection: bytes, news: list[bytes]) -> bool:
+        """Take a monitor's news; whether a connection broke."""
+        kind, value = _NEWS.unpack(news[0])
+        match kind:
+            case zmq.EVENT_DISCONNECTED:
+                return True
+            case zmq.EVENT_HANDSHAKE_SUCCEEDED:
+                self._hang_ups[connection] = 0
+            case zmq.EVENT_HANDSHAKE_FAILED_AUTH:
+                raise UnavailableError(
+                    f"{self._address} does not know this machine's key",
+                    f"pair them: phone-host pair --link {self._address}",
+                )
+            case zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL if value == _MECHANISM_MISMATCH:
+                raise self._mismatch()
+            case _:
+                self._hang_ups[connection] += 1
+                if self._hang_ups[connection] == _HANG_UPS:
+                    peer = self._peer.name if self._peer else "none"
+                    _LOG.warning(event("peer_hangs_up", address=self._address, expected=peer, lane=connection.decode()))
+        return False
+
+    def _mismatch(self) -> UnavailableError:
+        if self._peer is None:
+            return UnavailableError(
+                f"{self._address} wants a key", f"pair with it: phone-host pair --link {self._address}"
+            )
+        return UnavailableError(
+            f"{self._address} is open to everybody", "secure it there, or say so here too: add ?insecure=1 to --link"
+        )
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Hand a packet over; before the peer is there it is FULL (ZMQ_IMMEDIATE)."""

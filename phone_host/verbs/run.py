@@ -15,7 +15,7 @@ from common.link.factory import open_link, parse_link
 from common.settings import Resolved, log_level, resolve
 from common.signals import StopSignals
 from common.stamp import HOST_CLOCK
-from phone_host.settings import ENVIRONMENT_PREFIX, PhoneHostSettings, check
+from phone_host.settings import ENVIRONMENT_PREFIX, PhoneHostSettings, check, key_folder
 
 EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --calibration rig.yaml --out scan
   phone-host run --link ipc:///tmp/board --camera 'replay:right?pace=demand' --rectified --disparities 64 --pairs 20 --out scan
@@ -63,12 +63,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="save every Nth pair from the first on; 0: none (default 30)",
     )
+    parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
     parser.add_argument("--log-level", choices=("debug", "info", "warning", "error"), help="how much to log to stderr")
 
 
 def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
     """Work out the settings from file, environment and options."""
-    names = ("link", "camera", "calibration", "matcher", "tolerance", "fifo", "log_level")
+    names = ("link", "camera", "calibration", "matcher", "tolerance", "fifo", "keys", "log_level")
     given = {name: getattr(options, name, None) for name in names}
     return resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given)
 
@@ -110,7 +111,7 @@ def run(options: argparse.Namespace) -> int:
         save_every=options.save_every,
         time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
     )
-    link = open_link(parse_link(settings.link, listens_by_default=False))
+    link = open_link(parse_link(settings.link, listens_by_default=False), key_folder(settings.keys))
     signals = StopSignals()
     host = Host(host_settings, camera, link, core)
     live = LiveTable(host) if sys.stderr.isatty() else None

@@ -8,11 +8,11 @@ from tests.support.programs import program
 
 COMMANDS = [
     ("board_agent.cli", []),
-    *(("board_agent.cli", [verb]) for verb in ("run", "settings", "cameras", "doctor")),
+    *(("board_agent.cli", [verb]) for verb in ("run", "settings", "cameras", "doctor", "keys", "pair")),
     ("phone_host.cli", []),
     *(
         ("phone_host.cli", [verb])
-        for verb in ("demo", "run", "calibrate", "calibrate-time", "stereo", "doctor", "settings")
+        for verb in ("demo", "run", "calibrate", "calibrate-time", "stereo", "doctor", "pair", "keys", "settings")
     ),
     ("phone_host.bench_cli", []),
 ]
@@ -30,7 +30,7 @@ def test_help_opens_with_examples(module: str, verb: list[str], tmp_path: Path) 
     name = {"board_agent.cli": "board-agent", "phone_host.cli": "phone-host", "phone_host.bench_cli": "delay-bench"}[
         module
     ]
-    assert second.split("=")[0].strip().startswith((name, "PHONE_HOST", "BOARD_AGENT"))
+    assert second.split("=")[0].strip().removeprefix("sudo ").startswith((name, "PHONE_HOST", "BOARD_AGENT"))
     # Where verbs are still to be chosen there are none of their options.
     runs_as_it_is = bool(verb) or module == "phone_host.bench_cli"
     assert ("--debug" in running.out.read_text()) is runs_as_it_is

@@ -19,7 +19,7 @@ def test_every_setting_of_the_host_is_an_option_and_named_as_its_origin() -> Non
     """Each setting that is given as an option shows its value and `--NAME`."""
     given = {
         "link": "tcp://board:5555", "camera": "replay:right", "calibration": "rig.yaml", "matcher": "block",
-        "tolerance": "5", "fifo": "2:block", "log_level": "info",
+        "tolerance": "5", "fifo": "2:block", "keys": "my-keys", "log_level": "info",
     }  # fmt: skip
     words = [word for name, value in given.items() for word in (f"--{name.replace('_', '-')}", value)]
     done = settings("phone_host.cli", "--json", *words)

@@ -1,0 +1,137 @@
+"""CURVE on ZeroMQ links: who listens lets in the keys that it knows, who dials knows the key that must answer.
+
+The listener's guard answers ZeroMQ's questions (ZAP) in its owner's poll loop: no thread, no asyncio. Whoever is not let in has cost a
+handshake and at most one line in the log every ten seconds.
+"""
+
+import logging
+from dataclasses import dataclass
+from typing import Final
+
+import zmq
+from zmq.utils import z85
+
+from common import now
+from common.errors import TandemError
+from common.keys import KeyFolder, OwnKey, Peer
+from common.logs import event
+from common.protocol import zap
+
+_LOG = logging.getLogger(__name__)
+
+_NOW: Final = int(zmq.DONTWAIT)
+_QUIET_NS: Final = 10_000_000_000
+"""Between two lines about strangers: a person at the log sees them come, a flood of them does not fill a disk."""
+
+_DOMAIN: Final = b"tandemscan"
+
+_AT_ONCE: Final = 64
+"""Answers in one round of the poll loop: a crowd at the door must not hold up frames."""
+
+_ENVELOPE_BYTES: Final = 33
+"""What CURVE adds to each part: command name 8, nonce 8, authenticator 16, flags 1 (RFC 26, "MESSAGE")."""
+
+
+@dataclass(slots=True)
+class Seldom:
+    """Says when a line that strangers can cause may be written."""
+
+    count: int = 0
+    _due_ns: int = 0
+
+    def now(self, now_ns: int) -> bool:
+        """Count one more; whether to write of it.
+
+        Args:
+            now_ns: CLOCK_MONOTONIC, ns.
+        """
+        self.count += 1
+        if now_ns < self._due_ns:
+            return False
+        self._due_ns = now_ns + _QUIET_NS
+        return True
+
+
+class Guard:
+    """Lets peers in by their keys. Made before the first bind of the context's sockets.
+
+    Args:
+        context: of the sockets that it guards.
+        keys: where the known keys are; read again whenever the file has changed.
+
+    Raises:
+        DataError: the files of keys are bad.
+        UnavailableError: they cannot be read.
+    """
+
+    def __init__(self, context: "zmq.Context[zmq.Socket[bytes]]", keys: KeyFolder) -> None:
+        self._keys = keys
+        self._state = keys.peers_state
+        self._names = _names(keys)
+        self._denied = Seldom()
+        self._let_in = ""
+        self.socket = context.socket(zmq.REP)
+        self.socket.bind(zap.ENDPOINT)
+        self._readable = zmq.Poller()
+        self._readable.register(self.socket, zmq.POLLIN)
+
+    @property
+    def knows_nobody(self) -> bool:
+        """Whether no peer is known at all."""
+        self._refresh()
+        return not self._names
+
+    def answer(self) -> None:
+        """Answer all who are at the door."""
+        for _ in range(_AT_ONCE):
+            if not self._readable.poll(0):
+                return
+            request = zap.read_request(self.socket.recv_multipart(_NOW))
+            self._refresh()
+            name = self._names.get(request.key)
+            if name is None:
+                if self._denied.now(now.monotonic_ns()):
+                    key = z85.encode(request.key).decode() if request.key else "none"
+                    _LOG.warning(event("key_denied", address=request.address, key=key, count=self._denied.count))
+            elif name != self._let_in:
+                self._let_in = name
+                _LOG.info(event("key_known", peer=name, address=request.address))
+            self.socket.send_multipart(zap.deny(request) if name is None else zap.allow(request, name))
+
+    def _refresh(self) -> None:
+        """Read the known keys if their file has changed; while it is bad nobody is let in."""
+        state = self._keys.peers_state
+        if state == self._state:
+            return
+        self._state = state
+        try:
+            self._names = _names(self._keys)
+        except TandemError as error:
+            self._names = {}
+            _LOG.error(event("peers_unreadable", problem=error))
+
+
+def secure_listener(sock: "zmq.Socket[bytes]", own: OwnKey) -> None:
+    """Let only holders of keys that the context's guard knows connect to a socket that is not bound yet."""
+    _allow_envelope(sock)
+    sock.setsockopt(zmq.ZAP_DOMAIN, _DOMAIN)
+    sock.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 1)  # without a guard nobody gets in, rather than everybody
+    sock.setsockopt(zmq.CURVE_SERVER, 1)
+    sock.setsockopt(zmq.CURVE_SECRETKEY, own.secret.encode())
+
+
+def secure_dialler(sock: "zmq.Socket[bytes]", own: OwnKey, peer: Peer) -> None:
+    """Let a socket that is not connected yet talk to the holder of one key only."""
+    _allow_envelope(sock)
+    sock.setsockopt(zmq.CURVE_SERVERKEY, peer.key.encode())
+    sock.setsockopt(zmq.CURVE_PUBLICKEY, own.public.encode())
+    sock.setsockopt(zmq.CURVE_SECRETKEY, own.secret.encode())
+
+
+def _allow_envelope(sock: "zmq.Socket[bytes]") -> None:
+    """Keep the limit of a message's size what it is without keys; set before."""
+    sock.setsockopt(zmq.MAXMSGSIZE, int(sock.getsockopt(zmq.MAXMSGSIZE)) + _ENVELOPE_BYTES)
+
+
+def _names(keys: KeyFolder) -> dict[bytes, str]:
+    return {z85.decode(peer.key.encode()): peer.name for peer in keys.peers()}

@@ -1,0 +1,70 @@
+"""ZeroMQ's authentication protocol, the handler's side: who asks to be let in with which key, and the answer. Sans-I/O.
+
+ZeroMQ asks once for each connection, over inproc, when the peer has proved that it holds its key. Source: ZeroMQ RFC 27 (ZAP), sections
+"The request message" and "The reply message"; RFC 26 (CurveZMQ) for the key.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from common.errors import ProtocolError
+
+ENDPOINT: Final = "inproc://zeromq.zap.01"
+"""Where a handler listens (RFC 27)."""
+
+KEY_BYTES: Final = 32
+"""A public key of Curve25519."""
+
+_VERSION: Final = b"1.0"
+_FIELDS: Final = 6
+_CURVE: Final = b"CURVE"
+
+
+@dataclass(frozen=True, slots=True)
+class ZapRequest:
+    """A peer at the door.
+
+    Attributes:
+        request_id: goes back with the answer, opaque.
+        address: the peer's network address, for people.
+        key: the public key that it holds, 32 bytes; empty for a peer that uses none.
+    """
+
+    request_id: bytes
+    address: str
+    key: bytes
+
+
+def read_request(parts: Sequence[bytes]) -> ZapRequest:
+    """Read what ZeroMQ asks.
+
+    Args:
+        parts: the message's parts, without the envelope.
+
+    Returns:
+        The request; its key is empty unless the mechanism is CURVE.
+
+    Raises:
+        ProtocolError: these are not the parts of a request.
+    """
+    if len(parts) < _FIELDS or parts[0] != _VERSION:
+        raise ProtocolError("a request for authentication is not of RFC 27", "update ZeroMQ")
+    _, request_id, _, address, _, mechanism, *credentials = parts
+    is_key = mechanism == _CURVE and len(credentials) == 1 and len(credentials[0]) == KEY_BYTES
+    return ZapRequest(request_id, address.decode("ascii", "replace"), credentials[0] if is_key else b"")
+
+
+def allow(request: ZapRequest, name: str) -> list[bytes]:
+    """Give the answer that lets a peer in.
+
+    Args:
+        request: what was asked.
+        name: under which the peer is known; every message of its carries it as its user id.
+    """
+    return [_VERSION, request.request_id, b"200", b"OK", name.encode(), b""]
+
+
+def deny(request: ZapRequest) -> list[bytes]:
+    """Give the answer that sends a peer away; it hears the number 400."""
+    return [_VERSION, request.request_id, b"400", b"unknown key", b"", b""]

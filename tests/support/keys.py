@@ -1,0 +1,21 @@
+"""Two machines that know each other's keys, as after pairing."""
+
+from pathlib import Path
+
+from common.keys import KeyFolder, Peer
+
+
+def acquainted(folder: Path, address: str) -> tuple[KeyFolder, KeyFolder]:
+    """Make keys of a listener and a dialler that trust each other.
+
+    Args:
+        folder: where both folders are made.
+        address: where the dialler finds the listener.
+
+    Returns:
+        The listener's folder and the dialler's.
+    """
+    listener, dialler = KeyFolder(folder / "listener-keys"), KeyFolder(folder / "dialler-keys")
+    dialler.add(Peer("listener", listener.own().public, "2026-01-01T00:00:00+0000", address))
+    listener.add(Peer("dialler", dialler.own().public, "2026-01-01T00:00:00+0000"))
+    return listener, dialler

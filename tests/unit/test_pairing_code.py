@@ -1,0 +1,289 @@
+"""The pairing code's core: who knows the code is trusted, who guesses is not, and guessing gets slow."""
+
+import random
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.errors import ProtocolError
+from common.protocol.pairing_code import (
+    CODE_LIFE_NS,
+    FIRST_PAUSE_NS,
+    LONGEST_PAUSE_NS,
+    ROUNDS,
+    TRIES,
+    Ask,
+    Asking,
+    Commit,
+    Desk,
+    Failed,
+    Identity,
+    Open,
+    Output,
+    Paired,
+    Refuse,
+    Refused,
+    Say,
+    ShowCode,
+    Shown,
+    Word,
+    code_text,
+    new_code,
+    read_code,
+)
+from common.protocol.pairing_wire import MAX_WORD_BYTES, decode_word, encode_word
+
+BOARD = Identity(bytes(range(32)), "bone")
+HOST = Identity(bytes(range(32, 64)), "phone")
+MALLORY = Identity(bytes(range(64, 96)), "phone")
+S = 1_000_000_000
+codes = st.integers(0, 999_999)
+
+
+def chance(seed: int) -> Callable[[int], bytes]:
+    """Random bytes that a test can repeat."""
+    return random.Random(seed).randbytes
+
+
+def said(outputs: list[Output]) -> list[Word]:
+    """The words among a desk's outputs."""
+    return [output.word for output in outputs if isinstance(output, Say)]
+
+
+def shown_code(outputs: list[Output]) -> int:
+    """The code that a desk shows."""
+    return next(output.code for output in outputs if isinstance(output, ShowCode))
+
+
+def converse(desk: Desk, asking: Asking, typed: int, connection: bytes, now_ns: int) -> list[Output]:
+    """Carry words between the two until neither has more to say; gives all that the desk put out."""
+    word: Word | None = asking.begin(typed)
+    everything: list[Output] = []
+    while word is not None:
+        outputs = desk.receive(connection, decode_word(encode_word(word)), now_ns)
+        everything += outputs
+        (answer,) = said(outputs)
+        if isinstance(answer, Refuse):
+            break
+        word = asking.receive(decode_word(encode_word(answer)))
+    return everything
+
+
+def start(desk: Desk, asking: Asking, connection: bytes = b"a", now_ns: int = 0) -> int:
+    """Ask; gives the code that the board shows."""
+    outputs = desk.receive(connection, asking.ask(), now_ns)
+    (answer,) = said(outputs)
+    asking.receive(answer)
+    return shown_code(outputs)
+
+
+@given(st.integers(0, 2**32))
+def test_who_types_the_code_is_trusted_and_trusts(seed: int) -> None:
+    """With the right code both sides end with the other's key proved, and the code is spent."""
+    desk, asking = Desk(BOARD, chance(seed)), Asking(HOST, chance(seed + 1))
+    code = start(desk, asking)
+    outputs = converse(desk, asking, code, b"a", 0)
+    assert [output for output in outputs if isinstance(output, Paired)] == [Paired(HOST)]
+    assert asking.proved
+    assert asking.board == BOARD
+    assert desk.receive(b"a", Commit(0, bytes(32)), 0) == [Say(b"a", Refuse(Refused.WRONG))]
+
+
+@given(st.integers(0, 2**32), st.integers(1, 999_999))
+def test_any_other_code_proves_nothing(seed: int, off: int) -> None:
+    """Every wrong code fails at its first wrong bit, on both sides, and spends the code."""
+    desk, asking = Desk(BOARD, chance(seed)), Asking(HOST, chance(seed + 1))
+    code = start(desk, asking)
+    typed = (code + off) % 10**6
+    outputs = converse(desk, asking, typed, b"a", 0)
+    assert not any(isinstance(output, Paired) for output in outputs)
+    assert not asking.proved
+    same_bits = ((code ^ typed) & -(code ^ typed)).bit_length() - 1
+    assert sum(isinstance(word, Commit) for word in said(outputs)) == same_bits + 1
+    assert sum(isinstance(word, Open) for word in said(outputs)) == same_bits
+    again = Asking(HOST, chance(seed + 2))
+    assert start(desk, again, b"b") == desk.code(0)
+    assert said(outputs)[-1] == Refuse(Refused.WRONG, 0)
+
+
+@given(codes, st.integers(0, 2**32))
+@settings(max_examples=30)
+def test_keys_changed_on_the_way_are_noticed_even_with_the_right_code(code: int, seed: int) -> None:
+    """Whoever puts a key or a name of its own into the exchange fails in the first round although all know the code."""
+    for changed in (MALLORY, replace(HOST, name="fone")):
+        desk, asking = Desk(BOARD, chance(seed)), Asking(HOST, chance(seed + 1))
+        outputs = desk.receive(b"a", Ask(changed), 0)
+        asking.receive(Shown(BOARD))
+        assert not any(isinstance(o, Paired) for o in converse(desk, asking, shown_code(outputs), b"a", 0))
+    asking = Asking(HOST, chance(seed))
+    desk = Desk(BOARD, chance(seed + 1))
+    outputs = desk.receive(b"a", asking.ask(), 0)
+    asking.receive(Shown(replace(BOARD, key=MALLORY.key)))  # the host believes in another board
+    assert not any(isinstance(o, Paired) for o in converse(desk, asking, shown_code(outputs), b"a", 0))
+    assert not asking.proved
+    del code
+
+
+def test_a_guess_succeeds_once_in_two_to_the_rounds() -> None:
+    """Of all codes exactly those with the same first k bits pass k rounds: each round halves what is left, 20 rounds leave one of 2^20."""
+    desk = Desk(BOARD, chance(7))
+    asking = Asking(HOST, chance(8))
+    code = start(desk, asking)
+    assert code < 10**6 < 2**ROUNDS
+    passed = []
+    for typed in range(0, 10**6, 4999):
+        desk, asking = Desk(BOARD, chance(7)), Asking(HOST, chance(typed))
+        assert start(desk, asking) == code
+        outputs = converse(desk, asking, typed, b"a", 0)
+        passed.append((typed, sum(isinstance(word, Open) for word in said(outputs))))
+    assert all((typed ^ code) % 2**rounds == 0 for typed, rounds in passed)
+    assert all((typed ^ code) >> rounds & 1 for typed, rounds in passed if rounds < ROUNDS)
+
+
+def test_what_was_recorded_does_not_tell_the_code_before_it_is_spent() -> None:
+    """Before a round is opened each of its two commitments fits both bits: the nonces are fresh each time and the words carry nothing else."""
+    words: set[bytes] = set()
+    for seed in range(200):
+        desk, asking = Desk(BOARD, chance(1)), Asking(HOST, chance(1000 + seed))
+        code = start(desk, asking)
+        words.add(asking.begin(code).commitment)
+    assert len(words) == 200
+
+
+def fail_once(desk: Desk, now_ns: int, connection: bytes = b"x") -> list[Output]:
+    """One wrong guess."""
+    asking = Asking(MALLORY, chance(now_ns + 1))
+    code = start(desk, asking, connection, now_ns)
+    return converse(desk, asking, (code + 1) % 10**6, connection, now_ns)
+
+
+def test_after_three_wrong_codes_there_is_a_pause_that_grows() -> None:
+    """Three tries, a minute; three more, two minutes; and so on to an hour at most; whoever asks meanwhile hears how long."""
+    desk, now_ns, pauses = Desk(BOARD, chance(3)), 0, []
+    for _ in range(10):
+        failures = [output for _ in range(TRIES) for output in fail_once(desk, now_ns) if isinstance(output, Failed)]
+        assert [failed.pause_ns > 0 for failed in failures] == [False, False, True]
+        pauses.append(failures[-1].pause_ns)
+        (refusal,) = said(desk.receive(b"y", Ask(HOST), now_ns + 1))
+        assert refusal == Refuse(Refused.PAUSE, pauses[-1] // S)
+        now_ns += pauses[-1]
+    assert pauses == [min(FIRST_PAUSE_NS * 2**k, LONGEST_PAUSE_NS) for k in range(10)]
+
+
+def test_the_owner_ends_a_pause_and_success_forgets_failures() -> None:
+    """`pardon` lets hosts try at once; so does a pairing that came off, for later ones."""
+    desk = Desk(BOARD, chance(4))
+    for _ in range(TRIES):
+        fail_once(desk, 0)
+    assert said(desk.receive(b"y", Ask(HOST), 1)) == [Refuse(Refused.PAUSE, 60)]
+    desk.pardon()
+    fail_once(desk, 1)
+    asking = Asking(HOST, chance(5))
+    code = start(desk, asking, b"h", 1)
+    converse(desk, asking, code, b"h", 1)
+    assert asking.proved
+    for number in range(TRIES):
+        failed = next(output for output in fail_once(desk, 2) if isinstance(output, Failed))
+        assert (failed.pause_ns > 0) is (number == TRIES - 1)
+
+
+def test_one_attempt_at_a_time() -> None:
+    """While a host may still type, another one hears `busy`; its words do not disturb the first; a host that asks anew gets a new code."""
+    desk, first = Desk(BOARD, chance(6)), Asking(HOST, chance(7))
+    code = start(desk, first)
+    assert said(desk.receive(b"b", Ask(MALLORY), S)) == [Refuse(Refused.BUSY, CODE_LIFE_NS // S - 1)]
+    assert said(desk.receive(b"b", Commit(0, bytes(32)), S)) == [Refuse(Refused.WRONG)]
+    assert desk.receive(b"b", Refuse(Refused.CLOSED), S) == []
+    converse(desk, first, code, b"a", S)
+    assert first.proved
+    second = Asking(HOST, chance(8))
+    code = start(desk, second, b"c", S)
+    outputs = desk.receive(b"d", Ask(HOST), S)
+    assert [type(output) for output in outputs] == [Failed, Say, ShowCode, Say]
+    assert shown_code(outputs) != code
+
+
+def test_a_code_that_nobody_types_runs_out() -> None:
+    """After its life a code is spent and its attempt has failed; the next one who asks sees another code."""
+    desk, asking = Desk(BOARD, chance(9)), Asking(HOST, chance(10))
+    code = start(desk, asking)
+    assert desk.tick(CODE_LIFE_NS - 1) == []
+    assert [type(output) for output in desk.tick(CODE_LIFE_NS)] == [Failed, Say]
+    assert desk.tick(CODE_LIFE_NS) == []
+    assert start(desk, Asking(HOST, chance(11)), b"b", CODE_LIFE_NS) != code
+    owned = Desk(BOARD, chance(12))  # a code shown by the owner's command before anybody asked
+    early = owned.code(0)
+    assert owned.code(CODE_LIFE_NS - 1) == early
+    assert owned.code(CODE_LIFE_NS) != early
+
+
+words = st.one_of(
+    st.builds(Ask, st.builds(Identity, st.binary(min_size=32, max_size=32), st.text(max_size=64))),
+    st.builds(Shown, st.builds(Identity, st.binary(min_size=32, max_size=32), st.text(max_size=64))),
+    st.builds(Commit, st.integers(0, ROUNDS - 1), st.binary(min_size=32, max_size=32)),
+    st.builds(Open, st.integers(0, ROUNDS - 1), st.binary(min_size=16, max_size=16)),
+    st.builds(Refuse, st.sampled_from(Refused), st.integers(0, 86_400)),
+)
+
+
+@given(words)
+def test_words_survive_the_line(word: Word) -> None:
+    """Every word comes back from its bytes as it went in, unless its name is too long for them."""
+    packed = encode_word(word)
+    if len(packed) <= MAX_WORD_BYTES:
+        assert decode_word(packed) == word
+    else:
+        with pytest.raises(ProtocolError):
+            decode_word(packed)
+
+
+@given(st.lists(st.tuples(st.sampled_from([b"a", b"b"]), words, st.integers(0, 400 * S)), max_size=12))
+def test_no_order_of_words_lets_a_stranger_in(events: list[tuple[bytes, Word, int]]) -> None:
+    """Whatever strangers say, in any order, nobody is taken in, and a word has six consequences at most (an attempt runs out, one fails, one begins)."""
+    desk, now_ns = Desk(BOARD, chance(13)), 0
+    for connection, word, wait_ns in events:
+        now_ns += wait_ns
+        outputs = desk.receive(connection, word, now_ns)
+        assert not any(isinstance(output, Paired) for output in outputs)
+        assert len(outputs) <= 6
+
+
+@given(st.binary(max_size=300))
+def test_any_bytes_are_a_word_or_refused(packed: bytes) -> None:
+    """Hostile bytes raise ProtocolError and nothing else."""
+    try:
+        decode_word(packed)
+    except ProtocolError as error:
+        assert "\n" not in str(error)  # noqa: PT017 - either is right
+
+
+@given(codes)
+def test_codes_are_read_as_people_type_them(code: int) -> None:
+    """Six digits, with blanks or hyphens, are the code; anything else is none."""
+    text = code_text(code)
+    assert read_code(text) == read_code(f" {text[:3]} {text[3:]}\n") == read_code(f"{text[:3]}-{text[3:]}") == code
+    for wrong in (text[:5], text + "0", text[:5] + "x", "", "٣" * 6):
+        assert read_code(wrong) is None
+
+
+def test_codes_are_equally_likely() -> None:
+    """Bytes beyond the greatest multiple of a million are drawn again: no code is favoured."""
+    draws = iter([b"\xff" * 4, (4294000000 - 1).to_bytes(4, "big"), (1_000_001).to_bytes(4, "big")])
+    assert new_code(lambda _: next(draws)) == 999_999
+    assert new_code(lambda _: next(draws)) == 1
+
+
+@given(words)
+def test_a_host_takes_no_word_out_of_turn(word: Word) -> None:
+    """Before it has asked and typed, a host accepts nothing but the board's name."""
+    asking = Asking(HOST, chance(14))
+    if isinstance(word, Shown):
+        assert asking.receive(word) is None
+        with pytest.raises(ProtocolError):
+            asking.receive(word)
+    else:
+        with pytest.raises(ProtocolError):
+            asking.receive(word)
