@@ -1,12 +1,11 @@
 """The board's composition root: camera -> outbox -> session -> links, in one poll loop."""
 
 import logging
+import select
 import socket
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
-
-import zmq
 
 from board_agent.outbox import Outbox
 from board_agent.sd_notify import Notifier
@@ -17,6 +16,7 @@ from common.camera.factory import open_camera
 from common.errors import ProtocolError, UnavailableError
 from common.frame import Frame
 from common.link.base import Broken, Garbage, Link, Packet, SendResult
+from common.link.wait import Waiter
 from common.logs import event
 from common.protocol.board_session import BoardSession
 from common.protocol.message import PROTOCOL_VERSION, BoardCounts, DropReason, Pacing, Refusal, RefusalReason
@@ -75,8 +75,7 @@ def wait_for_camera(uri: str, clock: str, wake: socket.socket, notifier: Notifie
         SettingsError: the URI makes no sense.
         DataError: a replay's images are bad.
     """
-    poller = zmq.Poller()
-    poller.register(wake, zmq.POLLIN)
+    waiter = Waiter([wake])
     known = ""
     while True:
         now_ns = now.monotonic_ns()
@@ -88,7 +87,7 @@ def wait_for_camera(uri: str, clock: str, wake: socket.socket, notifier: Notifie
                 _LOG.warning(event("camera_missing", problem=known))
             if notifier.due(now_ns):
                 notifier.alive(now_ns, f"waiting for the camera: {known}")
-        if poller.poll(_CAMERA_RETRY_MS):
+        if waiter.wait(_CAMERA_RETRY_MS):
             return None
 
 
@@ -105,9 +104,8 @@ class Service:
     status: StatusLine
 
     def alive(self, now_ns: int, counts: BoardCounts, *, has_host: bool) -> None:
-        """Take note of one round of the loop."""
-        if self.notifier.due(now_ns):
-            self.notifier.alive(now_ns, self.status.text(now_ns, counts, has_host=has_host))
+        """Tell it, when the notifier is due."""
+        self.notifier.alive(now_ns, self.status.text(now_ns, counts, has_host=has_host))
 
 
 class Agent:
@@ -152,9 +150,7 @@ class Agent:
         self._retry_ns = 0
         self._garbage = 0
         self._stopping = False
-        self._poller = zmq.Poller()
-        for pollable in (wake, *(item for link in links for item in link.pollables)):
-            self._poller.register(pollable, zmq.POLLIN)
+        self._waiter = Waiter([wake, *(item for link in links for item in link.pollables)])
         self._camera_fd: int | None = None
 
     def run(self) -> Summary:
@@ -176,7 +172,7 @@ class Agent:
             if now_ns >= self._session.due_ns:
                 self._send_all(self._session.tick(now_ns, self._outbox.counts))
             self._watch_host(now_ns)
-            if self._service is not None:
+            if self._service is not None and self._service.notifier.due(now_ns):
                 self._service.alive(now_ns, self._outbox.counts, has_host=self._session.has_host)
         if self._camera_ended and not self._stopping:
             self._drain()
@@ -202,26 +198,28 @@ class Agent:
         self._watch_camera()
         due_ns = min(due_ns, *(link.due_ns for link in self._links))
         wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
-        ready = self._poller.poll(wait_ms)
-        if not ready and now.monotonic_ns() < min(link.due_ns for link in self._links):
-            return False
-        woken = [item for item, _ in ready]
-        if self._wake.fileno() in woken:
+        ready = self._waiter.wait(wait_ms)
+        if self._wake.fileno() in ready:
             self._stopping = True
+        if any(fd != self._camera_fd for fd in ready) or now.monotonic_ns() >= min(link.due_ns for link in self._links):
+            self._receive()
+        return self._camera_fd in ready
+
+    def _receive(self) -> None:
+        """Take all packets."""
         for index, link in enumerate(self._links):
             for incoming in link.receive():
                 self._take(index, incoming)
-        return self._camera_fd in woken
 
     def _watch_camera(self) -> None:
         """Wait on the camera's descriptor, which changes when a device is lost and comes back."""
         if self._camera.pollable == self._camera_fd:
             return
         if self._camera_fd is not None:
-            self._poller.unregister(self._camera_fd)
+            self._waiter.remove(self._camera_fd)
         self._camera_fd = self._camera.pollable
         if self._camera_fd is not None:
-            self._poller.register(self._camera_fd, zmq.POLLIN | zmq.POLLPRI)
+            self._waiter.add(self._camera_fd, select.POLLIN | select.POLLPRI)
 
     def _take(self, index: int, incoming: Packet | Broken | Garbage) -> None:
         arrived_ns = now.monotonic_ns()
@@ -321,15 +319,11 @@ class Agent:
         """Say goodbye, and stay until the host has answered: ZeroMQ throws away what was not read when a connection closes."""
         farewell = self._session.leave(self._outbox.counts)
         self._send_all(farewell)
-        poller = zmq.Poller()
-        for pollable in (item for link in self._links for item in link.pollables):
-            poller.register(pollable, zmq.POLLIN)
+        waiter = Waiter([item for link in self._links for item in link.pollables])
         deadline_ns = now.monotonic_ns() + _FAREWELL_NS
         while farewell and self._session.has_host and (left_ns := deadline_ns - now.monotonic_ns()) > 0:
-            poller.poll(left_ns // 1_000_000 + 1)
-            for index, link in enumerate(self._links):
-                for incoming in link.receive():
-                    self._take(index, incoming)
+            waiter.wait(left_ns // 1_000_000 + 1)
+            self._receive()
 
 
 def _address(link_index: int, connection: bytes) -> bytes:

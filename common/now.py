@@ -2,7 +2,6 @@
 
 import os
 import time
-import uuid
 from pathlib import Path
 
 
@@ -24,7 +23,7 @@ def boot_id() -> str:
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip().replace("-", "")
     except OSError:
-        return uuid.uuid4().hex
+        return os.urandom(16).hex()
 
 
 def random_id() -> str:

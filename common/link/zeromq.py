@@ -22,6 +22,7 @@ from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.curve import Guard, secure_dialler, secure_listener
 from common.link.pairing_door import Door
 from common.logs import event
+from common.link.wait import is_readable
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
 
@@ -48,7 +49,6 @@ _UNIX_PATH_MAX: Final = 107
 # As plain integers: pyzmq's flags are enums, whose operators cost more than the call that takes them.
 _NOW: Final = int(zmq.DONTWAIT)
 _NOW_AND_MORE: Final = int(zmq.DONTWAIT | zmq.SNDMORE)
-_READABLE: Final = int(zmq.POLLIN)
 
 _WATCHED: Final = int(
     zmq.EVENT_DISCONNECTED
@@ -103,14 +103,6 @@ def _send(sock: zmq.Socket[bytes], prefix: list[bytes], header: bytes, payload: 
             return SendResult.UNREACHABLE
         raise
     return SendResult.SENT
-
-
-def _poller(sockets: Sequence[zmq.Socket[bytes]]) -> zmq.Poller:
-    """Tells which sockets have something to receive: one call for all, cheaper than the exception of one that has nothing."""
-    poller = zmq.Poller()
-    for sock in sockets:
-        poller.register(sock, _READABLE)
-    return poller
 
 
 def _receive(sock: zmq.Socket[bytes], connection: bytes) -> Incoming:
@@ -177,7 +169,6 @@ class ZeroMqListener(_AlwaysReady):
         finally:
             os.umask(before)
         self._door = Door(self._context, address, keys, self._guard) if takes_in and keys and self._guard else None
-        self._readable = _poller((self._socket,))
 
     @property
     def pollables(self) -> Sequence[zmq.Socket[bytes]]:
@@ -196,7 +187,7 @@ class ZeroMqListener(_AlwaysReady):
             self._guard.answer()
         if self._door:
             self._door.answer()
-        while self._readable.poll(0):
+        while is_readable(self._socket):
             yield _receive(self._socket, self._socket.recv(_NOW))
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
@@ -246,7 +237,6 @@ class ZeroMqDialer(_AlwaysReady):
         self._lanes = tuple(
             (self._sockets[self.dialled[lane]], self.dialled[lane]) for lane in (Lane.FRAMES, Lane.CONTROL)
         )
-        self._readable = _poller(self.pollables)
 
     @property
     def pollables(self) -> Sequence[zmq.Socket[bytes]]:
@@ -260,13 +250,18 @@ class ZeroMqDialer(_AlwaysReady):
             UnavailableError: the peer does not talk to us, or only with keys; ZeroMQ dials no more.
         """
         broken = []
-        while ready := [sock for sock, _ in self._readable.poll(0)]:
+        going_on = True
+        while going_on:
+            going_on = False
             for sock, connection in self._lanes:
-                if sock in ready:
+                if is_readable(sock):
+                    going_on = True
                     yield _receive(sock, connection)
             for connection, monitor in self._monitors.items():
-                if monitor in ready and self._is_broken(connection, monitor.recv_multipart(_NOW)):
-                    broken.append(Broken(connection))
+                if is_readable(monitor):
+                    going_on = True
+                    if self._is_broken(connection, monitor.recv_multipart(_NOW)):
+                        broken.append(Broken(connection))
         yield from broken
 
     def _is_broken(self, connection: bytes, news: list[bytes]) -> bool:

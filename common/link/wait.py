@@ -1,0 +1,63 @@
+"""Waits for links, cameras and signals in one place, with few system calls.
+
+Each call into ZeroMQ costs two of them where there is no cheap cycle counter (ARM), and a zmq.Poller, which makes its lists anew for each
+wait, asks each socket twice. Here it is once, by the rule of ZMQ_FD (zmq_getsockopt(3)): a ZeroMQ socket's descriptor tells once that there
+is news, and any call of the socket may have taken it in. So ZMQ_EVENTS is asked right before waiting, and a readable descriptor says: look.
+"""
+
+import select
+from collections.abc import Iterable
+from typing import Any, Final
+
+import zmq
+
+# As plain integers: pyzmq's flags are enums, whose operators cost more than the call that takes them.
+_EVENTS: Final = int(zmq.EVENTS)
+_READABLE: Final = int(zmq.POLLIN)
+
+
+def is_readable(sock: "zmq.Socket[bytes]") -> bool:
+    """Whether a ZeroMQ socket has something to receive: cheaper than the exception of one that has nothing."""
+    return bool(int(sock.getsockopt(_EVENTS)) & _READABLE)
+
+
+class Waiter:
+    """What is waited on.
+
+    Args:
+        pollables: ZeroMQ sockets, descriptors, or objects with one.
+    """
+
+    def __init__(self, pollables: Iterable[Any]) -> None:
+        self._poll = select.poll()
+        self._sockets: list[tuple[int, zmq.Socket[bytes]]] = []
+        for item in pollables:
+            fd = item if isinstance(item, int) else item.fileno()
+            self.add(fd)
+            if isinstance(item, zmq.Socket):
+                self._sockets.append((fd, item))
+
+    def add(self, fd: int, events: int = select.POLLIN) -> None:
+        """Wait on a descriptor, too.
+
+        Args:
+            fd: the descriptor.
+            events: bits of poll(2).
+        """
+        self._poll.register(fd, events)
+
+    def remove(self, fd: int) -> None:
+        """Wait on a descriptor no more."""
+        self._poll.unregister(fd)
+
+    def wait(self, wait_ms: int) -> list[int]:
+        """Wait until there is something to look at.
+
+        Args:
+            wait_ms: at most so long, ms.
+
+        Returns:
+            Descriptors, those of ZeroMQ sockets included; a socket may turn out to have nothing to receive.
+        """
+        ready = [fd for fd, sock in self._sockets if is_readable(sock)]
+        return ready + [fd for fd, _ in self._poll.poll(0 if ready else wait_ms)]
