@@ -14,6 +14,7 @@ from zmq.utils import z85
 from common import now
 from common.errors import TandemError
 from common.keys import KeyFolder, OwnKey, Peer
+from common.link.wait import is_readable
 from common.logs import event
 from common.protocol import zap
 
@@ -72,8 +73,6 @@ class Guard:
         self._let_in = ""
         self.socket = context.socket(zmq.REP)
         self.socket.bind(zap.ENDPOINT)
-        self._readable = zmq.Poller()
-        self._readable.register(self.socket, zmq.POLLIN)
 
     @property
     def knows_nobody(self) -> bool:
@@ -84,7 +83,7 @@ class Guard:
     def answer(self) -> None:
         """Answer all who are at the door."""
         for _ in range(_AT_ONCE):
-            if not self._readable.poll(0):
+            if not is_readable(self.socket):
                 return
             request = zap.read_request(self.socket.recv_multipart(_NOW))
             self._refresh()

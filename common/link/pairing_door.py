@@ -21,6 +21,7 @@ from common import now
 from common.errors import ProtocolError, SettingsError, TandemError
 from common.keys import KeyFolder, Peer, clean_name
 from common.link.curve import Guard, Seldom
+from common.link.wait import is_readable
 from common.logs import event
 from common.protocol.pairing_code import (
     Desk,
@@ -111,9 +112,6 @@ class Door:
         self._state = DoorState("", "", "", 0)
         self._strangers, self._troubles = Seldom(), Seldom()
         self.due_ns = 0
-        self._readable = zmq.Poller()
-        for sock in self.pollables:
-            self._readable.register(sock, zmq.POLLIN)
 
     @property
     def pollables(self) -> "tuple[zmq.Socket[bytes], zmq.Socket[bytes]]":
@@ -123,10 +121,9 @@ class Door:
     def answer(self) -> None:
         """Do all that is to be done now."""
         now_ns = now.monotonic_ns()
-        ready = {sock for sock, _ in self._readable.poll(0)}
-        if self._control in ready:
+        if is_readable(self._control):
             self._hear_owner(now_ns)
-        if self._socket in ready:
+        if is_readable(self._socket):
             self._hear_hosts(now_ns)
         if now_ns >= self.due_ns:
             self.due_ns = now_ns + _LOOK_NS

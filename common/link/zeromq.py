@@ -21,8 +21,8 @@ from common.keys import KeyFolder, Peer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.curve import Guard, secure_dialler, secure_listener
 from common.link.pairing_door import Door
-from common.logs import event
 from common.link.wait import is_readable
+from common.logs import event
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
 
