@@ -9,7 +9,7 @@ from common.ledger import PairLedger
 from phone_host.demo import CheckedPair, DepthErrors
 from phone_host.formats.preview import colour_disparity, colour_range_px
 from phone_host.model import Image
-from phone_host.report import RunFacts, board_drops
+from phone_host.report import RunFacts, board_drops, phase_lines
 from phone_host.report_page import Figure, PageData, Picture, Table, Verdict, delay_series, page
 
 _GOOD_PERCENT = 0.6
@@ -42,6 +42,7 @@ def demo_page(facts: RunFacts, errors: DepthErrors, last: CheckedPair | None, le
             notes=(
                 "The truth is the rendered scene itself: exact depth at every pixel that both cameras see.",
                 "Board and host share one clock here, so the clock's true offset is 0; what is plotted is what the echoes could prove.",
+                *phase_lines(facts.phase, facts.alignment),
             ),
         )
     )

@@ -25,6 +25,7 @@ from phone_host.results import Results
 from phone_host.source import Source
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
+from phone_host.sync.phase import Alignment, PhaseController, Whose
 
 _LOG = logging.getLogger(__name__)
 
@@ -60,6 +61,7 @@ class HostSettings:
         out: folder for results; None to write none.
         save_every: every which pair is saved; 0 for none.
         time_offset: between the two cameras' stamps.
+        align_phase: whether a camera is steered until both expose together.
     """
 
     board_side: Side = Side.LEFT
@@ -70,6 +72,7 @@ class HostSettings:
     out: Path | None = None
     save_every: int = 30
     time_offset: TimeOffset = field(default_factory=TimeOffset)
+    align_phase: bool = False
 
 
 class Host:
@@ -108,6 +111,8 @@ class Host:
         self._pipeline = Pipeline(core, settings.board_side, now.monotonic_ns)
         self._on_pair = on_pair
         self._worker = threading.Thread(target=self._work, name="worker", daemon=True)
+        self._controller: PhaseController | None = None
+        self._steered_session = ""
         self._finished = threading.Event()
         self._failure: Exception | None = None
         self.processed = 0
@@ -141,6 +146,11 @@ class Host:
             self._worker.join()
             self.receiver.stop()  # last: the worker wakes it
 
+    @property
+    def alignment(self) -> Alignment | None:
+        """How the steering of a camera stands; None where it was not asked for."""
+        return None if self._controller is None else self._controller.alignment
+
     def facts(self, ended: str) -> RunFacts:
         """Give everything a report is made of, now.
 
@@ -162,6 +172,8 @@ class Host:
             spoiled=self.source.spoiled,
             skipped=self.source.skipped,
             time_offset=self.settings.time_offset,
+            phase=self.queue.phase,
+            alignment=self.alignment,
         )
 
     def _watch(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
@@ -170,6 +182,7 @@ class Host:
         while not self._finished.wait(_STEP_S):
             now_ns = now.monotonic_ns()
             self._raise_failures()
+            self._align(now_ns)
             if watch is not None:
                 watch()
             if stop():
@@ -183,6 +196,25 @@ class Host:
                     return self._drain(stop, watch)
         self._raise_failures()
         return EndReason.PAIRS_REACHED
+
+    def _align(self, now_ns: int) -> None:
+        """Steer a camera where that was asked for and is due; another life of the board is steered anew."""
+        hello = self.receiver.hello
+        if not self.settings.align_phase or hello is None or not self.receiver.connected:
+            return
+        if self._controller is None or hello.session != self._steered_session:
+            self._steered_session = hello.session
+            ways = hello.camera.steering, self.source.steering
+            self._controller = PhaseController(*ways, has_phase=self.queue.has_phase)
+        state = self._controller.alignment.state
+        correction = self._controller.update(now_ns, self.queue.phase)
+        if correction is not None:
+            steer = self.receiver.steer if correction.whose is Whose.BOARD else self.source.steer
+            steer(correction.later_ns)
+            self.queue.restart_phase()
+        alignment = self._controller.alignment
+        if alignment.state is not state or correction is not None:
+            _LOG.info(event("phase", state=alignment.state.value, words=alignment.words))
 
     def _drain(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
         """Let the worker finish the pairs that wait; no frame will follow."""

@@ -12,7 +12,7 @@ from rich.text import Text
 from common import now
 from phone_host.delays import DELAYS, Spread
 from phone_host.host import Host
-from phone_host.report import board_drops
+from phone_host.report import board_drops, phase_lines
 
 _REFRESH_S: Final = 0.25
 _RECENT: Final = 300
@@ -87,7 +87,8 @@ class LiveTable:
         drops |= {f"{reason} (host)": count for reason, count in counts.board_orphans}
         drops["full FIFO"] = counts.dropped
         shown = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in drops.items() if count) or "none"
-        return Text(f"{board} · {clock} · drops: {shown}")
+        phase = "\n".join(phase_lines(self._host.queue.phase, self._host.alignment))
+        return Text(f"{board} · {clock} · drops: {shown}" + (f"\n{phase}" if phase else ""))
 
 
 def _values_ms(spread: Spread) -> list[str]:

@@ -13,6 +13,7 @@ from common.frame import Frame
 from phone_host.model import BoardFrame, FramePair
 from phone_host.sync.fifo import Fifo, FifoSettings, Overflow
 from phone_host.sync.pairing import BoardOrphan, HostOrphan, OrphanReason, Outcome, Paired, Pairing, PairingSettings
+from phone_host.sync.phase import Phase, PhaseMeter
 
 _SIDE_BYTES: Final = 64 * 1024 * 1024
 """Frames of each side wait for their partners, still encoded, in at most this much memory: 40 s of 50 KB JPEGs at 30 fps, more than any link delays."""
@@ -83,6 +84,7 @@ class PairQueue:
         self._closed = False
         self._timeless = on_demand
         self._time_offset_ns = time_offset_ns
+        self._meter: PhaseMeter | None = None
         self._received = self._host_frames = self._paired = self._dropped = self._taken = 0
         self._board_orphans: dict[str, int] = {}
         self._host_orphans: dict[str, int] = {}
@@ -104,6 +106,24 @@ class PairQueue:
             pairs = (self._paired, self._dropped, self._taken, len(self._fifo))
             return PairCounts(self._received, self._host_frames, *pairs, *held, *orphans)
 
+    @property
+    def phase(self) -> Phase | None:
+        """The two cameras' phase now; None while it is not known, and for images shown on demand."""
+        with self._changed:
+            return None if self._meter is None or self._timeless else self._meter.phase
+
+    @property
+    def has_phase(self) -> bool:
+        """Whether the two rates have a phase at all."""
+        with self._changed:
+            return self._meter is not None and self._meter.has_phase and not self._timeless
+
+    def restart_phase(self) -> None:
+        """Measure the phase anew: a camera was steered."""
+        with self._changed:
+            if self._meter is not None:
+                self._meter.restart()
+
     def free_slots(self) -> int:
         """How many more board frames have a place, counting those that wait for their partner."""
         with self._changed:
@@ -118,6 +138,7 @@ class PairQueue:
         """
         with self._changed:
             self._timeless |= on_demand
+            self._meter = PhaseMeter(board_period_ns, self._host_period_ns)
             if self._pairing is not None:
                 self._settle(self._pairing.restart(OrphanReason.STREAM_ENDED))
             if self._pairing is None or board_period_ns != self._board_period_ns or on_demand:
@@ -139,6 +160,8 @@ class PairQueue:
             self._host_wait_ns = min(_SLOWEST_NS, max(delay_ns, self._host_wait_ns * 63 // 64))
             self._board_bytes += len(frame.message.payload)
             exposed_ns = frame.marks.exposed_ns + self._time_offset_ns
+            if self._meter is not None:
+                self._meter.add_board(exposed_ns)
             self._settle(self._pairing.add_board(exposed_ns, frame, now.monotonic_ns()))
             while self._board_bytes > _SIDE_BYTES:
                 self._settle(self._pairing.evict_oldest_board())
@@ -151,6 +174,8 @@ class PairQueue:
                 self._count(self._host_orphans, OrphanReason.STREAM_ENDED.value if self._closed else "no_board")
                 return
             now_ns = now.monotonic_ns()
+            if self._meter is not None:
+                self._meter.add_host(frame.exposed.ns)
             self._host_bytes += len(frame.payload)
             self._settle(self._pairing.add_host(frame.exposed.ns, frame, now_ns))
             self._evict(now_ns)

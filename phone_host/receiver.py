@@ -124,6 +124,7 @@ class Receiver:
         for pollable in (*link.pollables, self._wake_read):
             self._poller.register(pollable, zmq.POLLIN)
         self._stopping = False
+        self._later_ns = 0
         self._settled = False
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
         self.account = LinkAccount()
@@ -165,6 +166,11 @@ class Receiver:
         """Let the thread look at the queue's free places now; safe from any thread."""
         with suppress(BlockingIOError):  # then it has been told often enough
             os.write(self._wake_write, b"\0")
+
+    def steer(self, later_ns: int) -> None:
+        """Ask the board's camera to expose later; safe from any thread."""
+        self._later_ns = later_ns
+        self.wake()
 
     def stop(self) -> None:
         """Say goodbye and close the link."""
@@ -209,6 +215,9 @@ class Receiver:
             self._handle(self._session.tick(now_ns), now_ns)
         self._queue.tick()
         self._grant(now_ns)
+        if self._later_ns:
+            later_ns, self._later_ns = self._later_ns, 0
+            self._handle(self._session.steer(later_ns), now_ns)
 
     def _take(self, incoming: Incoming, now_ns: int) -> None:
         match incoming:

@@ -1,5 +1,6 @@
 """A run in figures: the report.json object and the summary for people. Pure."""
 
+import math
 from dataclasses import asdict, dataclass, field
 from typing import Final
 
@@ -10,6 +11,7 @@ from phone_host.receiver import LinkAccount
 from phone_host.results import Unwritten
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings, Overflow
+from phone_host.sync.phase import Alignment, Phase
 
 _MS: Final = 1e6
 
@@ -33,6 +35,8 @@ class RunFacts:
         spoiled: own frames that were no whole images.
         skipped: own frames that a newer one had replaced before they were looked at.
         time_offset: between the two cameras' stamps, as it was applied.
+        phase: of the two cameras at the end; None: not known, or there is none.
+        alignment: how the steering of a camera came out; None: not asked for.
     """
 
     ended: str
@@ -49,6 +53,8 @@ class RunFacts:
     spoiled: int
     skipped: int
     time_offset: TimeOffset = field(default_factory=TimeOffset)
+    phase: Phase | None = None
+    alignment: Alignment | None = None
 
     @property
     def stopped(self) -> int:
@@ -75,6 +81,7 @@ def build(facts: RunFacts) -> dict[str, object]:
         "stages_ms": {name: spread_ms(facts.delays.spread(name)) for name in STAGES},
         "time_skew_ms": spread_ms(facts.delays.spread("time_skew")),
         "clock": _clock(facts),
+        "phase": _phase(facts),
         "time_offset_ms": {
             "applied": facts.time_offset.offset_ns / _MS,
             "uncertainty": facts.time_offset.uncertainty_ns / _MS,
@@ -154,8 +161,47 @@ def summary(facts: RunFacts) -> str:
             f" (+-{facts.estimate.bound_ns / 1000:.0f} us whatever the link does), skew {facts.estimate.skew * 1e6:+.1f} ppm"
         )
     lines.append(_offset_text(facts.time_offset))
+    lines += phase_lines(facts.phase, facts.alignment)
     lines += _losses(facts)
     return "\n".join(lines)
+
+
+def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
+    """Say how the two cameras' exposures stand to each other, and what came of steering them."""
+    lines = []
+    if phase is not None:
+        drift = (
+            ""
+            if math.isnan(phase.drift)
+            else f", drifts by {phase.drift * 1e6:+.1f} ppm, comes round in {phase.beat_s:.0f} s"
+        )
+        lines.append(
+            f"phase: the board exposes {phase.time_skew_ns / _MS:+.1f} of {phase.period_ns / _MS:.1f} ms after the host{drift}"
+        )
+    if alignment is not None:
+        lines.append(f"alignment: {alignment.state.value}: {alignment.words}")
+    return lines
+
+
+def _phase(facts: RunFacts) -> dict[str, object]:
+    phase, alignment = facts.phase, facts.alignment
+    said: dict[str, object] = {"known": phase is not None}
+    if phase is not None:
+        said |= {
+            "time_skew_ms": _number(phase.time_skew_ns / _MS),
+            "period_ms": _number(phase.period_ns / _MS),
+            "drift_ppm": _number(phase.drift * 1e6),
+            "beat_s": None if not math.isfinite(phase.beat_s) else _number(phase.beat_s),
+        }
+    if alignment is not None:
+        said["alignment"] = {
+            "state": alignment.state.value,
+            "words": alignment.words,
+            "corrections": alignment.corrections,
+            "before_ms": _number(alignment.before_ns / _MS),
+            "after_ms": _number(alignment.after_ns / _MS),
+        }
+    return said
 
 
 def _offset_text(offset: TimeOffset) -> str:

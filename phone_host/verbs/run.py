@@ -50,6 +50,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fifo", metavar="DEPTH:POLICY", help="drop-oldest, drop-newest or block (default 1:drop-oldest)"
     )
     parser.add_argument(
+        "--align-phase",
+        action="store_true",
+        help="steer a camera until both expose together (board's or own; it takes no notice: the report says so)",
+    )
+    parser.add_argument(
         "--pairs", type=int, default=0, metavar="N", help="end after N pairs; fewer when the stream ends: exit 4"
     )
     parser.add_argument(
@@ -110,6 +115,7 @@ def run(options: argparse.Namespace) -> int:
         out=options.out,
         save_every=options.save_every,
         time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
+        align_phase=options.align_phase,
     )
     link = open_link(parse_link(settings.link, listens_by_default=False), key_folder(settings.keys))
     signals = StopSignals()

@@ -1,0 +1,257 @@
+"""The phase of two free-running cameras: how far their exposures stand apart, how that drifts, and how to steer it to 0. Pure, `now_ns` passed in.
+
+Two cameras of equal rate keep the time skew that chance gave them, up to half a period, and no clock estimate helps. The phase is measured from the
+stamps of all frames, paired or not, modulo the shorter period. Where one camera can be steered the controller lets it expose later by
+what is missing, waits until frames exposed after that tell the outcome, and corrects again when crystals have drifted apart. It never
+steers on the word of frames that were exposed before its last correction took hold.
+"""
+
+import math
+from bisect import bisect_left
+from collections import deque
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+import numpy as np
+
+from common.protocol.message import Steering
+
+_MS: Final = 1_000_000
+
+_RECENT: Final = 15
+"""Frames whose median is the phase now: half a second at 30 fps, deaf to single late stamps."""
+
+_DRIFT_SAMPLES: Final = 1800
+_DRIFT_SPAN_NS: Final = 5_000 * _MS
+"""Stamps scatter by 1 ms on webcams: over 5 s of 30 fps the drift is known to some 20 ppm, over a minute to 1 ppm."""
+
+_KEPT_HOST: Final = 256
+"""A board frame may come seconds after the host frame of its moment (Bluetooth)."""
+
+_RATIO_OFF: Final = 0.01
+"""Rates whose ratio is farther than this from a whole number have no phase: 24 and 30 fps run through all of them six times a second."""
+
+_NEAR_NS: Final = 4 * _MS
+_NEAR_PART: Final = 8
+"""Good enough, and the point of correcting again: 4 ms, or an eighth of the period. Restarts of webcams scatter by 1 to 3 ms."""
+
+_SETTLE_NS: Final = {Steering.GRID: 200 * _MS, Steering.RESTART: 1_000 * _MS}
+"""After this, frames are of the steered stream; a webcam's first frames after a start may have odd stamps."""
+
+_PATIENCE_NS: Final = 10_000 * _MS
+"""A correction without new frames for so long has failed; and one that did not hold for so long counts against the camera."""
+
+_TRIES: Final = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """Where the two cameras stand to each other now.
+
+    Attributes:
+        time_skew_ns: board's exposures minus the host's, modulo the period, in [-period/2, period/2); median of the newest frames.
+        period_ns: the shorter of the two periods.
+        drift: its change per ns; NaN until it is known.
+        first_ns: exposure of the oldest frame that it rests on, host's clock.
+    """
+
+    time_skew_ns: float
+    period_ns: int
+    drift: float
+    first_ns: int
+
+    @property
+    def beat_s(self) -> float:
+        """How long it takes until the cameras stand to each other as now; NaN until the drift is known, infinite without any."""
+        return self.period_ns / abs(self.drift) / 1e9 if self.drift else math.inf
+
+
+class PhaseMeter:
+    """Measures the phase from all stamps.
+
+    Args:
+        board_period_ns: time between two frames of the board's camera.
+        host_period_ns: the same of the host's.
+    """
+
+    def __init__(self, board_period_ns: int, host_period_ns: int) -> None:
+        self._period_ns = min(board_period_ns, host_period_ns)
+        ratio = max(board_period_ns, host_period_ns) / self._period_ns
+        self.has_phase = abs(ratio - round(ratio)) <= _RATIO_OFF * ratio
+        self._host: deque[int] = deque(maxlen=_KEPT_HOST)
+        self._samples: deque[tuple[int, float]] = deque(maxlen=_DRIFT_SAMPLES)
+
+    @property
+    def phase(self) -> Phase | None:
+        """The phase now; None before there are enough frames, and where rates differ so that there is none."""
+        if not self.has_phase or len(self._samples) < _RECENT:
+            return None
+        recent = [self._samples[index] for index in range(len(self._samples) - _RECENT, len(self._samples))]
+        middle = float(np.median([value for _, value in recent]))
+        return Phase(self._wrapped(middle), self._period_ns, self._drift(), recent[0][0])
+
+    def add_host(self, stamp_ns: int) -> None:
+        """Take note of a frame of the host's camera; stamps that go back are left out."""
+        if not self._host or stamp_ns > self._host[-1]:
+            self._host.append(stamp_ns)
+
+    def add_board(self, stamp_ns: int) -> None:
+        """Take note of a frame of the board's camera, its stamp on the host's clock."""
+        if not self._host or (self._samples and stamp_ns <= self._samples[-1][0]):
+            return
+        after = bisect_left(self._host, stamp_ns)
+        nearest = min(self._near(after), key=lambda t: abs(t - stamp_ns))
+        skew = self._wrapped(stamp_ns - nearest)
+        if self._samples:  # without jumps where it passes half a period
+            skew = self._samples[-1][1] + self._wrapped(skew - self._samples[-1][1])
+        self._samples.append((stamp_ns, skew))
+
+    def restart(self) -> None:
+        """Forget what was measured: one of the cameras has been steered."""
+        self._samples.clear()
+
+    def _near(self, after: int) -> list[int]:
+        """The host stamps before and after a place among them."""
+        return [self._host[index] for index in (after - 1, after) if 0 <= index < len(self._host)]
+
+    def _wrapped(self, skew_ns: float) -> float:
+        half = self._period_ns / 2
+        return (skew_ns + half) % self._period_ns - half
+
+    def _drift(self) -> float:
+        first_ns, last_ns = self._samples[0][0], self._samples[-1][0]
+        if last_ns - first_ns < _DRIFT_SPAN_NS:
+            return math.nan
+        times = np.array([time_ns - first_ns for time_ns, _ in self._samples], dtype=np.float64)
+        return float(np.polyfit(times, [value for _, value in self._samples], 1)[0])
+
+
+class Aligning(Enum):
+    """How the steering stands."""
+
+    MEASURING = "measuring"
+    STEERING = "steering"
+    ALIGNED = "aligned"
+    GIVEN_UP = "given up"
+    IMPOSSIBLE = "impossible"
+
+
+class Whose(Enum):
+    """Which camera is steered."""
+
+    BOARD = "board"
+    HOST = "host"
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """Let this camera expose later by so much."""
+
+    whose: Whose
+    later_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Alignment:
+    """What the steering has come to, for reports.
+
+    Attributes:
+        state: how it stands.
+        words: the same in words, with a remedy where it failed.
+        corrections: how often a camera was steered.
+        before_ns: time skew before the first correction; NaN: none was needed.
+        after_ns: time skew when it was measured last; NaN: not yet.
+    """
+
+    state: Aligning
+    words: str
+    corrections: int
+    before_ns: float
+    after_ns: float
+
+
+class PhaseController:
+    """Steers one of the two cameras until the phase is nearly 0, and keeps it there.
+
+    Args:
+        board: how the board's camera can be steered.
+        host: how the host's can.
+        has_phase: whether the two rates have a phase at all.
+    """
+
+    def __init__(self, board: Steering, host: Steering, *, has_phase: bool) -> None:
+        ways = [(board, Whose.BOARD), (host, Whose.HOST)]
+        # A grid moves exactly and without a gap; of two restarts the own camera's needs no link.
+        self._steering, self._whose = next(
+            (way for kind in (Steering.GRID, Steering.RESTART) for way in reversed(ways) if way[0] is kind),
+            (Steering.NONE, Whose.HOST),
+        )
+        self._state = Aligning.MEASURING
+        self._words = "not measured yet"
+        if not has_phase:
+            self._state, self._words = (
+                Aligning.IMPOSSIBLE,
+                "the cameras' rates have no common phase: give both the same fps",
+            )
+        elif self._steering is Steering.NONE:
+            self._state = Aligning.IMPOSSIBLE
+            self._words = (
+                "neither camera can be steered: --interpolate moves the board's image to the host's time instead"
+            )
+        self._settled_ns = -(2**63)
+        self._deadline_ns = 2**63
+        self._aligned_ns: int | None = None
+        self._tries = self._corrections = 0
+        self._before_ns = self._after_ns = math.nan
+
+    @property
+    def alignment(self) -> Alignment:
+        """How it stands."""
+        return Alignment(self._state, self._words, self._corrections, self._before_ns, self._after_ns)
+
+    def update(self, now_ns: int, phase: Phase | None) -> Correction | None:
+        """Look at the phase; to be called a few times a second.
+
+        Args:
+            now_ns: host's clock, ns.
+            phase: as measured now; None: not known.
+
+        Returns:
+            What to do now, if anything. The meter is to be restarted then.
+        """
+        if self._state in {Aligning.GIVEN_UP, Aligning.IMPOSSIBLE}:
+            return None
+        if phase is None or phase.first_ns < self._settled_ns:
+            if now_ns > self._deadline_ns:
+                self._give_up("no frames came after a correction")
+            return None
+        self._deadline_ns = 2**63
+        skew_ns = self._after_ns = phase.time_skew_ns
+        if abs(skew_ns) <= min(_NEAR_NS, phase.period_ns / _NEAR_PART):
+            if self._state is not Aligning.ALIGNED:
+                self._state, self._aligned_ns = Aligning.ALIGNED, now_ns
+            if self._aligned_ns is not None and now_ns - self._aligned_ns >= _PATIENCE_NS:
+                self._tries = 0
+            self._words = f"in step to {abs(skew_ns) / _MS:.1f} ms after {self._corrections} corrections"
+            return None
+        if self._tries >= _TRIES:
+            self._give_up(f"{_TRIES} corrections left {abs(skew_ns) / _MS:.1f} ms")
+            return None
+        return self._correct(now_ns, skew_ns, phase.period_ns)
+
+    def _correct(self, now_ns: int, skew_ns: float, period_ns: int) -> Correction:
+        if not self._corrections:
+            self._before_ns = skew_ns
+        self._state = Aligning.STEERING
+        self._words = f"steering the {self._whose.value}'s camera by {abs(skew_ns) / _MS:.1f} ms"
+        self._tries += 1
+        self._corrections += 1
+        self._settled_ns = now_ns + _SETTLE_NS[self._steering]
+        self._deadline_ns = self._settled_ns + _PATIENCE_NS
+        later_ns = -skew_ns if self._whose is Whose.BOARD else skew_ns
+        return Correction(self._whose, round(later_ns) % period_ns)
+
+    def _give_up(self, why: str) -> None:
+        self._state = Aligning.GIVEN_UP
+        self._words = f"the {self._whose.value}'s camera does not follow ({why}): use --interpolate, or equal fps"
