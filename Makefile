@@ -15,7 +15,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
+.PHONY: help venv demo test soak $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -51,6 +51,9 @@ types: $(READY) ## mypy --strict
 
 bench: .venv/.ready-bench ## the figures: every benchmark in tests/bench prints its table
 	@for bench in $(BENCHES); do $(BIN)/python -m tests.bench.$$bench || [ $$? = 3 ] || exit; done # 3: something is missing, and it said what
+
+soak: $(READY) ## ten minutes of a booted board, thirty of both programs (MINUTES=N: each part so long); exit 4 when a limit is missed
+	@$(BIN)/python -m tests.bench.soak $(if $(MINUTES),--minutes $(MINUTES))
 
 .venv/.ready-bench: $(READY) requirements/bench.txt
 	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: --no-binary cobs --no-build-isolation -r requirements/bench.txt

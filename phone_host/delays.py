@@ -37,10 +37,11 @@ class Spread:
 
 
 class Series:
-    """A growing list of integers, thinned evenly when it gets long."""
+    """Integers, thinned evenly when they get many; all the memory that they will ever need is taken at once, so that a long run stays flat."""
 
     def __init__(self) -> None:
-        self._values: list[int] = []
+        self._values = np.ones(EXACT, np.int64)  # not zeros: the kernel would hand out their pages only when they are first written
+        self._kept = 0
         self._stride = 1
         self._count = 0
         self._sum = 0
@@ -49,10 +50,12 @@ class Series:
     def add(self, value: int) -> None:
         """Take one value."""
         if self._count % self._stride == 0:
-            self._values.append(value)
-            if len(self._values) > EXACT:
-                self._values = self._values[::2]
+            if self._kept == EXACT:
+                self._kept //= 2
                 self._stride *= 2
+                self._values[: self._kept] = self._values[::2].copy()
+            self._values[self._kept] = value
+            self._kept += 1
         self._count += 1
         self._sum += value
         self._max = value if self._max is None else max(self._max, value)
@@ -63,13 +66,13 @@ class Series:
         Args:
             last: how many of the newest values; None for all.
         """
-        kept = len(self._values) if last is None else -(-last // self._stride)
-        values = self._values[max(0, len(self._values) - kept) :]
-        if not values or self._max is None:
+        wanted = self._kept if last is None else -(-last // self._stride)
+        values = self._values[max(0, self._kept - wanted) : self._kept]
+        if not len(values) or self._max is None:
             nan = float("nan")
             return Spread(0, nan, nan, nan, nan, nan)
         p50, p95, p99 = (float(p) for p in np.percentile(values, (50, 95, 99)))
-        greatest = float(self._max if last is None else max(values))
+        greatest = float(self._max if last is None else values.max())
         return Spread(self._count, p50, p95, p99, greatest, self._sum / self._count)
 
 

@@ -4,6 +4,7 @@ CPU time is what the guest's kernel gives for all threads of a process (/proc/PI
 its behalf included, what runs in kernel threads and interrupts not.
 """
 
+import os
 import shlex
 import shutil
 import socket
@@ -11,6 +12,7 @@ import subprocess
 import tempfile
 import threading
 import time
+from array import array
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -24,7 +26,7 @@ from common.errors import UnavailableError
 from common.link.factory import open_link, parse_link
 from phone_host.model import BoardFrame
 from phone_host.pairqueue import PairQueue
-from phone_host.receiver import Receiver
+from phone_host.receiver import Receiver, SessionAccount
 from phone_host.sync.fifo import FifoSettings
 from tests.support.unheard import Unheard
 from tests.vm.guest import LINK_PORT, UNIT, Architecture, Guest, image_of
@@ -35,6 +37,7 @@ COMPILER: Final = "arm-linux-gnueabihf-gcc"
 _LIBZMQ: Final = "/usr/lib/arm-linux-gnueabihf/libzmq.so.5"
 _LEAST_FRAMES: Final = 30
 _PATIENCE_S: Final = 120.0
+_FIFO_PRIORITY: Final = 10
 
 
 class Counter(Protocol):
@@ -50,6 +53,9 @@ class Counter(Protocol):
 class OurHost:
     """Our host up to the pairing: link, session, clock echoes, credit.
 
+    Attributes:
+        ages_ns: of each frame when it came, since its exposure.
+
     Args:
         address: of the board's link.
         period_ns: of its camera, ns.
@@ -57,6 +63,7 @@ class OurHost:
 
     def __init__(self, address: str, period_ns: int) -> None:
         self.frames = self.bytes = 0
+        self.ages_ns = array("q")
         counter = self
 
         class Counting(PairQueue):
@@ -65,6 +72,7 @@ class OurHost:
             def add_board(self, frame: BoardFrame) -> None:
                 counter.frames += 1
                 counter.bytes += len(frame.message.payload)
+                counter.ages_ns.append(frame.received_ns - frame.marks.exposed_ns)
 
         link = open_link(parse_link(address, listens_by_default=False))
         queue = Counting(FifoSettings(), None, period_ns)
@@ -72,8 +80,14 @@ class OurHost:
         self._receiver.start()
 
     def close(self) -> None:
-        """Say goodbye."""
+        """Say goodbye, and hear the board's last account."""
         self._receiver.stop()
+
+    @property
+    def account(self) -> SessionAccount:
+        """The session so far; whole after `close`."""
+        (only,) = self._receiver.account.sessions
+        return only
 
 
 class _Counting(threading.Thread):
@@ -172,7 +186,7 @@ class _Meter:
 
 
 class Board:
-    """A booted board with our package, the C program and its counter of copies.
+    """A booted board with our package.
 
     Args:
         guest: booted, with the package installed.
@@ -180,6 +194,21 @@ class Board:
 
     def __init__(self, guest: Guest) -> None:
         self.guest = guest
+
+    def be_quiet(self) -> bool:
+        """Put the emulator and this process before ordinary work: time in which the guest does not run counts as its programs' own.
+
+        Returns:
+            Whether that is permitted.
+        """
+        priority = os.sched_param(_FIFO_PRIORITY)
+        try:
+            for process in (self.guest.emulator_pid, os.getpid()):
+                for thread in Path(f"/proc/{process}/task").iterdir():
+                    os.sched_setscheduler(int(thread.name), os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, priority)
+        except PermissionError:
+            return False
+        return True
 
     def interpreter_s(self) -> float:
         """What the guest's Python takes for 10^6 rounds of `x += i`: the best of three, s."""
@@ -204,14 +233,17 @@ class Board:
         before, frames_before = self.meter(pid), frames()
         time.sleep(seconds)
         after, got = self.meter(pid), frames() - frames_before
-        resident = self.guest.sh(f"awk '/^VmRSS/ {{ print $2 }}' /proc/{pid}/status")
         return Cost(
             got,
             (after.read_ns - before.read_ns) / 1e9,
             after.cpu_ns - before.cpu_ns,
             after.system_ns - before.system_ns,
-            int(resident) * 1024,
+            self.resident_bytes(pid),
         )
+
+    def resident_bytes(self, pid: int) -> int:
+        """Memory of a process that is in RAM now."""
+        return 1024 * int(self.guest.sh(f"awk '/^VmRSS/ {{ print $2 }}' /proc/{pid}/status"))
 
     def until_frames(self, counter: Counter) -> None:
         """Wait until a second's worth of frames has come.
@@ -263,17 +295,15 @@ class Board:
 
 
 @contextmanager
-def booted_board() -> Iterator[Board]:
-    """Boot the armhf board and install our package and the programs to compare with, for the length of a block.
+def booted_board(architecture: Architecture = Architecture.ARMHF) -> Iterator[Board]:
+    """Boot a board and install our package, for the length of a block.
 
     Raises:
-        UnavailableError: the image, the emulator or the cross compiler is missing.
+        UnavailableError: the image or the emulator is missing.
     """
-    image = image_of(Architecture.ARMHF)
+    image = image_of(architecture)
     if not image.built or not shutil.which(image.emulator):
-        raise UnavailableError("there is no image of an armhf board", "run .ci/board as root")
-    if not shutil.which(COMPILER):
-        raise UnavailableError(f"{COMPILER} is missing", "apt install gcc-arm-linux-gnueabihf")
+        raise UnavailableError(f"there is no image of an {architecture.value} board", "run .ci/board as root")
     with tempfile.TemporaryDirectory(prefix="board-") as name:
         folder = Path(name)
         guest = Guest(image, folder)
@@ -283,28 +313,31 @@ def booted_board() -> Iterator[Board]:
                 [ROOT / "deploy/board/build-deb", folder], capture_output=True, text=True, check=True
             )
             guest.install(Path(package.stdout.strip()))
-            for program in _compile(guest, folder):
-                guest.put(program, "/opt/bench")
             yield Board(guest)
         finally:
             guest.stop()
 
 
-def _compile(guest: Guest, folder: Path) -> tuple[Path, Path]:
-    """Compile for the guest: linked to its own libzmq, which is fetched from it."""
-    libzmq = folder / "libzmq.so.5"
-    guest.get(_LIBZMQ, libzmq)
-    forward, copies = folder / "forward", folder / "copies.so"
-    warnings = ("-Wall", "-Wextra", "-Werror")
-    subprocess.run(
-        [COMPILER, "-O2", *warnings, "-o", forward, SOURCES / "forward.c", libzmq, "-Wl,--allow-shlib-undefined"],
-        check=True,
-    )
-    # -fno-builtin: its own loops must not become calls of what they stand for.
-    subprocess.run(
-        [COMPILER, "-O2", *warnings, "-fno-builtin", "-shared", "-fPIC", "-o", copies, SOURCES / "copies.c"], check=True
-    )
-    return forward, copies
+def install_rivals(board: Board) -> None:
+    """Compile what stands beside our board and what counts its copies for an armhf guest, linked to its own libzmq, and put it there.
+
+    Raises:
+        UnavailableError: the cross compiler is missing.
+    """
+    if not shutil.which(COMPILER):
+        raise UnavailableError(f"{COMPILER} is missing", "apt install gcc-arm-linux-gnueabihf")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        libzmq, forward, copies = folder / "libzmq.so.5", folder / "forward", folder / "copies.so"
+        board.guest.get(_LIBZMQ, libzmq)
+        compiler = (COMPILER, "-O2", "-Wall", "-Wextra", "-Werror")
+        linked = (SOURCES / "forward.c", libzmq, "-Wl,--allow-shlib-undefined")
+        subprocess.run([*compiler, "-o", forward, *linked], check=True)
+        # -fno-builtin: its own loops must not become calls of what they stand for.
+        library = ("-fno-builtin", "-shared", "-fPIC", SOURCES / "copies.c")
+        subprocess.run([*compiler, "-o", copies, *library], check=True)
+        for program in (forward, copies):
+            board.guest.put(program, "/opt/bench")
 
 
 FORWARD: Final = f"/opt/bench/forward {{device}} {{width}} {{height}} {{fps}} tcp://*:{LINK_PORT}"

@@ -145,6 +145,12 @@ class Guest:
         self._await_boot(after="")
 
     @property
+    def emulator_pid(self) -> int:
+        """Process id of the emulator on this machine."""
+        assert self._process is not None
+        return self._process.pid
+
+    @property
     def boot_id(self) -> str:
         """Id of this boot of the guest; empty while it cannot be asked."""
         return self._ssh("cat /proc/sys/kernel/random/boot_id").stdout.strip()
