@@ -40,7 +40,8 @@ class Series:
     """Integers, thinned evenly when they get many; all the memory that they will ever need is taken at once, so that a long run stays flat."""
 
     def __init__(self) -> None:
-        self._values = np.ones(EXACT, np.int64)  # not zeros: the kernel would hand out their pages only when they are first written
+        # Not zeros: the kernel would hand out their pages only when they are first written.
+        self._values = np.ones(EXACT, np.int64)
         self._kept = 0
         self._stride = 1
         self._count = 0
