@@ -18,12 +18,15 @@ from common.camera.factory import parse_camera
 from common.doctor import machine
 from common.doctor.access import check_access
 from common.doctor.camera_probe import examine_camera
-from common.doctor.finding import Finding, Verdict, ok
+from common.doctor.finding import Finding, Verdict, fail, ok
 from common.doctor.machine_checks import check_bluetooth, check_clocks, check_disk, check_power, check_usb_log
 from common.doctor.unit_check import Unit
-from common.errors import TandemError
+from common.errors import TandemError, UnavailableError
 from common.link.factory import open_link, parse_link
 from common.protocol.message import RefusalReason
+from common.stamp import HOST_CLOCK
+from phone_host.camera.factory import open_camera
+from phone_host.camera.http_uri import is_http
 from phone_host.doctor_checks import (
     OPENCV_WHEELS,
     Answer,
@@ -78,7 +81,9 @@ def examine(question: Question) -> list[Finding]:
     packages = [check_package(package) for package in _packages()]
     findings += packages
     works = all(finding.verdict is not Verdict.FAIL for finding in packages)
-    if question.camera:
+    if is_http(question.camera):
+        findings.append(_server(question.camera))
+    elif question.camera:
         findings += examine_camera(question.camera, account, Unit("phone-host"))
     else:
         findings.append(_cameras())
@@ -123,6 +128,16 @@ def _package(name: str, least: str, below: str = "", wheels: tuple[str, ...] = (
         return Package(name, "", f"{type(error).__name__}: {error}", least, below, wheels)
     version = getattr(module, "__version__", None) or ".".join(map(str, getattr(module, "version", ())))
     return Package(name, str(version), "", least, below, wheels)
+
+
+def _server(uri: str) -> Finding:
+    try:
+        camera = open_camera(uri, HOST_CLOCK, now.monotonic_ns())
+    except UnavailableError as error:
+        return fail("camera", error.problem, error.remedy)
+    camera.close()
+    shown = camera.description
+    return ok("camera", f"{shown.name}: {shown.width_px}x{shown.height_px} every {shown.period_ns / 1e6:.1f} ms")
 
 
 def _cameras() -> Finding:
@@ -233,7 +248,7 @@ def _read_rig(question: Question) -> RigReadings:
     except TandemError as error:
         return RigReadings(question.calibration, error.problem, error.remedy)
     own = rig.right if rig.board_side is Side.LEFT else rig.left
-    asked = parse_camera(question.camera, "") if question.camera else None
+    asked = parse_camera(question.camera, "") if question.camera and not is_http(question.camera) else None
     return RigReadings(
         path=question.calibration,
         rms_px=rig.rms_stereo_px,

@@ -174,6 +174,7 @@ class Host:
             time_offset=self.settings.time_offset,
             phase=self.queue.phase,
             alignment=self.alignment,
+            camera=self.source.health,
         )
 
     def _watch(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:

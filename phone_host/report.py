@@ -4,6 +4,7 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Final
 
+from common.camera.base import CameraHealth
 from phone_host.delays import DELAYS, STAGES, DelayStatistics, Spread
 from phone_host.model import TimeOffset
 from phone_host.pairqueue import PairCounts
@@ -37,6 +38,7 @@ class RunFacts:
         time_offset: between the two cameras' stamps, as it was applied.
         phase: of the two cameras at the end; None: not known, or there is none.
         alignment: how the steering of a camera came out; None: not asked for.
+        camera: how the own camera has fared.
     """
 
     ended: str
@@ -52,6 +54,7 @@ class RunFacts:
     unwritten: Unwritten
     spoiled: int
     skipped: int
+    camera: CameraHealth
     time_offset: TimeOffset = field(default_factory=TimeOffset)
     phase: Phase | None = None
     alignment: Alignment | None = None
@@ -106,6 +109,7 @@ def build(facts: RunFacts) -> dict[str, object]:
             "paired": facts.counts.paired,
             "held": facts.counts.held_host,
             "orphaned": dict(facts.counts.host_orphans),
+            "camera": _camera(facts.camera),
         },
         "pairs_account": {
             "paired": facts.counts.paired,
@@ -162,6 +166,7 @@ def summary(facts: RunFacts) -> str:
         )
     lines.append(_offset_text(facts.time_offset))
     lines += phase_lines(facts.phase, facts.alignment)
+    lines += _arrivals(facts.camera, facts.time_offset)
     lines += _losses(facts)
     return "\n".join(lines)
 
@@ -209,6 +214,22 @@ def _offset_text(offset: TimeOffset) -> str:
     if offset == TimeOffset():
         return f"the cameras' stamps agree to {known}: not measured (phone-host calibrate-time)"
     return f"the cameras' stamps differ by {offset.offset_ns / _MS:+.2f} {known}, which is taken out"
+
+
+def _arrivals(health: CameraHealth, offset: TimeOffset) -> list[str]:
+    """What the stamps of an own camera mean that tells of arrivals only."""
+    if health.jitter_ns is None:
+        return []
+    jitter = f"they arrive up to {health.jitter_ns / _MS:.1f} ms late (p95)"
+    if health.latency_ns is not None:
+        stated = health.latency_uncertainty_ns
+        known = "" if stated is None else f", known to +-{(stated + health.jitter_ns) / _MS:.1f} ms"
+        return [f"own camera: stamps are arrivals - {health.latency_ns / _MS:g} ms{known}; {jitter}"]
+    if offset != TimeOffset():
+        return [f"own camera: stamps are arrivals, its latency part of the measured difference; {jitter}"]
+    return [
+        f"own camera: its latency is not known, every time skew is off by it (calibrate-time, or ?latency_ms=); {jitter}"
+    ]
 
 
 def _losses(facts: RunFacts) -> list[str]:
@@ -260,6 +281,30 @@ def _clock(facts: RunFacts) -> dict[str, object]:
             if k != "count"
         },
     }
+
+
+def _camera(health: CameraHealth) -> dict[str, object]:
+    """What is known of the own camera; its stamps' figures only where they are arrivals."""
+    values: dict[str, object] = {
+        "state": health.state.value,
+        "faults": {fault.value: count for fault, count in health.faults},
+        "stalls": health.stalls,
+        "failures": health.failures,
+        "returned": health.returned,
+        "period_ms": _ms(health.period_ns),
+    }
+    if health.jitter_ns is None:
+        return values
+    stated = health.latency_uncertainty_ns
+    return values | {
+        "latency_ms": _ms(health.latency_ns),
+        "jitter_ms": _ms(health.jitter_ns),
+        "stamp_uncertainty_ms": None if stated is None else _ms(stated + health.jitter_ns),
+    }
+
+
+def _ms(value_ns: int | None) -> float | None:
+    return None if value_ns is None else round(value_ns / _MS, 3)
 
 
 def _session(facts: RunFacts, index: int) -> dict[str, object]:

@@ -5,11 +5,11 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from common.camera.factory import parse_camera
 from common.errors import SettingsError
 from common.keys import KeyFolder, default_folder
 from common.link.factory import parse_link
 from common.settings import log_level, setting
+from phone_host.camera.factory import check_camera
 
 ENVIRONMENT_PREFIX = "PHONE_HOST"
 
@@ -39,7 +39,7 @@ def check(settings: PhoneHostSettings) -> None:
 
     log_level(settings.log_level)
     if settings.camera:
-        parse_camera(settings.camera, "")
+        check_camera(settings.camera)
     parse_link(settings.link, listens_by_default=False)
     FifoSettings.parse(settings.fifo)
     matchers = [name.value for name in MatcherName]

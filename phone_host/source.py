@@ -8,7 +8,7 @@ from typing import Final
 import zmq
 
 from common import now
-from common.camera.base import Camera, Ended, Grab, Skipped, Spoiled
+from common.camera.base import Camera, CameraHealth, Ended, Grab, Skipped, Spoiled
 from common.frame import Frame
 from common.protocol.message import Pacing, Steering
 
@@ -43,6 +43,11 @@ class Source:
     def on_demand(self) -> bool:
         """Whether the camera gives an image only when one is wanted."""
         return self._camera.description.pacing is Pacing.DEMAND
+
+    @property
+    def health(self) -> CameraHealth:
+        """How the camera has fared."""
+        return self._camera.health
 
     def start(self) -> None:
         """Begin to read."""

@@ -68,6 +68,9 @@ class CameraHealth:
         distrusted_stamps: frames whose stamp could not be true, so that the moment of dequeuing stands for it.
         refused_controls: controls that the driver would not set.
         period_ns: time between frames as measured, ns; None where unknown.
+        latency_ns: calibrated time from exposure to arrival that was subtracted from every stamp, ns; None where there is none, or the driver knows.
+        latency_uncertainty_ns: of that, as it was stated; None: not stated.
+        jitter_ns: how much later than the swiftest frame 95 % of them arrived; None where stamps are no arrivals.
     """
 
     state: CameraState = CameraState.RUNNING
@@ -80,6 +83,9 @@ class CameraHealth:
     distrusted_stamps: int = 0
     refused_controls: int = 0
     period_ns: int | None = None
+    latency_ns: int | None = None
+    latency_uncertainty_ns: int | None = None
+    jitter_ns: int | None = None
 
 
 class Camera(Protocol):

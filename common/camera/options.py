@@ -21,14 +21,14 @@ def exact(text: str) -> Fraction:
     return Fraction(text)
 
 
-def milliseconds(text: str) -> int:
-    """Read a time from 0 to 1000 ms; gives ns.
+def milliseconds(text: str, most_ms: int = 1000) -> int:
+    """Read a time from 0 to `most_ms`; gives ns.
 
     Raises:
         ValueError: it is none.
         ZeroDivisionError: a ratio to nothing.
     """
     value_ns = round(exact(text) * 1_000_000)
-    if not 0 <= value_ns <= 1_000_000_000:
+    if not 0 <= value_ns <= most_ms * 1_000_000:
         raise ValueError(text)
     return value_ns

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common import logs, now
-from common.camera.factory import EXAMPLE, open_camera
 from common.commandline import INTERRUPTED
 from common.errors import SettingsError
 from common.link.factory import open_link, parse_link
 from common.settings import log_level
 from common.signals import StopSignals
 from common.stamp import HOST_CLOCK
+from phone_host.camera.factory import EXAMPLE, open_camera
 from phone_host.formats.json_text import json_text
 from phone_host.verbs.outputs import require_file, require_folder, unwritable
 

@@ -8,17 +8,18 @@ from contextlib import nullcontext
 from pathlib import Path
 
 from common import logs, now
-from common.camera.factory import EXAMPLE, open_camera
 from common.commandline import INTERRUPTED
 from common.errors import SettingsError
 from common.link.factory import open_link, parse_link
 from common.settings import Resolved, log_level, resolve
 from common.signals import StopSignals
 from common.stamp import HOST_CLOCK
+from phone_host.camera.factory import EXAMPLE, open_camera
 from phone_host.settings import ENVIRONMENT_PREFIX, PhoneHostSettings, check, key_folder
 
 EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --calibration rig.yaml --out scan
   phone-host run --link ipc:///tmp/board --camera 'replay:right?pace=demand' --rectified --disparities 64 --pairs 20 --out scan
+  phone-host run --link tcp://192.168.7.2:5555 --camera 'http://127.0.0.1:8080/video?latency_ms=120' --calibration rig.yaml --out scan
   phone-host run --camera 'replay:right?loop=1' --pairs 300 --json        (no depth: pairs and delays only)
 """
 

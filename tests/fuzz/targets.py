@@ -13,7 +13,6 @@ from pathlib import Path
 import msgpack
 
 from common.camera import v4l2_abi as abi
-from common.camera.factory import parse_camera
 from common.camera.imagefile import read_image
 from common.camera.v4l2_controls import Axis, Control, ControlPlan, ControlWishes
 from common.camera.v4l2_stamps import RateMeter, Timing, exposure_midpoint_ns, is_trusted, stamp_clock, stamp_source
@@ -46,6 +45,9 @@ from common.protocol.message import (
 from common.protocol.session import Arrived, Echo, Outgoing
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES, decode, encode
 from common.settings import resolve
+from phone_host.camera.factory import check_camera
+from phone_host.camera.jpegs import MAX_IMAGE_BYTES, JpegStream
+from phone_host.camera.jpegs import Whole as WholeImage
 from phone_host.formats.rig_yaml import read_rig
 from phone_host.settings import PhoneHostSettings, check
 from phone_host.sync.clock import ClockEstimator
@@ -240,7 +242,7 @@ def _session_seeds() -> list[bytes]:
 def uri(data: bytes) -> None:
     """What a user may type as link or camera: a link, a camera or a SettingsError that says why not in one line."""
     text = data.decode("utf-8", "surrogateescape")
-    for read in (lambda: parse_link(text, listens_by_default=True), lambda: parse_camera(text, "host")):
+    for read in (lambda: parse_link(text, listens_by_default=True), lambda: check_camera(text)):
         try:
             read()
         except SettingsError as error:
@@ -260,6 +262,7 @@ def _uri_seeds() -> list[bytes]:
         b"v4l2:auto?size=640x480&fps=30&format=mjpeg&exposure_ms=10&lock=0&power_line=50&readout_ms=1e1&latency_ms=4",
         b"replay:a?fps=1e999999",
         b"v4l2:/dev/video0?send=luma&gain=3&white_balance=4600&focus=2",
+        b"https://[::1]/?action=stream&verify=0&latency_uncertainty_ms=3.5",
         b"http://user:pass@phone:8080/video?latency_ms=120",
     ]
 
@@ -327,6 +330,44 @@ def _image_seeds() -> list[bytes]:
     return [*kinds, b"P5\n# comment\n3 2\n255\nabcdef", b"P6 1 1 65535 abcdef", b"P5 4 4 255 "]
 
 
+def mjpeg(data: bytes) -> None:
+    """A server's stream in two ways of chopping: the same images, each of which stands in the bytes; nothing beyond the limit; good ones come again."""
+    good = _JPEG
+    stream = data + bytes(70_000) + good  # no segment of the garbage covers what comes behind so many bytes
+    whole, chopped = JpegStream(), JpegStream()
+    images = [event.payload for event in whole.feed(stream, 1) if isinstance(event, WholeImage)]
+    pieces: list[bytes] = []
+    at, step = 0, 1 + len(data) % 97
+    while at < len(stream):
+        pieces += [event.payload for event in chopped.feed(stream[at : at + step], 1) if isinstance(event, WholeImage)]
+        assert chopped.held_bytes <= MAX_IMAGE_BYTES, "more is held than an image"
+        at, step = at + step, 1 + step * 31 % 4099
+    assert images == pieces, "chopping changes the images"
+    assert images, "the good image is passed over"
+    assert images[-1] == good, "the good image is not the last one"
+    at = 0
+    for found in images:
+        at = stream.find(found, at)
+        assert at >= 0, "an image was never sent"
+        at += len(found)
+    assert whole.passed_bytes == len(stream) - sum(map(len, images)), "bytes are unaccounted for"
+
+
+_JPEG = jpeg(16, 8)
+
+
+def _mjpeg_seeds() -> list[bytes]:
+    header = b"\r\n--frame\r\nContent-Type: image/jpeg\r\n\r\n"
+    comment = _JPEG[:2] + b"\xff\xfe\x00\x06\xff\xd9\xff\xd8" + _JPEG[2:]
+    return [
+        header + _JPEG + header + _JPEG,
+        _JPEG[:-20] + header + _JPEG,
+        comment,
+        _JPEG[:30],
+        b"\xff\xd8\xff\xda\x00\x02\xff\xd0\xff\xd9",
+    ]
+
+
 def _is_one_line(error: TandemError) -> None:
     assert "\n" not in str(error), "an error of several lines"
 
@@ -381,6 +422,7 @@ TARGETS: dict[str, Target] = {
     "uri": Target("link and camera URIs", uri, _uri_seeds, 300, 0.01),
     "v4l2": Target("a driver's controls and stamps", v4l2, _v4l2_seeds, 2048, 0.005),
     "image": Target("JPEG, PNG and PNM headers", image, _image_seeds, 4096, 0.005),
+    "mjpeg": Target("images in a server's stream", mjpeg, _mjpeg_seeds, 8192, 0.01),
     "rig": Target("rig.yaml", rig, _rig_seeds, 4096, 0.005),
     "settings": Target("settings files", settings, _settings_seeds, 2048, 0.005),
 }

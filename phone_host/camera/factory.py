@@ -1,0 +1,45 @@
+"""Camera URI to camera, for the host: what `common` knows, and servers."""
+
+from typing import Final
+
+from common.camera import factory as common_factory
+from common.camera.base import Camera
+from phone_host.camera.http_uri import EXAMPLE as HTTP_EXAMPLE
+from phone_host.camera.http_uri import http_settings, is_http
+
+EXAMPLE: Final = f"{common_factory.EXAMPLE} or {HTTP_EXAMPLE}"
+
+
+def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
+    """Open the camera that a URI names.
+
+    Args:
+        uri: see EXAMPLE.
+        clock: name of this machine's clock, for the stamps.
+        now_ns: CLOCK_MONOTONIC now, ns.
+
+    Returns:
+        The open camera.
+
+    Raises:
+        SettingsError: the URI makes no sense.
+        UnavailableError: there is no such device, folder or server.
+        DataError: a replay's images are bad.
+    """
+    if not is_http(uri):
+        return common_factory.open_camera(uri, clock, now_ns)
+    from phone_host.camera.mjpeg_http import HttpCamera  # noqa: PLC0415 - TLS and all that only where it is of use
+
+    return HttpCamera(http_settings(uri, clock))
+
+
+def check_camera(uri: str) -> None:
+    """Read a camera URI without opening anything.
+
+    Raises:
+        SettingsError: the URI makes no sense.
+    """
+    if is_http(uri):
+        http_settings(uri, "")
+    else:
+        common_factory.parse_camera(uri, "")

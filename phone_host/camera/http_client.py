@@ -1,0 +1,142 @@
+"""One connection to an MJPEG server: opened, its answer judged, its bytes read. Every refusal is one line with its remedy."""
+
+import base64
+import http.client
+import socket
+import ssl
+from contextlib import suppress
+from typing import Final
+
+from common.errors import UnavailableError
+from phone_host.camera.http_uri import HttpSettings
+
+_READ_BYTES: Final = 65_536
+"""More than a JPEG of a phone at 720p: one read takes what has come."""
+
+_NO_STREAM: Final = (
+    "text/",
+    "application/json",
+    "application/xml",
+    "application/xhtml",
+    "image/",
+    "audio/",
+    "video/mp4",
+)
+"""What is told to be something else; any other type is looked into: servers call MJPEG many names, or none."""
+
+_FAILURES: Final[tuple[tuple[type[Exception], str, str], ...]] = (
+    (ssl.SSLCertVerificationError, "has a certificate that nobody vouches for", "give ?verify=0 to accept it"),
+    (ssl.SSLError, "does not speak https", "give http:// in place of https://"),
+    (TimeoutError, "does not answer", "check that both are in one network"),
+    (ConnectionRefusedError, "refuses the connection", "start the server in the phone's app"),
+    (socket.gaierror, "has no address", "give the number that the phone's app shows"),
+    (ConnectionResetError, "hangs up without an answer", "check the port, and whether it needs https://"),
+    (http.client.HTTPException, "does not speak HTTP", "check the port"),
+)
+"""What a failure means, the special ones first."""
+
+
+class Connection:
+    """An open stream of bytes.
+
+    Args:
+        settings: which server.
+        patience_s: for connecting, and for each word of the answer.
+
+    Raises:
+        UnavailableError: it cannot be had, or it answers with something else than a stream.
+    """
+
+    def __init__(self, settings: HttpSettings, patience_s: float) -> None:
+        self._settings = settings
+        self._client = self._make(patience_s)
+        self._response: http.client.HTTPResponse | None = None
+        try:
+            self._client.connect()
+            self._sock: socket.socket = self._client.sock  # the client forgets it when it has read the answer's head
+            self._client.request("GET", settings.target, headers=_headers(settings))
+            self._response = self._client.getresponse()
+            self._judge(self._response)
+        except UnavailableError:
+            self.close()
+            raise
+        except (OSError, http.client.HTTPException, ValueError) as error:
+            self.close()
+            raise self._failed(error) from None
+
+    def read(self, patience_s: float) -> bytes:
+        """Wait for bytes.
+
+        Args:
+            patience_s: so long.
+
+        Returns:
+            What has come; empty at the end of the stream.
+
+        Raises:
+            OSError: nothing came within the patience, or the connection broke.
+        """
+        assert self._response is not None
+        self._sock.settimeout(patience_s)
+        try:
+            return self._response.read1(_READ_BYTES)
+        except (http.client.HTTPException, ValueError):  # chunks that are none; TLS that was shut down
+            return b""
+
+    def interrupt(self) -> None:
+        """Let a thread that waits in `read` find the stream at its end; safe from any thread."""
+        with suppress(OSError):  # broken already
+            self._sock.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        """Let go of it; for the thread that reads."""
+        with suppress(OSError):
+            if self._response is not None:
+                self._response.close()
+            self._client.close()
+
+    def _make(self, patience_s: float) -> http.client.HTTPConnection:
+        settings = self._settings
+        if not settings.secure:
+            return http.client.HTTPConnection(settings.host, settings.port, timeout=patience_s)
+        context = ssl.create_default_context()
+        if not settings.verify:
+            context.check_hostname = False
+            context.verify_mode = ssl.CERT_NONE
+        return http.client.HTTPSConnection(settings.host, settings.port, timeout=patience_s, context=context)
+
+    def _failed(self, error: Exception) -> UnavailableError:
+        shown = self._settings.shown
+        for kind, problem, remedy in _FAILURES:
+            if isinstance(error, kind):
+                return UnavailableError(f"camera {shown} {problem}", remedy)
+        why = getattr(error, "strerror", None) or error
+        return UnavailableError(f"camera {shown} cannot be reached ({why})", "check the address and the network")
+
+    def _judge(self, response: http.client.HTTPResponse) -> None:
+        shown, status = self._settings.shown, response.status
+        kind = (response.getheader("Content-Type") or "").split(";")[0].strip().lower()
+        if status == http.client.UNAUTHORIZED:
+            if self._settings.user:
+                raise UnavailableError(f"camera {shown} does not take this name and password", "correct them")
+            raise UnavailableError(f"camera {shown} asks for a password", "give http://USER:PASSWORD@HOST:PORT/…")
+        if status in {301, 302, 303, 307, 308}:
+            there = response.getheader("Location") or "elsewhere"
+            raise UnavailableError(f"camera {shown} has moved to {there[:200]}", "give that address")
+        if status == http.client.NOT_FOUND:
+            raise UnavailableError(f"camera {shown} is not there (404)", "check the path; IP Webcam has /video")
+        if status != http.client.OK:
+            raise UnavailableError(f"camera {shown} answers {status}", "look at the phone's app; it may be busy")
+        if kind.startswith(_NO_STREAM) and kind != "image/x-mjpeg":
+            what = "a web page" if kind == "text/html" else "single images" if kind.startswith("image/") else kind
+            raise UnavailableError(
+                f"camera {shown} gives {what}, no MJPEG stream", "give the video's own address; IP Webcam has /video"
+            )
+
+
+def _headers(settings: HttpSettings) -> dict[str, str]:
+    headers = {"Accept": "*/*", "User-Agent": "tandemscan", "Connection": "close"}
+    if settings.user:
+        secret = base64.b64encode(f"{settings.user}:{settings.password}".encode()).decode("ascii")
+        headers["Authorization"] = f"Basic {secret}"
+    return headers

@@ -1,0 +1,125 @@
+"""The address of an MJPEG server as the user gives it: `http://USER:PASSWORD@HOST:8080/video?latency_ms=120`.
+
+Our own options are taken out of the query; what else stands there is the server's.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Final
+from urllib.parse import parse_qsl, unquote, urlencode, urlsplit
+
+from common.camera.options import milliseconds
+from common.errors import SettingsError
+
+EXAMPLE: Final = "http://PHONE:8080/video[?latency_ms=120&latency_uncertainty_ms=20]"
+
+_LONGEST_MS: Final = 10_000
+_OURS: Final = ("latency_ms", "latency_uncertainty_ms", "verify")
+
+
+@dataclass(frozen=True, slots=True)
+class HttpSettings:
+    """Which server, and what is known of its delay.
+
+    Attributes:
+        secure: whether it is https.
+        host: name or address.
+        port: TCP port.
+        target: path and query as the server gets them.
+        user: for basic authentication; empty: none.
+        password: the same.
+        latency_ns: from exposure mid-point to the arrival of an image's first byte; None: not calibrated, taken for 0.
+        latency_uncertainty_ns: of that; None: not stated.
+        verify: whether the certificate of an https server is checked.
+        clock: name of the clock of the stamps.
+    """
+
+    secure: bool
+    host: str
+    port: int
+    target: str
+    user: str = ""
+    password: str = ""
+    latency_ns: int | None = None
+    latency_uncertainty_ns: int | None = None
+    verify: bool = True
+    clock: str = "host"
+
+    @property
+    def shown(self) -> str:
+        """The address for logs and errors: without the password."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{'https' if self.secure else 'http'}://{host}:{self.port}{self.target}"
+
+
+def is_http(uri: str) -> bool:
+    """Whether a camera URI names a server."""
+    return uri.lower().startswith(("http://", "https://"))
+
+
+def http_settings(uri: str, clock: str) -> HttpSettings:
+    """Read the address of a server.
+
+    Args:
+        uri: see EXAMPLE.
+        clock: name of the clock of the stamps.
+
+    Returns:
+        The settings.
+
+    Raises:
+        SettingsError: it makes no sense.
+    """
+    try:
+        parts = urlsplit(uri)
+        port, host = parts.port, parts.hostname
+        user, password = unquote(parts.username or ""), unquote(parts.password or "")
+    except ValueError:
+        raise SettingsError(f"camera {_hidden(uri)!r} is no address", f"give {EXAMPLE}") from None
+    secure = parts.scheme.lower() == "https"
+    # Blanks and control characters would end the request's line early.
+    target = parts.path or "/"
+    if not host or port == 0 or re.search(r"[^\x21-\x7e]", host + target + parts.query):
+        raise SettingsError(f"camera {_hidden(uri)!r} is no address", f"give {EXAMPLE}")
+    ours, theirs = _split(parts.query)
+    return HttpSettings(
+        secure,
+        host,
+        port or (443 if secure else 80),
+        target + (f"?{theirs}" if theirs else ""),
+        user,
+        password,
+        _time(uri, ours, "latency_ms"),
+        _time(uri, ours, "latency_uncertainty_ms"),
+        _truth(uri, ours.get("verify", "1")),
+        clock,
+    )
+
+
+def _split(query: str) -> tuple[dict[str, str], str]:
+    """Our options, and the server's query; that stays as it is where none of ours stands in it."""
+    items = parse_qsl(query, keep_blank_values=True, max_num_fields=100) if query.count("&") < 100 else []
+    ours = {name: value for name, value in items if name in _OURS}
+    return ours, urlencode([item for item in items if item[0] not in _OURS]) if ours else query
+
+
+def _time(uri: str, options: dict[str, str], name: str) -> int | None:
+    if name not in options:
+        return None
+    try:
+        return milliseconds(options[name], _LONGEST_MS)
+    except (ValueError, ZeroDivisionError):
+        raise SettingsError(
+            f"camera {_hidden(uri)!r} has {name}={options[name]}", f"give ms from 0 to {_LONGEST_MS}"
+        ) from None
+
+
+def _truth(uri: str, text: str) -> bool:
+    if text not in {"0", "1"}:
+        raise SettingsError(f"camera {_hidden(uri)!r} has verify={text}", "give verify=0 to accept any certificate")
+    return text == "1"
+
+
+def _hidden(uri: str) -> str:
+    """The address without its password."""
+    return re.sub(r"(//[^/@]*?:)[^/@]*@", r"\1…@", uri)

@@ -1,0 +1,197 @@
+"""JPEG images in a byte stream, found by their own structure. Sans-I/O: bytes in, images out, `now_ns` passed in.
+
+What a server writes between them (multipart boundaries, part headers) is passed over: servers leave out dashes, lengths and line ends, announce
+one boundary and write another, and write the next boundary together with the image before it. A JPEG says by itself where it begins and ends: its
+segments carry their lengths, and in the entropy-coded data 0xFF is always followed by 0 or a restart marker (ITU-T T.81, B.1.1.2 to B.1.1.5). So an
+image is given with its last byte, not when the next part begins a period later.
+
+Rules: an image is given only whole; what breaks off is told of once and the search goes on behind the place that was wrong, so every byte is
+looked at once; never more than MAX_IMAGE_BYTES are kept.
+"""
+
+import re
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from common.frame import FrameFault
+from common.protocol.wire import MAX_PAYLOAD_BYTES, MAX_SIZE_PX
+
+MAX_IMAGE_BYTES: Final = MAX_PAYLOAD_BYTES
+
+_BEGIN: Final = b"\xff\xd8\xff"
+"""SOI and the first byte of the segment behind it."""
+
+_MARKER: Final = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]", re.DOTALL)
+"""What ends entropy-coded data: neither a stuffed byte nor a restart marker nor a fill byte."""
+
+_SOI, _EOI, _SOS = 0xD8, 0xD9, 0xDA
+_FRAME_HEADERS: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+"""SOF0 to SOF15: the codes between them that are DHT, JPG and DAC are left out (Table B.1)."""
+
+_LEAST_CODE: Final = 0xC0
+"""Codes below are reserved (Table B.1)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """An image that came in whole.
+
+    Attributes:
+        payload: from SOI to EOI.
+        width_px: from its frame header.
+        height_px: from its frame header.
+        began_ns: when its first byte came.
+        ended_ns: when its last byte came.
+    """
+
+    payload: bytes
+    width_px: int
+    height_px: int
+    began_ns: int
+    ended_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """An image that had begun and is none."""
+
+    fault: FrameFault
+
+
+class _Phase(Enum):
+    BETWEEN = 0
+    SEGMENTS = 1
+    ENTROPY = 2
+
+
+class JpegStream:
+    """Finds the images in one stream."""
+
+    def __init__(self) -> None:
+        self._data = bytearray()
+        self._phase = _Phase.BETWEEN
+        self._at = 0
+        self._size_px = (0, 0)
+        self._began_ns = 0
+        self._heard_ns = 0
+        self._old_bytes = 0
+        self._passed_bytes = 0
+
+    @property
+    def held_bytes(self) -> int:
+        """Bytes that are kept now."""
+        return len(self._data)
+
+    @property
+    def passed_bytes(self) -> int:
+        """Bytes that belonged to no whole image, so far: headers, boundaries, broken images."""
+        return self._passed_bytes
+
+    def feed(self, data: bytes, now_ns: int) -> list[Whole | Broken]:
+        """Take bytes as they come, chopped in any way.
+
+        Args:
+            data: what was read.
+            now_ns: when, any steady clock, ns.
+
+        Returns:
+            Whole images and broken ones, in order.
+        """
+        self._old_bytes = len(self._data)
+        self._data += data
+        events: list[Whole | Broken] = []
+        while self._step(now_ns, events):
+            pass
+        if len(self._data) > MAX_IMAGE_BYTES:
+            self._give_up(len(self._data), events)
+        self._heard_ns = now_ns
+        return events
+
+    def _step(self, now_ns: int, events: list[Whole | Broken]) -> bool:
+        """Go on by one marker; gives whether there may be more to do."""
+        match self._phase:
+            case _Phase.BETWEEN:
+                return self._seek(now_ns)
+            case _Phase.SEGMENTS:
+                return self._segment(now_ns, events)
+            case _Phase.ENTROPY:
+                return self._entropy()
+
+    def _seek(self, now_ns: int) -> bool:
+        found = self._data.find(_BEGIN)
+        if found < 0:
+            self._drop(max(0, len(self._data) - len(_BEGIN) + 1))
+            return False
+        self._began_ns = self._heard_ns if found < self._old_bytes else now_ns
+        self._drop(found)
+        self._phase, self._at, self._size_px = _Phase.SEGMENTS, 2, (0, 0)
+        return True
+
+    def _segment(self, now_ns: int, events: list[Whole | Broken]) -> bool:  # noqa: PLR0911 - one for each kind of marker
+        """Look at the marker at `_at`."""
+        data, at = self._data, self._at
+        if len(data) < at + 4:
+            return self._short(now_ns, events)
+        code = data[at + 1]
+        if data[at] != 0xFF or code < _LEAST_CODE or code == _SOI:
+            return self._give_up(at, events)
+        if code == 0xFF:  # a fill byte before a marker
+            self._at += 1
+            return True
+        if code == _EOI:
+            return self._end(now_ns, events)
+        if 0xD0 <= code <= 0xD7:
+            self._at += 2
+            return True
+        length = int.from_bytes(data[at + 2 : at + 4], "big")
+        if length < 2:
+            return self._give_up(at, events)
+        if code in _FRAME_HEADERS:
+            if len(data) < at + 9:
+                return False
+            self._size_px = (int.from_bytes(data[at + 7 : at + 9], "big"), int.from_bytes(data[at + 5 : at + 7], "big"))
+        self._at += 2 + length
+        self._phase = _Phase.ENTROPY if code == _SOS else _Phase.SEGMENTS
+        return True
+
+    def _short(self, now_ns: int, events: list[Whole | Broken]) -> bool:
+        """Fewer than four bytes are there: enough for an end, and for what is no marker."""
+        data, at = self._data, self._at
+        if len(data) > at and data[at] != 0xFF:
+            return self._give_up(at, events)
+        if len(data) > at + 1 and data[at + 1] == _EOI:
+            return self._end(now_ns, events)
+        return False
+
+    def _entropy(self) -> bool:
+        found = _MARKER.search(self._data, self._at)
+        if found is None:
+            self._at = max(self._at, len(self._data) - 1)
+            return False
+        self._phase, self._at = _Phase.SEGMENTS, found.start()
+        return True
+
+    def _end(self, now_ns: int, events: list[Whole | Broken]) -> bool:
+        end = self._at + 2
+        width_px, height_px = self._size_px
+        if not (1 <= width_px <= MAX_SIZE_PX and 1 <= height_px <= MAX_SIZE_PX):
+            return self._give_up(end, events, FrameFault.WRONG_LENGTH)
+        events.append(Whole(bytes(self._data[:end]), width_px, height_px, self._began_ns, now_ns))
+        del self._data[:end]
+        self._old_bytes = max(0, self._old_bytes - end)
+        self._phase = _Phase.BETWEEN
+        return True
+
+    def _give_up(self, at: int, events: list[Whole | Broken], fault: FrameFault = FrameFault.NO_END) -> bool:
+        """What has begun is no image: go on behind the place that was wrong."""
+        if self._phase is not _Phase.BETWEEN:
+            events.append(Broken(fault))
+        self._drop(at)
+        self._phase = _Phase.BETWEEN
+        return True
+
+    def _drop(self, count: int) -> None:
+        self._passed_bytes += count
+        self._old_bytes = max(0, self._old_bytes - count)
+        del self._data[:count]

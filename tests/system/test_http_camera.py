@@ -1,0 +1,278 @@
+"""A phone's MJPEG server as the host's own camera, beside servers that misbehave in every way that was heard of; real sockets, a real process."""
+
+import itertools
+import select
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from common import now
+from common.camera.base import CameraState, Grab, Skipped, Spoiled
+from common.errors import UnavailableError
+from common.frame import Frame, FrameFault
+from phone_host.camera.factory import open_camera
+from phone_host.camera.mjpeg_http import HttpCamera
+from tests.support.mjpeg_server import PASSWORD, USER, MjpegServer
+from tests.support.numbered import saved_numbers, write_film
+from tests.support.programs import board, free_port, host, ledgers, lines, until
+
+FRAMES = 200
+FPS = 25
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Numbered images."""
+    return write_film(tmp_path_factory.mktemp("film") / "numbered", FRAMES)
+
+
+@contextmanager
+def serving(film: Path, manner: str, certificate: Path | None = None, fps: float = FPS) -> Iterator[MjpegServer]:
+    """A server for the length of a block."""
+    server = MjpegServer(film, fps, manner, certificate)
+    try:
+        yield server
+    finally:
+        server.stop()
+
+
+@contextmanager
+def camera_of(uri: str) -> Iterator[HttpCamera]:
+    """An open camera for the length of a block."""
+    camera = open_camera(uri, "host", now.monotonic_ns())
+    assert isinstance(camera, HttpCamera)
+    try:
+        yield camera
+    finally:
+        camera.close()
+
+
+def grabs(camera: HttpCamera, enough: Callable[[list[Grab]], bool]) -> list[Grab]:
+    """Read until it is enough."""
+    came: list[Grab] = []
+
+    def step() -> bool:
+        assert camera.pollable is not None
+        select.select([camera.pollable], [], [], 0.1)
+        came.extend(camera.read(now.monotonic_ns()))
+        return enough(came)
+
+    until(step, "images")
+    return came
+
+
+def frames(came: list[Grab]) -> list[Frame]:
+    """The frames among these."""
+    return [grab for grab in came if isinstance(grab, Frame)]
+
+
+@pytest.mark.parametrize(
+    "manner",
+    ["plain", "dashes", "no_dashes", "no_line_end", "wrong_boundary", "chunked", "early_boundary", "garbage"],
+)
+def test_every_sloppy_manner(film: Path, manner: str) -> None:
+    """However a server parts its images, every one comes whole and unaltered, in order, with the measured period."""
+    contents = [(film / f"{number}.jpg").read_bytes() for number in range(FRAMES)]
+    with serving(film, manner) as server, camera_of(server.uri) as camera:
+        came = frames(grabs(camera, lambda came: len(frames(came)) >= 20))
+        assert (camera.description.width_px, camera.description.height_px) == (160, 120)
+        assert camera.health.faults == ()
+        assert camera.health.state is CameraState.RUNNING
+    numbers = [contents.index(bytes(frame.payload)) for frame in came]
+    assert all((after - before) % FRAMES > 0 for before, after in itertools.pairwise(numbers))
+    assert all(before.exposed < after.exposed for before, after in itertools.pairwise(came))
+    assert camera.description.period_ns > 0
+
+
+def test_an_image_is_stamped_with_its_own_arrival(film: Path) -> None:
+    """A server that writes the next boundary with the image before it does not make stamps early: they follow the sending, less the latency."""
+    with serving(film, "early_boundary") as server, camera_of(f"{server.uri}?latency_ms=200") as camera:
+        came = frames(grabs(camera, lambda came: len(frames(came)) >= 20))
+        assert camera.health.latency_ns == 200_000_000
+    period_ns = 1_000_000_000 // FPS
+    # Sent at k / FPS, arrived later: modulo the period the stamps lie just behind the grid. The swiftest of them tell.
+    late_ns = sorted((frame.exposed.ns + 200_000_000) % period_ns for frame in came)
+    assert late_ns[0] < period_ns // 2
+
+
+def test_truncated_images_are_told_of(film: Path) -> None:
+    """A cut image is a spoiled grab under its own number and is counted; all others come."""
+    with serving(film, "truncated") as server, camera_of(server.uri) as camera:
+        came = grabs(camera, lambda came: sum(isinstance(grab, Spoiled) for grab in came) >= 4)
+        faults = dict(camera.health.faults)
+    assert {grab.fault for grab in came if isinstance(grab, Spoiled)} == {FrameFault.NO_END}
+    assert faults[FrameFault.NO_END] >= 4
+    assert len(frames(came)) >= 8
+
+
+@pytest.mark.parametrize("manner", ["closes", "resets", "hangs", "drips", "endless"])
+def test_a_server_that_goes_wrong_is_met_again(film: Path, manner: str) -> None:
+    """A server that hangs up, resets, hangs, drips or never ends an image is left, counted, and frames come again over a new connection."""
+    with serving(film, manner) as server, camera_of(server.uri) as camera:
+        grabs(camera, lambda _: camera.health.returned > 0)
+        came = grabs(camera, lambda came: len(frames(came)) >= 5)
+        health = camera.health
+    assert len(frames(came)) >= 5
+    assert health.failures == 1
+    assert health.stalls == (manner in {"hangs", "drips", "endless"})
+    assert health.state is CameraState.RUNNING
+
+
+def test_a_server_that_is_away_is_waited_for(film: Path) -> None:
+    """A phone that is gone is looked for until it is back at the same address."""
+    server = MjpegServer(film, FPS)
+    with camera_of(server.uri) as camera:
+        grabs(camera, lambda came: len(frames(came)) >= 3)
+        server.stop()
+        until(lambda: camera.health.state is CameraState.GONE, "the camera is gone")
+        until(lambda: camera.health.failures >= 3, "several attempts")
+        server = MjpegServer(film, FPS, port=server.port)
+        try:
+            grabs(camera, lambda came: len(frames(came)) >= 3)
+            assert camera.health.returned == 1
+        finally:
+            server.stop()
+
+
+def test_a_slow_reader_gets_the_newest(film: Path) -> None:
+    """Who did not read for a hundred images gets one frame, the newest, and word of all that it replaced."""
+    with serving(film, "plain", fps=100) as server, camera_of(server.uri) as camera:
+        first = frames(grabs(camera, lambda came: len(frames(came)) >= 1))[-1]
+        until(lambda: camera.newest_sequence >= first.sequence + 100, "a hundred images")
+        before = camera.newest_sequence
+        came = camera.read(now.monotonic_ns())
+    [newest] = frames(came)
+    assert newest.sequence >= before
+    assert len(came) <= 2
+    passed = sum(grab.frames for grab in came if isinstance(grab, Skipped))
+    assert first.sequence + 1 + passed == newest.sequence
+
+
+REFUSALS = {
+    "page": ("a web page", "IP Webcam has /video"),
+    "snapshot": ("single images", "IP Webcam has /video"),
+    "missing": ("404", "check the path"),
+    "moved": ("http://elsewhere/video", "give that address"),
+    "busy": ("503", "busy"),
+    "password": ("asks for a password", "USER:PASSWORD"),
+    "another_tongue": ("does not speak HTTP", "port"),
+}
+
+
+@pytest.mark.parametrize("manner", REFUSALS)
+def test_what_is_no_stream_is_told_with_its_remedy(film: Path, manner: str) -> None:
+    """A page, a single image, a refusal or another protocol is unavailable at once, in one line with its remedy."""
+    problem, remedy = REFUSALS[manner]
+    with serving(film, manner) as server, pytest.raises(UnavailableError) as caught:
+        open_camera(server.uri, "host", 0)
+    assert problem in caught.value.problem
+    assert remedy in caught.value.remedy
+    assert str(server.port) in caught.value.problem
+
+
+def test_nobody_there_is_told(film: Path) -> None:
+    """A port that nobody listens on, and a name that nobody has, are unavailable at once."""
+    del film
+    for uri in (f"http://127.0.0.1:{free_port()}/video", "http://phone.invalid/video"):
+        with pytest.raises(UnavailableError, match=r"refuses|no address"):
+            open_camera(uri, "host", 0)
+
+
+@pytest.mark.parametrize(("manner", "said"), [("no_image", "no JPEG image within 10 s"), ("mute", "does not answer")])
+def test_silence_is_told(film: Path, manner: str, said: str) -> None:
+    """A server that answers nothing, or sends nothing that is an image, is unavailable in the end."""
+    with serving(film, manner) as server, pytest.raises(UnavailableError, match=said):
+        open_camera(server.uri, "host", 0)
+
+
+def test_a_password_opens(film: Path) -> None:
+    """Name and password of the address open a server that asks for them, whatever letters they have; wrong ones are told without being shown."""
+    with serving(film, "password") as server:
+        _, _, rest = server.uri.partition("//")
+        with camera_of(f"http://{USER}:a%3Ab%40c%2F%25@{rest}") as camera:
+            grabs(camera, lambda came: len(frames(came)) >= 3)
+        assert PASSWORD == "a:b@c/%"
+        with pytest.raises(UnavailableError, match="name and password") as caught:
+            open_camera(f"http://{USER}:guessed@{rest}", "host", 0)
+        assert "guessed" not in str(caught.value)
+
+
+def test_https(film: Path, tmp_path: Path) -> None:
+    """An https server is refused for its own certificate unless that is accepted; http and https mixed up are told."""
+    certificate = tmp_path / "both.pem"
+    key = tmp_path / "key.pem"
+    request = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=phone"]
+    subprocess.run([*request, "-keyout", str(key), "-out", str(certificate)], check=True, capture_output=True)
+    certificate.write_bytes(certificate.read_bytes() + key.read_bytes())
+    with serving(film, "plain", certificate) as server:
+        with pytest.raises(UnavailableError, match="verify=0"):
+            open_camera(server.uri, "host", 0)
+        with camera_of(f"{server.uri}?verify=0") as camera:
+            grabs(camera, lambda came: len(frames(came)) >= 3)
+        with pytest.raises(UnavailableError, match="needs https"):
+            open_camera(server.uri.replace("https", "http"), "host", 0)
+    with serving(film, "plain") as server, pytest.raises(UnavailableError, match="http://"):
+        open_camera(server.uri.replace("http", "https"), "host", 0)
+
+
+def test_it_ends_at_once_and_leaves_nothing(film: Path) -> None:
+    """Closing twice is harmless, is not held up by a server that hangs, and leaves no thread."""
+    with serving(film, "hangs") as server:
+        camera = open_camera(server.uri, "host", 0)
+        assert isinstance(camera, HttpCamera)
+        until(lambda: camera.newest_sequence >= 5, "the server hangs soon")
+        camera.close()
+        camera.close()
+        until(lambda: all(thread.name != "mjpeg" for thread in threading.enumerate()), "its thread ends")
+
+
+def test_a_board_and_a_phone_are_paired(tmp_path: Path) -> None:
+    """phone-host pairs a replay board with an HTTP camera that shows the same film, and its report tells the camera's figures."""
+    fps, out = 4, tmp_path / "out"
+    film = write_film(tmp_path / "film", 100)
+    link = f"ipc://{tmp_path}/board"
+    known = "latency_ms=3&latency_uncertainty_ms=2"
+    receiving = ["--link", link, "--out", str(out), "--save-every", "1", "--json"]
+    with (
+        serving(film, "plain", fps=fps) as server,
+        board(["run", "--camera", f"replay:{film}?fps={fps}&loop=1", "--link", link], tmp_path),
+        host(["run", "--camera", f"{server.uri}?{known}", *receiving], tmp_path) as receiver,
+    ):
+        until(lambda: lines(out / "delays.jsonl") >= 20, "pairs")
+        assert receiver.stop() == 0
+        report = receiver.json()
+    own = report["host_frames"]["camera"]
+    assert own["latency_ms"] == 3
+    assert own["jitter_ms"] >= 0
+    assert own["stamp_uncertainty_ms"] == pytest.approx(2 + own["jitter_ms"], abs=0.002)
+    assert own["period_ms"] == pytest.approx(1000 / fps, rel=0.2)
+    assert own["failures"] == 0
+    # The server sends at the moment of the replay's exposure; an image that is held up by half a period has another partner.
+    agree = [left == right for left, right in saved_numbers(out)]
+    assert sum(agree) > len(agree) / 2
+    assert all(abs(ledger["time_skew_ns"]) <= 125_000_000 for ledger in ledgers(out))
+
+
+def test_the_doctor_looks_at_a_phone(film: Path, tmp_path: Path) -> None:
+    """phone-host doctor tells what a server gives, or why it gives nothing."""
+    with serving(film, "plain") as server, host(["doctor", "--camera", server.uri], tmp_path, "sound") as doctor:
+        doctor.wait()
+        assert "160x120 every" in doctor.out.read_text()
+    with serving(film, "page") as server, host(["doctor", "--camera", server.uri], tmp_path, "page") as doctor:
+        assert doctor.wait() != 0
+        assert "IP Webcam has /video" in doctor.out.read_text()
+
+
+def test_an_absent_phone_ends_the_run(tmp_path: Path) -> None:
+    """phone-host run without its own camera ends at once with exit 3 and one line that names the address and not the password."""
+    uri = f"http://me:secret@127.0.0.1:{free_port()}/video"
+    with host(["run", "--camera", uri, "--link", f"ipc://{tmp_path}/board"], tmp_path) as receiver:
+        assert receiver.wait() == 3
+        told = [line for line in receiver.stderr.splitlines() if "error" in line]
+        assert len(told) == 1
+        assert "refuses the connection" in told[0]
+        assert "secret" not in receiver.stderr

@@ -1,0 +1,137 @@
+"""Images in a stream of multipart or whatever: each whole one once, with its own bytes, whatever stands between them."""
+
+import random
+
+import cv2
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.frame import FrameFault
+from phone_host.camera.jpegs import MAX_IMAGE_BYTES, Broken, JpegStream, Whole
+from tests.support.pictures import jpeg, picture
+
+IMAGES = [jpeg(16 + 8 * seed, 8, seed=seed) for seed in range(6)]
+
+
+def progressive(seed: int) -> bytes:
+    """An image of several scans, with tables between them and restart markers within."""
+    flags = [cv2.IMWRITE_JPEG_PROGRESSIVE, 1, cv2.IMWRITE_JPEG_RST_INTERVAL, 1]
+    done, data = cv2.imencode(".jpg", picture(64, 48, seed=seed), flags)
+    assert done
+    return data.tobytes()
+
+
+def with_comment(image: bytes, comment: bytes) -> bytes:
+    """The image with a comment segment behind its first marker (T.81, B.2.4.5), such as a thumbnail in EXIF data."""
+    return image[:2] + b"\xff\xfe" + (len(comment) + 2).to_bytes(2, "big") + comment + image[2:]
+
+
+def parts(stream: JpegStream, data: bytes, now_ns: int = 1) -> list[bytes]:
+    """Payloads of the images in these bytes."""
+    return [event.payload for event in stream.feed(data, now_ns) if isinstance(event, Whole)]
+
+
+BETWEEN = {
+    "as RFC 2046 has it": b"\r\n--frame\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n",
+    "no length": b"\r\n--frame\r\nContent-Type: image/jpeg\r\n\r\n",
+    "no line end before": b"--frame\r\nContent-Type: image/jpeg\r\n\r\n",
+    "no dashes": b"\r\nframe\r\nContent-Type: image/jpeg\r\n\r\n",
+    "bare newlines": b"\n--frame\nContent-Type: image/jpeg\n\n",
+    "a lying length": b"\r\n--frame\r\nContent-Length: 7\r\n\r\n",
+    "other headers": b"\r\n--frame\r\nX-Timestamp: 12.5\r\nServer: IP Webcam\r\nContent-type:image/jpeg\r\n\r\n",
+    "no header": b"\r\n--frame\r\n\r\n",
+    "zeros": bytes(300),
+    "nothing": b"",
+}
+
+
+@pytest.mark.parametrize("between", BETWEEN.values(), ids=BETWEEN.keys())
+def test_every_way_of_parting_images(between: bytes) -> None:
+    """Whatever stands between the images of a stream, each comes once, with exactly its bytes and size."""
+    stream = JpegStream()
+    data = b"".join((between % len(image) if b"%d" in between else between) + image for image in IMAGES)
+    events = stream.feed(data + between, 1)
+    assert [event.payload for event in events if isinstance(event, Whole)] == IMAGES
+    assert [(event.width_px, event.height_px) for event in events if isinstance(event, Whole)] == [
+        (16 + 8 * seed, 8) for seed in range(6)
+    ]
+    assert len(events) == len(IMAGES)
+
+
+@given(cuts=st.lists(st.integers(0, 20_000), max_size=30), between=st.sampled_from(sorted(BETWEEN.values())))
+@settings(deadline=None, max_examples=60)
+def test_any_chopping_gives_the_same_images(cuts: list[int], between: bytes) -> None:
+    """However the bytes are chopped, the same images come."""
+    data = b"".join(between + image for image in [*IMAGES, progressive(3)])
+    edges = sorted(min(cut, len(data)) for cut in cuts)
+    stream = JpegStream()
+    pieces = [data[a:b] for a, b in zip([0, *edges], [*edges, len(data)], strict=True)]
+    assert [image for piece in pieces for image in parts(stream, piece)] == [*IMAGES, progressive(3)]
+
+
+def test_an_image_is_there_with_its_last_byte() -> None:
+    """An image is given as soon as its last byte has come, not with the next part; its first byte's time is told."""
+    stream, image = JpegStream(), IMAGES[2]
+    assert stream.feed(b"--frame\r\n\r\n", 5) == []
+    assert stream.feed(image[:1], 10) == []
+    assert stream.feed(image[1:100], 20) == []
+    assert stream.feed(image[100:-1], 30) == []
+    assert stream.feed(image[-1:], 40) == [Whole(image, 32, 8, 10, 40)]
+
+
+def test_a_thumbnail_ends_no_image() -> None:
+    """An image within a segment of another one, and the word of an end there, belong to the outer one."""
+    outer = with_comment(IMAGES[3], IMAGES[0] + b"\xff\xd9\xff\xd8")
+    assert parts(JpegStream(), outer + IMAGES[1]) == [outer, IMAGES[1]]
+
+
+@given(at=st.integers(400, 10_000), between=st.sampled_from(sorted(BETWEEN.values())))
+@settings(deadline=None)
+def test_a_truncated_image_costs_only_itself(at: int, between: bytes) -> None:
+    """An image that breaks off in its data is told of as broken once; the images before and behind it come."""
+    image = jpeg(64, 48, seed=9)
+    cut = image[: min(max(at, image.index(b"\xff\xda") + 20), len(image) - 2)]
+    events = JpegStream().feed(between.join([IMAGES[0], cut, IMAGES[1], IMAGES[2]]), 1)
+    assert [event.payload for event in events if isinstance(event, Whole)] == IMAGES[:3]
+    assert [event for event in events if isinstance(event, Broken)] == [Broken(FrameFault.NO_END)]
+
+
+@given(garbage=st.binary(max_size=2000))
+@settings(deadline=None)
+def test_images_behind_garbage_are_found(garbage: bytes) -> None:
+    """Behind any garbage images come again: all from the first one on that no spoiled length of the garbage covers."""
+    stream = JpegStream()
+    came = parts(stream, garbage + bytes(70_000) + b"".join(IMAGES))
+    assert came == IMAGES
+
+
+def test_an_image_without_end_is_bounded() -> None:
+    """An image that never ends is given up at the limit of a link's payload, and images behind it come."""
+    stream, endless = JpegStream(), IMAGES[0][:-2]
+    stream.feed(endless, 1)
+    broken = 0
+    for _ in range(40):
+        broken += len(stream.feed(bytes(1 << 20), 2))
+        assert stream.held_bytes <= MAX_IMAGE_BYTES
+    assert broken == 1
+    assert parts(stream, IMAGES[1]) == [IMAGES[1]]
+
+
+def test_ten_million_random_bytes() -> None:
+    """10^7 random bytes hold no more than an image's bytes, and the next good image comes within a segment's length."""
+    chance, stream = random.Random(4), JpegStream()
+    for _ in range(100):
+        stream.feed(chance.randbytes(100_000), 1)
+        assert stream.held_bytes <= MAX_IMAGE_BYTES
+    came = parts(stream, b"".join(IMAGES * 200))
+    assert came
+    assert came[-1] == IMAGES[-1]
+
+
+def test_an_image_without_size_is_broken() -> None:
+    """A JPEG of no height, which some encoders write and fill in later, is told of as broken."""
+    image = bytearray(IMAGES[0])
+    at = image.index(b"\xff\xc0")
+    image[at + 5 : at + 7] = b"\0\0"
+    assert JpegStream().feed(bytes(image), 1) == [Broken(FrameFault.WRONG_LENGTH)]
