@@ -1,0 +1,135 @@
+"""Predictions from measured cells, judged by arithmetic on constant delays."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from common.ledger import BoardMarks, PairLedger, StageTimes
+from phone_host.emulate import PROFILES
+from phone_host.prediction import (
+    Cell,
+    Figures,
+    Images,
+    Target,
+    Unknown,
+    foretell,
+    held_out,
+    learn_link,
+    measured,
+    nominal_link,
+)
+from phone_host.sync.fifo import FifoSettings, Overflow
+
+MS = 1_000_000
+LATENCY_NS, NS_PER_BYTE = 2 * MS, 1000
+"""2 ms and 1 MB/s."""
+
+
+def cell(interface: str = "tcp", size_bytes: int = 10_000, period_ms: int = 40, width_px: int = 320) -> Cell:
+    """An unhurried camera: capture 1 ms, processing 10 ms for 320 x 240 and by pixels times width for others, nothing waits."""
+    images = Images(width_px, width_px * 3 // 4, period_ms * MS, np.full(1, float(size_bytes)))
+    processing_ns = round(10 * MS * (width_px / 320) ** 3)
+    ledgers = []
+    for number in range(50):
+        exposed_ns = number * period_ms * MS
+        received_ns = exposed_ns + 1 * MS + LATENCY_NS + NS_PER_BYTE * size_bytes
+        board = BoardMarks(exposed_ns, exposed_ns + 1 * MS, exposed_ns + 1 * MS)
+        done_ns = received_ns + processing_ns
+        marks = (received_ns, received_ns, received_ns, received_ns, done_ns, done_ns - period_ms * MS)
+        ledgers.append(PairLedger("s", number, number, size_bytes, "tcp", board, *marks, StageTimes(), 0, 0, 0))
+    return Cell(
+        interface,
+        self_paced=False,
+        images=images,
+        fifo=FifoSettings(),
+        ledgers=tuple(ledgers),
+        pairs_per_s=1000 / period_ms,
+        lost_share=0.0,
+    )
+
+
+def figures(found: Figures | Unknown) -> Figures:
+    """The figures, which must be there."""
+    assert isinstance(found, Figures)
+    return found
+
+
+def test_a_cell_is_foretold_by_the_others() -> None:
+    """From 10 000 and 30 000 bytes at other rates, 20 000 bytes every 50 ms: 22 ms on the link, 33 ms in all, 40 ms idle, 20 pairs/s."""
+    target = cell(size_bytes=20_000, period_ms=50)
+    cells = [cell(), cell(size_bytes=30_000, period_ms=100), target]
+    made, true = figures(held_out(target, cells)), measured(target)
+    assert made.propagation_p50_ns == pytest.approx(22 * MS, rel=0.01)
+    assert made.end_to_end_p50_ns == pytest.approx(33 * MS, rel=0.01)
+    assert made.starvation_p50_ns == pytest.approx(40 * MS, rel=0.01)
+    assert made.pairs_per_s == pytest.approx(20.0, rel=0.01)
+    for name in ("propagation_p50_ns", "end_to_end_p50_ns", "end_to_end_p95_ns", "starvation_p50_ns", "pairs_per_s"):
+        assert getattr(made, name) == pytest.approx(getattr(true, name), rel=0.01)
+
+
+def test_a_cell_gives_nothing_to_its_own_prediction() -> None:
+    """What was measured in a cell does not change what is foretold of it: with nonsense in its ledgers the prediction is the same."""
+    target = cell(size_bytes=20_000, period_ms=50)
+    nonsense = replace(target, ledgers=tuple(replace(one, done_ns=one.done_ns + 10**9) for one in target.ledgers))
+    others = [cell(), cell(size_bytes=30_000)]
+    assert held_out(target, [*others, target]) == held_out(nonsense, [*others, nonsense])
+
+
+def test_what_others_cannot_tell_is_not_guessed() -> None:
+    """Another interface, or only frames of another size: no figures, but the reason."""
+    target = cell("wifi")
+    unknown = held_out(target, [target, cell(), cell(size_bytes=30_000)])
+    assert isinstance(unknown, Unknown)
+    assert "wifi" in unknown.reason
+    far = cell(size_bytes=60_000)
+    assert isinstance(held_out(far, [far, cell(), cell(period_ms=50)]), Unknown)
+
+
+def test_frames_of_one_size_stand_for_their_like() -> None:
+    """Where all other cells had frames of this very size, their delay is taken as it is."""
+    target = cell(period_ms=50)
+    made = figures(held_out(target, [target, cell(period_ms=40), cell(period_ms=30)]))
+    assert made.propagation_p50_ns == pytest.approx(12 * MS, rel=0.001)
+
+
+@pytest.mark.parametrize("others", [[cell(width_px=320)], [cell(width_px=320), cell(width_px=480)]])
+def test_processing_of_a_size_that_was_not_run_follows_its_work(others: list[Cell]) -> None:
+    """Twice the width and height: eight times the pixels times disparities, so 80 ms where 320 x 240 took 10."""
+    images = Images(640, 480, 1000.0 * MS, np.array([10_000.0]))
+    link = learn_link("tcp", images, others)
+    assert not isinstance(link, Unknown)
+    made = figures(foretell(Target("tcp", link, images, FifoSettings()), others))
+    assert made.end_to_end_p50_ns == pytest.approx((1 + 12 + 80) * MS, rel=0.01)
+
+
+def test_settings_of_the_queue_and_the_matcher_change_what_they_should() -> None:
+    """A matcher that takes 60 ms at 25 frames/s gives 16.7 pairs/s; with `block` nothing is dropped in the FIFO but frames are replaced."""
+    base = cell()
+    link = learn_link("tcp", base.images, [base])
+    assert not isinstance(link, Unknown)
+    target = Target("tcp", link, base.images, FifoSettings(), processing_factor=6.0)
+    made = figures(foretell(target, [base]))
+    assert made.pairs_per_s == pytest.approx(1000 / 60, rel=0.01)
+    assert made.lost_share == pytest.approx(1 - 40 / 60, abs=0.01)
+    assert made.starvation_p50_ns == 0.0
+    deep = figures(foretell(replace(target, fifo=FifoSettings(4, Overflow.DROP_NEWEST)), [base]))
+    # Four services wait before it, less what was left of the running one when it came.
+    assert 180 * MS <= deep.queuing_p95_ns <= 240 * MS
+
+
+def test_a_profile_alone_gives_a_link() -> None:
+    """An interface that nobody ran: delay, rate and jitter of its profile, nothing else."""
+    for profile in PROFILES:
+        link = nominal_link(profile, self_paced=profile.carrier == "serial")
+        assert link.ns_per_byte == pytest.approx(1e9 / profile.bytes_per_s)
+        least, most = link.latency_ns + link.spread_ns.min(), link.latency_ns + link.spread_ns.max()
+        assert profile.delay_ns - 1 <= least <= most <= profile.delay_ns + profile.jitter_ns + 1
+
+
+def test_nothing_measured_gives_nothing() -> None:
+    """Without any cell there is a reason instead of figures."""
+    base = cell()
+    assert isinstance(held_out(base, [base]), Unknown)
+    assert math.isfinite(measured(base).pairs_per_s)
