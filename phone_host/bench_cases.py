@@ -79,6 +79,12 @@ class Case:
         quality = f" JPEG {self.quality_percent}" if self.quality_percent != BOARD_SETS else ""
         return f"{self.size}{quality} at {self.rate_hz} frames/s"
 
+    @property
+    def short(self) -> str:
+        """The same for a table, for example `640x480 q80 30/s`."""
+        quality = f" q{self.quality_percent}" if self.quality_percent != BOARD_SETS else ""
+        return f"{self.size}{quality} {self.rate_hz}/s"
+
     def __str__(self) -> str:
         return f"{self.interface} {self.images}"
 

@@ -16,6 +16,7 @@ from common.signals import StopSignals
 
 if TYPE_CHECKING:
     from phone_host.bench import CaseResult, RunSettings
+    from phone_host.bench_analysis import Analysis
     from phone_host.bench_cases import Case, Interface, Size
     from phone_host.bench_report import Conditions
     from phone_host.film import Film
@@ -29,7 +30,8 @@ _EXAMPLES = """examples:
 
 Runs a board-agent process and the host for each link, size, quality and rate, and prints each delay's p50, p95, p99 and maximum. The
 first second of each run is left out of the statistics. A board elsewhere is measured with what its own camera shows: its size, quality and
-rate cannot be set from here. --out gets delay-bench.json and delay-bench.html.
+rate cannot be set from here. --out gets
+delay-bench.json, delay-bench.html (plots, the queueing model beside the measurement) and trace.json for Perfetto.
 """
 
 _NOTHING_MEASURED = 4
@@ -90,7 +92,9 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DEPTH:POLICY",
         help="queue before the matcher: drop-oldest, drop-newest or block (default 1:drop-oldest)",
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for delay-bench.json and delay-bench.html")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder for delay-bench.json, delay-bench.html and trace.json"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     parser.add_argument("--debug", action="store_true", help="show tracebacks")
     return parser
@@ -100,6 +104,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.emulate == "list":
         _print_profiles(as_json=options.json)
         return 0
+    from phone_host.bench_analysis import analyse  # noqa: PLC0415 - OpenCV, only now
     from phone_host.bench_cases import (  # noqa: PLC0415 - only what this run needs is loaded
         cases,
         interfaces,
@@ -109,8 +114,10 @@ def _run(options: argparse.Namespace) -> int:
         parse_sizes,
     )
     from phone_host.bench_links import obstacle  # noqa: PLC0415
+    from phone_host.bench_page import page  # noqa: PLC0415
     from phone_host.bench_report import as_json, conditions  # noqa: PLC0415
     from phone_host.emulate import parse_profiles  # noqa: PLC0415
+    from phone_host.trace import TracedRun, trace_json  # noqa: PLC0415
 
     settings = _settings(options)
     asked = interfaces(
@@ -131,13 +138,19 @@ def _run(options: argparse.Namespace) -> int:
     planned = (*cases([interface for interface in here if not interface.is_remote], *matrix), *boards)
     outcome = _measure(planned, settings, signals)
     under = conditions(settings, not_run)
-    report = as_json(outcome.results, under)
+    analysis = analyse(outcome.results, settings.fifo)
+    report = as_json(outcome.results, under, analysis)
     if options.json:
         print(json.dumps(report))
     else:
-        _print(outcome.results, under)
+        _print(outcome.results, under, analysis)
     if options.out is not None:
-        _write(options.out, report, outcome.results, under)
+        files = {
+            "delay-bench.json": json.dumps(report, indent=1) + "\n",
+            "delay-bench.html": page(outcome.results, under, analysis),
+            "trace.json": trace_json([TracedRun(str(result.case), result.ledgers) for result in outcome.results]),
+        }
+        _write(options.out, files)
     if outcome.failure is not None:
         raise outcome.failure
     if signals.stop:
@@ -300,25 +313,31 @@ def _make_folder(folder: Path) -> None:
         ) from None
 
 
-def _write(out: Path, report: dict[str, object], results: "Sequence[CaseResult]", under: "Conditions") -> None:
-    from phone_host.bench_report import page  # noqa: PLC0415
+def _write(out: Path, files: dict[str, str]) -> None:
     from phone_host.formats.atomic import write_text  # noqa: PLC0415
 
     try:
-        write_text(out / "delay-bench.json", json.dumps(report, indent=1) + "\n")
-        write_text(out / "delay-bench.html", page(results, under))
+        for name, text in files.items():
+            write_text(out / name, text)
     except OSError as error:
         raise UnavailableError(
             f"results in {out} cannot be written ({error.strerror})", "make room or give another folder with --out"
         ) from None
 
 
-def _print(results: "Sequence[CaseResult]", under: "Conditions") -> None:
+def _print(results: "Sequence[CaseResult]", under: "Conditions", analysis: "Analysis") -> None:
     """A table for each kind of images, stage by stage, the interfaces below each other."""
     from rich.console import Console  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
 
-    from phone_host.bench_report import PERCENTILES, grouped, rows, summary_line  # noqa: PLC0415
+    from phone_host.bench_report import (  # noqa: PLC0415
+        PERCENTILES,
+        fit_lines,
+        grouped,
+        prediction_lines,
+        rows,
+        summary_line,
+    )
 
     console = Console(highlight=False)
     console.print(f"{under.machine}, {under.date}, matcher {under.matcher}", soft_wrap=True)
@@ -334,6 +353,8 @@ def _print(results: "Sequence[CaseResult]", under: "Conditions") -> None:
         for result in group:
             console.print(f"{result.case.interface}: {summary_line(result)}", soft_wrap=True)
         console.print()
+    for line in (*fit_lines(analysis), *prediction_lines(analysis)):
+        console.print(line, soft_wrap=True)
 
 
 def _print_profiles(*, as_json: bool) -> None:

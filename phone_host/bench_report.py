@@ -1,19 +1,21 @@
-"""What the delay benchmark measured, as a JSON object and as a page with plots. Pure. Every number's unit stands in its key."""
+"""What the delay benchmark measured, as a JSON object and as rows of tables. Pure. Every number's unit stands in its key."""
 
 import os
 import platform
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Final
 
 import zmq
 
 from common import now
 from phone_host.bench import WARM_UP_S, CaseResult, RunSettings
+from phone_host.bench_analysis import Analysis, Checked, InterfaceFit, WhatIf
 from phone_host.bench_cases import BOARD_SETS, Interface
 from phone_host.delays import DELAYS, STAGES, DelayStatistics, Spread
-from phone_host.plots import Budget, Part, Quantity, Strips, budgets, distributions, legend
-from phone_host.report_page import DelaySeries, delay_series, document, section, two_widths
+from phone_host.fits import DelayFit
+from phone_host.plot_scale import duration_text
+from phone_host.prediction import Figures, Unknown
 from phone_host.sync.fifo import FifoSettings
 
 PERCENTILES: Final = ("p50", "p95", "p99", "max")
@@ -54,12 +56,13 @@ def conditions(settings: RunSettings, not_run: Sequence[tuple[Interface, str]]) 
     )
 
 
-def as_json(results: Sequence[CaseResult], under: Conditions) -> dict[str, object]:
+def as_json(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> dict[str, object]:
     """The object of delay-bench.json.
 
     Args:
         results: what was measured.
         under: machine, date, settings.
+        analysis: what follows from the results.
     """
     return {
         "machine": under.machine,
@@ -69,6 +72,10 @@ def as_json(results: Sequence[CaseResult], under: Conditions) -> dict[str, objec
         "left_out_warm_up_s": WARM_UP_S,
         "fifo": f"{under.fifo.depth}:{under.fifo.overflow.value}",
         "runs": [_run(result) for result in results],
+        "interfaces": [_interface(one) for one in analysis.fits],
+        "predictions": [_checked(one) for one in analysis.checked],
+        "typical_prediction_error_percent": _number(100.0 * analysis.typical_error),
+        "not_run_settings": [_what_if(one) for one in analysis.what_ifs],
         "not_run": [{"link": str(interface), "reason": reason} for interface, reason in under.not_run],
     }
 
@@ -92,23 +99,6 @@ def losses(result: CaseResult) -> dict[str, int]:
     lost["dropped_in_fifo"] = counts.dropped
     lost["undecodable"] = result.undecodable
     return {reason: count for reason, count in lost.items() if count}
-
-
-def page(results: Sequence[CaseResult], under: Conditions) -> str:
-    """A self-contained HTML page: for each size and rate the links side by side, stage by stage.
-
-    Args:
-        results: what was measured.
-        under: machine, date, settings.
-    """
-    method = (
-        f"Two real programs on one machine over rendered films, matcher {under.matcher}. {under.seconds:g} s each, after a warm-up "
-        f"of {WARM_UP_S:g} s that is left out. Delays as of the host's clock; propagation carries the clocks' uncertainty."
-    )
-    head = f"<header><h1>Delays of every link and stage</h1><p class='sub'>{under.machine} · {under.date}</p></header>"
-    cards = [section("How this was measured", method, "")]
-    cards += [_card(group) for group in grouped(results)]
-    return document("delay-bench", head + "".join(cards))
 
 
 def grouped(results: Sequence[CaseResult]) -> list[list[CaseResult]]:
@@ -204,44 +194,178 @@ def _number(value: float) -> float | None:
     return None if value != value else round(value, 6)  # noqa: PLR0124 - NaN is the only value unlike itself; JSON has none
 
 
-def _card(results: Sequence[CaseResult]) -> str:
-    """The card of one size and rate: a bar for each link, then each delay and stage by itself."""
-    case = results[0].case
-    title = case.images
-    measured = [(result.case, delay_series(result.ledgers)) for result in results if result.ledgers]
-    if not measured:
-        return section(title, "No pair was processed.", "")
-    delays, stages = measured[0][1].delays, measured[0][1].stages
-    bars = [
-        Budget(str(case.interface), tuple(_mean(quantity) for quantity in series.delays)) for case, series in measured
-    ]
-    work = [
-        Budget(str(case.interface), tuple(_mean(quantity) for quantity in series.stages)) for case, series in measured
-    ]
-    strips = [Strips(str(case.interface), _quantities(series)) for case, series in measured]
-    content = (
-        legend([(quantity.label, quantity.colour) for quantity in delays])
-        + two_widths(lambda width: budgets(bars, width))
-        + "<h3>Stages of processing, means</h3>"
-        + legend([(quantity.label, quantity.colour) for quantity in stages])
-        + two_widths(lambda width: budgets(work, width))
-        + "<h3>Each by itself</h3>"
-        + two_widths(lambda width: distributions(strips, width))
-    )
-    rates = "; ".join(f"{result.case.interface}: {summary_line(result)}" for result in results)
-    return section(title, f"Means of all pairs, end to end. {rates}.", content)
-
-
 def summary_line(result: CaseResult) -> str:
     """Rate, losses and clock of one run in a line."""
     lost = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in losses(result).items()) or "nothing"
     uncertainty_us = statistics_of(result).spread("uncertainty").p95_ns / 1e3
-    return f"{result.pairs_per_second:.1f} pairs/s, clock +-{uncertainty_us:.0f} us (p95), +-{result.bound_ns / 1e3:.0f} us whatever the link does, whole run lost: {lost}"
+    return f"{result.pairs_per_second:.1f} pairs/s, clock +-{uncertainty_us:.0f} us (p95; +-{result.bound_ns / 1e3:.0f} us whatever the link does), whole run lost: {lost}"
 
 
-def _quantities(series: DelaySeries) -> tuple[Quantity, ...]:
-    return (*series.delays, series.end_to_end, series.starvation, *series.stages)
+def rate_text(bytes_per_s: float) -> str:
+    """A rate in words: MB/s or kB/s with three digits."""
+    if bytes_per_s != bytes_per_s or bytes_per_s == float("inf"):  # noqa: PLR0124 - NaN is the only value unlike itself
+        return "any" if bytes_per_s == float("inf") else "\u2013"
+    return f"{bytes_per_s / 1e6:.3g} MB/s" if bytes_per_s >= 1e6 else f"{bytes_per_s / 1e3:.3g} kB/s"
 
 
-def _mean(quantity: Quantity) -> Part:
-    return Part(quantity.label, float(quantity.values_ns.mean()), quantity.colour)
+def fit_rows(analysis: Analysis) -> list[tuple[str, ...]]:
+    """Each interface's latency and rate with their 95 % intervals, and how well the clocks were known there."""
+    rows: list[tuple[str, ...]] = []
+    for one in analysis.fits:
+        fit = one.fit
+        uncertainty_ns = max(statistics_of(result).spread("uncertainty").p95_ns for result in one.results)
+        bound_ns = max(result.bound_ns for result in one.results)
+        lost = sum(account.lost for result in one.results for account in result.link.sessions)
+        sent = sum(result.board.sent for result in one.results)
+        rows.append(
+            (
+                str(one.interface),
+                duration_text(fit.latency_ns),
+                f"{duration_text(fit.latency_low_ns)} to {duration_text(fit.latency_high_ns)}",
+                rate_text(fit.bytes_per_s),
+                f"{rate_text(fit.least_bytes_per_s)} to {rate_text(fit.most_bytes_per_s)}",
+                duration_text(fit.typical_error_ns),
+                f"{fit.points}",
+                f"\u00b1{duration_text(uncertainty_ns)}",
+                f"\u00b1{duration_text(bound_ns)}",
+                f"{lost} of {sent}",
+            )
+        )
+    return rows
+
+
+FIT_COLUMNS: Final = (
+    "interface",
+    "latency",
+    "95 %",
+    "rate",
+    "95 %",
+    "left over, median",
+    "frames",
+    "clock",
+    "hard bound",
+    "lost on the link",
+)
+
+PREDICTION_COLUMNS: Final = (
+    "interface",
+    "setting",
+    "pairs/s",
+    "lost",
+    "propagation p50",
+    "queuing p95",
+    "starvation p50",
+    "end-to-end p50",
+    "p95",
+)
+
+
+def fit_lines(analysis: Analysis) -> list[str]:
+    """Each interface's latency and rate for the terminal, with their 95 % intervals."""
+    lines = []
+    for one in analysis.fits:
+        name, latency, latency_reach, rate, rate_reach, *_ = fit_rows(replace(analysis, fits=(one,)))[0]
+        lines.append(f"{name}: propagation = {latency} ({latency_reach}) + bytes / {rate} ({rate_reach})")
+    return lines
+
+
+def prediction_lines(analysis: Analysis) -> list[str]:
+    """Each run beside its prediction from the other runs, for the terminal."""
+    if len(analysis.checked) < 2:
+        return []
+    lines = ["", "end-to-end p50 and pairs/s, measured and predicted from the other runs:"]
+    for one in analysis.checked:
+        seen, said = one.measured, one.predicted
+        found = f"{one.case.interface} {one.case.short}: {duration_text(seen.end_to_end_p50_ns)}, {seen.pairs_per_s:.1f}/s; "
+        if isinstance(said, Unknown):
+            lines.append(f"{found}no prediction: {said.reason}")
+        else:
+            lines.append(f"{found}{duration_text(said.end_to_end_p50_ns)}, {said.pairs_per_s:.1f}/s")
+    return lines
+
+
+def checked_rows(analysis: Analysis) -> list[tuple[str, ...]]:
+    """Each run: measured, and predicted from the others; `12.1 | 11.9`."""
+    rows: list[tuple[str, ...]] = []
+    for one in analysis.checked:
+        name, images = str(one.case.interface), one.case.short
+        if isinstance(one.predicted, Unknown):
+            rows.append((name, images, f"no prediction: {one.predicted.reason}", *[""] * 6))
+            continue
+        pairs = zip(_figure_texts(one.measured), _figure_texts(one.predicted), strict=True)
+        rows.append((name, images, *(f"{seen} | {said}" for seen, said in pairs)))
+    return rows
+
+
+def what_if_rows(analysis: Analysis) -> list[tuple[str, ...]]:
+    """Each setting that was not run, predicted."""
+    return [
+        (one.interface, one.setting, *_figure_texts(one.figures))
+        if isinstance(one.figures, Figures)
+        else (one.interface, one.setting, f"no prediction: {one.figures.reason}", *[""] * 6)
+        for one in analysis.what_ifs
+    ]
+
+
+def _figure_texts(figures: Figures) -> tuple[str, ...]:
+    delays = (
+        figures.propagation_p50_ns,
+        figures.queuing_p95_ns,
+        figures.starvation_p50_ns,
+        figures.end_to_end_p50_ns,
+        figures.end_to_end_p95_ns,
+    )
+    return (
+        f"{figures.pairs_per_s:.1f}",
+        f"{100.0 * figures.lost_share:.0f} %",
+        *(duration_text(value) for value in delays),
+    )
+
+
+def _interface(one: InterfaceFit) -> dict[str, object]:
+    fit: DelayFit = one.fit
+    finite = {
+        "latency_ms": fit.latency_ns / 1e6,
+        "latency_low_ms": fit.latency_low_ns / 1e6,
+        "latency_high_ms": fit.latency_high_ns / 1e6,
+        "slope_ns_per_byte": fit.ns_per_byte,
+        "slope_low_ns_per_byte": fit.slope_low,
+        "slope_high_ns_per_byte": fit.slope_high,
+        "typical_error_ms": fit.typical_error_ns / 1e6,
+    }
+    rates = {
+        "rate_bytes_per_s": fit.bytes_per_s,
+        "rate_low_bytes_per_s": fit.least_bytes_per_s,
+        "rate_high_bytes_per_s": fit.most_bytes_per_s,
+    }
+    # An endless rate has no number in JSON: the slope beside it says what was found.
+    numbers = {key: None if value == float("inf") else _number(value) for key, value in (finite | rates).items()}
+    return {"link": str(one.interface), "fitted_frames": fit.points, **numbers}
+
+
+def _checked(one: Checked) -> dict[str, object]:
+    head: dict[str, object] = {"link": str(one.case.interface), "images": one.case.images}
+    head["measured"] = _figures(one.measured)
+    return head | _said(one.predicted)
+
+
+def _what_if(one: WhatIf) -> dict[str, object]:
+    return {"link": one.interface, "setting": one.setting} | _said(one.figures)
+
+
+def _said(predicted: Figures | Unknown) -> dict[str, object]:
+    if isinstance(predicted, Unknown):
+        return {"predicted": None, "reason": predicted.reason}
+    return {"predicted": _figures(predicted)}
+
+
+def _figures(figures: Figures) -> dict[str, object]:
+    return {
+        "pair_rate_hz": _number(figures.pairs_per_s),
+        "lost_percent": _number(100.0 * figures.lost_share),
+        "propagation_p50_ms": _number(figures.propagation_p50_ns / 1e6),
+        "queuing_p95_ms": _number(figures.queuing_p95_ns / 1e6),
+        "starvation_p50_ms": _number(figures.starvation_p50_ns / 1e6),
+        "end_to_end_p50_ms": _number(figures.end_to_end_p50_ns / 1e6),
+        "end_to_end_p95_ms": _number(figures.end_to_end_p95_ns / 1e6),
+    }

@@ -11,8 +11,9 @@ import pytest
 
 from tests.support.numbered import write_film
 from tests.support.programs import Program, board, free_port, program, until
+from tests.support.trace_format import checked
 
-SHORT = ["--links", "ipc", "--size", "320x240", "--fps", "15", "--seconds", "2"]
+SHORT = ["--links", "ipc", "--size", "160x120", "--fps", "15", "--seconds", "2"]
 
 
 def bench(arguments: list[str], folder: Path) -> Any:
@@ -43,7 +44,9 @@ def test_every_delay_is_measured_and_every_frame_accounted_for(tmp_path: Path) -
     assert json.loads((tmp_path / "out" / "delay-bench.json").read_text()) == report
     assert "<svg" in (tmp_path / "out" / "delay-bench.html").read_text()
     (run,) = report["runs"]
-    assert (run["link"], run["width_px"], run["height_px"], run["camera_rate_hz"]) == ("ipc", 320, 240, 15)
+    traced = checked((tmp_path / "out" / "trace.json").read_text())
+    assert sum(event["ph"] == "s" for event in traced) == run["measured_pairs"]
+    assert (run["link"], run["width_px"], run["height_px"], run["camera_rate_hz"]) == ("ipc", 160, 120, 15)
     assert run["measured_pairs"] > 0
     delays, whole = run["delays"], run["whole_run"]
     parts = ("capture", "outbox", "propagation", "pairing", "queuing", "processing")
@@ -150,6 +153,44 @@ def test_profiles_are_listed() -> None:
     listed = json.loads(subprocess.run([*command, "--json"], capture_output=True, text=True, check=True).stdout)
     assert {"bluetooth", "wifi", "usb-serial", "ethernet"} <= {one["name"] for one in listed["profiles"]}
     assert all(one["name"] in said and one["source"] in said for one in listed["profiles"])
+
+
+def test_a_matrix_foretells_each_run_from_the_others(tmp_path: Path) -> None:
+    """Two qualities and two rates over one link: sizes differ, so there is a line with an interval, a prediction for each run, and settings not run."""
+    with bench(
+        ["--links", "ipc", "--size", "160x120", "--quality", "40,95", "--fps", "10,20", "--seconds", "1", "--json"],
+        tmp_path,
+    ) as running:
+        assert running.wait() == 0, running.stderr
+    report = running.json()
+    assert len(report["runs"]) == 4
+    (line,) = report["interfaces"]
+    assert line["fitted_frames"] == sum(run["measured_pairs"] for run in report["runs"])
+    assert line["slope_low_ns_per_byte"] <= line["slope_ns_per_byte"] <= line["slope_high_ns_per_byte"]
+    for one in report["predictions"]:
+        rate_hz = int(one["images"].split()[-2])
+        # A fast link and a small image: the camera sets the rate, measured and foretold.
+        assert one["predicted"]["pair_rate_hz"] == pytest.approx(rate_hz, rel=0.2)
+        assert one["predicted"]["end_to_end_p50_ms"] > 0
+    settings = {one["setting"]: one["predicted"] for one in report["not_run_settings"] if one["link"] == "ipc"}
+    faster = settings["camera twice as fast"]["pair_rate_hz"]
+    assert faster > next(value for name, value in settings.items() if "as it was run" in name)["pair_rate_hz"]
+    assert {one["link"] for one in report["not_run_settings"]} > {"bluetooth (serial)", "wifi (tcp)"}
+
+
+def test_a_full_disk_is_said_and_the_table_is_not_lost(tmp_path: Path) -> None:
+    """When the files cannot be written the command has printed its report all the same, and exits 3 with one line that names the folder."""
+    out = tmp_path / "disk"
+    out.mkdir()
+    bench_run = [sys.executable, "-P", "-m", "phone_host.bench_cli", *SHORT, "--json", "--out", str(out)]
+    small = 'mount -t tmpfs -o size=8k tmpfs "$1" && shift && exec "$@"'
+    command = ["unshare", "-rm", "sh", "-c", small, "sh", str(out), *bench_run]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if "unshare" in done.stderr or "mount" in done.stderr:
+        pytest.skip(f"no small disk can be had here: {done.stderr.strip()}")
+    assert done.returncode == 3, done.stderr
+    assert str(out) in done.stderr.splitlines()[-1]
+    assert json.loads(done.stdout)["runs"][0]["measured_pairs"] > 0
 
 
 def test_a_folder_that_cannot_be_made_is_exit_3(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from common.errors import SettingsError
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts
 from phone_host.bench import WARM_UP_S, CaseResult, after_warm_up, rig_of
+from phone_host.bench_analysis import Analysis, analyse
 from phone_host.bench_cases import (
     LOCAL_LINKS,
     SHAPED_LINKS,
@@ -26,7 +27,8 @@ from phone_host.bench_cases import (
     parse_rates,
     parse_sizes,
 )
-from phone_host.bench_report import Conditions, as_json, losses, page, rows
+from phone_host.bench_page import page
+from phone_host.bench_report import Conditions, as_json, losses, rows
 from phone_host.boardprocess import BoardAccount
 from phone_host.delays import DELAYS, STAGES
 from phone_host.emulate import PROFILES
@@ -71,6 +73,10 @@ def result(pairs: int = 100, link: str = "tcp") -> CaseResult:
     board = BoardAccount(108, 105, (("no_host", 3),))
     case = Case(Interface(link), Size(640, 480), 80, 30)
     return CaseResult(case, kept, measured_s, 70e3, board, LinkAccount([account]), host, 100, 0)
+
+
+def analysed(*results: CaseResult) -> Analysis:
+    return analyse(results, UNDER.fifo)
 
 
 def keys_of_numbers(value: Any, key: str = "") -> list[str]:
@@ -185,14 +191,14 @@ def test_the_first_second_is_left_out(pairs: int) -> None:
 
 def test_every_number_of_the_report_has_its_unit_in_its_key() -> None:
     """A reader needs nothing but the key to know what a number is."""
-    report = as_json([result()], UNDER)
+    report = as_json([result()], UNDER, analysed(result()))
     assert json.loads(json.dumps(report, allow_nan=False)) == report
     assert [key for key in keys_of_numbers(report) if not key.endswith(UNITS)] == []
 
 
 def test_report_holds_each_delay_and_stage() -> None:
     """The known delays of the pairs come out, stage by stage, in ms."""
-    run: Any = as_json([result()], UNDER)["runs"]
+    run: Any = as_json([result()], UNDER, analysed(result()))["runs"]
     known = {
         "capture": 1,
         "outbox": 2,
@@ -216,7 +222,7 @@ def test_report_holds_each_delay_and_stage() -> None:
 
 def test_counts_of_the_report_are_conserved() -> None:
     """Grabbed = sent + dropped; sent = received + lost + under way; received = paired + orphaned; paired = processed + dropped."""
-    runs: Any = as_json([result()], UNDER)["runs"]
+    runs: Any = as_json([result()], UNDER, analysed(result()))["runs"]
     whole = runs[0]["whole_run"]
     assert whole["grabbed_frames"] == whole["sent_frames"] + sum(whole["dropped_on_board_frames"].values())
     assert whole["sent_frames"] == whole["received_frames"] + whole["lost_on_link_frames"] + 1
@@ -238,11 +244,11 @@ def test_losses_name_what_became_of_each_frame() -> None:
 def test_a_run_without_pairs_is_reported_without_numbers() -> None:
     """Nothing measured is null in JSON and a dash in the table, never a zero."""
     empty = result(pairs=0)
-    runs: Any = as_json([empty], UNDER)["runs"]
+    runs: Any = as_json([empty], UNDER, analysed(empty))["runs"]
     assert runs[0]["delays"]["processing"]["p50_ms"] is None
     assert runs[0]["pair_rate_hz"] is None
     assert {cell for row in rows([empty]) for cell in row[2:]} == {"-"}
-    assert "No pair was processed" in page([empty], UNDER)
+    assert "No pair was processed" in page([empty], UNDER, analysed(empty))
 
 
 def test_the_table_has_a_line_for_each_stage_and_link() -> None:
@@ -276,16 +282,13 @@ def test_page_is_whole_html_and_refers_to_nothing_outside() -> None:
 
     checker = Checker()
     checker.open_tags = []
-    text = page(
-        [
-            result(),
-            result(link="ipc"),
-            dataclasses.replace(result(), case=Case(Interface("tcp"), Size(320, 240), 80, 15)),
-        ],
-        UNDER,
-    )
+    small = dataclasses.replace(result(), case=Case(Interface("tcp"), Size(320, 240), 80, 15))
+    results = [result(), result(link="ipc"), small]
+    text = page(results, UNDER, analysed(*results))
     checker.feed(text)
     assert checker.open_tags == []
-    assert checker.plots == 2 * 3 * 2
+    # In two widths each: four for both kinds of images, one for both interfaces, one for the model.
+    assert checker.plots == 2 * (4 * 2 + 2 + 1)
+    assert "rfcomm was not run: no radio" in text
     assert "640x480 JPEG 80 at 30" in text
     assert "320x240 JPEG 80 at 15" in text

@@ -1,0 +1,207 @@
+"""What follows from the measured cells together: each interface's latency and rate, predictions beside measurements, settings not run. Pure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from common.ledger import PairLedger
+from phone_host.bench import CaseResult
+from phone_host.bench_cases import Case, Interface
+from phone_host.emulate import PROFILES
+from phone_host.fits import DelayFit
+from phone_host.prediction import (
+    Cell,
+    Figures,
+    Images,
+    Target,
+    Unknown,
+    fit_of,
+    foretell,
+    held_out,
+    learn_link,
+    measured,
+    nominal_link,
+    values_of,
+)
+from phone_host.queue_model import LinkModel
+from phone_host.sync.fifo import FifoSettings, Overflow
+
+_SELF_PACED: Final = ("serial", "rfcomm")
+
+
+@dataclass(frozen=True, slots=True)
+class InterfaceFit:
+    """Propagation over one interface, from all of its runs.
+
+    Attributes:
+        interface: which.
+        results: its runs that gave pairs.
+        fit: latency + bytes / rate.
+    """
+
+    interface: Interface
+    results: tuple[CaseResult, ...]
+    fit: DelayFit
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """One run beside what the model says of it from all other runs.
+
+    Attributes:
+        case: which.
+        measured: the run.
+        predicted: from the others; or why not.
+    """
+
+    case: Case
+    measured: Figures
+    predicted: Figures | Unknown
+
+
+@dataclass(frozen=True, slots=True)
+class WhatIf:
+    """A setting that was not run.
+
+    Attributes:
+        interface: its name.
+        setting: what is different, in words.
+        figures: predicted; or why not.
+    """
+
+    interface: str
+    setting: str
+    figures: Figures | Unknown
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """Everything that follows from a matrix.
+
+    Attributes:
+        fits: one for each interface.
+        checked: one for each run that gave pairs.
+        what_ifs: settings that were not run.
+    """
+
+    fits: tuple[InterfaceFit, ...]
+    checked: tuple[Checked, ...]
+    what_ifs: tuple[WhatIf, ...]
+
+    @property
+    def typical_error(self) -> float:
+        """Median relative error of the predicted median end-to-end delay, 0 = none; NaN without predictions."""
+        errors = [
+            abs(one.predicted.end_to_end_p50_ns / one.measured.end_to_end_p50_ns - 1.0)
+            for one in self.checked
+            if isinstance(one.predicted, Figures)
+        ]
+        return float(np.median(errors)) if errors else float("nan")
+
+
+def analyse(results: Sequence[CaseResult], fifo: FifoSettings) -> Analysis:
+    """Look at all runs together.
+
+    Args:
+        results: what was measured.
+        fifo: the queue of all runs.
+    """
+    useful = [result for result in results if result.ledgers]
+    cells = [_cell(result, fifo) for result in useful]
+    checked = [
+        Checked(result.case, measured(cell), held_out(cell, cells)) for result, cell in zip(useful, cells, strict=True)
+    ]
+    by_interface: dict[str, list[CaseResult]] = {}
+    for result in useful:
+        by_interface.setdefault(str(result.case.interface), []).append(result)
+    fits = [
+        InterfaceFit(mine[0].case.interface, tuple(mine), fit_of(_all_ledgers(mine), intervals=True))
+        for mine in by_interface.values()
+    ]
+    return Analysis(tuple(fits), tuple(checked), tuple(_what_ifs(cells, fifo)))
+
+
+def typical_and_slow(result: CaseResult) -> tuple[int, int]:
+    """Which of a run's pairs stand for it: the one at the median of end-to-end, and the one at its 99th percentile."""
+    order = np.argsort(values_of(result.ledgers, lambda ledger: ledger.end_to_end_ns), kind="stable")
+    last = order.size - 1
+    return int(order[last // 2]), int(order[round(0.99 * last)])
+
+
+def _cell(result: CaseResult, fifo: FifoSettings) -> Cell:
+    case = result.case
+    interface = str(case.interface)
+    return Cell(
+        interface=interface,
+        self_paced=case.interface.link.startswith(_SELF_PACED),
+        images=Images(
+            case.size.width_px,
+            case.size.height_px,
+            1e9 / case.rate_hz,
+            values_of(result.ledgers, lambda ledger: ledger.bytes),
+        ),
+        fifo=fifo,
+        ledgers=result.ledgers,
+        pairs_per_s=result.pairs_per_second,
+        lost_share=_lost_share(result),
+    )
+
+
+def _lost_share(result: CaseResult) -> float:
+    """Of the frames for which there was a host, those that a newer one replaced or whose pair the FIFO dropped."""
+    replaced = dict(result.board.dropped).get("replaced", 0)
+    kept = result.board.sent / max(1, result.board.sent + replaced)
+    return 1.0 - kept * (1.0 - result.counts.dropped / max(1, result.counts.paired))
+
+
+def _all_ledgers(results: Sequence[CaseResult]) -> tuple[PairLedger, ...]:
+    return tuple(ledger for result in results for ledger in result.ledgers)
+
+
+def _what_ifs(cells: Sequence[Cell], fifo: FifoSettings) -> list[WhatIf]:
+    """Each interface's heaviest run with one thing changed, and the profiles that nobody ran in place of its link."""
+    found = []
+    heaviest: dict[str, Cell] = {}
+    for cell in cells:
+        if cell.interface not in heaviest or _load(cell) > _load(heaviest[cell.interface]):
+            heaviest[cell.interface] = cell
+    for cell in heaviest.values():
+        link = learn_link(cell.interface, cell.images, cells)
+        if isinstance(link, LinkModel):
+            target = Target(cell.interface, link, cell.images, fifo)
+            found += [WhatIf(cell.interface, words, foretell(one, cells)) for words, one in _changes(target)]
+    if heaviest:
+        base = max(heaviest.values(), key=_load)
+        for profile in PROFILES:
+            interface = Interface(profile.carrier, profile)
+            if str(interface) not in heaviest:
+                link = nominal_link(profile, self_paced=profile.carrier in _SELF_PACED)
+                target = Target(str(interface), link, base.images, fifo)
+                found.append(
+                    WhatIf(str(interface), f"{_images(base.images)}, from its figures alone", foretell(target, cells))
+                )
+    return found
+
+
+def _load(cell: Cell) -> float:
+    return float(cell.images.size_bytes.mean()) / cell.images.period_ns
+
+
+def _images(images: Images) -> str:
+    size = f"{images.width_px}x{images.height_px}"
+    return f"{size} {images.size_bytes.mean() / 1e3:.0f} kB {1e9 / images.period_ns:.0f}/s"
+
+
+def _changes(target: Target) -> list[tuple[str, Target]]:
+    images = target.images
+    return [
+        (f"{_images(images)}, as it was run", target),
+        ("camera twice as fast", replace(target, images=replace(images, period_ns=images.period_ns / 2))),
+        ("half the bytes", replace(target, images=replace(images, size_bytes=images.size_bytes / 2))),
+        ("matcher twice as fast", replace(target, processing_factor=0.5)),
+        ("matcher four times slower", replace(target, processing_factor=4.0)),
+        ("FIFO 4:drop-newest", replace(target, fifo=FifoSettings(4, Overflow.DROP_NEWEST))),
+        ("FIFO 1:block", replace(target, fifo=FifoSettings(1, Overflow.BLOCK))),
+    ]

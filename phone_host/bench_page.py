@@ -1,0 +1,195 @@
+"""The delay benchmark's page: one self-contained HTML document, offline, light and dark, desk and phone. Pure."""
+
+import math
+from collections.abc import Sequence
+from html import escape
+from typing import Final
+
+from phone_host.bench import WARM_UP_S, CaseResult
+from phone_host.bench_analysis import Analysis, InterfaceFit, typical_and_slow
+from phone_host.bench_report import (
+    FIT_COLUMNS,
+    PREDICTION_COLUMNS,
+    Conditions,
+    checked_rows,
+    fit_rows,
+    grouped,
+    rate_text,
+    summary_line,
+    what_if_rows,
+)
+from phone_host.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
+from phone_host.plot_scale import duration_text
+from phone_host.plots import Budget, Part, Quantity, Strips, budgets, distributions, legend
+from phone_host.prediction import Figures, values_of
+from phone_host.report_page import DelaySeries, delay_series, document, section, two_widths
+
+_PALETTE: Final = 8
+_HALF_PX: Final = 450
+
+_FIT_WORDS: Final = (
+    "Propagation, from the first byte written to the last received, is a latency and the bytes over a rate: the line of least absolute deviations "
+    "through all frames of an interface, with 95 % intervals by a block bootstrap. Colours are the camera's rates; triangles are cut off."
+)
+_MODEL_WORDS: Final = (
+    "Median end-to-end delay of each run. Each run is predicted from all the other runs: arrivals as the camera's clock gives them, the link as fitted, processing drawn "
+    "from what was measured elsewhere, then Lindley's recursion through outbox, link, FIFO and worker. Nothing of a run enters its own prediction "
+    "but its settings and the sizes of its frames. Lost: replaced by a newer frame on the board, or dropped in the FIFO."
+)
+_WHAT_IF_WORDS: Final = (
+    "The same model for settings that nobody ran: each interface's heaviest run with one thing changed, and in its place the profiles of --emulate, "
+    "as their figures stand there. No more than a prediction: a processor that several things compete for is slower than one that they do not."
+)
+
+
+def page(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> str:
+    """A self-contained HTML page: the interfaces beside each other, the model beside the measurement, then every run stage by stage.
+
+    Args:
+        results: what was measured.
+        under: machine, date, settings.
+        analysis: what follows from the results.
+    """
+    head = (
+        f"<header><h1>Delays of every interface and stage</h1><p class='sub'>{escape(under.machine)} · {escape(under.date)} · "
+        f"matcher {escape(under.matcher)}, FIFO {under.fifo.depth}:{under.fifo.overflow.value}</p></header>"
+    )
+    cards = [_glance(results, under, analysis), _fits(analysis), _model(analysis), _what_ifs(analysis)]
+    cards += [_card(group) for group in grouped(results)]
+    cards.append(section("How this was measured", _method(results, under), ""))
+    return document("delay-bench", head + "".join(cards))
+
+
+def _method(results: Sequence[CaseResult], under: Conditions) -> str:
+    shaped = any(result.case.interface.profile is not None for result in results)
+    emulated = (
+        " An interface with a link in brackets is emulated: that link, with its bytes passed on by a process between the two programs at the "
+        "interface's rate, delay and losses."
+        if shaped
+        else ""
+    )
+    return (
+        f"Two real programs over rendered films, {under.seconds:g} s for each run after a warm-up of {WARM_UP_S:g} s that is left out. Delays are on the "
+        f"host's clock; propagation carries the clocks' uncertainty.{emulated}"
+    )
+
+
+def _glance(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> str:
+    missing = "".join(f"<li>{escape(str(one))} was not run: {escape(reason)}</li>" for one, reason in under.not_run)
+    content = _table(FIT_COLUMNS, fit_rows(analysis)) + (f"<ul>{missing}</ul>" if missing else "")
+    words = f"{len(results)} runs. Propagation = latency + bytes / rate; the clock's uncertainty is the 95th percentile of the worst run."
+    return section("The interfaces", words, content)
+
+
+def _fits(analysis: Analysis) -> str:
+    if not analysis.fits:
+        return ""
+    rates = sorted({result.case.rate_hz for one in analysis.fits for result in one.results})
+    colours = {rate_hz: index % _PALETTE for index, rate_hz in enumerate(rates)}
+    plots = "".join(
+        f"<div><h3>{escape(str(one.interface))}: {_line(one)}</h3>{_scatter(one, colours)}</div>"
+        for one in analysis.fits
+    )
+    names = legend([(f"{rate_hz} frames/s", colour) for rate_hz, colour in colours.items()])
+    return section("Delay against bytes", _FIT_WORDS, f"{names}<div class='pair'>{plots}</div>")
+
+
+def _line(one: InterfaceFit) -> str:
+    if math.isnan(one.fit.ns_per_byte):
+        return "frames of one size only, no rate to be told"
+    return f"{duration_text(one.fit.latency_ns)} + bytes / {rate_text(one.fit.bytes_per_s)}"
+
+
+def _scatter(one: InterfaceFit, colours: dict[int, int]) -> str:
+    ledgers = [ledger for result in one.results for ledger in result.ledgers]
+    size = values_of(ledgers, lambda ledger: ledger.bytes)
+    delay = values_of(ledgers, lambda ledger: ledger.propagation_ns)
+    runs = tuple(colours[result.case.rate_hz] for result in one.results for _ in result.ledgers)
+    scatter = Scatter(size, delay, runs, one.fit)
+    return two_widths(lambda width: against_bytes(scatter, width), _HALF_PX)
+
+
+def _model(analysis: Analysis) -> str:
+    if len(analysis.checked) < 2:
+        return section("The model beside the measurement", "One run alone predicts nothing: measure two or more.", "")
+    error = analysis.typical_error
+    share = (
+        f" Half of the predicted medians of end-to-end are within {100.0 * error:.0f} % of the measured ones."
+        if not math.isnan(error)
+        else ""
+    )
+    names = list(dict.fromkeys(str(one.interface) for one in analysis.fits))
+    colours = {name: index % _PALETTE for index, name in enumerate(names)}
+    points = [
+        Compared(
+            f"{one.case.interface} {one.case.short}",
+            one.measured.end_to_end_p50_ns,
+            one.predicted.end_to_end_p50_ns,
+            colours[str(one.case.interface)],
+        )
+        for one in analysis.checked
+        if isinstance(one.predicted, Figures)
+    ]
+    plot = legend(list(colours.items())) + two_widths(lambda width: compared(points, width)) if points else ""
+    content = f"{plot}<h3>Measured | predicted</h3>{_table(PREDICTION_COLUMNS, checked_rows(analysis))}"
+    return section("The model beside the measurement", _MODEL_WORDS + share, content)
+
+
+def _what_ifs(analysis: Analysis) -> str:
+    if not analysis.what_ifs:
+        return ""
+    return section("Settings that were not run", _WHAT_IF_WORDS, _table(PREDICTION_COLUMNS, what_if_rows(analysis)))
+
+
+def _card(results: Sequence[CaseResult]) -> str:
+    """The card of one kind of images: a bar for each interface, each delay and stage by itself, the lives of single pairs."""
+    title = results[0].case.images
+    useful = [result for result in results if result.ledgers]
+    if not useful:
+        return section(title, "No pair was processed.", "")
+    measured = [(str(result.case.interface), delay_series(result.ledgers)) for result in useful]
+    delays, stages = measured[0][1].delays, measured[0][1].stages
+    bars = [Budget(name, tuple(_mean(quantity) for quantity in series.delays)) for name, series in measured]
+    work = [Budget(name, tuple(_mean(quantity) for quantity in series.stages)) for name, series in measured]
+    strips = [Strips(name, _quantities(series)) for name, series in measured]
+    chosen = [life for result in useful for life in _lives(result)]
+    summaries = "".join(
+        f"<li>{escape(str(result.case.interface))}: {escape(summary_line(result))}</li>" for result in results
+    )
+    content = (
+        f'<ul style="font-size:.85rem;color:var(--ink2)">{summaries}</ul>'
+        + legend([(quantity.label, quantity.colour) for quantity in delays])
+        + two_widths(lambda width: budgets(bars, width))
+        + "<h3>Single pairs: one at the median of end-to-end, one at its 99th percentile</h3>"
+        + two_widths(lambda width: lives(chosen, width))
+        + "<h3>Stages of processing, means</h3>"
+        + legend([(quantity.label, quantity.colour) for quantity in stages])
+        + two_widths(lambda width: budgets(work, width))
+        + "<details><summary>The distribution of each delay and stage</summary>"
+        + two_widths(lambda width: distributions(strips, width))
+        + "</details>"
+    )
+    return section(title, "Means of all pairs, from the middle of the exposure to the written result.", content)
+
+
+def _lives(result: CaseResult) -> list[Life]:
+    name = str(result.case.interface)
+    typical, slow = typical_and_slow(result)
+    return [
+        Life(f"{name}, typical", result.ledgers[typical]),
+        Life(f"{name}, slow", result.ledgers[slow]),
+    ]
+
+
+def _quantities(series: DelaySeries) -> tuple[Quantity, ...]:
+    return (*series.delays, series.end_to_end, series.starvation, *series.stages)
+
+
+def _mean(quantity: Quantity) -> Part:
+    return Part(quantity.label, float(quantity.values_ns.mean()), quantity.colour)
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    head = "".join(f"<th>{escape(name)}</th>" for name in columns)
+    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+    return f'<div class="scroll"><table style="white-space:nowrap;font-size:.82rem"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
