@@ -17,6 +17,7 @@ class StageTimes:
     match: int = 0
     reproject: int = 0
     write: int = 0
+    interpolate: int = 0
 
 
 @dataclass(frozen=True, slots=True)

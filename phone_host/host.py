@@ -14,7 +14,7 @@ from common.errors import DataError, UnavailableError
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.logs import event
-from common.protocol.message import Pacing, RefusalReason
+from common.protocol.message import Pacing, RefusalReason, Steering
 from phone_host.delays import DelayStatistics
 from phone_host.model import FramePair, Side, TimeOffset
 from phone_host.pairqueue import PairQueue
@@ -24,6 +24,7 @@ from phone_host.report import RunFacts
 from phone_host.results import Results
 from phone_host.source import Source
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.interpolate import Interpolator
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Alignment, PhaseController, Whose
 
@@ -61,7 +62,8 @@ class HostSettings:
         out: folder for results; None to write none.
         save_every: every which pair is saved; 0 for none.
         time_offset: between the two cameras' stamps.
-        align_phase: whether a camera is steered until both expose together.
+        interpolate: whether the board's image is taken to the moment of the host's before anything else is done with it.
+        steered: the cameras that may be steered until both expose together; none: the phase stays as it is.
     """
 
     board_side: Side = Side.LEFT
@@ -72,7 +74,8 @@ class HostSettings:
     out: Path | None = None
     save_every: int = 30
     time_offset: TimeOffset = field(default_factory=TimeOffset)
-    align_phase: bool = False
+    interpolate: bool = False
+    steered: frozenset[Whose] = frozenset()
 
 
 class Host:
@@ -108,7 +111,9 @@ class Host:
         )
         self.source = Source(camera, self.queue.add_host)
         self.receiver = Receiver(link, now.random_id(), self.queue, self)
-        self._pipeline = Pipeline(core, settings.board_side, now.monotonic_ns)
+        self._pipeline = Pipeline(
+            core, settings.board_side, now.monotonic_ns, Interpolator() if settings.interpolate else None
+        )
         self._on_pair = on_pair
         self._worker = threading.Thread(target=self._work, name="worker", daemon=True)
         self._controller: PhaseController | None = None
@@ -201,12 +206,13 @@ class Host:
     def _align(self, now_ns: int) -> None:
         """Steer a camera where that was asked for and is due; another life of the board is steered anew."""
         hello = self.receiver.hello
-        if not self.settings.align_phase or hello is None or not self.receiver.connected:
+        if not self.settings.steered or hello is None or not self.receiver.connected:
             return
         if self._controller is None or hello.session != self._steered_session:
             self._steered_session = hello.session
-            ways = hello.camera.steering, self.source.steering
-            self._controller = PhaseController(*ways, has_phase=self.queue.has_phase)
+            ways = (Whose.BOARD, hello.camera.steering), (Whose.HOST, self.source.steering)
+            board, own = (way if whose in self.settings.steered else Steering.NONE for whose, way in ways)
+            self._controller = PhaseController(board, own, has_phase=self.queue.has_phase)
         state = self._controller.alignment.state
         correction = self._controller.update(now_ns, self.queue.phase)
         if correction is not None:
@@ -315,7 +321,12 @@ class Host:
             done_ns=done_ns,
             previous_done_ns=self.last_done_ns or pair.queued_ns,
             stages=type(stages)(
-                stages.decode, stages.rectify, stages.match, stages.reproject, done_ns - before_write_ns
+                stages.decode,
+                stages.rectify,
+                stages.match,
+                stages.reproject,
+                done_ns - before_write_ns,
+                stages.interpolate,
             ),
             time_skew_ns=pair.time_skew_ns,
             offset_ns=board.offset_ns,

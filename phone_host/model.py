@@ -183,6 +183,7 @@ class FramePair:
         time_skew_ns: exposure of the board's frame minus that of the host's.
         paired_ns: when the partner was found.
         queued_ns: when the pair entered the FIFO.
+        before: the board's frame before that one, if it is at hand.
     """
 
     board: BoardFrame
@@ -190,3 +191,4 @@ class FramePair:
     time_skew_ns: int
     paired_ns: int
     queued_ns: int
+    before: BoardFrame | None = None

@@ -4,6 +4,7 @@ Conservation: received = paired + orphaned(by reason) + held; paired = taken + d
 """
 
 import threading
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, assert_never
@@ -17,6 +18,9 @@ from phone_host.sync.phase import Phase, PhaseMeter
 
 _SIDE_BYTES: Final = 64 * 1024 * 1024
 """Frames of each side wait for their partners, still encoded, in at most this much memory: 40 s of 50 KB JPEGs at 30 fps, more than any link delays."""
+
+_NEWEST: Final = 4
+"""Board frames kept beside those that wait: a pair is nearly always formed before its frame has three successors."""
 
 _FIRST_WAIT_NS: Final = 2_000_000_000
 """Before a delay has been measured a host frame waits this long for its partner."""
@@ -85,6 +89,7 @@ class PairQueue:
         self._timeless = on_demand
         self._time_offset_ns = time_offset_ns
         self._meter: PhaseMeter | None = None
+        self._newest: deque[BoardFrame] = deque(maxlen=_NEWEST)
         self._received = self._host_frames = self._paired = self._dropped = self._taken = 0
         self._board_orphans: dict[str, int] = {}
         self._host_orphans: dict[str, int] = {}
@@ -159,6 +164,7 @@ class PairQueue:
             # The study of links found bursts up to twice the usual delay; the slow decay follows a link that gets faster.
             self._host_wait_ns = min(_SLOWEST_NS, max(delay_ns, self._host_wait_ns * 63 // 64))
             self._board_bytes += len(frame.message.payload)
+            self._newest.append(frame)
             exposed_ns = frame.marks.exposed_ns + self._time_offset_ns
             if self._meter is not None:
                 self._meter.add_board(exposed_ns)
@@ -226,7 +232,7 @@ class PairQueue:
                     self._board_bytes -= len(board.message.payload)
                     paired_ns = now.monotonic_ns()
                     self._paired += 1
-                    pair = FramePair(board, host, time_skew_ns, paired_ns, now.monotonic_ns())
+                    pair = FramePair(board, host, time_skew_ns, paired_ns, now.monotonic_ns(), self._before(board))
                     self._dropped += len(self._fifo.put(pair))
                     self._changed.notify()
                 case BoardOrphan(frame, reason):
@@ -237,6 +243,12 @@ class PairQueue:
                     self._count(self._host_orphans, reason.value)
                 case _:
                     assert_never(outcome)
+
+    def _before(self, frame: BoardFrame) -> BoardFrame | None:
+        """The newest board frame of the same session that was exposed before this one."""
+        session, exposed_ns = frame.message.session, frame.marks.exposed_ns
+        older = (f for f in self._newest if f.message.session == session and f.marks.exposed_ns < exposed_ns)
+        return max(older, key=lambda f: f.marks.exposed_ns, default=None)
 
     @staticmethod
     def _count(account: dict[str, int], reason: str) -> None:

@@ -1,14 +1,16 @@
-"""What the worker does with a pair: decode, rectify or pass, match, reproject; each stage timed. The order of the stages lives here."""
+"""What the worker does with a pair: decode, interpolate if asked for, rectify or pass, match, reproject; each stage timed. The order of the stages lives here."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from common.errors import DataError
 from common.frame import Frame
 from common.ledger import StageTimes
 from common.protocol.message import FrameMessage
-from phone_host.model import CloudImage, Disparity, FramePair, RectifiedPair, Side
+from phone_host.model import CloudImage, Disparity, FramePair, Image, RectifiedPair, Side
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.raw_images import EncodedImage, decode_frames
+from phone_host.stereo.interpolate import LARGEST_PART, Interpolator
+from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +37,17 @@ class Pipeline:
         core: rectification, matching and reprojection; None to decode only (delays without depth).
         board_side: which view the board's frame is.
         clock: gives ns of CLOCK_MONOTONIC.
+        interpolator: takes the board's image to the moment of the host's; None to leave it as it is.
     """
 
-    def __init__(self, core: StereoCore | None, board_side: Side, clock: Callable[[], int]) -> None:
+    def __init__(
+        self,
+        core: StereoCore | None,
+        board_side: Side,
+        clock: Callable[[], int],
+        interpolator: Interpolator | None = None,
+    ) -> None:
+        self._interpolator = interpolator
         self._core = core
         self._board_side = board_side
         self._clock = clock
@@ -59,8 +69,14 @@ class Pipeline:
         start_ns = self._clock()
         left, right = decode_frames(first, second)
         decoded_ns = self._clock()
+        if self._board_side is Side.LEFT:
+            left = self._at_host_time(pair, left)
+        else:
+            right = self._at_host_time(pair, right)
+        interpolated_ns = self._clock()
+        early = StageTimes(decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
         if self._core is None:
-            return Processed(RectifiedPair(left, right), None, None, StageTimes(decode=decoded_ns - start_ns))
+            return Processed(RectifiedPair(left, right), None, None, early)
         rectified = self._core.rectify(left, right)
         rectified_ns = self._clock()
         disparity = self._core.match(rectified)
@@ -68,12 +84,26 @@ class Pipeline:
         cloud = self._core.reproject(disparity) if self._core.geometry is not None else None
         reprojected_ns = self._clock()
         stages = StageTimes(
-            decode=decoded_ns - start_ns,
-            rectify=rectified_ns - decoded_ns,
+            decode=early.decode,
+            interpolate=early.interpolate,
+            rectify=rectified_ns - interpolated_ns,
             match=matched_ns - rectified_ns,
             reproject=reprojected_ns - matched_ns,
         )
         return Processed(rectified, disparity, cloud, stages)
+
+    def _at_host_time(self, pair: FramePair, image: Image) -> Image:
+        """The board's image as it would have been at the host's exposure; as it is where the frame before is missing, far away or spoiled."""
+        if self._interpolator is None or pair.before is None:
+            return image
+        part = pair.time_skew_ns / (pair.board.marks.exposed_ns - pair.before.marks.exposed_ns)
+        if abs(part) > LARGEST_PART:
+            return image
+        try:
+            earlier = decode_frame(_encoded(pair.before.message, "board"))
+        except DataError:
+            return image
+        return self._interpolator.back(earlier, image, part) if earlier.shape == image.shape else image
 
 
 def _encoded(frame: FrameMessage | Frame, whose: str) -> EncodedImage:

@@ -52,8 +52,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--align-phase",
+        nargs="?",
+        const="either",
+        choices=("either", "board", "host"),
+        help="steer a camera until both expose together; which one may be steered (default either)",
+    )
+    parser.add_argument(
+        "--interpolate",
         action="store_true",
-        help="steer a camera until both expose together (board's or own; it takes no notice: the report says so)",
+        help="move the board's image to the host's moment along the optical flow, where no camera can be steered",
     )
     parser.add_argument(
         "--pairs", type=int, default=0, metavar="N", help="end after N pairs; fewer when the stream ends: exit 4"
@@ -87,6 +94,7 @@ def run(options: argparse.Namespace) -> int:
     from phone_host.model import Side, TimeOffset  # noqa: PLC0415
     from phone_host.report import build, summary  # noqa: PLC0415
     from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
+    from phone_host.sync.phase import Whose  # noqa: PLC0415
     from phone_host.verbs.stereo_options import build_core  # noqa: PLC0415
 
     settings = resolve_settings(options).values
@@ -116,7 +124,8 @@ def run(options: argparse.Namespace) -> int:
         out=options.out,
         save_every=options.save_every,
         time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
-        align_phase=options.align_phase,
+        interpolate=options.interpolate,
+        steered=frozenset(whose for whose in Whose if options.align_phase in {"either", whose.value}),
     )
     link = open_link(parse_link(settings.link, listens_by_default=False), key_folder(settings.keys))
     signals = StopSignals()

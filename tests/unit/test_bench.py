@@ -216,6 +216,7 @@ def test_report_holds_each_delay_and_stage() -> None:
         "match": 14,
         "reproject": 0,
         "write": 0,
+        "interpolate": 0,
     }
     assert run[0]["clock_uncertainty"]["p99_us"] == 40
 

@@ -76,11 +76,11 @@ def test_nothing_measured_is_nan() -> None:
 def test_each_delay_of_a_ledger_reaches_its_series() -> None:
     """Marks 1, 2, 4, ... ns apart give each delay and stage its own value, and time skews lose their sign."""
     board = BoardMarks(0, 1, 3)
-    ledger = PairLedger("s", 0, 0, 9, "tcp", board, 7, 9, 15, 31, 63, 14, StageTimes(1, 2, 3, 4, 5), -77, 0, 88)
+    ledger = PairLedger("s", 0, 0, 9, "tcp", board, 7, 9, 15, 31, 63, 14, StageTimes(1, 2, 3, 4, 5, 6), -77, 0, 88)
     statistic = DelayStatistics()
     statistic.add(ledger)
     expected = (1, 2, 4, 8, 16, 32, 63, 1)
     assert tuple(statistic.spread(name).max_ns for name in DELAYS) == expected
-    assert tuple(statistic.spread(name).max_ns for name in STAGES) == (1, 2, 3, 4, 5)
+    assert tuple(statistic.spread(name).max_ns for name in STAGES) == (1, 2, 3, 4, 5, 6)
     assert statistic.spread("time_skew").p50_ns == 77
     assert statistic.spread("uncertainty").p50_ns == 88

@@ -75,7 +75,7 @@ def test_json_has_exactly_the_agreed_keys(ledger: PairLedger) -> None:
     assert "\n" not in line
     record = json.loads(line)
     assert set(record) == set(KEYS.replace(",", " ").split())
-    assert set(record["stages_ns"]) == {"decode", "rectify", "match", "reproject", "write"}
+    assert set(record["stages_ns"]) == {"decode", "rectify", "match", "reproject", "write", "interpolate"}
     assert record["exposed_ns"] == ledger.board.exposed_ns
     assert record["paired_ns"] == ledger.paired_ns
     assert record["end_to_end_ns"] == ledger.end_to_end_ns

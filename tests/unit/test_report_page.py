@@ -199,7 +199,7 @@ def test_series_hold_what_the_ledgers_say() -> None:
     assert series.end_to_end.values_ns.tolist() == [35e6, 46e6]
     # Done at 35 ms and at 40 + 46 ms.
     assert series.time_s == pytest.approx([0.0, 0.051])
-    assert [quantity.values_ns[0] for quantity in series.stages] == [1e6, 2e6, 10e6, 3e6, 4e6]
+    assert [quantity.values_ns[0] for quantity in series.stages] == [1e6, 2e6, 10e6, 3e6, 4e6, 0.0]
     assert series.time_skew.values_ns[0] == -7000.0
     assert series.uncertainty.values_ns[0] == 9000.0
 
