@@ -149,6 +149,7 @@ class Agent:
         self._held_back = False
         self._retry_ns = 0
         self._garbage = 0
+        self._refused = 0
         self._stopping = False
         self._waiter = Waiter([wake, *(item for link in links for item in link.pollables)])
         self._camera_fd: int | None = None
@@ -233,7 +234,12 @@ class Agent:
                 try:
                     message = decode(header, payload)
                 except VersionError as error:
-                    _LOG.warning(event("host_refused", reason="version", theirs=error.theirs, ours=PROTOCOL_VERSION))
+                    self._refused += 1
+                    if self._refused.bit_count() == 1:  # as for garbage: an old host asks five times a second
+                        theirs, count = error.theirs, self._refused
+                        _LOG.warning(
+                            event("host_refused", reason="version", theirs=theirs, ours=PROTOCOL_VERSION, count=count)
+                        )
                     refusal = encode_for_any_version(error.theirs, Refusal(RefusalReason.VERSION))
                     self._links[index].send(incoming.connection, refusal, b"")
                 except ProtocolError as error:

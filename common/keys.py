@@ -213,6 +213,11 @@ def default_folder(environment: Mapping[str, str], *, service: bool) -> Path:
     return base / "tandemscan"
 
 
+def usual_keys() -> KeyFolder:
+    """The host's folder where no setting names another."""
+    return KeyFolder(default_folder(os.environ, service=False))
+
+
 def peer_at(peers: Sequence[Peer], address: str) -> Peer | None:
     """Find who is at an address: whoever was paired there last, else who is named like it, else the only one that there is.
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from common import now
 from common.camera.factory import open_camera
+from common.keys import usual_keys
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
@@ -160,7 +161,7 @@ def run_case(
         host = Host(
             HostSettings(wait_ns=PATIENCE_NS, save_every=0, fifo=settings.fifo),
             open_camera(shown.replay_uri(shown.right), HOST_CLOCK, now.monotonic_ns()),
-            open_link(parse_link(ends.address, listens_by_default=False)),
+            open_link(parse_link(ends.address, listens_by_default=False), usual_keys()),
             _core(case.size, settings.matcher),
             keep,
         )

@@ -15,6 +15,7 @@ from typing import Final
 
 from common import now
 from common.errors import SettingsError, UnavailableError
+from common.keys import usual_keys
 from common.link.factory import open_link, parse_link
 from common.protocol.message import BoardHello, Pacing
 from phone_host.bench_cases import BOARD_SETS, Case, Interface, Size
@@ -136,7 +137,7 @@ def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | No
     Raises:
         UnavailableError: there is no board, it is busy, or its images come on demand only.
     """
-    link = open_link(parse_link(uri, listens_by_default=False))
+    link = open_link(parse_link(uri, listens_by_default=False), usual_keys())
     receiver = Receiver(link, now.random_id(), PairQueue(FifoSettings(), None, 1), _Silent())
     receiver.start()
     try:

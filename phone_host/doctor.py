@@ -22,6 +22,7 @@ from common.doctor.finding import Finding, Verdict, fail, ok
 from common.doctor.machine_checks import check_bluetooth, check_clocks, check_disk, check_power, check_usb_log
 from common.doctor.unit_check import Unit
 from common.errors import TandemError, UnavailableError
+from common.keys import KeyFolder
 from common.link.factory import open_link, parse_link
 from common.protocol.message import RefusalReason
 from common.stamp import HOST_CLOCK
@@ -55,6 +56,7 @@ class Question:
         calibration: rig.yaml; empty: none is given.
         out: folder of the results.
         wait_s: how long the board is waited for, s.
+        keys: folder of this host's key and the boards that it knows.
     """
 
     camera: str
@@ -62,6 +64,7 @@ class Question:
     calibration: str
     out: Path
     wait_s: float
+    keys: KeyFolder
 
 
 def examine(question: Question) -> list[Finding]:
@@ -184,7 +187,7 @@ def _ask_board(question: Question) -> BoardReadings:
     from phone_host.receiver import Receiver  # noqa: PLC0415
     from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
 
-    link = open_link(parse_link(question.link, listens_by_default=False))
+    link = open_link(parse_link(question.link, listens_by_default=False), question.keys)
     receiver = Receiver(link, now.random_id(), PairQueue(FifoSettings(), None, 1), _Listener())
     receiver.start()
     pause = threading.Event()

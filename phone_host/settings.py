@@ -8,7 +8,7 @@ from pathlib import Path
 from common.errors import SettingsError
 from common.keys import KeyFolder, default_folder
 from common.link.factory import parse_link
-from common.settings import log_level, setting
+from common.settings import log_level, resolve, setting
 from phone_host.camera.factory import check_camera
 
 ENVIRONMENT_PREFIX = "PHONE_HOST"
@@ -56,3 +56,16 @@ def key_folder(keys: str) -> KeyFolder:
         keys: the setting; empty for the usual place.
     """
     return KeyFolder(Path(keys).expanduser() if keys else default_folder(os.environ, service=False))
+
+
+def chosen_keys(file: Path | None, option: str | None) -> KeyFolder:
+    """Give the folder of keys for a verb that needs no other setting.
+
+    Args:
+        file: settings file, or None.
+        option: what --keys says, or None.
+
+    Raises:
+        SettingsError: the file or the environment makes no sense.
+    """
+    return key_folder(resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, {"keys": option}).values.keys)

@@ -128,8 +128,10 @@ def secure_dialler(sock: "zmq.Socket[bytes]", own: OwnKey, peer: Peer) -> None:
 
 
 def _allow_envelope(sock: "zmq.Socket[bytes]") -> None:
-    """Keep the limit of a message's size what it is without keys; set before."""
-    sock.setsockopt(zmq.MAXMSGSIZE, int(sock.getsockopt(zmq.MAXMSGSIZE)) + _ENVELOPE_BYTES)
+    """Keep the limit of a message's size, set before, what it is without keys."""
+    limit_bytes = int(sock.getsockopt(zmq.MAXMSGSIZE))
+    if limit_bytes >= 0:  # -1: there is none
+        sock.setsockopt(zmq.MAXMSGSIZE, limit_bytes + _ENVELOPE_BYTES)
 
 
 def _names(keys: KeyFolder) -> dict[bytes, str]:

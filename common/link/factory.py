@@ -81,13 +81,13 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
     return LinkUri(address, listens_by_default if not options else "bind" in options, baud, unpaired, insecure)
 
 
-def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, takes_in: bool = False) -> Link:
+def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = False) -> Link:
     """Open the link: with keys where tcp leaves this machine, or where the peer at an address is known.
 
     Args:
         uri: what to open.
         keys: this machine's key and those that it trusts; None where only open links can be had.
-        takes_in: whether a link with keys also takes in new peers that prove a code (the board's do).
+        board: whether this side is the board, which over tcp and ipc takes no images and, where there are keys, new hosts that prove a code.
 
     Returns:
         The open link; a dialled peer may still be absent.
@@ -101,8 +101,6 @@ def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, takes_in: bool = F
         return _open_serial(uri)
     if uri.address.startswith("rfcomm:"):
         return _open_rfcomm(uri)
-    if uri.insecure:
-        _LOG.warning(event("link_insecure", address=uri.address, meaning="no keys: whoever reaches it sees the camera"))
     from common.link.zeromq import ZeroMqDialer, ZeroMqListener  # noqa: PLC0415 - only the transport that is used is loaded
 
     if not uri.listens and "//*:" in uri.address:
@@ -111,8 +109,14 @@ def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, takes_in: bool = F
         )
     if uri.listens:
         secured = _keys(uri, keys) if needs_keys(uri) else None
-        return ZeroMqListener(uri.address, secured, takes_in=takes_in)
-    return ZeroMqDialer(uri.address, keys, _peer(uri, keys))
+        return ZeroMqListener(uri.address, secured, board=board)
+    return ZeroMqDialer(uri.address, keys, _peer(uri, keys), board=board)
+
+
+def tell_insecure(uri: LinkUri) -> None:
+    """Say in the log, at a program's start, that a link is open because its owner wants so."""
+    if uri.insecure:
+        _LOG.warning(event("link_insecure", address=uri.address, meaning="no keys: whoever reaches it sees the camera"))
 
 
 def needs_keys(uri: LinkUri) -> bool:

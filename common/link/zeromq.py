@@ -67,9 +67,14 @@ _HANG_UPS: Final = 5
 """Handshakes that the peer may break off before it is told of: a board that restarts, or a port that is forwarded to nobody yet."""
 
 
-def _configure(sock: zmq.Socket[bytes]) -> None:
+def _most_bytes(*, board: bool) -> int:
+    """The longest part that is let in. Nobody sends images to a board: what it must keep for a peer that floods it is a few KB."""
+    return MAX_HEADER_BYTES if board else max(MAX_PAYLOAD_BYTES, MAX_HEADER_BYTES)
+
+
+def _configure(sock: zmq.Socket[bytes], most_bytes: int) -> None:
     for option, value in (
-        (zmq.MAXMSGSIZE, max(MAX_PAYLOAD_BYTES, MAX_HEADER_BYTES)),
+        (zmq.MAXMSGSIZE, most_bytes),
         (zmq.LINGER, _LINGER_MS),
         (zmq.IMMEDIATE, 1),
         (zmq.SNDHWM, _QUEUE_PACKETS),
@@ -139,7 +144,7 @@ class ZeroMqListener(_AlwaysReady):
     Args:
         address: `tcp://HOST:PORT` (`*` for every interface) or `ipc://PATH`.
         keys: holds this side's key and those that may connect; None: anybody may.
-        takes_in: whether new peers can be paired by a code, at the port behind this one.
+        board: whether this side is the board: it hears short messages only, and takes in new hosts by a code at the port behind this one.
 
     Raises:
         SettingsError: the address makes no sense.
@@ -147,7 +152,7 @@ class ZeroMqListener(_AlwaysReady):
         DataError: the files of keys are bad.
     """
 
-    def __init__(self, address: str, keys: KeyFolder | None = None, *, takes_in: bool = False) -> None:
+    def __init__(self, address: str, keys: KeyFolder | None = None, *, board: bool = False) -> None:
         own = keys.own() if keys else None
         self.kind = address.partition(":")[0]
         self.dialled: dict[Lane, bytes] = {}
@@ -156,7 +161,7 @@ class ZeroMqListener(_AlwaysReady):
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._guard = Guard(self._context, keys) if keys else None
         self._socket = self._context.socket(zmq.ROUTER)
-        _configure(self._socket)
+        _configure(self._socket, _most_bytes(board=board))
         if own:
             secure_listener(self._socket, own)
         self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # a vanished host is told of instead of swallowing frames
@@ -168,7 +173,7 @@ class ZeroMqListener(_AlwaysReady):
             raise _explained(address, error, "stop what listens there, or choose another with --link") from None
         finally:
             os.umask(before)
-        self._door = Door(self._context, address, keys, self._guard) if takes_in and keys and self._guard else None
+        self._door = Door(self._context, address, keys, self._guard) if board and keys and self._guard else None
 
     @property
     def pollables(self) -> Sequence[zmq.Socket[bytes]]:
@@ -206,6 +211,7 @@ class ZeroMqDialer(_AlwaysReady):
         address: `tcp://HOST:PORT` or `ipc://PATH`.
         keys: holds this side's key; None on an open link.
         peer: who must answer; None on an open link.
+        board: whether this side is the board: it hears short messages only.
 
     Raises:
         SettingsError: the address makes no sense.
@@ -213,7 +219,9 @@ class ZeroMqDialer(_AlwaysReady):
         DataError: the files of keys are bad.
     """
 
-    def __init__(self, address: str, keys: KeyFolder | None = None, peer: Peer | None = None) -> None:
+    def __init__(
+        self, address: str, keys: KeyFolder | None = None, peer: Peer | None = None, *, board: bool = False
+    ) -> None:
         own = keys.own() if keys and peer else None
         self._address, self._peer = address, peer
         self.kind = address.partition(":")[0]
@@ -224,7 +232,7 @@ class ZeroMqDialer(_AlwaysReady):
         self._monitors: dict[bytes, zmq.Socket[bytes]] = {}
         for connection in self.dialled.values():
             sock = self._context.socket(zmq.DEALER)
-            _configure(sock)
+            _configure(sock, _most_bytes(board=board))
             if own and peer:
                 secure_dialler(sock, own, peer)
             self._monitors[connection] = sock.get_monitor_socket(_WATCHED)

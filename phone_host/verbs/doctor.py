@@ -9,6 +9,7 @@ from pathlib import Path
 from common.doctor.finding import exit_code, table, values
 from common.errors import SettingsError
 from phone_host.doctor import Question, examine
+from phone_host.settings import key_folder
 from phone_host.verbs.run import resolve_settings
 
 EXAMPLES = """  phone-host doctor
@@ -33,7 +34,9 @@ def run(options: argparse.Namespace) -> int:
         raise SettingsError(f"--wait {options.wait}", "give seconds, 0 or more")
     resolved = resolve_settings(options)
     settings = resolved.values
-    question = Question(settings.camera, settings.link, settings.calibration, options.out, options.wait)
+    question = Question(
+        settings.camera, settings.link, settings.calibration, options.out, options.wait, key_folder(settings.keys)
+    )
     if dict(resolved.origins)["link"] == "default":
         question = replace(question, link="")
     findings = examine(question)

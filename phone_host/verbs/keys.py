@@ -1,11 +1,12 @@
 """phone-host keys: this host's public key and the boards that it knows."""
 
 import argparse
+from pathlib import Path
 
 from common import now
 from common.errors import SettingsError
 from common.keys import change, listing
-from phone_host.settings import key_folder
+from phone_host.settings import chosen_keys
 
 EXAMPLES = """  phone-host keys
   phone-host keys --forget beaglebone
@@ -20,12 +21,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument("--forget", metavar="NAME", help="trust this board no longer")
     what.add_argument("--new", action="store_true", help="make a new key in place of the old one")
     what.add_argument("--add", nargs=3, metavar=("NAME", "LINK", "KEY"), help="trust a board without pairing")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
     parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
 
 
 def run(options: argparse.Namespace) -> int:
     """Change what is asked for and print what there is."""
-    folder = key_folder(options.keys or "")
+    folder = chosen_keys(options.config, options.keys)
     name, address, key = options.add or ("", "", "")
     if options.add and not address.startswith("tcp://"):
         raise SettingsError(f"{address!r} is no tcp link", "give tcp://HOST:PORT")

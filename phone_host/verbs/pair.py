@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 from contextlib import closing
+from pathlib import Path
 
 from common.errors import DataError, SettingsError, UnavailableError
 from common.link.factory import needs_keys, parse_link
@@ -25,19 +26,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--pairing-port", type=int, metavar="PORT", help="the board's door (default: the port behind the link's)"
     )
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
     parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
 
 
 def run(options: argparse.Namespace) -> int:
     """Pair; asks for the code on the terminal."""
     from phone_host.pairing_call import PairingCall  # noqa: PLC0415 - ZeroMQ, only now
-    from phone_host.settings import key_folder  # noqa: PLC0415
+    from phone_host.settings import chosen_keys  # noqa: PLC0415
 
     link = parse_link(options.link, listens_by_default=False)
     if not link.address.startswith("tcp://") or link.listens:
         raise SettingsError(f"link {options.link!r} needs no keys", "pair over tcp://HOST:PORT")
     door = _door(link.address, options.pairing_port)
-    keys = key_folder(options.keys or "")
+    keys = chosen_keys(options.config, options.keys)
     used: set[int] = set()
     while True:
         with closing(PairingCall(door, keys)) as call:

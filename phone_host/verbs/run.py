@@ -10,7 +10,7 @@ from pathlib import Path
 from common import logs, now
 from common.commandline import INTERRUPTED
 from common.errors import SettingsError
-from common.link.factory import open_link, parse_link
+from common.link.factory import open_link, parse_link, tell_insecure
 from common.settings import Resolved, log_level, resolve
 from common.signals import StopSignals
 from common.stamp import HOST_CLOCK
@@ -127,7 +127,9 @@ def run(options: argparse.Namespace) -> int:
         interpolate=options.interpolate,
         steered=frozenset(whose for whose in Whose if options.align_phase in {"either", whose.value}),
     )
-    link = open_link(parse_link(settings.link, listens_by_default=False), key_folder(settings.keys))
+    uri = parse_link(settings.link, listens_by_default=False)
+    tell_insecure(uri)
+    link = open_link(uri, key_folder(settings.keys))
     signals = StopSignals()
     host = Host(host_settings, camera, link, core)
     live = LiveTable(host) if sys.stderr.isatty() else None

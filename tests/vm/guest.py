@@ -103,7 +103,7 @@ class Guest:
     def __init__(self, image: Image, folder: Path) -> None:
         self._image = image
         self._folder = folder
-        self._ssh_port, self.link_port = free_port(), free_port()
+        self._ssh_port, self.link_port, self.door_port = free_port(), free_port(), free_port()
         self._process: subprocess.Popen[bytes] | None = None
         self._key = folder / "key"
 
@@ -116,10 +116,14 @@ class Guest:
         """Boot, and wait until it takes orders."""
         self._key.write_bytes((self._image.folder / "key").read_bytes())
         self._key.chmod(0o600)
+        forwarded = ",".join(
+            f"hostfwd=tcp:127.0.0.1:{here}-10.0.3.15:{there}"
+            for here, there in ((self.link_port, LINK_PORT), (self.door_port, LINK_PORT + 1))
+        )
         network = [
             *("-netdev", f"user,id=orders,net=10.0.2.0/24,hostfwd=tcp:127.0.0.1:{self._ssh_port}-10.0.2.15:22"),
             *("-device", "virtio-net-pci,netdev=orders,romfile="),
-            *("-netdev", f"user,id=link,net=10.0.3.0/24,hostfwd=tcp:127.0.0.1:{self.link_port}-10.0.3.15:{LINK_PORT}"),
+            *("-netdev", f"user,id=link,net=10.0.3.0/24,{forwarded}"),
             *("-device", "virtio-net-pci,netdev=link,romfile="),
         ]
         disk = f"id=disk,if=none,format=raw,file={self._image.folder / 'rootfs.ext4'},snapshot=on,cache=unsafe"
@@ -215,9 +219,10 @@ class Guest:
         self.put(package, "/root")
         self.sh(f"dpkg -i /root/{package.name}")
 
-    def configure(self, camera: str) -> None:
-        """Set the service's camera, open its link to everybody, and restart it."""
-        edits = (f'camera = "{camera}"', f'link = ["tcp://*:{LINK_PORT}?insecure=1"]')
+    def configure(self, camera: str, *, secured: bool = False) -> None:
+        """Set the service's camera, open its link on every network, to everybody unless it is to be secured, and restart it."""
+        link = f"tcp://*:{LINK_PORT}" if secured else f"tcp://*:{LINK_PORT}?insecure=1"
+        edits = (f'camera = "{camera}"', f'link = ["{link}"]')
         script = " ".join(f"-e {shlex.quote(f's|^{edit.split()[0]} = .*|{_literal(edit)}|')}" for edit in edits)
         self.sh(f"sed -i {script} /etc/tandemscan/board-agent.toml && systemctl restart {UNIT}")
 
