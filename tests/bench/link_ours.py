@@ -4,11 +4,13 @@ import os
 import socket
 import time
 from fractions import Fraction
+from pathlib import Path
 
 from board_agent.agent import Agent
 from common import now
 from common.camera.base import Ended, Grab
 from common.camera.replay import ReplayCamera, ReplaySettings
+from common.keys import KeyFolder
 from common.link.base import Link
 from common.link.factory import open_link, parse_link
 from common.link.stream import StreamLink
@@ -70,7 +72,7 @@ def send_tandemscan(job: Job) -> Tally:
     pacing = Pacing.CLOCK if job.fps else Pacing.DEMAND
     settings = ReplaySettings(str(job.folder), Fraction(job.fps or 30), loop=True, pacing=pacing)
     camera = Metered(settings, now.monotonic_ns())
-    link = open_link(parse_link(job.address, listens_by_default=True))
+    link = _open_tcp(job.address, listens=True)
     reader, writer = socket.socketpair()
     with reader, writer:
         Agent(camera, [link], now.random_id(), now.boot_id(), reader).run()
@@ -107,8 +109,16 @@ def receive_tandemscan(job: Job) -> Tally:
 
 
 def _open(address: str) -> Link:
-    """The host's end: a URI, or `fd:N` for the end of a pseudo terminal."""
+    """The host's end: an address, or `fd:N` for the end of a pseudo terminal."""
     if address.startswith("fd:"):
         descriptor = int(address.removeprefix("fd:"))
         return StreamLink("serial", Side.DIALLER, lambda: OpenLine(descriptor))
-    return open_link(parse_link(address, listens_by_default=False))
+    return _open_tcp(address, listens=False)
+
+
+def _open_tcp(address: str, *, listens: bool) -> Link:
+    """Open a URI; behind a `#` there may be the folder of keys."""
+    uri, _, keys = address.partition("#")
+    return open_link(
+        parse_link(uri, listens_by_default=listens), KeyFolder(Path(keys)) if keys else None, board=listens
+    )

@@ -119,6 +119,7 @@ _WORKERS: dict[str, tuple[str, str, str]] = {
     "imagezmq-pub": ("tests.bench.link_rivals", "send_imagezmq_pub", "receive_imagezmq_sub"),
     "netgear": ("tests.bench.link_rivals", "send_netgear", "receive_netgear"),
     "tandemscan": _OURS,
+    "tandemscan-curve": _OURS,
     "tandemscan-ipc": _OURS,
     "tandemscan-serial": _OURS,
 }
