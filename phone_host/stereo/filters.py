@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import Disparity
+from phone_host.model import Disparity, Image
 
 Steps = NDArray[np.int16]
 """(H, W) int16, sixteenths of a pixel, NO_STEPS = none."""
@@ -40,6 +40,20 @@ def confirmed(left: Steps, right: Steps, tolerance_px: float) -> NDArray[np.bool
     back = cv2.remap(right, column, row, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=(never,))
     apart = np.abs(np.asarray(back, np.int32) - left)
     return np.asarray((left >= 0) & (apart <= tolerance_px * STEPS_PER_PX), np.bool_)
+
+
+def told_rows(image: Image) -> NDArray[np.bool_]:
+    """The rows of which matching along rows and from above can know anything: they, or one above them, change somewhere from left to right.
+
+    On any other row every disparity costs the same, and 0 would win for being the first.
+
+    Args:
+        image: (H, W) uint8 grey.
+
+    Returns:
+        (H,) bool.
+    """
+    return np.logical_or.accumulate((image[:, 1:] != image[:, :-1]).any(axis=1))
 
 
 def without_speckles(steps: Steps, area_px: int, step_px: float) -> Steps:

@@ -5,8 +5,9 @@ Definition. Let L and R be the grey images, continued beyond their borders by th
     SAD(x, y, d) = sum over i, j = -4 .. 3 of |L(x + i, y + j) - R(x - d + i, y + j)|
 
 The left pixel's disparity is the d of least SAD, the lowest such d on a tie; the right pixel's the same over SAD(x + d, y, d).
-A left pixel keeps its value only when the right pixel it points to points back to within 1 px; else NaN. Then the value is
-refined below one pixel. An image smaller than the window in one direction has no whole window to compare: all NaN.
+A left pixel keeps its value only when the right pixel it points to points back to within 1 px, and when its window changes
+somewhere along its rows: a window of even rows looks the same wherever it is put. Else NaN. Then the value is refined below
+one pixel. An image smaller than the window in one direction has no whole window to compare: all NaN.
 
 The window is even and so reaches one pixel further left and up than right and down; OpenCV's StereoBM refuses even windows.
 """
@@ -136,6 +137,23 @@ def points_back(left_px: NDArray[np.int32], right_px: NDArray[np.int32]) -> NDAr
     return np.asarray(apart <= LEFT_RIGHT_TOLERANCE_PX, np.bool_)
 
 
+def varies(image: Image) -> NDArray[np.bool_]:
+    """Whether a pixel's window tells places along the scanline apart: some row of it changes from left to right.
+
+    Args:
+        image: (H, W) uint8 grey.
+
+    Returns:
+        (H, W) bool.
+    """
+    border = (BEFORE_PX, AFTER_PX, BEFORE_PX, AFTER_PX)
+    padded = np.asarray(cv2.copyMakeBorder(image, *border, cv2.BORDER_REPLICATE), np.uint8)
+    steps = (padded[:, 1:] != padded[:, :-1]).astype(np.uint8)
+    # A window of 8 columns has 7 steps between them.
+    counts = cv2.boxFilter(steps, cv2.CV_32S, (WINDOW_PX - 1, WINDOW_PX), anchor=(0, 0), normalize=False)
+    return np.asarray(counts[: image.shape[0], : image.shape[1]] > 0, np.bool_)
+
+
 class BlockMatcher:
     """The paper's 8 x 8 matcher as this module's head defines it, on the grey image.
 
@@ -151,7 +169,8 @@ class BlockMatcher:
         check_pair(pair)
         if min(pair.left.shape[:2]) < WINDOW_PX:
             return np.full(pair.left.shape[:2], np.nan, np.float32)
-        winners = search(grey(pair.left), grey(pair.right), self._disparities)
-        trusted = points_back(winners.left_px, winners.right_px)
+        left = grey(pair.left)
+        winners = search(left, grey(pair.right), self._disparities)
+        trusted = points_back(winners.left_px, winners.right_px) & varies(left)
         disparity = winners.left_px.astype(np.float32) + winners.offset_px
         return np.where(trusted, disparity, np.float32(np.nan))

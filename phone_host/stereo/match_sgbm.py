@@ -5,7 +5,8 @@ Steps, each with what it gains in docs/decisions/0002-sgbm-tuning.md:
 1. the right image gets the left one's levels and, when it is measurably too high or low, its vertical position (match_align);
 2. StereoSGBM, 3-way mode, single-pixel cost, once for the left and once for the right view, with OpenCV's own checks off;
    the left border is continued by N pixels, without which the first N columns would get no value;
-3. median of the left view, left-right check, small islands dropped: what is left is trusted, the rest is NaN;
+3. median of the left view, left-right check, small islands dropped, rows left out that no texture can tell anything of: what
+   is left is trusted, the rest is NaN;
 4. narrow gaps within one surface bridged, pixel locking undone, the rest of the noise averaged (filters).
 """
 
@@ -89,6 +90,7 @@ class SgbmMatcher:
         right_steps = self._compute(self._fine, _mirrored(right), _mirrored(left))[:, ::-1]
         trusted = filters.confirmed(left_steps, right_steps, AGREEMENT_PX)
         trusted &= left_steps <= (self._disparities - 1) * filters.STEPS_PER_PX
+        trusted &= (filters.told_rows(left) & filters.told_rows(right))[:, np.newaxis]
         steps = np.where(trusted, left_steps, np.int16(filters.NO_STEPS))
         disparity = filters.to_px(filters.without_speckles(steps, SPECKLE_AREA_PX, SPECKLE_STEP_PX))
         disparity = filters.bridged(disparity, GAP_PX, GAP_STEP_PX)

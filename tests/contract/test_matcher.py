@@ -189,3 +189,29 @@ def test_an_empty_search_range_is_refused(disparities: int) -> None:
     """Less than one disparity is a setting that makes no sense."""
     with pytest.raises(SettingsError):
         MatchSettings(disparities=disparities)
+
+
+@every_matcher
+@pytest.mark.parametrize("disparities", [1, 16, 64])
+def test_what_has_no_texture_has_no_disparity(name: MatcherName, disparities: int) -> None:
+    """Images of one grey, or of even rows, look the same wherever they are put: no pixel gets a value, least of all 0, infinitely far."""
+    matcher = create_matcher(MatchSettings(name, disparities))
+    stripes = np.repeat(noise(1, 50, seed=3), 70, axis=1)
+    for left, right in (
+        (np.full((50, 70), 128, np.uint8), np.full((50, 70), 128, np.uint8)),
+        (np.zeros((50, 70), np.uint8), np.zeros((50, 70), np.uint8)),
+        (np.full((50, 70), 90, np.uint8), np.full((50, 70), 140, np.uint8)),
+        (stripes, stripes),
+    ):
+        assert np.isnan(matcher.match(RectifiedPair(left, right))).all()
+
+
+@every_matcher
+def test_a_black_border_has_no_disparity(name: MatcherName) -> None:
+    """Rows above the scene that rectification has painted black get no value; the scene below keeps its own."""
+    pair = plane(seed=12).pair
+    left, right = (np.vstack([np.zeros((24, image.shape[1]), np.uint8), image]) for image in (pair.left, pair.right))
+    matcher = create_matcher(MatchSettings(name, 48))
+    disparity = matcher.match(RectifiedPair(left, right))
+    assert np.isnan(disparity[:20]).all()
+    assert np.isfinite(disparity[24:]).mean() > 0.5
