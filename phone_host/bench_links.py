@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Final
 
 from common import now
-from common.errors import SettingsError, UnavailableError
-from common.keys import usual_keys
+from common.errors import UnavailableError
+from common.keys import KeyFolder
 from common.link.factory import open_link, parse_link
 from common.protocol.message import BoardHello, Pacing
 from phone_host.bench_cases import BOARD_SETS, Case, Interface, Size
@@ -30,6 +30,9 @@ _CHANNEL: Final = 22
 """For the benchmark's own RFCOMM listener: in the range that profiles do not use by themselves (1 to 30 exist)."""
 
 _STEP_S: Final = 0.05
+
+# Numbers of the kernel: a Python without Bluetooth has no names for them.
+_AF_BLUETOOTH, _BTPROTO_HCI = 31, 1
 
 # include/net/bluetooth/hci_sock.h: _IOR('H', 211, int), and the head of struct hci_dev_info (92 bytes): number, name, address.
 _HCIGETDEVINFO: Final = 0x800448D3
@@ -80,8 +83,9 @@ def ends_of(interface: Interface, camera: str, folder: Path) -> Iterator[Ends]:
     if interface.is_remote:
         yield Ends(interface.link, None, None)
     elif interface.link == "rfcomm":
-        with board_process(camera, f"rfcomm://*/{_CHANNEL}") as board:
-            yield Ends(f"rfcomm://{_known_adapters()[0]}/{_CHANNEL}", board, None)
+        # A machine's own two adapters have no reason to be paired with each other.
+        with board_process(camera, f"rfcomm://*/{_CHANNEL}?unpaired=1") as board:
+            yield Ends(f"rfcomm://{_adapters()[0]}/{_CHANNEL}?unpaired=1", board, None)
     elif interface.link == "serial":
         # A line of two terminals needs somebody who passes on the bytes, even one that adds nothing.
         profile = interface.profile or NOTHING
@@ -101,13 +105,7 @@ def obstacle(interface: Interface) -> str:
     """Why an interface cannot be measured here; empty if it can, as far as is known without trying."""
     if interface.link != "rfcomm":
         return ""
-    try:
-        parse_link(f"rfcomm://*/{_CHANNEL}", listens_by_default=True)
-    except SettingsError:
-        return "this version has no Bluetooth link"
-    if not hasattr(socket, "AF_BLUETOOTH"):
-        return "this Python was built without Bluetooth (Debian's own python3 has it)"
-    if len(adapters := _known_adapters()) < 2:
+    if len(adapters := _adapters()) < 2:
         there = "no Bluetooth adapter" if not adapters else "one Bluetooth adapter, and its two ends need two"
         return f"this machine has {there}; name a board instead, for example rfcomm://AA:BB:CC:DD:EE:FF/1"
     return ""
@@ -123,11 +121,12 @@ class _Silent:
         """See BoardListener."""
 
 
-def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | None:
+def ask_board(uri: str, keys: KeyFolder, patience_ns: int, stop: Callable[[], bool]) -> Case | None:
     """Ask a remote board what its camera shows: that, and nothing else, can be measured there.
 
     Args:
         uri: its link.
+        keys: for a board on a network.
         patience_ns: how long an absent board is waited for.
         stop: asked several times a second.
 
@@ -137,7 +136,7 @@ def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | No
     Raises:
         UnavailableError: there is no board, it is busy, or its images come on demand only.
     """
-    link = open_link(parse_link(uri, listens_by_default=False), usual_keys())
+    link = open_link(parse_link(uri, listens_by_default=False), keys)
     receiver = Receiver(link, now.random_id(), PairQueue(FifoSettings(), None, 1), _Silent())
     receiver.start()
     try:
@@ -182,9 +181,13 @@ def _account_of(seen: LinkAccount) -> BoardAccount:
 
 
 def _adapters() -> list[str]:
-    """Addresses of this machine's Bluetooth adapters."""
+    """Addresses of this machine's Bluetooth adapters; none where the kernel has no Bluetooth."""
+    try:
+        asker = socket.socket(_AF_BLUETOOTH, socket.SOCK_RAW, _BTPROTO_HCI)
+    except OSError:
+        return []
     addresses = []
-    with socket.socket(socket.AF_BLUETOOTH, socket.SOCK_RAW, socket.BTPROTO_HCI) as asker:
+    with asker:
         for path in sorted(Path("/sys/class/bluetooth").glob("hci*")):
             number = path.name.removeprefix("hci")
             if not number.isdigit():
@@ -195,11 +198,3 @@ def _adapters() -> list[str]:
                 _, _, address = _DEVICE_INFO.unpack_from(info)
                 addresses.append(":".join(f"{byte:02X}" for byte in reversed(address)))
     return addresses
-
-
-def _known_adapters() -> list[str]:
-    """The same; none where the kernel has no Bluetooth."""
-    try:
-        return _adapters()
-    except OSError:
-        return []

@@ -20,7 +20,7 @@ _FRAMES: Final = 3000
 """Frames that a prediction runs: the p95 of 3000 values is known to 0.4 percentage points of rank."""
 
 _NEAR_SIZE: Final = 1.2
-"""Where all frames were within this factor of one size and the fit found no slope, their delay stands for frames of that size only."""
+"""Where all frames were within this factor of one size, their delay stands for frames of that size only."""
 
 _SEED: Final = 1
 
@@ -199,18 +199,21 @@ def learn_link(interface: str, images: Images, cells: Sequence[Cell]) -> LinkMod
     ledgers = [ledger for cell in mine for ledger in cell.ledgers]
     size = values_of(ledgers, lambda ledger: ledger.bytes)
     delay = values_of(ledgers, lambda ledger: ledger.propagation_ns)
-    fit = fit_of(ledgers, intervals=False)
-    if size.max() < _NEAR_SIZE * size.min() or not fit.ns_per_byte > 0.0 or fit.latency_ns < 0.0:
+    if size.max() < _NEAR_SIZE * size.min():
         wanted = float(np.median(images.size_bytes))
         if not size.min() / _NEAR_SIZE <= wanted <= size.max() * _NEAR_SIZE:
             return Unknown(f"frames of one size only were measured over {interface}")
         # No line can be told from frames of one size; how much of it is latency hardly matters for frames of the same.
-        middle = float(np.median(delay))
-        share = 0.5 * middle / float(np.median(size))
-        return LinkModel(0.5 * middle, share, delay - 0.5 * middle - share * size, mine[0].self_paced)
-    return LinkModel(
-        fit.latency_ns, fit.ns_per_byte, delay - fit.latency_ns - fit.ns_per_byte * size, mine[0].self_paced
-    )
+        latency_ns, ns_per_byte = 0.5 * float(np.median(delay)), 0.5 * float(np.median(delay / size))
+    else:
+        fit = fit_of(ledgers, intervals=False)
+        latency_ns, ns_per_byte = fit.latency_ns, fit.ns_per_byte
+        # Noise may tilt a fast link's line until it means nothing: then all of the delay is latency, or all of it bytes.
+        if ns_per_byte < 0.0:
+            latency_ns, ns_per_byte = float(np.median(delay)), 0.0
+        elif latency_ns < 0.0:
+            latency_ns, ns_per_byte = 0.0, float(np.median(delay / size))
+    return LinkModel(latency_ns, ns_per_byte, delay - latency_ns - ns_per_byte * size, mine[0].self_paced)
 
 
 def nominal_link(profile: Profile, *, self_paced: bool) -> LinkModel:

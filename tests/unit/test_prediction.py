@@ -133,3 +133,20 @@ def test_nothing_measured_gives_nothing() -> None:
     base = cell()
     assert isinstance(held_out(base, [base]), Unknown)
     assert math.isfinite(measured(base).pairs_per_s)
+
+
+@pytest.mark.parametrize(("latency_ns", "ns_per_byte"), [(5 * MS, -50.0), (-5 * MS, 1000.0)])
+def test_a_line_that_noise_has_tilted_gives_no_negative_delay(latency_ns: int, ns_per_byte: float) -> None:
+    """Where the fitted line falls, or begins below zero, latency and time for a byte are none of them negative, and typical delays are kept."""
+    tilted = []
+    for size_bytes in (10_000, 20_000, 40_000):
+        base = cell(size_bytes=size_bytes)
+        delay_ns = round(latency_ns + ns_per_byte * size_bytes)
+        moved = [replace(one, received_ns=one.board.sent_ns + delay_ns) for one in base.ledgers]
+        tilted.append(replace(base, ledgers=tuple(moved)))
+    link = learn_link("tcp", tilted[1].images, tilted)
+    assert not isinstance(link, Unknown)
+    assert link.latency_ns >= 0.0
+    assert link.ns_per_byte >= 0.0
+    middle = link.latency_ns + link.ns_per_byte * 20_000 + float(np.median(link.spread_ns))
+    assert middle == pytest.approx(latency_ns + ns_per_byte * 20_000, rel=0.3)
