@@ -14,7 +14,7 @@ import numpy as np
 
 from common import now
 from common.camera.factory import open_camera
-from common.keys import KeyFolder
+from common.keys import usual_keys
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
@@ -86,13 +86,11 @@ class RunSettings:
         matcher: of the stereo core.
         fifo: depth and policy of the queue before it.
         seconds: length of each run after its warm-up, s.
-        keys: for boards on a network.
     """
 
     matcher: MatcherName
     fifo: FifoSettings
     seconds: float
-    keys: KeyFolder
 
 
 def rig_of(size: Size) -> Rig:
@@ -164,7 +162,7 @@ def run_case(
             HostSettings(wait_ns=PATIENCE_NS, save_every=0, fifo=settings.fifo),
             open_camera(shown.replay_uri(shown.right), HOST_CLOCK, now.monotonic_ns()),
             open_link(
-                parse_link(ends.address, listens_by_default=False), settings.keys if case.interface.is_remote else None
+                parse_link(ends.address, listens_by_default=False), usual_keys() if case.interface.is_remote else None
             ),
             _core(case.size, settings.matcher),
             keep,

@@ -92,7 +92,6 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DEPTH:POLICY",
         help="queue before the matcher: drop-oldest, drop-newest or block (default 1:drop-oldest)",
     )
-    parser.add_argument("--keys", default="", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder for delay-bench.json, delay-bench.html and trace.json"
     )
@@ -135,7 +134,7 @@ def _run(options: argparse.Namespace) -> int:
         _make_folder(options.out)
     logs.set_up(30)
     signals = StopSignals()
-    boards = _remote_cases([interface for interface in here if interface.is_remote], settings, signals)
+    boards = _remote_cases([interface for interface in here if interface.is_remote], signals)
     planned = (*cases([interface for interface in here if not interface.is_remote], *matrix), *boards)
     outcome = _measure(planned, settings, signals)
     under = conditions(settings, not_run)
@@ -163,7 +162,6 @@ def _run(options: argparse.Namespace) -> int:
 
 def _settings(options: argparse.Namespace) -> "RunSettings":
     from phone_host.bench import RunSettings  # noqa: PLC0415 - OpenCV, only now
-    from phone_host.settings import key_folder  # noqa: PLC0415
     from phone_host.stereo.match import MatcherName  # noqa: PLC0415
     from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
 
@@ -173,18 +171,17 @@ def _settings(options: argparse.Namespace) -> "RunSettings":
         raise SettingsError(
             f"--matcher {options.matcher!r} is unknown", f"give {' or '.join(name.value for name in MatcherName)}"
         )
-    fifo, keys = FifoSettings.parse(options.fifo), key_folder(options.keys)
-    return RunSettings(MatcherName(options.matcher), fifo, options.seconds, keys)
+    return RunSettings(MatcherName(options.matcher), FifoSettings.parse(options.fifo), options.seconds)
 
 
-def _remote_cases(remote: "Sequence[Interface]", settings: "RunSettings", signals: StopSignals) -> "list[Case]":
+def _remote_cases(remote: "Sequence[Interface]", signals: StopSignals) -> "list[Case]":
     """What the boards elsewhere show; an absent one is an error before anything is measured."""
     from phone_host.bench import PATIENCE_NS  # noqa: PLC0415
     from phone_host.bench_links import ask_board  # noqa: PLC0415
 
     found = []
     for interface in remote:
-        case = ask_board(interface.link, settings.keys, PATIENCE_NS, lambda: signals.stop)
+        case = ask_board(interface.link, PATIENCE_NS, lambda: signals.stop)
         if case is None:
             break
         print(

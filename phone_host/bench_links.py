@@ -15,7 +15,7 @@ from typing import Final
 
 from common import now
 from common.errors import UnavailableError
-from common.keys import KeyFolder
+from common.keys import usual_keys
 from common.link.factory import open_link, parse_link
 from common.protocol.message import BoardHello, Pacing
 from phone_host.bench_cases import BOARD_SETS, Case, Interface, Size
@@ -121,12 +121,11 @@ class _Silent:
         """See BoardListener."""
 
 
-def ask_board(uri: str, keys: KeyFolder, patience_ns: int, stop: Callable[[], bool]) -> Case | None:
+def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | None:
     """Ask a remote board what its camera shows: that, and nothing else, can be measured there.
 
     Args:
         uri: its link.
-        keys: for a board on a network.
         patience_ns: how long an absent board is waited for.
         stop: asked several times a second.
 
@@ -136,7 +135,7 @@ def ask_board(uri: str, keys: KeyFolder, patience_ns: int, stop: Callable[[], bo
     Raises:
         UnavailableError: there is no board, it is busy, or its images come on demand only.
     """
-    link = open_link(parse_link(uri, listens_by_default=False), keys)
+    link = open_link(parse_link(uri, listens_by_default=False), usual_keys())
     receiver = Receiver(link, now.random_id(), PairQueue(FifoSettings(), None, 1), _Silent())
     receiver.start()
     try:

@@ -190,6 +190,10 @@ def _mean(quantity: Quantity) -> Part:
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table; a row with fewer cells than columns ends in one that takes their room."""
     head = "".join(f"<th>{escape(name)}</th>" for name in columns)
-    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
-    return f'<div class="scroll"><table style="white-space:nowrap;font-size:.82rem"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    body = ""
+    for row in rows:
+        last = f"<td colspan={len(columns) - len(row) + 1}>{escape(row[-1])}</td>"
+        body += f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row[:-1])}{last}</tr>"
+    return f'<div class="scroll"><table class="tight"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'

@@ -240,11 +240,11 @@ FIT_COLUMNS: Final = (
     "95 %",
     "rate",
     "95 %",
-    "left over, median",
+    "left over",
     "frames",
     "clock",
     "hard bound",
-    "lost on the link",
+    "lost there",
 )
 
 PREDICTION_COLUMNS: Final = (
@@ -290,7 +290,7 @@ def checked_rows(analysis: Analysis) -> list[tuple[str, ...]]:
     for one in analysis.checked:
         name, images = str(one.case.interface), one.case.short
         if isinstance(one.predicted, Unknown):
-            rows.append((name, images, f"no prediction: {one.predicted.reason}", *[""] * 6))
+            rows.append((name, images, f"no prediction: {one.predicted.reason}"))
             continue
         pairs = zip(_figure_texts(one.measured), _figure_texts(one.predicted), strict=True)
         rows.append((name, images, *(f"{seen} | {said}" for seen, said in pairs)))
@@ -302,7 +302,7 @@ def what_if_rows(analysis: Analysis) -> list[tuple[str, ...]]:
     return [
         (one.interface, one.setting, *_figure_texts(one.figures))
         if isinstance(one.figures, Figures)
-        else (one.interface, one.setting, f"no prediction: {one.figures.reason}", *[""] * 6)
+        else (one.interface, one.setting, f"no prediction: {one.figures.reason}")
         for one in analysis.what_ifs
     ]
 

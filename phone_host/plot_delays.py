@@ -50,8 +50,8 @@ def against_bytes(scatter: Scatter, width_px: int, height_px: int = 240) -> str:
     """
     size, delay, fit = scatter.size_bytes, scatter.delay_ns, scatter.fit
     x = Linear(0.0, 1.05 * span(size)[1], _LEFT_PX, width_px - _RIGHT_PX)
-    usual = float(np.percentile(delay, 97))
-    top = min(1.06 * float(delay.max()), max(1.6 * usual, 1.25 * fit.delay_ns(x.high) if fit.ns_per_byte > 0 else 0.0))
+    wanted = max(2.5 * float(np.percentile(delay, 75)), 1.25 * fit.delay_ns(x.high) if fit.ns_per_byte > 0 else 0.0)
+    top = min(1.06 * float(delay.max()), wanted)
     y = Linear(0.0, max(1.0, top), height_px - _BOTTOM_PX, _TOP_PX)
     dots = []
     every = max(1, -(-size.size // _MOST_DOTS))
