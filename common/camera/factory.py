@@ -6,11 +6,11 @@ from urllib.parse import parse_qsl
 
 from common.camera.base import Camera
 from common.camera.options import exact
-from common.camera.replay import ReplayCamera, ReplaySettings
 from common.errors import SettingsError
 from common.protocol.message import Pacing
 
 if TYPE_CHECKING:
+    from common.camera.replay import ReplaySettings
     from common.camera.v4l2_stream import V4l2Settings
 
 EXAMPLE = "v4l2:/dev/video0[?size=640x480&fps=30&format=mjpeg] or replay:PATH[?fps=30&loop=1&pace=clock|demand]"
@@ -33,10 +33,15 @@ def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
         DataError: a replay's images are bad.
     """
     settings = parse_camera(uri, clock)
-    if isinstance(settings, ReplaySettings):
-        return ReplayCamera(settings, now_ns)
-    from common.camera.v4l2 import V4l2Camera  # noqa: PLC0415 - ctypes and the kernel's structures only where they are of use
+    if uri.startswith("replay:"):
+        from common.camera.replay import ReplayCamera, ReplaySettings  # noqa: PLC0415 - each kind only where it is of use
 
+        assert isinstance(settings, ReplaySettings)
+        return ReplayCamera(settings, now_ns)
+    from common.camera.v4l2 import V4l2Camera  # noqa: PLC0415 - ctypes and the kernel's structures
+    from common.camera.v4l2_stream import V4l2Settings  # noqa: PLC0415
+
+    assert isinstance(settings, V4l2Settings)
     return V4l2Camera(settings, now_ns)
 
 
@@ -75,7 +80,9 @@ def _split(uri: str, rest: str) -> tuple[str, dict[str, str]]:
         raise SettingsError(f"camera {uri!r} has options {query!r}", f"give {EXAMPLE}") from None
 
 
-def _replay_settings(uri: str, path: str, options: dict[str, str], clock: str) -> ReplaySettings:
+def _replay_settings(uri: str, path: str, options: dict[str, str], clock: str) -> "ReplaySettings":
+    from common.camera.replay import ReplaySettings  # noqa: PLC0415 - as above
+
     if unknown := set(options) - {"fps", "loop", "pace", "phase_ms"}:
         raise SettingsError(f"camera {uri!r} has an unknown option {min(unknown)!r}", f"give {EXAMPLE}")
     try:

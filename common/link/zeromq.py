@@ -11,7 +11,7 @@ import socket
 import stat
 import struct
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import zmq
 
@@ -19,12 +19,14 @@ from common.errors import SettingsError, TakenError, UnavailableError
 from common.frame import Buffer
 from common.keys import KeyFolder, Peer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
-from common.link.curve import Guard, secure_dialler, secure_listener
-from common.link.pairing_door import Door
 from common.link.wait import is_readable
 from common.logs import event
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
+
+if TYPE_CHECKING:
+    from common.link.curve import Guard
+    from common.link.pairing_door import Door
 
 _LOG = logging.getLogger(__name__)
 
@@ -159,10 +161,12 @@ class ZeroMqListener(_AlwaysReady):
         if self.kind == "ipc":
             _free_path(address.removeprefix("ipc://"))
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._guard = Guard(self._context, keys) if keys else None
+        self._guard = _guard(self._context, keys) if keys else None
         self._socket = self._context.socket(zmq.ROUTER)
         _configure(self._socket, _most_bytes(board=board))
         if own:
+            from common.link.curve import secure_listener  # noqa: PLC0415 - as in _guard
+
             secure_listener(self._socket, own)
         self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # a vanished host is told of instead of swallowing frames
         before = os.umask(0o177)  # an ipc path is for its owner only
@@ -173,7 +177,7 @@ class ZeroMqListener(_AlwaysReady):
             raise _explained(address, error, "stop what listens there, or choose another with --link") from None
         finally:
             os.umask(before)
-        self._door = Door(self._context, address, keys, self._guard) if board and keys and self._guard else None
+        self._door = _door(self._context, address, keys, self._guard) if board and keys and self._guard else None
 
     @property
     def pollables(self) -> Sequence[zmq.Socket[bytes]]:
@@ -234,6 +238,8 @@ class ZeroMqDialer(_AlwaysReady):
             sock = self._context.socket(zmq.DEALER)
             _configure(sock, _most_bytes(board=board))
             if own and peer:
+                from common.link.curve import secure_dialler  # noqa: PLC0415 - as in _guard
+
                 secure_dialler(sock, own, peer)
             self._monitors[connection] = sock.get_monitor_socket(_WATCHED)
             self._sockets[connection] = sock
@@ -312,6 +318,18 @@ class ZeroMqDialer(_AlwaysReady):
         for sock in self._sockets.values():
             sock.disable_monitor()
         self._context.destroy(linger=_LINGER_MS)
+
+
+def _guard(context: "zmq.Context[zmq.Socket[bytes]]", keys: KeyFolder) -> "Guard":
+    from common.link.curve import Guard  # noqa: PLC0415 - an open link does not pay for keys: half a second of a board's start
+
+    return Guard(context, keys)
+
+
+def _door(context: "zmq.Context[zmq.Socket[bytes]]", address: str, keys: KeyFolder, guard: "Guard") -> "Door":
+    from common.link.pairing_door import Door  # noqa: PLC0415 - as above
+
+    return Door(context, address, keys, guard)
 
 
 def _explained(address: str, error: zmq.ZMQError, remedy: str) -> SettingsError | UnavailableError:

@@ -52,6 +52,7 @@ def soak_board(folder: Path, minutes: float, tell: Callable[[float], None]) -> l
         booted_board(Architecture.AMD64) as board,
         closing(Webcam(frames, _FPS, _READOUT_NS, Model(sizes_px=(_SIZE_PX,), rates_hz=(_FPS,)))) as webcam,
     ):
+        board.be_quiet()
         webcam.plug(board.guest)
         board.guest.configure(f"v4l2:auto?size={_SIZE_PX[0]}x{_SIZE_PX[1]}&fps={_FPS}")
         pid = board.service_pid
