@@ -8,13 +8,13 @@ import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from board_agent.sd_notify import Notifier
 from board_agent.settings import ENVIRONMENT_PREFIX, BoardSettings, key_folder
 from board_agent.status import StatusLine
 from common import logs, now
-from common.camera.base import CameraHealth
+from common.camera.base import CameraHealth, health_values
 from common.camera.factory import EXAMPLE, open_camera, parse_camera
 from common.commandline import INTERRUPTED, ExamplesFirstParser, run_command
 from common.errors import SettingsError
@@ -186,7 +186,7 @@ def _run(options: argparse.Namespace) -> int:
     summary = _serve(settings, signals)
     session, counts = summary.session, {"grabbed": summary.counts.grabbed, "sent": summary.counts.sent}
     dropped = {reason.value: count for reason, count in summary.counts.dropped}
-    camera = _health(summary.camera)
+    camera = health_values(summary.camera)
     _LOG.info(logs.event("stopped", session=session, **counts, dropped=dropped, garbage=summary.garbage, camera=camera))
     if options.json:
         account = {"session": session, **counts, "dropped": dropped, "garbage": summary.garbage}
@@ -195,22 +195,6 @@ def _run(options: argparse.Namespace) -> int:
         drops = "".join(f", {count} {reason}" for reason, count in dropped.items()) or ", none dropped"
         print(f"session {session}: {counts['grabbed']} frames grabbed, {counts['sent']} sent{drops}", file=sys.stderr)
     return INTERRUPTED if signals.interrupted else 0
-
-
-def _health(health: CameraHealth) -> dict[str, Any]:
-    """A camera's health as a JSON object."""
-    return {
-        "state": health.state.value,
-        "missed": health.missed,
-        "faults": {fault.value: count for fault, count in health.faults},
-        "stalls": health.stalls,
-        "failures": health.failures,
-        "unplugged": health.unplugged,
-        "returned": health.returned,
-        "distrusted_stamps": health.distrusted_stamps,
-        "refused_controls": health.refused_controls,
-        "period_ms": None if health.period_ns is None else round(health.period_ns / 1e6, 3),
-    }
 
 
 def _serve(settings: BoardSettings, signals: StopSignals) -> "Summary":

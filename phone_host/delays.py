@@ -82,6 +82,7 @@ class DelayStatistics:
 
     def __init__(self) -> None:
         self._series = {name: Series() for name in (*DELAYS, *STAGES, *OTHERS)}
+        self._bytes = 0
 
     def add(self, ledger: PairLedger) -> None:
         """Take one pair's ledger."""
@@ -91,6 +92,13 @@ class DelayStatistics:
             self._series[name].add(getattr(ledger.stages, name))
         self._series["time_skew"].add(abs(ledger.time_skew_ns))
         self._series["uncertainty"].add(ledger.uncertainty_ns)
+        self._bytes += ledger.bytes
+
+    @property
+    def frame_bytes(self) -> float:
+        """Mean length of the pairs' board frames, bytes; NaN without a pair."""
+        pairs = self._series["uncertainty"].spread(1).count
+        return self._bytes / pairs if pairs else float("nan")
 
     def spread(self, name: str, last: int | None = None) -> Spread:
         """Summarise one of DELAYS, STAGES or OTHERS (time skews without their sign)."""

@@ -17,16 +17,18 @@ from common.logs import event
 from common.protocol.message import Pacing, RefusalReason, Steering
 from phone_host.delays import DelayStatistics
 from phone_host.model import FramePair, Side, TimeOffset
+from phone_host.motion import MotionMeter
 from phone_host.pairqueue import PairQueue
 from phone_host.pipeline import Pipeline, Processed
 from phone_host.receiver import Receiver, refusal_text
-from phone_host.report import RunFacts
+from phone_host.report import RunFacts, time_and_motion
 from phone_host.results import Results
 from phone_host.source import Source
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Alignment, PhaseController, Whose
+from phone_host.trust import Concern, Doubt, concerns
 
 _LOG = logging.getLogger(__name__)
 
@@ -36,6 +38,10 @@ _LAST_PARTNER_NS: Final = 1_000_000_000
 
 _BUSY_NS: Final = 4_000_000_000
 """A board may take a host that crashed for alive for a moment; only after this long `busy` is believed."""
+
+_TRUST_NS: Final = 1_000_000_000
+_RECENT: Final = 60
+"""Once a second the last 60 pairs are judged: two seconds at 30 per second."""
 
 _HOPELESS: Final = 10
 """This many pairs in a row that cannot be processed, and none that could: it is not a spoiled frame now and then."""
@@ -114,6 +120,10 @@ class Host:
         self._pipeline = Pipeline(
             core, settings.board_side, now.monotonic_ns, Interpolator() if settings.interpolate else None
         )
+        self.motion = MotionMeter()
+        self._own = own
+        self._known_doubts: frozenset[Doubt] = frozenset()
+        self._trust_due_ns = 0
         self._on_pair = on_pair
         self._worker = threading.Thread(target=self._work, name="worker", daemon=True)
         self._controller: PhaseController | None = None
@@ -180,7 +190,36 @@ class Host:
             phase=self.queue.phase,
             alignment=self.alignment,
             camera=self.source.health,
+            period_ns=self._period_ns,
+            motion_px_s=self.motion.px_s,
+            width_px=self.motion.width_px,
+            interpolated=self.settings.interpolate,
         )
+
+    @property
+    def _period_ns(self) -> int:
+        """Of the slower camera, ns; 0 where one gives images on demand, or before the board is known."""
+        hello = self.receiver.hello
+        if hello is None or Pacing.DEMAND in {hello.camera.pacing, self._own.pacing}:
+            return 0
+        return max(hello.camera.period_ns, self._own.period_ns)
+
+    def concerns(self) -> tuple[Concern, ...]:
+        """What makes the depth of the last pairs wrong."""
+        return concerns(time_and_motion(self.facts("running"), _RECENT))
+
+    def _watch_trust(self, now_ns: int) -> None:
+        """Log each reason not to trust the depth when it comes, and when it has gone."""
+        if now_ns < self._trust_due_ns:
+            return
+        self._trust_due_ns = now_ns + _TRUST_NS
+        found = {concern.doubt: concern for concern in self.concerns()}
+        for doubt in found.keys() - self._known_doubts:
+            concern = found[doubt]
+            _LOG.warning(event("depth_doubtful", doubt=doubt.value, problem=concern.sentence, remedy=concern.remedy))
+        for doubt in self._known_doubts - found.keys():
+            _LOG.info(event("depth_trusted", doubt=doubt.value))
+        self._known_doubts = frozenset(found)
 
     def _watch(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
         absent_since_ns = now.monotonic_ns()
@@ -189,6 +228,7 @@ class Host:
             now_ns = now.monotonic_ns()
             self._raise_failures()
             self._align(now_ns)
+            self._watch_trust(now_ns)
             if watch is not None:
                 watch()
             if stop():
@@ -298,6 +338,9 @@ class Host:
         self.first_done_ns = self.first_done_ns or done_ns
         self.last_done_ns = done_ns
         self.processed += 1
+        # The host's own image: the board's may have been interpolated to another moment.
+        seen = processed.pair.right if self.settings.board_side is Side.LEFT else processed.pair.left
+        self.motion.add(seen, pair.host.exposed.ns, done_ns)
         if self._on_pair is not None:
             self._on_pair(processed, ledger)
         if self.settings.pairs and self.processed >= self.settings.pairs:

@@ -12,7 +12,8 @@ from rich.text import Text
 from common import now
 from phone_host.delays import DELAYS, Spread
 from phone_host.host import Host
-from phone_host.report import board_drops, phase_lines
+from phone_host.regime import judge
+from phone_host.report import board_drops, camera_troubles, figures, phase_lines
 
 _REFRESH_S: Final = 0.25
 _RECENT: Final = 300
@@ -65,7 +66,7 @@ class LiveTable:
             done = now_s - self._started_s if self._seconds else self._host.processed
             self._progress.update(self._task, completed=done)
         bar = [self._progress] if self._task is not None else []
-        self._live.update(Group(self._table(), self._state(), *bar), refresh=True)
+        self._live.update(Group(self._table(), self._state(), *self._judgement(), *bar), refresh=True)
 
     def _table(self) -> Table:
         table = Table(title=f"{self._host.processed} pairs, {self._rate:.1f} /s", title_justify="left")
@@ -76,6 +77,15 @@ class LiveTable:
             spread = self._host.delays.spread(name, _RECENT)
             table.add_row(name.replace("_", "-"), *_values_ms(spread))
         return table
+
+    def _judgement(self) -> list[Text]:
+        """The queueing regime, what has befallen the own camera, and what makes depth wrong."""
+        facts = self._host.facts("running")
+        warnings = [
+            Text(f"warning: {item.sentence}: {item.remedy}", style="bold red") for item in self._host.concerns()
+        ]
+        camera = [Text(line, style="yellow") for line in camera_troubles(facts.camera)]
+        return [Text(judge(figures(facts)).sentence, style="dim"), *camera, *warnings]
 
     def _state(self) -> Text:
         receiver, counts = self._host.receiver, self._host.queue.counts

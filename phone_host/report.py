@@ -4,15 +4,17 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Final
 
-from common.camera.base import CameraHealth
+from common.camera.base import CameraHealth, health_values
 from phone_host.delays import DELAYS, STAGES, DelayStatistics, Spread
 from phone_host.model import TimeOffset
 from phone_host.pairqueue import PairCounts
 from phone_host.receiver import LinkAccount
+from phone_host.regime import Judgement, RunFigures, judge
 from phone_host.results import Unwritten
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.phase import Alignment, Phase
+from phone_host.trust import Timing, concerns
 
 _MS: Final = 1e6
 
@@ -39,6 +41,10 @@ class RunFacts:
         phase: of the two cameras at the end; None: not known, or there is none.
         alignment: how the steering of a camera came out; None: not asked for.
         camera: how the own camera has fared.
+        period_ns: of the slower camera, ns; 0 where images come on demand.
+        motion_px_s: how fast the own camera's image moves, px/s; NaN where not measured.
+        width_px: of that image; 0 where not measured.
+        interpolated: whether the board's images were taken to the moment of the host's, so that their time skew did no harm.
     """
 
     ended: str
@@ -55,6 +61,10 @@ class RunFacts:
     spoiled: int
     skipped: int
     camera: CameraHealth
+    period_ns: int
+    motion_px_s: float
+    width_px: int
+    interpolated: bool = False
     time_offset: TimeOffset = field(default_factory=TimeOffset)
     phase: Phase | None = None
     alignment: Alignment | None = None
@@ -111,6 +121,12 @@ def build(facts: RunFacts) -> dict[str, object]:
             "orphaned": dict(facts.counts.host_orphans),
             "camera": _camera(facts.camera),
         },
+        "regime": _regime(judge(figures(facts))),
+        "image_motion_px_per_s": _number(facts.motion_px_s),
+        "warnings": [
+            {"doubt": item.doubt.value, "sentence": item.sentence, "remedy": item.remedy}
+            for item in concerns(time_and_motion(facts))
+        ],
         "pairs_account": {
             "paired": facts.counts.paired,
             "processed": facts.processed,
@@ -167,6 +183,10 @@ def summary(facts: RunFacts) -> str:
     lines.append(_offset_text(facts.time_offset))
     lines += phase_lines(facts.phase, facts.alignment)
     lines += _arrivals(facts.camera, facts.time_offset)
+    lines.append(judge(figures(facts)).sentence)
+    lines += [f"  {remedy}" for remedy in judge(figures(facts)).remedies]
+    lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(time_and_motion(facts))]
+    lines += camera_troubles(facts.camera)
     lines += _losses(facts)
     return "\n".join(lines)
 
@@ -254,6 +274,62 @@ def _losses(facts: RunFacts) -> list[str]:
     return lines
 
 
+def figures(facts: RunFacts) -> RunFigures:
+    """What the queueing regime is judged by, over the whole run."""
+    delays, counts, processed = facts.delays, facts.counts, facts.processed
+    return RunFigures(
+        pairs=processed,
+        interval_ns=facts.seconds * 1e9 / (processed - 1) if processed > 1 else float("nan"),
+        processing_ns=delays.spread("processing").mean_ns,
+        match_ns=delays.spread("match").mean_ns,
+        starvation_ns=delays.spread("starvation").mean_ns,
+        period_ns=facts.period_ns,
+        received=counts.received / counts.paired if counts.paired else 1.0,
+        offered=counts.paired / processed if processed else 1.0,
+        frame_bytes=delays.frame_bytes,
+        propagation_ns=delays.spread("propagation").mean_ns,
+    )
+
+
+def time_and_motion(facts: RunFacts, last: int | None = None) -> Timing:
+    """What time and motion are.
+
+    Args:
+        facts: the run.
+        last: over how many of the newest pairs; None for all.
+    """
+    return Timing(
+        time_skew_ns=float("nan") if facts.interpolated else facts.delays.spread("time_skew", last).p95_ns,
+        uncertainty_ns=facts.delays.spread("uncertainty", last).p50_ns,
+        end_to_end_ns=facts.delays.spread("end_to_end", last).p50_ns,
+        motion_px_s=facts.motion_px_s,
+        width_px=facts.width_px,
+    )
+
+
+def _regime(judgement: Judgement) -> dict[str, object]:
+    return {
+        "regime": judgement.regime.value,
+        "sentence": judgement.sentence,
+        "remedies": list(judgement.remedies),
+    }
+
+
+def camera_troubles(health: CameraHealth) -> list[str]:
+    """Say what has befallen a camera, in one line; nothing where nothing has."""
+    parts = [
+        *([f"unplugged {health.unplugged} times"] if health.unplugged else []),
+        *([f"stalled {health.stalls} times"] if health.stalls else []),
+        *([f"failed {health.failures} times"] if health.failures else []),
+        *([f"back {health.returned} times"] if health.returned else []),
+        *([f"{health.missed} frames missed by its driver"] if health.missed else []),
+        *(f"{count} frames {fault.value}" for fault, count in health.faults),
+        *([f"{health.distrusted_stamps} stamps not believed"] if health.distrusted_stamps else []),
+        *([f"{health.refused_controls} controls refused"] if health.refused_controls else []),
+    ]
+    return [f"own camera: {', '.join(parts)}".replace("_", " ")] if parts else []
+
+
 def board_drops(link: LinkAccount) -> dict[str, int]:
     """Frames that the board dropped while this host was connected, by reason."""
     drops: dict[str, int] = {}
@@ -285,14 +361,7 @@ def _clock(facts: RunFacts) -> dict[str, object]:
 
 def _camera(health: CameraHealth) -> dict[str, object]:
     """What is known of the own camera; its stamps' figures only where they are arrivals."""
-    values: dict[str, object] = {
-        "state": health.state.value,
-        "faults": {fault.value: count for fault, count in health.faults},
-        "stalls": health.stalls,
-        "failures": health.failures,
-        "returned": health.returned,
-        "period_ms": _ms(health.period_ns),
-    }
+    values = health_values(health)
     if health.jitter_ns is None:
         return values
     stated = health.latency_uncertainty_ns

@@ -34,20 +34,21 @@ class Source:
         self._later_ns = 0
         self._reading = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
+        self._last_health: CameraHealth | None = None
         self.spoiled = 0
         self.skipped = 0
         self.ended = False
         self.failure: Exception | None = None
 
     @property
+    def health(self) -> CameraHealth:
+        """How the camera has fared, up to the moment before it was closed."""
+        return self._last_health or self._camera.health
+
+    @property
     def on_demand(self) -> bool:
         """Whether the camera gives an image only when one is wanted."""
         return self._camera.description.pacing is Pacing.DEMAND
-
-    @property
-    def health(self) -> CameraHealth:
-        """How the camera has fared."""
-        return self._camera.health
 
     def start(self) -> None:
         """Begin to read."""
@@ -83,6 +84,7 @@ class Source:
         self._stop.set()
         self._wants.put(None)
         self._thread.join()
+        self._last_health = self._camera.health
         self._camera.close()
 
     def _run(self) -> None:

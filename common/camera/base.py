@@ -5,7 +5,7 @@ A camera never blocks: it says what to wait for (`pollable`, `due_ns`) and then 
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
+from typing import Any, Protocol
 
 from common.frame import Frame, FrameFault
 from common.protocol.message import CameraDescription
@@ -67,6 +67,7 @@ class CameraHealth:
         returned: how often the device was back after any of these.
         distrusted_stamps: frames whose stamp could not be true, so that the moment of dequeuing stands for it.
         refused_controls: controls that the driver would not set.
+        held: exposure, gain, white balance and focus as they are held now, by name, in the control's own unit.
         period_ns: time between frames as measured, ns; None where unknown.
         latency_ns: calibrated time from exposure to arrival that was subtracted from every stamp, ns; None where there is none, or the driver knows.
         latency_uncertainty_ns: of that, as it was stated; None: not stated.
@@ -82,10 +83,28 @@ class CameraHealth:
     returned: int = 0
     distrusted_stamps: int = 0
     refused_controls: int = 0
+    held: tuple[tuple[str, int], ...] = ()
     period_ns: int | None = None
     latency_ns: int | None = None
     latency_uncertainty_ns: int | None = None
     jitter_ns: int | None = None
+
+
+def health_values(health: CameraHealth) -> dict[str, Any]:
+    """A camera's health as a JSON object."""
+    return {
+        "state": health.state.value,
+        "missed": health.missed,
+        "faults": {fault.value: count for fault, count in health.faults},
+        "stalls": health.stalls,
+        "failures": health.failures,
+        "unplugged": health.unplugged,
+        "returned": health.returned,
+        "distrusted_stamps": health.distrusted_stamps,
+        "refused_controls": health.refused_controls,
+        "held": dict(health.held),
+        "period_ms": None if health.period_ns is None else round(health.period_ns / 1e6, 3),
+    }
 
 
 class Camera(Protocol):

@@ -133,6 +133,7 @@ class V4l2Camera:
             returned=self._returned,
             distrusted_stamps=tally.distrusted,
             refused_controls=tally.refused,
+            held=tuple((axis.value, value) for axis, value in self._wishes.held),
             period_ns=tally.rate.period_ns,
         )
 

@@ -19,7 +19,7 @@ CAMERA = f"v4l2:auto?size=320x240&fps={FPS}&readout_ms={READOUT_MS}"
 
 
 @contextmanager
-def booted(architecture: Architecture) -> Iterator[Guest]:
+def booted(architecture: Architecture, disk: Path | None = None) -> Iterator[Guest]:
     """A booted board without the package, for the length of a block; skips the test where there is no image of one."""
     image = image_of(architecture)
     if not shutil.which(image.emulator):
@@ -28,7 +28,7 @@ def booted(architecture: Architecture) -> Iterator[Guest]:
         pytest.skip(f"no image of a board in {image.folder}: run make test-board")
     # Not pytest's folder: the path of ssh's socket must be short.
     with tempfile.TemporaryDirectory(prefix="board-") as folder:
-        guest = Guest(image, Path(folder))
+        guest = Guest(image, Path(folder), disk)
         try:
             guest.start()
             yield guest

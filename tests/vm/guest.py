@@ -98,10 +98,12 @@ class Guest:
     Args:
         image: what to boot.
         folder: for console, pid and ssh's socket.
+        disk: an image with a file system of its own, /dev/vdb in the guest; never changed either.
     """
 
-    def __init__(self, image: Image, folder: Path) -> None:
+    def __init__(self, image: Image, folder: Path, disk: Path | None = None) -> None:
         self._image = image
+        self._disk = disk
         self._folder = folder
         self._ssh_port, self.link_port, self.door_port = free_port(), free_port(), free_port()
         self._process: subprocess.Popen[bytes] | None = None
@@ -142,7 +144,7 @@ class Guest:
             *("-kernel", str(self._image.folder / "vmlinuz"), "-initrd", str(self._image.folder / "initrd.img")),
             *("-append", f"{machine.command_line} {_COMMAND_LINE}"),
             *("-serial", f"file:{self._folder / 'console'}", "-device", "virtio-rng-pci"),
-            *("-drive", disk, "-device", "virtio-blk-pci,drive=disk", *network),
+            *("-drive", disk, "-device", "virtio-blk-pci,drive=disk", *_further_disk(self._disk), *network),
         ]
         with (self._folder / "qemu.log").open("wb") as log:
             self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
@@ -325,6 +327,15 @@ class GuestClock:
 def _literal(text: str) -> str:
     """Text as the replacement of sed's `s|…|…|`."""
     return text.replace("&", "\\&")
+
+
+def _further_disk(image: Path | None) -> list[str]:
+    if image is None:
+        return []
+    return [
+        *("-drive", f"id=more,if=none,format=raw,file={image},snapshot=on"),
+        *("-device", "virtio-blk-pci,drive=more"),
+    ]
 
 
 def _as_root(member: tarfile.TarInfo) -> tarfile.TarInfo:

@@ -34,17 +34,22 @@ Skew = Callable[[int, int], float]
 """From the numbers of a pair's left and right image the least time that can have been between their stamps, s."""
 
 
-def webcam_skew(late_ns: Mapping[int, tuple[int, int]]) -> Skew:
+def webcam_skew(
+    late_ns: Mapping[int, tuple[int, int]], right_late_ns: Mapping[int, tuple[int, int]] | None = None
+) -> Skew:
     """Time skew of the webcam and a replay on this machine: image k of both is due at k / FPS, and the board stamps it a little later.
 
     Args:
         late_ns: by image number, least and greatest lateness; read anew for each pair, as it grows while the webcam runs.
+        right_late_ns: the same of the right view where that is a webcam's, too; None: a replay is never late.
     """
     lap_s = FRAMES / FPS
 
     def skew(left: int, right: int) -> float:
         due_s = ((left - right) / FPS + lap_s / 2) % lap_s - lap_s / 2
-        least_s, most_s = (due_s + late / 1e9 for late in late_ns[left])
+        right_least_ns, right_most_ns = (0, 0) if right_late_ns is None else right_late_ns[right]
+        least_s = due_s + (late_ns[left][0] - right_most_ns) / 1e9
+        most_s = due_s + (late_ns[left][1] - right_least_ns) / 1e9
         return 0.0 if least_s <= 0 <= most_s else min(least_s, most_s, key=abs)
 
     return skew

@@ -1,0 +1,177 @@
+"""Which of the two queueing regimes holds, and what would help: the processor starves, or a backlog waits for it. Pure.
+
+The paper (chapter 4) names both: where propagation takes longer than processing the processor waits for input; where it takes less, input waits
+in a FIFO. Stages overlap here, so what is compared are the times between pairs, not the delays themselves: how often pairs arrive, and how long
+each keeps the processor busy.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+_BUSY: Final = 0.9
+"""From this share of its time on the processor counts as the bottleneck: with random arrivals a queue's length grows as 1 / (1 - share)."""
+
+_SLOWER: Final = 1.15
+"""Arrivals are slower than the cameras from this factor on: a run of 30 pairs may lack one or two at its ends."""
+
+_FEW: Final = 10
+
+
+class Regime(Enum):
+    """Which regime holds, and for starvation what keeps the processor waiting."""
+
+    UNKNOWN = "unknown"
+    STARVED_BY_CAMERAS = "starved by the cameras"
+    STARVED_BY_LINK = "starved by the link"
+    STARVED_BY_PAIRING = "starved by pairing"
+    BACKLOG = "backlog"
+
+
+@dataclass(frozen=True, slots=True)
+class RunFigures:
+    """What the regime is judged by; means over a run or over its last pairs, ns; NaN = not measured.
+
+    Attributes:
+        pairs: processed.
+        interval_ns: between two results.
+        processing_ns: of a pair.
+        match_ns: the matcher's share of it.
+        starvation_ns: how long the processor had nothing to do before a pair.
+        period_ns: of the slower camera; 0 where images come on demand.
+        received: board frames that reached the host, for each that was paired.
+        offered: pairs formed, for each that was processed.
+        frame_bytes: length of a board frame.
+        propagation_ns: of a board frame.
+    """
+
+    pairs: int
+    interval_ns: float
+    processing_ns: float
+    match_ns: float
+    starvation_ns: float
+    period_ns: int
+    received: float
+    offered: float
+    frame_bytes: float
+    propagation_ns: float
+
+    @property
+    def busy(self) -> float:
+        """Share of the time in which the processor has work."""
+        return self.processing_ns / (self.processing_ns + self.starvation_ns)
+
+    @property
+    def arrival_ns(self) -> float:
+        """Time between two pairs that are offered to the processor."""
+        return self.interval_ns / max(1.0, self.offered)
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """The regime in words.
+
+    Attributes:
+        regime: which.
+        sentence: what holds, with figures.
+        remedies: what would help, each with an estimate from the measured figures.
+    """
+
+    regime: Regime
+    sentence: str
+    remedies: tuple[str, ...] = ()
+
+
+def judge(figures: RunFigures) -> Judgement:
+    """Say which regime holds and what would help."""
+    if figures.pairs < _FEW or not math.isfinite(figures.interval_ns) or not figures.processing_ns > 0:
+        return Judgement(Regime.UNKNOWN, f"too few pairs ({figures.pairs}) to tell whether the processor starves")
+    if figures.busy >= _BUSY:
+        return _backlog(figures)
+    waits = f"the processor has nothing to do for {100 * (1 - figures.busy):.0f} % of the time"
+    if not figures.period_ns or figures.arrival_ns <= _SLOWER * figures.period_ns:
+        rate = _rate(figures.arrival_ns)
+        text = (
+            f"{waits}: it keeps up with the cameras, {_ms(figures.processing_ns)} ms of work for each of {rate} pairs/s"
+        )
+        return Judgement(Regime.STARVED_BY_CAMERAS, text, _room(figures))
+    if figures.arrival_ns <= _SLOWER * figures.period_ns * figures.received:
+        lost = 100 * (1 - 1 / figures.received)
+        text = f"{waits}: frames arrive at the cameras' rate, but {lost:.0f} % of them find no partner"
+        remedy = "a larger --tolerance, equal rates of both cameras, or a look at frames.orphaned in the report"
+        return Judgement(Regime.STARVED_BY_PAIRING, text, (remedy,))
+    return _starved_by_link(figures, waits)
+
+
+def _starved_by_link(figures: RunFigures, waits: str) -> Judgement:
+    """Propagation is slower than processing."""
+    rate_bytes = figures.frame_bytes * 1e9 / figures.arrival_ns
+    wanted_bytes = figures.frame_bytes * 1e9 / figures.period_ns
+    fitting_bytes = figures.frame_bytes * figures.period_ns / figures.arrival_ns
+    text = (
+        f"{waits}: the link brings {_rate(figures.arrival_ns)} of the cameras' {_rate(figures.period_ns)} frames/s "
+        f"(propagation {_ms(figures.propagation_ns)} ms, processing {_ms(figures.processing_ns)} ms)"
+    )
+    scale = math.sqrt(figures.period_ns / figures.arrival_ns)
+    how = f"(about {100 * scale:.0f} % of width and height, or a lower JPEG quality)"
+    remedies = (
+        f"smaller frames: {fitting_bytes / 1000:.1f} instead of {figures.frame_bytes / 1000:.1f} KB would bring them all {how}",
+        f"another link: it would have to carry {wanted_bytes / 1e6:.2f} MB/s, this one carries {rate_bytes / 1e6:.2f}",
+        f"fewer frames asked of the camera (fps={_rate(figures.arrival_ns)}): no more pairs, but none dropped on the board",
+    )
+    return Judgement(Regime.STARVED_BY_LINK, text, remedies)
+
+
+def _backlog(figures: RunFigures) -> Judgement:
+    """Processing is slower than arrival."""
+    arrival_ns = min(figures.arrival_ns, figures.period_ns or figures.arrival_ns)
+    text = (
+        f"the processor is busy for {100 * figures.busy:.0f} % of the time: {_ms(figures.processing_ns)} ms of work for each pair, "
+        f"while {_rate(arrival_ns)} a second are offered; the others wait in the FIFO or are dropped"
+    )
+    remedies = []
+    scale = _fitting_scale(figures, arrival_ns)
+    if scale < 1:
+        remedies.append(
+            f"smaller images: {100 * scale:.0f} % of width and height would do "
+            "(estimate: work goes with the pixels, matching with the disparities, too)"
+        )
+        rest_ns = figures.processing_ns - figures.match_ns
+        if figures.match_ns > 0 and rest_ns < arrival_ns:
+            remedies.append(
+                f"another matcher: it may take {_ms(arrival_ns - rest_ns)} ms, this one takes {_ms(figures.match_ns)} ms"
+            )
+        remedies.append(
+            f"fewer frames: fps={_rate(figures.processing_ns)} is what the processor does; the link is spared"
+        )
+    return Judgement(Regime.BACKLOG, text, tuple(remedies))
+
+
+def _room(figures: RunFigures) -> tuple[str, ...]:
+    """What the processor's spare time would allow."""
+    factor = figures.arrival_ns / figures.processing_ns
+    if factor < 1.5:
+        return ()
+    return (f"nothing is wrong; there is time for {factor:.1f} times the work on each pair",)
+
+
+def _fitting_scale(figures: RunFigures, arrival_ns: float) -> float:
+    """Share of width and height with which a pair's work fits between two arrivals; matching goes with its cube, the rest with its square."""
+    rest_ns = figures.processing_ns - figures.match_ns
+    low, high = 0.0, 1.0
+    if figures.processing_ns <= arrival_ns:
+        return 1.0
+    for _ in range(30):
+        middle = (low + high) / 2
+        fits = figures.match_ns * middle**3 + rest_ns * middle**2 <= arrival_ns
+        low, high = (middle, high) if fits else (low, middle)
+    return low
+
+
+def _rate(interval_ns: float) -> str:
+    return f"{1e9 / interval_ns:.3g}"
+
+
+def _ms(time_ns: float) -> str:
+    return f"{time_ns / 1e6:.1f}"

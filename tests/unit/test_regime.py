@@ -1,0 +1,103 @@
+"""Which queueing regime holds: known arrival and processing times give the known regime, and remedies whose figures add up."""
+
+import re
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phone_host.regime import Judgement, Regime, RunFigures, judge
+
+MS = 1_000_000
+NAN = float("nan")
+
+
+def figures(*, period_ms: float, arrival_ms: float, processing_ms: float, match_ms: float = 0.0) -> RunFigures:
+    """A steady run: pairs are offered every `arrival_ms`; a processor that is slower drops the rest."""
+    interval_ms = max(arrival_ms, processing_ms)
+    return RunFigures(
+        pairs=300,
+        interval_ns=interval_ms * MS,
+        processing_ns=processing_ms * MS,
+        match_ns=match_ms * MS,
+        starvation_ns=(interval_ms - processing_ms) * MS,
+        period_ns=round(period_ms * MS),
+        received=1.0,
+        offered=interval_ms / arrival_ms,
+        frame_bytes=50_000,
+        propagation_ns=arrival_ms * MS,
+    )
+
+
+def numbers(text: str) -> list[float]:
+    """All numbers in a text, in order."""
+    return [float(found) for found in re.findall(r"\d+(?:\.\d+)?", text)]
+
+
+def test_a_slow_link_starves_the_processor() -> None:
+    """The paper's first case: 30 a second from the cameras, 10 through the link, 20 ms of work: it idles for 80 % of the time."""
+    judgement = judge(figures(period_ms=100 / 3, arrival_ms=100, processing_ms=20))
+    assert judgement.regime is Regime.STARVED_BY_LINK
+    assert "80 %" in judgement.sentence
+    smaller, link, fewer = judgement.remedies
+    # A third of the bytes comes three times as often; 50 KB at 30 a second are 1.5 MB/s, the link carries a third of that.
+    assert numbers(smaller)[:2] == [16.7, 50.0]
+    assert numbers(link) == [1.5, 0.5]
+    assert "fps=10" in fewer
+
+
+def test_a_slow_processor_has_a_backlog() -> None:
+    """The paper's second case: 30 pairs a second are offered, each takes 100 ms."""
+    judgement = judge(figures(period_ms=100 / 3, arrival_ms=100 / 3, processing_ms=100, match_ms=80))
+    assert judgement.regime is Regime.BACKLOG
+    assert "100 %" in judgement.sentence
+    smaller, matcher, fewer = judgement.remedies
+    share = numbers(smaller)[0] / 100
+    assert 80 * share**3 + 20 * share**2 == pytest.approx(100 / 3, rel=0.03)  # the share is told in whole per cent
+    assert numbers(matcher) == [pytest.approx(100 / 3 - 20, abs=0.05), 80.0]
+    assert "fps=10" in fewer
+
+
+def test_a_processor_that_keeps_up_waits_for_the_cameras() -> None:
+    """With 10 ms of work for each of 30 pairs a second nothing is wrong, and the room that is left is told."""
+    judgement = judge(figures(period_ms=100 / 3, arrival_ms=100 / 3, processing_ms=10))
+    assert judgement.regime is Regime.STARVED_BY_CAMERAS
+    assert "3.3 times the work" in judgement.remedies[0]
+
+
+def test_frames_without_partner_are_told_from_a_slow_link() -> None:
+    """When all board frames arrive and only every third is paired, the link is not to blame."""
+    run = replace(figures(period_ms=100 / 3, arrival_ms=100, processing_ms=20), received=3.0)
+    judgement = judge(run)
+    assert judgement.regime is Regime.STARVED_BY_PAIRING
+    assert "67 %" in judgement.sentence
+    assert "--tolerance" in judgement.remedies[0]
+
+
+def test_images_on_demand_are_never_slow() -> None:
+    """Without a rate of the cameras there is no arrival to be too slow."""
+    run = replace(figures(period_ms=30, arrival_ms=100, processing_ms=20), period_ns=0)
+    assert judge(run).regime is Regime.STARVED_BY_CAMERAS
+
+
+@pytest.mark.parametrize(
+    "run", [RunFigures(0, NAN, NAN, NAN, NAN, 0, 1.0, 1.0, NAN, NAN), RunFigures(9, 1e8, 1e7, 0, 1e7, 0, 1, 1, 1, 1)]
+)
+def test_nothing_is_said_of_too_few_pairs(run: RunFigures) -> None:
+    """Below ten pairs no regime is named."""
+    assert judge(run).regime is Regime.UNKNOWN
+
+
+@given(st.floats(1, 1000), st.floats(1, 5), st.floats(1, 2000), st.floats(0, 1))
+def test_the_slower_side_is_always_blamed(period_ms: float, slower: float, processing_ms: float, match: float) -> None:
+    """A processor slower than arrival is a backlog, one far faster starves; every remedy is a sentence with finite numbers."""
+    arrival_ms = period_ms * slower
+    judgement: Judgement = judge(
+        figures(period_ms=period_ms, arrival_ms=arrival_ms, processing_ms=processing_ms, match_ms=match * processing_ms)
+    )
+    if processing_ms >= arrival_ms:
+        assert judgement.regime is Regime.BACKLOG
+    if processing_ms < 0.8 * arrival_ms:
+        assert judgement.regime not in {Regime.BACKLOG, Regime.UNKNOWN}
+    assert not any(word in text for text in (judgement.sentence, *judgement.remedies) for word in ("nan", "inf"))

@@ -1,0 +1,123 @@
+"""phone-host with a camera of its own by V4L2: the booted machine is board and host at once, each program has one of two webcams."""
+
+import json
+import shutil
+import subprocess
+import sys
+import tarfile
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.programs import PATIENCE_S, until
+from tests.vm import uvc
+from tests.vm.conftest import CAMERA, READOUT_MS, ROOT, booted
+from tests.vm.guest import LINK_PORT, Architecture, Guest
+from tests.vm.stream import FPS, FRAMES, Film, check_counts, check_delays, check_journal, check_pairs, webcam_skew
+from tests.vm.webcam import Webcam
+
+pytestmark = pytest.mark.timeout(600)  # the first test boots the machine
+
+GUEST_PYTHON = (3, 11)
+"""Debian 12's; packages with compiled parts fit one version only."""
+
+WHEELS = ("numpy", "opencv-python-headless", "rich", "pygments", "markdown-it-py", "mdurl")
+"""What phone-host needs beside the board's packages."""
+
+BY_ID = "v4l2:/dev/v4l/by-id/usb-tandemscan_Board_Test_Camera_{}-video-index0?" + CAMERA.partition("?")[2]
+HOST = "PYTHONPATH=/mnt python3 -P -m phone_host.cli"
+
+
+def write_disk(folder: Path) -> Path:
+    """An image with phone-host and its packages as they are installed here, tests left out."""
+    root = folder / "root"
+    for name in WHEELS:
+        for file in metadata.files(name) or ():
+            if file.parts[0] != ".." and "tests" not in file.parts and file.suffix != ".pyc":
+                (root / file).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(str(file.locate()), root / file)
+    for part in ("common", "phone_host"):
+        shutil.copytree(ROOT / part, root / part, ignore=shutil.ignore_patterns("__pycache__"))
+    image = folder / "host.ext4"
+    make = shutil.which("mke2fs", path="/usr/sbin:/sbin:/usr/bin:/bin")
+    assert make is not None, "apt install e2fsprogs"
+    subprocess.run([make, "-q", "-t", "ext4", "-O", "^has_journal", "-d", root, image, "500M"], check=True)
+    return image
+
+
+@pytest.fixture(scope="module")
+def machine(package: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guest]:
+    """The booted machine with both programs."""
+    if sys.version_info[:2] != GUEST_PYTHON:
+        pytest.skip(
+            f"packages of Python {sys.version_info[0]}.{sys.version_info[1]} do not run in the guest, it has 3.11"
+        )
+    with booted(Architecture.AMD64, write_disk(tmp_path_factory.mktemp("disk"))) as guest:
+        guest.sh("mount -o ro /dev/vdb /mnt")
+        guest.install(package)
+        yield guest
+
+
+@pytest.fixture(scope="module")
+def cameras(machine: Guest, film: Film) -> Iterator[tuple[Webcam, Webcam]]:
+    """The left view's webcam for the board, the right view's for the host, both plugged in."""
+    views = [(film.right / f"{number}.jpg").read_bytes() for number in range(FRAMES)]
+    left = Webcam(film.frames, FPS, READOUT_MS * 1_000_000, uvc.Model(serial="LEFT"))
+    right = Webcam(views, FPS, READOUT_MS * 1_000_000, uvc.Model(serial="RIGHT"))
+    left.plug(machine)
+    right.plug(machine, usb_port=1)
+    machine.configure(BY_ID.format("LEFT"))
+    yield left, right
+    left.close()
+    right.close()
+
+
+def pairs_so_far(machine: Guest) -> int:
+    """Lines of the host's delays."""
+    return int(machine.sh("cat /root/out/delays.jsonl 2>/dev/null | wc -l"))
+
+
+def test_two_webcams_are_paired_and_a_pulled_one_comes_back(
+    machine: Guest, cameras: tuple[Webcam, Webcam], tmp_path: Path
+) -> None:
+    """Every pair shows one moment by the webcams' own word; the host's camera, pulled and plugged in again, goes on, and its report tells so."""
+    left, right = cameras
+    run = f"{HOST} run --link tcp://127.0.0.1:{LINK_PORT} --camera '{BY_ID.format('RIGHT')}' --out /root/out --save-every 1 --json"
+    host = machine.popen(f"cd /; {run} > /root/report 2> /root/host.err & echo $!; wait; cat /root/report")
+    assert host.stdout is not None
+    pid = host.stdout.readline().decode().strip()
+    until(lambda: pairs_so_far(machine) >= 40, "40 pairs of two webcams")
+    right.unplug()
+    until(lambda: "camera_lost" in machine.sh("cat /root/host.err"), "the host notices that its camera is gone")
+    before = pairs_so_far(machine)
+    right.plug(machine, usb_port=2)
+    until(lambda: pairs_so_far(machine) >= before + 20, "pairs after the plug")
+    machine.sh(f"kill {pid}")
+    report: dict[str, Any] = json.loads(host.communicate(timeout=PATIENCE_S)[0])
+    assert "Traceback" not in machine.sh("cat /root/host.err")
+    machine.sh("tar -C /root -cf /root/out.tar out")
+    machine.get("/root/out.tar", tmp_path / "out.tar")
+    with tarfile.open(tmp_path / "out.tar") as archive:
+        archive.extractall(tmp_path, filter="data")
+    check_pairs(tmp_path / "out", webcam_skew(left.late_ns, right.late_ns))
+    check_delays(tmp_path / "out")
+    check_counts(report)
+    check_journal(machine)
+    camera = report["host_frames"]["camera"]
+    assert (camera["unplugged"], camera["returned"]) == (1, 1)
+    assert camera["held"]["focus"] == uvc.CONTROLS[uvc.FOCUS].found
+    assert camera["period_ms"] == pytest.approx(1000 / FPS, rel=0.2)
+
+
+def test_the_hosts_doctor_streams_from_its_camera(machine: Guest, cameras: tuple[Webcam, Webcam]) -> None:
+    """phone-host doctor finds its packages, proves the own camera by streaming, and gets the board's answer."""
+    assert cameras[1].plugged
+    asked = f"--link tcp://127.0.0.1:{LINK_PORT} --camera '{BY_ID.format('RIGHT')}' --wait 30 --out /root/out --json"
+    shown = machine.sh(f"cd / && {HOST} doctor {asked}")
+    checks = {check["what"]: check for check in json.loads(shown)["checks"]}
+    assert checks["cv2"]["verdict"] == checks["numpy"]["verdict"] == "ok"
+    assert "sound frames" in checks["stream"]["finding"]
+    assert "clock known to" in checks["board"]["finding"]
