@@ -11,6 +11,8 @@ from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.host import EndReason, Host, HostSettings
 from phone_host.pipeline import Processed
+from phone_host.regime import Regime, judge
+from phone_host.report import figures
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
 from tests.support.numbered import write_film
@@ -53,6 +55,9 @@ def test_pairs_do_not_get_older_on_a_slow_host(fifo: str, tmp_path: Path) -> Non
     assert account["grabbed"] == account["sent"] + sum(account["dropped"].values())
     assert account["camera"]["missed"] == 0
     assert account["grabbed"] > kept[-1].sequence
+    judgement = judge(figures(host.facts("pairs_reached")))
+    assert judgement.regime is Regime.BACKLOG
+    assert any("smaller images" in remedy for remedy in judgement.remedies)
     counts = host.queue.counts
     assert counts.received == counts.paired + counts.held_board + sum(n for _, n in counts.board_orphans)
     assert counts.paired == counts.taken + counts.dropped + counts.waiting

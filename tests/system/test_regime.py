@@ -1,0 +1,95 @@
+"""What a run says of its queue and of time, with real processes: a slow line, a moving scene, a terminal."""
+
+import os
+import pty
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from tests.support.numbered import write_film
+from tests.support.programs import board, host
+from tests.support.pty_line import PtyLine
+
+
+def write_moving_film(folder: Path, frames: int, step_px: int) -> Path:
+    """A texture that moves by so many pixels from image to image, back and forth."""
+    folder.mkdir(parents=True)
+    noise = np.random.default_rng(3).integers(0, 255, (240, 320 + frames * step_px), dtype=np.uint8)
+    texture = np.asarray(cv2.GaussianBlur(noise, (0, 0), 2.5))
+    texture = np.clip((texture.astype(float) - 127) * 5 + 127, 0, 255).astype(np.uint8)
+    for number in range(frames):
+        x_px = step_px * min(number, frames - number)
+        done, jpeg = cv2.imencode(".jpg", texture[:, x_px : x_px + 320])
+        assert done
+        (folder / f"{number}.jpg").write_bytes(jpeg.tobytes())
+    return folder
+
+
+def test_a_slow_line_starves_the_processor(tmp_path: Path) -> None:
+    """Over a line that carries a fraction of the cameras' rate the report blames the link, and what it asks for is more than the line gives."""
+    film = f"replay:{write_film(tmp_path / 'film', 200)}?fps=20&loop=1"
+    with PtyLine(tmp_path, bytes_per_s=25_000, delay_ns=300_000) as line:
+        board_uri, host_uri = line.uris
+        receiving = ["run", "--camera", film, "--link", host_uri, "--pairs", "20", "--json"]
+        with (
+            host(receiving, tmp_path) as receiver,
+            board(["run", "--camera", film, "--link", board_uri], tmp_path),
+        ):
+            assert receiver.wait() == 0
+    regime = receiver.json()["regime"]
+    assert regime["regime"] == "starved by the link", regime
+    assert "smaller frames" in regime["remedies"][0]
+    carried = float(regime["remedies"][1].rpartition("carries ")[2])
+    assert carried <= 0.03  # MB/s; the line is 25 KB/s
+
+
+def test_skew_and_motion_make_a_warning_and_rest_makes_none(tmp_path: Path) -> None:
+    """With cameras of unlike rates before a moving scene the run warns in its log and its report; before a still one it does not."""
+    moving = write_moving_film(tmp_path / "moving", 100, 6)
+    still = write_moving_film(tmp_path / "still", 2, 0)
+    doubted = {}
+    for name, film in (("moving", moving), ("still", still)):
+        link = f"ipc://{tmp_path}/{name}-link"
+        receiving = ["run", "--camera", f"replay:{film}?fps=15&loop=1", "--link", link, "--pairs", "60", "--json"]
+        with (
+            board(["run", "--camera", f"replay:{film}?fps=20&loop=1", "--link", link], tmp_path, f"{name}-board"),
+            host(receiving, tmp_path, f"{name}-host") as receiver,
+        ):
+            assert receiver.wait() == 0
+        report = receiver.json()
+        doubted[name] = [warning["doubt"] for warning in report["warnings"]]
+        assert ("depth_doubtful" in receiver.stderr) is (name == "moving")
+        if name == "moving":
+            # 6 px in 1/20 s are 120 px/s, but for the moments at which it turns or a pair is left out.
+            assert 60 < report["image_motion_px_per_s"] < 240
+        else:
+            assert report["image_motion_px_per_s"] < 5
+    assert "time_skew" in doubted["moving"]
+    assert doubted["still"] == []
+
+
+def test_the_terminal_shows_regime_and_warning(tmp_path: Path) -> None:
+    """In a terminal the live view says who waits for whom, and warns in words."""
+    film, link = write_moving_film(tmp_path / "moving", 100, 6), f"ipc://{tmp_path}/link"
+    out = tmp_path / "out"
+    command = [sys.executable, "-P", "-m", "phone_host.cli", "run", "--camera", f"replay:{film}?fps=15&loop=1"]
+    ours, theirs = pty.openpty()
+    shown = b""
+    with board(["run", "--camera", f"replay:{film}?fps=20&loop=1", "--link", link], tmp_path):
+        environment = {**os.environ, "COLUMNS": "300", "LINES": "50", "TERM": "xterm"}
+        arguments = [*command, "--link", link, "--out", str(out), "--save-every", "0", "--pairs", "90"]
+        with subprocess.Popen(arguments, stderr=theirs, stdout=subprocess.DEVNULL, env=environment) as running:
+            os.close(theirs)
+            try:
+                while more := os.read(ours, 65536):
+                    shown += more
+            except OSError:  # EIO: the other end of a pty is closed
+                pass
+            assert running.wait(60) == 0
+    os.close(ours)
+    text = shown.decode(errors="replace")
+    assert "the processor has nothing to do" in text
+    assert "px of error, depth is wrong" in text
