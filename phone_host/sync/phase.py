@@ -34,7 +34,8 @@ _RATIO_OFF: Final = 0.01
 
 _NEAR_NS: Final = 4 * _MS
 _NEAR_PART: Final = 8
-"""Good enough, and the point of correcting again: 4 ms, or an eighth of the period. Restarts of webcams scatter by 1 to 3 ms."""
+"""Good enough, and the point of correcting again: 4 ms, or an eighth of the period, and the scatter of the stamps beyond it. Restarts of
+webcams scatter by 1 to 3 ms."""
 
 _SETTLE_NS: Final = {Steering.GRID: 200 * _MS, Steering.RESTART: 1_000 * _MS}
 """After this, frames are of the steered stream; a webcam's first frames after a start may have odd stamps."""
@@ -54,12 +55,14 @@ class Phase:
         period_ns: the shorter of the two periods.
         drift: its change per ns; NaN until it is known.
         first_ns: exposure of the oldest frame that it rests on, host's clock.
+        scatter_ns: median distance of those frames' skews from theirs: how far stamps are to be trusted.
     """
 
     time_skew_ns: float
     period_ns: int
     drift: float
     first_ns: int
+    scatter_ns: float = 0.0
 
     @property
     def beat_s(self) -> float:
@@ -89,7 +92,8 @@ class PhaseMeter:
             return None
         recent = [self._samples[index] for index in range(len(self._samples) - _RECENT, len(self._samples))]
         middle = float(np.median([value for _, value in recent]))
-        return Phase(self._wrapped(middle), self._period_ns, self._drift(), recent[0][0])
+        scatter_ns = float(np.median([abs(value - middle) for _, value in recent]))
+        return Phase(self._wrapped(middle), self._period_ns, self._drift(), recent[0][0], scatter_ns)
 
     def add_host(self, stamp_ns: int) -> None:
         """Take note of a frame of the host's camera; stamps that go back are left out."""
@@ -228,7 +232,7 @@ class PhaseController:
             return None
         self._deadline_ns = 2**63
         skew_ns = self._after_ns = phase.time_skew_ns
-        if abs(skew_ns) <= min(_NEAR_NS, phase.period_ns / _NEAR_PART):
+        if abs(skew_ns) <= min(_NEAR_NS, phase.period_ns / _NEAR_PART) + phase.scatter_ns:
             if self._state is not Aligning.ALIGNED:
                 self._state, self._aligned_ns = Aligning.ALIGNED, now_ns
             if self._aligned_ns is not None and now_ns - self._aligned_ns >= _PATIENCE_NS:

@@ -6,12 +6,22 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from phone_host.model import Image, RectifiedPair
 from phone_host.stereo.interpolate import Interpolator
 from phone_host.stereo.match import MatchSettings, create_matcher
-from phone_host.stereo.scene import Body, Path, Renderer, Scene, demo_scene, matched_rig, matched_view, rig_poses, truth
+from phone_host.stereo.scene import (
+    Body,
+    Path,
+    Renderer,
+    Scene,
+    Truth,
+    demo_scene,
+    matched_rig,
+    matched_view,
+    rig_poses,
+    truth,
+)
 
 PERIOD_S = 1 / 30
 MOMENT_S = 0.4
@@ -66,26 +76,34 @@ def resting(body: Body) -> Body:
     return replace(body, path=Path())
 
 
+@cache
+def renderers() -> tuple[Renderer, Renderer]:
+    """The scene's two cameras."""
+    rig = matched_rig()
+    left, right = rig_poses(rig)
+    return Renderer(scene(), rig.left, left), Renderer(scene(), rig.right, right)
+
+
+@cache
+def judged(moment_s: float, *, still: bool = False) -> Truth:
+    """What is true at a moment, with the moving bodies or without."""
+    rig = matched_rig()
+    left, right = rig_poses(rig)
+    bodies = tuple(body for body in scene().bodies if not (still and body.path.moves))
+    return truth(Scene(bodies).at(moment_s), matched_view(), ((rig.left, left), (rig.right, right)))
+
+
 def depth_errors(skew_s: float) -> tuple[float, float, float]:
     """Median |depth error| on the moving bodies, mm: with this time skew, interpolated, and without any skew."""
-    rig = matched_rig()
-    left, right = (
-        Renderer(scene(), camera, pose) for camera, pose in zip((rig.left, rig.right), rig_poses(rig), strict=True)
-    )
+    left, right = renderers()
     host_s = MOMENT_S - skew_s
     earlier, later, other = left.frame(MOMENT_S - PERIOD_S), left.frame(MOMENT_S), right.frame(host_s)
     moved = Interpolator().back(earlier, later, skew_s / PERIOD_S)
-    sensors = tuple(zip((rig.left, rig.right), rig_poses(rig), strict=True))
     matcher = create_matcher(MatchSettings(disparities=96))
 
     def error_mm(view: Image, moment_s: float) -> float:
-        exact = truth(scene().at(moment_s), matched_view(), (sensors[0], sensors[1]))
-        still = truth(
-            Scene(tuple(b for b in scene().bodies if b.name not in {"ball", "cube"})),
-            matched_view(),
-            (sensors[0], sensors[1]),
-        )
-        moving: NDArray[np.bool_] = exact.visible & (np.abs(exact.depth_m - still.depth_m) > 0.05)
+        exact = judged(moment_s)
+        moving = exact.visible & (np.abs(exact.depth_m - judged(0.0, still=True).depth_m) > 0.05)
         disparity = matcher.match(RectifiedPair(view, other))
         off_mm = np.abs(FOCAL_M_PX / disparity - exact.depth_m)[moving & np.isfinite(disparity) & (disparity > 1)] * 1e3
         assert moving.sum() > 5000
