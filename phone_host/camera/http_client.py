@@ -4,6 +4,7 @@ import base64
 import http.client
 import socket
 import ssl
+import threading
 from contextlib import suppress
 from typing import Final
 
@@ -12,6 +13,9 @@ from phone_host.camera.http_uri import HttpSettings
 
 _READ_BYTES: Final = 65_536
 """More than a JPEG of a phone at 720p: one read takes what has come."""
+
+_ANSWER_S: Final = 8.0
+"""For the head of an answer: less than a camera's start is waited for."""
 
 _NO_STREAM: Final = (
     "text/",
@@ -55,7 +59,7 @@ class Connection:
             self._client.connect()
             self._sock: socket.socket = self._client.sock  # the client forgets it when it has read the answer's head
             self._client.request("GET", settings.target, headers=_headers(settings))
-            self._response = self._client.getresponse()
+            self._response = self._answer()
             self._judge(self._response)
         except UnavailableError:
             self.close()
@@ -63,6 +67,19 @@ class Connection:
         except (OSError, http.client.HTTPException, ValueError) as error:
             self.close()
             raise self._failed(error) from None
+
+    def _answer(self) -> http.client.HTTPResponse:
+        """The head of the server's answer; each of its bytes may be in time and the whole never come."""
+        timer = threading.Timer(_ANSWER_S, self.interrupt)
+        timer.daemon = True
+        timer.start()
+        try:
+            return self._client.getresponse()
+        finally:
+            in_time = timer.is_alive()
+            timer.cancel()
+            if not in_time:
+                raise TimeoutError
 
     def read(self, patience_s: float) -> bytes:
         """Wait for bytes.

@@ -196,6 +196,13 @@ def mute(on: Exchange) -> None:
     time.sleep(_LONG_S)
 
 
+def drips_head(on: Exchange) -> None:
+    """Answers a letter at a time, and never to the end."""
+    for letter in "HTTP/1.1 200 OK\r\nX-Long: " + 10_000 * "x":
+        on.sock.sendall(letter.encode())
+        time.sleep(0.2)
+
+
 def hangs(on: Exchange) -> None:
     """Falls silent in the middle of an image."""
     for image in on.first_parts():
@@ -237,7 +244,7 @@ MANNERS: Final[dict[str, Callable[[Exchange], None]]] = {
     manner.__name__: manner
     for manner in (
         plain, dashes, no_dashes, no_line_end, wrong_boundary, chunked, early_boundary, garbage, truncated, password, page, snapshot, missing,
-        moved, busy, another_tongue, no_image, mute, hangs, closes, resets, drips, endless,
+        moved, busy, another_tongue, no_image, mute, drips_head, hangs, closes, resets, drips, endless,
     )
 }  # fmt: skip
 
