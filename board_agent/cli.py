@@ -20,7 +20,7 @@ from common.commandline import INTERRUPTED, ExamplesFirstParser, run_command
 from common.errors import SettingsError
 from common.keys import change
 from common.keys import listing as keys_listing
-from common.link.factory import open_link, parse_link, tell_insecure
+from common.link.factory import open_links, parse_link, tell_insecure
 from common.protocol.message import BoardCounts
 from common.settings import Resolved, listing, log_level, resolve
 from common.signals import StopSignals
@@ -215,7 +215,7 @@ def _serve(settings: BoardSettings, signals: StopSignals) -> "Summary":
         for uri in uris:
             tell_insecure(uri)
         keys = key_folder(settings.keys)
-        links = [opened.enter_context(closing(open_link(uri, keys, board=True))) for uri in uris]
+        links = [opened.enter_context(closing(link)) for link in open_links(uris, keys, board=True)]
         _LOG.info(logs.event("serving", session=session, camera=settings.camera, links=",".join(settings.link)))
         idle_ns = round(settings.idle_after * 1e9) or None
         status = StatusLine(settings.camera, camera.description.pacing, settings.link, now.monotonic_ns())

@@ -45,6 +45,10 @@ class TakenError(UnavailableError):
     """Raised when another program has the device. Nobody's fault; the other one must let go first."""
 
 
+class MissingDeviceError(UnavailableError):
+    """Raised when a device is not there. Nobody's fault; it may be plugged in at any time."""
+
+
 class DataError(TandemError):
     """Raised when a file, image or result is bad, or a check failed. The input's fault."""
 

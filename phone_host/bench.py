@@ -18,6 +18,7 @@ from common.keys import usual_keys
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
+from phone_host.accounts import LinkAccount
 from phone_host.bench_cases import Case, Size
 from phone_host.bench_links import Ends, ends_of
 from phone_host.boardprocess import BoardAccount
@@ -27,7 +28,6 @@ from phone_host.host import Host, HostSettings
 from phone_host.model import Camera, Rig, StereoGeometry
 from phone_host.pairqueue import PairCounts
 from phone_host.pipeline import Processed
-from phone_host.receiver import LinkAccount
 from phone_host.relay import RelayAccount
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatcherName, MatchSettings, create_matcher
@@ -161,9 +161,12 @@ def run_case(
         host = Host(
             HostSettings(wait_ns=PATIENCE_NS, save_every=0, fifo=settings.fifo),
             open_camera(shown.replay_uri(shown.right), HOST_CLOCK, now.monotonic_ns()),
-            open_link(
-                parse_link(ends.address, listens_by_default=False), usual_keys() if case.interface.is_remote else None
-            ),
+            [
+                open_link(
+                    parse_link(ends.address, listens_by_default=False),
+                    usual_keys() if case.interface.is_remote else None,
+                )
+            ],
             _core(case.size, settings.matcher),
             keep,
         )

@@ -18,11 +18,12 @@ from common.errors import UnavailableError
 from common.keys import usual_keys
 from common.link.factory import open_link, parse_link
 from common.protocol.message import BoardHello, Pacing
+from phone_host.accounts import LinkAccount
 from phone_host.bench_cases import BOARD_SETS, Case, Interface, Size
 from phone_host.boardprocess import BoardAccount, BoardProcess, board_process, free_port
 from phone_host.emulate import NOTHING
 from phone_host.pairqueue import PairQueue
-from phone_host.receiver import LinkAccount, Receiver, refusal_text
+from phone_host.receiver import Receiver, refusal_text
 from phone_host.relay import RelayAccount, RelayProcess, relay_process
 from phone_host.sync.fifo import FifoSettings
 
@@ -136,7 +137,7 @@ def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | No
         UnavailableError: there is no board, it is busy, or its images come on demand only.
     """
     link = open_link(parse_link(uri, listens_by_default=False), usual_keys())
-    receiver = Receiver(link, now.random_id(), PairQueue(FifoSettings(), None, 1), _Silent())
+    receiver = Receiver([link], now.random_id(), PairQueue(FifoSettings(), None, 1), _Silent())
     receiver.start()
     try:
         hello = _hello_of(receiver, uri, now.monotonic_ns() + patience_ns, stop)

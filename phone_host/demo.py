@@ -108,7 +108,7 @@ class DemoRun:
         camera = open_camera(film.replay_uri(film.right), HOST_CLOCK, now.monotonic_ns())
         link = open_link(parse_link(self.address, listens_by_default=False))
         settings = HostSettings(wait_ns=_BOARD_PATIENCE_NS, out=out, save_every=0)
-        self.host = Host(settings, camera, link, core, self._keep)
+        self.host = Host(settings, camera, [link], core, self._keep)
 
     @property
     def last(self) -> CheckedPair | None:

@@ -52,7 +52,7 @@ class Question:
 
     Attributes:
         camera: URI of the own camera; empty: none is given.
-        link: URI of the link to the board; empty: none is given.
+        links: URIs of the links to the board; none: none is given.
         calibration: rig.yaml; empty: none is given.
         out: folder of the results.
         wait_s: how long the board is waited for, s.
@@ -60,7 +60,7 @@ class Question:
     """
 
     camera: str
-    link: str
+    links: tuple[str, ...]
     calibration: str
     out: Path
     wait_s: float
@@ -91,11 +91,13 @@ def examine(question: Question) -> list[Finding]:
     else:
         findings.append(_cameras())
     findings.append(_ports())
-    findings.append(check_bluetooth(machine.read_bluetooth(), wanted=question.link.startswith("rfcomm:")))
-    if not question.link:
+    findings.append(
+        check_bluetooth(machine.read_bluetooth(), wanted=any(uri.startswith("rfcomm:") for uri in question.links))
+    )
+    if not question.links:
         findings.append(ok("board", "not asked: give --link"))
-    else:
-        findings += _examine_board(question, works=works)
+    for uri in question.links:
+        findings += _examine_board(uri, question.wait_s, question.keys, works=works)
     if question.calibration and works:
         findings.append(check_rig(_read_rig(question)))
     findings += check_clocks(machine.read_clocks(Path(__file__).parent))
@@ -162,16 +164,16 @@ def _ports() -> Finding:
     return check_ports(tuple(f"{port.device} ({port.description})" for port in found), "")
 
 
-def _examine_board(question: Question, *, works: bool) -> list[Finding]:
+def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> list[Finding]:
     """Check the way to the board and, where the packages allow it, ask the board itself."""
-    address = parse_link(question.link, listens_by_default=False).address
+    address = parse_link(uri, listens_by_default=False).address
     findings = []
     if address.startswith("serial:") and (node := machine.read_node(Path(address.removeprefix("serial:")))) is not None:
         findings.append(check_access("permission", node, machine.own_account()))
     if not works:
-        return [*findings, check_board(BoardReadings(question.link, _way(address), 0.0))]
+        return [*findings, check_board(BoardReadings(uri, _way(address), 0.0))]
     try:
-        board = _ask_board(question)
+        board = _ask_board(uri, wait_s, keys)
     except TandemError as error:
         return [*findings, Finding("board", Verdict.FAIL, error.problem, error.remedy)]
     if board.answer is Answer.SILENT:
@@ -179,7 +181,7 @@ def _examine_board(question: Question, *, works: bool) -> list[Finding]:
     return [*findings, check_board(board)]
 
 
-def _ask_board(question: Question) -> BoardReadings:
+def _ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
     """Say hello as a host does, and leave again."""
     import threading  # noqa: PLC0415
 
@@ -187,11 +189,11 @@ def _ask_board(question: Question) -> BoardReadings:
     from phone_host.receiver import Receiver  # noqa: PLC0415
     from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
 
-    link = open_link(parse_link(question.link, listens_by_default=False), question.keys)
-    receiver = Receiver(link, now.random_id(), PairQueue(FifoSettings(), None, 1), _Listener())
+    link = open_link(parse_link(uri, listens_by_default=False), keys)
+    receiver = Receiver([link], now.random_id(), PairQueue(FifoSettings(), None, 1), _Listener())
     receiver.start()
     pause = threading.Event()
-    deadline_ns = now.monotonic_ns() + round(question.wait_s * 1e9)
+    deadline_ns = now.monotonic_ns() + round(wait_s * 1e9)
     answer = Answer.SILENT
     while answer is Answer.SILENT and now.monotonic_ns() < deadline_ns:
         pause.wait(_STEP_S)
@@ -206,9 +208,9 @@ def _ask_board(question: Question) -> BoardReadings:
     if receiver.failure is not None:
         raise receiver.failure
     if hello is None or estimate is None:
-        return BoardReadings(question.link, answer, question.wait_s)
+        return BoardReadings(uri, answer, wait_s)
     camera = f"{hello.camera.name} {hello.camera.width_px}x{hello.camera.height_px}"
-    return BoardReadings(question.link, answer, 0.0, camera, estimate.round_trip_ns, estimate.uncertainty_ns)
+    return BoardReadings(uri, answer, 0.0, camera, estimate.round_trip_ns, estimate.uncertainty_ns)
 
 
 class _Listener:

@@ -114,7 +114,7 @@ def film(
         camera.close()
         link.close()
         raise DataError("a camera with pace=demand has no time of its own", "use pace=clock")
-    receiver = Receiver(link, now.random_id(), keeper, _Unmoved())
+    receiver = Receiver([link], now.random_id(), keeper, _Unmoved())
     receiver.start()
     source.start()
     waiting = threading.Event()

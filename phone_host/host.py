@@ -2,7 +2,7 @@
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -90,7 +90,7 @@ class Host:
     Args:
         settings: what to do.
         camera: the own camera, open.
-        link: open link to the board.
+        links: open links to the board, the preferred one first.
         core: the stereo core; None to measure pairs and delays only.
         on_pair: told of each processed pair and its ledger, in the worker's thread; for live views and for checks against truth.
     """
@@ -99,7 +99,7 @@ class Host:
         self,
         settings: HostSettings,
         camera: Camera,
-        link: Link,
+        links: Sequence[Link],
         core: StereoCore | None,
         on_pair: Callable[[Processed, PairLedger], None] | None = None,
     ) -> None:
@@ -116,7 +116,7 @@ class Host:
             time_offset_ns=settings.time_offset.offset_ns,
         )
         self.source = Source(camera, self.queue.add_host)
-        self.receiver = Receiver(link, now.random_id(), self.queue, self)
+        self.receiver = Receiver(links, now.random_id(), self.queue, self)
         self._pipeline = Pipeline(
             core, settings.board_side, now.monotonic_ns, Interpolator() if settings.interpolate else None
         )

@@ -91,7 +91,8 @@ class LiveTable:
         receiver, counts = self._host.receiver, self._host.queue.counts
         estimate = receiver.estimate
         clock = f"clock +-{estimate.uncertainty_ns / 1000:.0f} us" if estimate else "clock unknown"
-        board = "board connected" if receiver.connected else "waiting for the board"
+        carrier = receiver.carrier
+        board = f"board connected over {carrier}" if carrier else "waiting for the board"
         drops = {f"{reason} (board)": count for reason, count in board_drops(receiver.account).items()}
         drops["lost on the link"] = sum(account.lost for account in receiver.account.sessions)
         drops |= {f"{reason} (host)": count for reason, count in counts.board_orphans}

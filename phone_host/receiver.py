@@ -1,17 +1,17 @@
-"""The host's end of the link in a thread of its own: session, clock estimate, credit. Frames go to the pair queue with all marks set."""
+"""The host's end of all links in a thread of its own: session, choice of the link, clock estimate, credit. Frames go to the pair queue with all marks set."""
 
 import logging
 import math
 import os
 import threading
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Final, Protocol
 
 import zmq
 
 from common import now
-from common.errors import ProtocolError
+from common.errors import ProtocolError, UnavailableError
 from common.link.base import Broken, Garbage, Incoming, Link, Packet
 from common.logs import event
 from common.protocol.host_session import HostSession
@@ -21,16 +21,24 @@ from common.protocol.session import (
     Arrived,
     Counted,
     Echo,
+    LinkDown,
+    LinkUp,
+    OtherBoard,
     Outgoing,
     Output,
     Refused,
     Stale,
+    StaleReason,
     Vanished,
+    connection_name,
 )
 from common.protocol.wire import VersionError, decode, encode_stamped
+from phone_host.accounts import LinkAccount, LinkTally, SessionAccount, link_names
 from phone_host.model import BoardFrame
 from phone_host.pairqueue import PairQueue
-from phone_host.sync.clock import ClockEstimate, ClockEstimator
+from phone_host.sync.choice import LinkChoice
+from phone_host.sync.clock import ClockEstimate
+from phone_host.sync.clocks import LinkClocks
 
 _LOG = logging.getLogger(__name__)
 
@@ -64,70 +72,40 @@ class BoardListener(Protocol):
         """A frame has come: its exposure on the host's clock, and its number if the board shows images on demand."""
 
 
-@dataclass(slots=True)
-class SessionAccount:
-    """One life of a board as the host saw it; closed accounts are kept for the report.
-
-    Attributes:
-        session: the board's session id.
-        first: the board's account when this host was accepted.
-        latest: the board's newest account.
-        received: frames that came.
-        lost: frames that were sent and never came (gaps).
-        duplicate: frames that a transport delivered again, dropped.
-        old_session: frames of an older life of the board, dropped.
-        ended: whether the board said that no frame follows.
-        vanished: whether the board went without a word: what it sent after `latest` is unknown.
-    """
-
-    session: str
-    first: BoardCounts
-    latest: BoardCounts
-    received: int = 0
-    lost: int = 0
-    duplicate: int = 0
-    old_session: int = 0
-    ended: bool = False
-    vanished: bool = False
-
-
-@dataclass(slots=True)
-class LinkAccount:
-    """What the receiver has seen so far; written by its thread only, read by others at leisure."""
-
-    sessions: list[SessionAccount] = field(default_factory=list)
-    connects: int = 0
-    garbage: int = 0
-    no_clock: int = 0
-
-
 class Receiver:
-    """Owns the link and speaks the host's role over it.
+    """Owns the links and speaks the host's role over them.
 
     Args:
-        link: open link; closed by this.
+        links: open links to one board, the preferred one first; closed by this.
         host_id: random id of this process's life.
         queue: where frames go.
         listener: told of sessions and frames.
     """
 
-    def __init__(self, link: Link, host_id: str, queue: PairQueue, listener: BoardListener) -> None:
-        self._link = link
+    def __init__(self, links: Sequence[Link], host_id: str, queue: PairQueue, listener: BoardListener) -> None:
+        self._links = tuple(links)
         self._queue = queue
         self._listener = listener
-        self._session = HostSession(host_id, link.dialled)
-        self._clock = ClockEstimator()
+        dialled = [
+            {lane: connection_name(number, path) for lane, path in link.dialled.items()}
+            for number, link in enumerate(links)
+        ]
+        self._session = HostSession(host_id, dialled)
+        self._choice = LinkChoice(len(dialled))
+        self._clock = LinkClocks(len(dialled))
+        self._boot_id = ""
         self._hello: BoardHello | None = None
+        self._streamed_over: int | None = None
         self._transit_ns = _UNKNOWN_NS
         self._poller = zmq.Poller()
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-        for pollable in (*link.pollables, self._wake_read):
+        for pollable in (*(item for link in links for item in link.pollables), self._wake_read):
             self._poller.register(pollable, zmq.POLLIN)
         self._stopping = False
         self._later_ns = 0
         self._settled = False
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
-        self.account = LinkAccount()
+        self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
         self.failure: Exception | None = None
         self._refused: tuple[RefusalReason, int] | None = None
 
@@ -142,6 +120,12 @@ class Receiver:
     def connected(self) -> bool:
         """Whether a board talks to us now."""
         return self._session.is_open
+
+    @property
+    def carrier(self) -> str:
+        """Name of the link that frames come over now; empty while there is none."""
+        link = self._session.carrier
+        return "" if link is None else self.account.links[link].name
 
     @property
     def hello(self) -> BoardHello | None:
@@ -188,7 +172,8 @@ class Receiver:
         except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
             self.failure = error
         finally:
-            self._link.close()
+            for link in self._links:
+                link.close()
 
     def _part(self) -> None:
         """Say goodbye and wait a moment for the board's last account: it comes behind the last frame."""
@@ -197,35 +182,42 @@ class Receiver:
         deadline_ns = now.monotonic_ns() + _FAREWELL_NS
         while farewell and not self._settled and (left_ns := deadline_ns - now.monotonic_ns()) > 0:
             self._poller.poll(left_ns // 1_000_000 + 1)
-            for incoming in self._link.receive():
-                self._take(incoming, now.monotonic_ns())
+            self._receive()
+
+    def _receive(self) -> None:
+        """Take all that has come."""
+        for number, link in enumerate(self._links):
+            for incoming in link.receive():
+                self._take(number, incoming, now.monotonic_ns())
 
     def _step(self) -> None:
         now_ns = now.monotonic_ns()
-        due_ns = min(self._session.due_ns, self._link.due_ns)
+        links_due_ns = min(link.due_ns for link in self._links)
+        due_ns = min(self._session.due_ns, links_due_ns)
         wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
         ready = self._poller.poll(wait_ms)
-        if ready or now.monotonic_ns() >= self._link.due_ns:
-            for incoming in self._link.receive():
-                self._take(incoming, now.monotonic_ns())
+        if ready or now.monotonic_ns() >= links_due_ns:
+            self._receive()
             if any(item == self._wake_read for item, _ in ready):
                 os.read(self._wake_read, 4096)
         now_ns = now.monotonic_ns()
         if now_ns >= self._session.due_ns:
             self._handle(self._session.tick(now_ns), now_ns)
+            if len(self._links) > 1 and (best := self._choice.best(now_ns)) is not None:
+                self._handle(self._session.carry(best, now_ns), now_ns)
         self._queue.tick()
         self._grant(now_ns)
         if self._later_ns:
             later_ns, self._later_ns = self._later_ns, 0
             self._handle(self._session.steer(later_ns), now_ns)
 
-    def _take(self, incoming: Incoming, now_ns: int) -> None:
+    def _take(self, link: int, incoming: Incoming, now_ns: int) -> None:
         match incoming:
-            case Broken():
-                self._handle(self._session.interrupted(now_ns), now_ns)
+            case Broken(path):
+                self._handle(self._session.interrupted(connection_name(link, path), now_ns), now_ns)
             case Garbage():
                 self._count_garbage("not a packet")
-            case Packet(connection, header, payload):
+            case Packet(path, header, payload):
                 try:
                     message = decode(header, payload)
                 except VersionError as error:
@@ -235,7 +227,7 @@ class Receiver:
                 except ProtocolError as error:
                     self._count_garbage(error.problem)
                 else:
-                    self._handle(self._session.receive(connection, message, now_ns), now_ns)
+                    self._handle(self._session.receive(connection_name(link, path), message, now_ns), now_ns)
 
     def _count_garbage(self, problem: str) -> None:
         self.account.garbage += 1
@@ -243,16 +235,16 @@ class Receiver:
             _LOG.warning(event("garbage", count=self.account.garbage, problem=problem))
 
     def _grant(self, now_ns: int) -> None:
-        estimate, hello = self._clock.estimate, self._hello
-        if estimate is None or hello is None:
+        carrier, hello = self._session.carrier, self._hello
+        if carrier is None or hello is None or self._clock.estimate is None:
             return  # without a clock a frame could not be paired
         if hello.camera.pacing is Pacing.DEMAND or self._queue.held_back_by_credit:
             self._handle(self._session.grant(self._queue.free_slots()), now_ns)
             return
         # One frame under way, more only where the link is longer than a period: each further one would be older when used.
         # A link that itself holds the next frame back, so that a newer one may take its place, always has credit for that one too.
-        periods = math.floor(estimate.round_trip_ns / hello.camera.period_ns)
-        needed = min(_MOST_UNDER_WAY, 1 + max(periods, int(self._link.self_paced)))
+        periods = math.floor((self._clock.round_trip_ns(carrier) or 0) / hello.camera.period_ns)
+        needed = min(_MOST_UNDER_WAY, 1 + max(periods, int(self._links[carrier].self_paced)))
         if self._session.outstanding < needed:
             # A swift link never has two frames under way, whatever the credit: then several are granted at once, which spares the
             # board most wake-ups (a fifth of its CPU time a frame, bench_link).
@@ -264,26 +256,71 @@ class Receiver:
             match output:
                 case Outgoing(connection, message):
                     header, payload = encode_stamped(message, now.monotonic_ns)
-                    self._link.send(connection, header, payload)
-                case Arrived(frame, lost):
-                    self._accept_frame(frame, lost, now_ns)
-                case Echo():
+                    self._links[connection[0]].send(connection[1:], header, payload)
+                case Arrived(frame, lost, link):
+                    self._accept_frame(frame, lost, link, now_ns)
+                case Echo(_, t0_ns, t1_ns, t2_ns, t3_ns, link):
                     self._clock.add(output)
-                case Stale(_, old_session):
-                    self._current.old_session += old_session
-                    self._current.duplicate += not old_session
+                    self._choice.echo(link, (t3_ns - t0_ns) - (t2_ns - t1_ns), now_ns)
+                case Stale(_, reason):
+                    self._count_stale(reason)
                 case Accepted():
-                    self._begin(output)
+                    self._begin(output, now_ns)
+                case LinkUp() | LinkDown() | OtherBoard():
+                    self._note_link(output, now_ns)
                 case Counted(counts, ended, lost, last):
                     self._settled = last
                     self._current.lost += lost
                     self._current.latest = max(counts, self._current.latest, key=lambda account: account.grabbed)
                     self._current.ended |= ended
+                    self._choice.account(counts.grabbed, now_ns, has_credit=self._session.outstanding > 0)
                 case Refused(reason):
                     self._refused = (reason, now_ns)
                 case Vanished(orderly):
                     self._current.vanished = not orderly
+                    for number, tally in enumerate(self.account.links):
+                        self._choice.down(number, now_ns)
+                        tally.is_up = False
                     _LOG.info(event("board_gone", session=self._current.session, orderly=orderly))
+
+    def _count_stale(self, reason: StaleReason) -> None:
+        account = self._current
+        match reason:
+            case StaleReason.OLD_SESSION:
+                account.old_session += 1
+            case StaleReason.DUPLICATE:
+                account.duplicate += 1
+            case StaleReason.LATE:
+                account.late += 1
+
+    def _note_link(self, news: LinkUp | LinkDown | OtherBoard, now_ns: int) -> None:
+        """Take note of a link that came up, went down, or leads astray."""
+        tally = self.account.links[news.link]
+        match news:
+            case LinkUp(link, hello):
+                tally.is_up = True
+                if hello.boot_id != self._boot_id:
+                    self._boot_id = hello.boot_id
+                    self._clock = LinkClocks(len(self._links))  # another boot is another clock
+                self._choice.up(link, now_ns)
+                _LOG.info(event("link_up", link=tally.name))
+            case LinkDown(link, stuck):
+                tally.is_up = stuck
+                tally.lost += 1
+                self._choice.down(link, now_ns)
+                if stuck:
+                    self._choice.up(link, now_ns)
+                _LOG.info(event("link_down", link=tally.name, stuck=stuck))
+            case OtherBoard(link, hello):
+                ours = self._hello
+                names = " and ".join(tally.name for tally in self.account.links)
+                if tally.frames or tally.lost or ours is None:  # it was right once: somebody has moved a cable
+                    _LOG.warning(event("other_board", link=tally.name, camera=hello.camera.name))
+                    return
+                raise UnavailableError(
+                    f"links {names} lead to different boards ({ours.camera.name} and, on link {link + 1}, {hello.camera.name})",
+                    "give --link only addresses of one board",
+                )
 
     @property
     def _current(self) -> SessionAccount:
@@ -291,14 +328,14 @@ class Receiver:
             self.account.sessions.append(SessionAccount("", BoardCounts(), BoardCounts()))
         return self.account.sessions[-1]
 
-    def _begin(self, accepted: Accepted) -> None:
-        hello = accepted.hello
+    def _begin(self, accepted: Accepted, now_ns: int) -> None:
+        hello, link = accepted.hello, accepted.link
         self._refused = None
-        self.account.connects += 1
-        if self._hello is None or self._hello.boot_id != hello.boot_id:
-            self._clock = ClockEstimator()  # another boot is another clock
         self._hello = hello
         self._transit_ns = _UNKNOWN_NS
+        self._choice.carries(link, now_ns)
+        tally, before = self.account.links[link], self._streamed_over
+        self._streamed_over = link
         if accepted.resumed:
             self._current.lost += accepted.lost
             self._current.vanished = False
@@ -306,14 +343,25 @@ class Receiver:
             self.account.sessions.append(SessionAccount(hello.session, hello.counts, hello.counts))
             self._listener.session_began()
             self._queue.begin(hello.camera.period_ns, on_demand=hello.camera.pacing is Pacing.DEMAND)
+        if link != before:
+            tally.carried += 1
+        if accepted.resumed and before is not None and link != before:
+            self.account.switches += 1
+            names = self.account.links
+            _LOG.info(event("link_switched", source=names[before].name, target=tally.name, lost=accepted.lost))
+            return
+        self.account.connects += 1
         camera = hello.camera
         size = f"{camera.width_px}x{camera.height_px}"
-        _LOG.info(event("board_found", session=hello.session, resumed=accepted.resumed, camera=camera.name, size=size))
+        found = {"session": hello.session, "resumed": accepted.resumed, "link": tally.name}
+        _LOG.info(event("board_found", **found, camera=camera.name, size=size))
 
-    def _accept_frame(self, frame: FrameMessage, lost: int, now_ns: int) -> None:
-        account = self._current
+    def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
+        account, tally = self._current, self.account.links[link]
         account.received += 1
         account.lost += lost
+        tally.frames += 1
+        tally.bytes += len(frame.payload)
         estimate = self._clock.estimate
         if estimate is None:
             self.account.no_clock += 1
@@ -324,7 +372,9 @@ class Receiver:
         marks = frame.marks.moved_to(sent_ns + offset_ns)
         uncertainty_ns = estimate.uncertainty_at(sent_ns)
         self._transit_ns = now_ns - marks.sent_ns
-        self._queue.add_board(BoardFrame(frame, self._link.kind, marks, now_ns, offset_ns, uncertainty_ns))
+        self._choice.frame(link, self._transit_ns, now_ns)
+        tally.age.add(now_ns - marks.exposed_ns)
+        self._queue.add_board(BoardFrame(frame, tally.name, marks, now_ns, offset_ns, uncertainty_ns))
         on_demand = self._hello is not None and self._hello.camera.pacing is Pacing.DEMAND
         self._listener.frame_arrived(marks.exposed_ns, frame.sequence if on_demand else None)
 

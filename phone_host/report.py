@@ -5,10 +5,10 @@ from dataclasses import asdict, dataclass, field
 from typing import Final
 
 from common.camera.base import CameraHealth, health_values
+from phone_host.accounts import LinkAccount, LinkTally
 from phone_host.delays import DELAYS, STAGES, DelayStatistics, Spread
 from phone_host.model import TimeOffset
 from phone_host.pairqueue import PairCounts
-from phone_host.receiver import LinkAccount
 from phone_host.regime import Judgement, RunFigures, judge
 from phone_host.results import Unwritten
 from phone_host.sync.clock import ClockEstimate
@@ -103,6 +103,8 @@ def build(facts: RunFacts) -> dict[str, object]:
         "fifo": {"depth": facts.fifo.depth, "overflow": facts.fifo.overflow.value, "age_bound": age_bound(facts)},
         "tolerance_ms": facts.tolerance_ns / _MS,
         "sessions": [_session(facts, index) for index in range(len(facts.link.sessions))],
+        "links": [_link(tally) for tally in facts.link.links],
+        "switches": facts.link.switches,
         "connects": facts.link.connects,
         "garbage": facts.link.garbage,
         "frames": {
@@ -187,7 +189,7 @@ def summary(facts: RunFacts) -> str:
     lines += [f"  {remedy}" for remedy in judge(figures(facts)).remedies]
     lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(time_and_motion(facts))]
     lines += camera_troubles(facts.camera)
-    lines += _losses(facts)
+    lines += [*_links(facts.link), *_losses(facts)]
     return "\n".join(lines)
 
 
@@ -252,9 +254,21 @@ def _arrivals(health: CameraHealth, offset: TimeOffset) -> list[str]:
     ]
 
 
+def _links(link: LinkAccount) -> list[str]:
+    """The links side by side, where there are several."""
+    if len(link.links) < 2:
+        return []
+    lines = [f"{'link':14} {'frames':>9} {'carried':>9} {'lost':>9} {'age p50':>9} {'p95':>9}"]
+    for tally in link.links:
+        age = tally.age.spread()
+        ages = f"{age.p50_ns / _MS:9.3f} {age.p95_ns / _MS:9.3f}" if age.count else f"{'-':>9} {'-':>9}"
+        lines.append(f"{tally.name:14} {tally.frames:9} {tally.carried:9} {tally.lost:9} {ages}")
+    return lines
+
+
 def _losses(facts: RunFacts) -> list[str]:
     lost = sum(account.lost for account in facts.link.sessions)
-    stale = sum(account.duplicate + account.old_session for account in facts.link.sessions)
+    stale = sum(account.duplicate + account.late + account.old_session for account in facts.link.sessions)
     board = {reason: n for reason, n in board_drops(facts.link).items() if n}
     parts = [
         *(f"{n} {reason} on the board" for reason, n in board.items()),
@@ -376,6 +390,18 @@ def _ms(value_ns: int | None) -> float | None:
     return None if value_ns is None else round(value_ns / _MS, 3)
 
 
+def _link(tally: LinkTally) -> dict[str, object]:
+    return {
+        "link": tally.name,
+        "up": tally.is_up,
+        "frames": tally.frames,
+        "bytes": tally.bytes,
+        "carried": tally.carried,
+        "lost": tally.lost,
+        "age_ms": spread_ms(tally.age.spread()),
+    }
+
+
 def _session(facts: RunFacts, index: int) -> dict[str, object]:
     account = facts.link.sessions[index]
     before = dict(account.first.dropped)
@@ -389,7 +415,7 @@ def _session(facts: RunFacts, index: int) -> dict[str, object]:
         "waiting": grabbed - sent - sum(dropped.values()),
         "received": account.received,
         "lost": account.lost,
-        "stale": {"duplicate": account.duplicate, "old_session": account.old_session},
+        "stale": {"duplicate": account.duplicate, "late": account.late, "old_session": account.old_session},
         "ended": account.ended,
         "tail": "unknown" if account.vanished else "known",
     }

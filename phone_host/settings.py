@@ -18,7 +18,10 @@ ENVIRONMENT_PREFIX = "PHONE_HOST"
 class PhoneHostSettings:
     """Settings of phone-host run, from a TOML file, the environment and options."""
 
-    link: str = setting("tcp://127.0.0.1:5555", "link to the board")
+    link: tuple[str, ...] = setting(
+        ("tcp://127.0.0.1:5555",),
+        "links to the board; frames come over the best that is up, the first where some are alike",
+    )
     camera: str = setting("", "own camera URI, for example replay:PATH?fps=30&loop=1")
     calibration: str = setting("", "rig.yaml of the two cameras")
     matcher: str = setting("sgbm", "stereo matcher")
@@ -40,7 +43,12 @@ def check(settings: PhoneHostSettings) -> None:
     log_level(settings.log_level)
     if settings.camera:
         check_camera(settings.camera)
-    parse_link(settings.link, listens_by_default=False)
+    for uri in settings.link:
+        parse_link(uri, listens_by_default=False)
+    if not settings.link:
+        raise SettingsError("link names no link", "give at least one, for example tcp://192.168.7.2:5555")
+    if doubled := next((uri for uri in settings.link if settings.link.count(uri) > 1), None):
+        raise SettingsError(f"link {doubled!r} is given twice", "give each link once")
     FifoSettings.parse(settings.fifo)
     matchers = [name.value for name in MatcherName]
     if settings.matcher not in matchers:

@@ -2,10 +2,11 @@
 
 import ipaddress
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from urllib.parse import parse_qsl, unquote, urlsplit
 
-from common.errors import SettingsError, UnavailableError
+from common.errors import MissingDeviceError, SettingsError, TandemError, UnavailableError
 from common.keys import KeyFolder, Peer, peer_at
 from common.link.base import Link
 from common.logs import event
@@ -151,6 +152,39 @@ def _peer(uri: LinkUri, keys: KeyFolder | None) -> Peer | None:
     )
 
 
+def open_links(uris: Sequence[LinkUri], keys: KeyFolder | None = None, *, board: bool = False) -> list[Link]:
+    """Open the links of one side. Of several, one whose device is missing is waited for as long as another is there.
+
+    Args:
+        uris: what to open.
+        keys: as for `open_link`.
+        board: as for `open_link`.
+
+    Returns:
+        The open links, in that order.
+
+    Raises:
+        SettingsError: an address makes no sense.
+        UnavailableError: a port or path is taken, or every device is missing.
+    """
+    links: list[Link] = []
+    missing: list[UnavailableError] = []
+    try:
+        for uri in uris:
+            try:
+                links.append(open_link(uri, keys, board=board))
+            except MissingDeviceError as error:
+                missing.append(error)
+                links.append(_open_serial(uri, waits=True))
+        if len(missing) == len(uris):
+            raise missing[0]
+    except TandemError:
+        for link in links:
+            link.close()
+        raise
+    return links
+
+
 def _check_port(uri: str, address: str) -> None:
     try:
         port = urlsplit(address.replace("*", "0.0.0.0")).port  # noqa: S104 - only to parse it
@@ -178,14 +212,14 @@ def _baud(uri: str, text: str) -> int:
     return int(text)
 
 
-def _open_serial(uri: LinkUri) -> Link:
+def _open_serial(uri: LinkUri, *, waits: bool = False) -> Link:
     try:
         from common.link.serial import DEFAULT_BAUD, SerialLink  # noqa: PLC0415 - only the transport that is used is loaded
     except ImportError as error:
         raise UnavailableError(
             f"{uri.address} cannot be opened ({error})", "install pyserial (apt: python3-serial)"
         ) from None
-    return SerialLink(uri.address.removeprefix("serial:"), uri.baud or DEFAULT_BAUD, listens=uri.listens)
+    return SerialLink(uri.address.removeprefix("serial:"), uri.baud or DEFAULT_BAUD, listens=uri.listens, waits=waits)
 
 
 def _open_rfcomm(uri: LinkUri) -> Link:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from common.errors import TakenError, UnavailableError
+from common.errors import MissingDeviceError, TakenError, UnavailableError
 from common.link.stream import StreamLink
 from common.protocol.framing import Side
 
@@ -76,13 +76,15 @@ class SerialLink(StreamLink):
         path: the device.
         baud: speed, for ports that have one.
         listens: whether this side plays the listener.
+        waits: whether a device that cannot be had now is waited for.
 
     Raises:
-        UnavailableError: the device cannot be had.
+        UnavailableError: the device cannot be had; MissingDeviceError where it is not there.
     """
 
-    def __init__(self, path: str, baud: int, *, listens: bool) -> None:
-        super().__init__("serial", Side.LISTENER if listens else Side.DIALLER, lambda: SerialLine(path, baud))
+    def __init__(self, path: str, baud: int, *, listens: bool, waits: bool = False) -> None:
+        side = Side.LISTENER if listens else Side.DIALLER
+        super().__init__("serial", side, lambda: SerialLine(path, baud), waits=waits)
 
 
 def _make_raw(descriptor: int) -> None:
@@ -111,7 +113,7 @@ def _explained(path: str, error: Exception) -> UnavailableError:
         group = _group(path)
         return UnavailableError(problem, f"sudo usermod -aG {group} $USER, then log in again")
     if number in _GONE:
-        return UnavailableError(problem, f"plug the cable in, or choose another port with --link{_others(path)}")
+        return MissingDeviceError(problem, f"plug the cable in, or choose another port with --link{_others(path)}")
     return UnavailableError(problem, "give the path of a serial port, for example serial:/dev/ttyACM0")
 
 

@@ -75,6 +75,7 @@ class StreamLink:
         side: which of the two this side plays.
         open_line: opens the line, or tells that this takes time; raises UnavailableError.
         frame_bytes: the transport carries bytes in frames of so many; 1: it does not.
+        waits: whether a line that cannot be had now is waited for.
 
     Raises:
         UnavailableError: the line cannot be had now.
@@ -82,7 +83,15 @@ class StreamLink:
 
     self_paced: Final = True
 
-    def __init__(self, kind: str, side: Side, open_line: Callable[[], Line | Opening], frame_bytes: int = 1) -> None:
+    def __init__(
+        self,
+        kind: str,
+        side: Side,
+        open_line: Callable[[], Line | Opening],
+        frame_bytes: int = 1,
+        *,
+        waits: bool = False,
+    ) -> None:
         self.kind = kind
         self._dials = side is Side.DIALLER
         self.dialled = {lane: lane.name.encode() for lane in Lane} if self._dials else {}
@@ -91,7 +100,7 @@ class StreamLink:
         self._opening = Opening()
         self._reopen_ns = 0
         self._events = select.EPOLLIN
-        opened = open_line()
+        opened = Opening() if waits else open_line()
         self._epoll = select.epoll()
         self._duplex = Duplex(side, int.from_bytes(os.urandom(4), "little"), frame_bytes)
         self._begin(opened)

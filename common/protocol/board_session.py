@@ -1,4 +1,9 @@
-"""The board's side of a session: serves one host at a time, sends a frame only against credit. Sans-I/O, `now_ns` passed in."""
+"""The board's side of a session: serves one host at a time, over all links on which it says hello. Sans-I/O, `now_ns` passed in.
+
+A frame is sent only against credit, and always over one link: the one on which the host said hello for frames last. The other links carry echoes
+and hellos. So the host decides where frames go, and the answer to its hello stands in line behind the last frame that can still come
+from anywhere: what it counts and has not come is lost.
+"""
 
 from dataclasses import dataclass, field
 from typing import assert_never
@@ -31,23 +36,67 @@ _NEVER = 2**63 - 1
 
 @dataclass(slots=True)
 class _Host:
-    """The host that is served."""
+    """The host that is served.
+
+    Attributes:
+        host_id: its random id.
+        heard_ns: when it was heard last, over any link.
+        status_due_ns: when it is told the account next.
+        silence_due_ns: not before then any of its links can have been silent for too long.
+        heard_by: when it was heard last, by link.
+        frames: the connection that frames go to; None where it was lost.
+        controls: the control connections, by link.
+        below_index: frames below this one may be sent.
+    """
 
     host_id: str
     heard_ns: int
     status_due_ns: int
-    lanes: dict[Lane, bytes] = field(default_factory=dict)
+    silence_due_ns: int
+    heard_by: dict[int, int] = field(default_factory=dict)
+    frames: bytes | None = None
+    controls: dict[int, bytes] = field(default_factory=dict)
     below_index: int = 0
+
+    @property
+    def account_lane(self) -> bytes | None:
+        """The control connection beside the frames; any where there is none."""
+        beside = None if self.frames is None else self.controls.get(self.frames[0])
+        return beside if beside is not None else next(iter(self.controls.values()), None)
+
+    def knows(self, connection: bytes) -> bool:
+        """Whether a connection is one of this host's."""
+        return connection == self.frames or self.controls.get(connection[0]) == connection
+
+    def heard(self, connection: bytes, now_ns: int) -> None:
+        """Take note of a word over a connection."""
+        self.heard_ns = self.heard_by[connection[0]] = now_ns
+
+    def lose(self, connection: bytes) -> None:
+        """Forget a connection."""
+        if connection == self.frames:
+            self.frames = None
+        if self.controls.get(connection[0]) == connection:
+            del self.controls[connection[0]]
+
+    def lose_silent_links(self, now_ns: int) -> None:
+        """Forget the links that have been silent for too long."""
+        for link in [link for link, heard_ns in self.heard_by.items() if now_ns - heard_ns >= SILENCE_NS]:
+            del self.heard_by[link]
+            self.controls.pop(link, None)
+            if self.frames is not None and self.frames[0] == link:
+                self.frames = None
+        self.silence_due_ns = min(self.heard_by.values(), default=now_ns) + SILENCE_NS
 
 
 class BoardSession:
-    """One life of a board process as seen over one link.
+    """One life of a board process.
 
     Args:
         session: random id of this process's life.
         boot_id: id of the machine's boot.
         camera: what the host must know of the camera.
-        dialled: the connections that this side opened itself (`?connect=1`); empty when the host dials.
+        dialled: the connections that this side opened itself (`?connect=1`), of all links; empty when the host dials.
     """
 
     def __init__(
@@ -65,13 +114,15 @@ class BoardSession:
 
     @property
     def has_host(self) -> bool:
-        """Whether a host is there that frames could be sent to."""
-        return self._host is not None and Lane.FRAMES in self._host.lanes
+        """Whether a host is there that frames can or soon could be sent to."""
+        host = self._host
+        return host is not None and (host.frames is not None or bool(host.controls))
 
     @property
     def has_credit(self) -> bool:
         """Whether the next frame may be sent now."""
-        return self._host is not None and Lane.FRAMES in self._host.lanes and self._sent < self._host.below_index
+        host = self._host
+        return host is not None and host.frames is not None and self._sent < host.below_index
 
     def receive(  # noqa: PLR0911 - one line for each kind of message
         self, connection: bytes, message: Message, now_ns: int, counts: BoardCounts
@@ -90,10 +141,10 @@ class BoardSession:
         if isinstance(message, HostHello):
             return self._greet(connection, message, now_ns, counts)
         host = self._host
-        if host is None or connection not in host.lanes.values():
+        if host is None or not host.knows(connection):
             # Somebody from before a restart, or a stranger: a clock echo shows which lane it is.
             return [] if isinstance(message, Bye) else [Outgoing(connection, Knock(Lane.CONTROL, self.session))]
-        host.heard_ns = now_ns
+        host.heard(connection, now_ns)
         match message:
             case Ping(wave, t0_ns):
                 return [Outgoing(connection, Pong(wave, t0_ns, now_ns, now_ns))]
@@ -107,7 +158,7 @@ class BoardSession:
                 # The last account goes behind the last frame, so that what it tells of and has not come is lost.
                 farewell = Status(self.session, counts)
                 self._host = None
-                return [Outgoing(host.lanes[Lane.FRAMES], farewell)] if Lane.FRAMES in host.lanes else []
+                return [] if host.frames is None else [Outgoing(host.frames, farewell)]
             case BoardHello() | Knock() | Refusal() | FrameMessage() | Pong() | Status() | End():
                 return []  # a board's words from a host: nothing a sound host sends
             case _:
@@ -122,17 +173,18 @@ class BoardSession:
         """Do what time demands: account to the host, give up a silent one, knock where this side has dialled."""
         outgoing: list[Outgoing] = []
         host = self._host
-        if host is not None and now_ns - host.heard_ns >= SILENCE_NS:
-            self._host = host = None
+        if host is not None and now_ns >= host.silence_due_ns:
+            host.lose_silent_links(now_ns)
+            if not host.heard_by:
+                self._host = host = None
         if host is not None and now_ns >= host.status_due_ns:
             host.status_due_ns = now_ns + STATUS_NS
             outgoing += self._account(host, counts)
         if self._dialled and now_ns >= self._knock_due_ns:
-            known = {} if host is None else host.lanes
             outgoing += [
                 Outgoing(connection, Knock(lane, self.session))
                 for lane, connection in self._dialled
-                if lane not in known
+                if host is None or not host.knows(connection)
             ]
             self._knock_due_ns = now_ns + HELLO_RETRY_NS
         return outgoing
@@ -142,7 +194,7 @@ class BoardSession:
         """When `tick` wants to be called next, board's clock, ns."""
         due = self._knock_due_ns if self._dialled else _NEVER
         if self._host is not None:
-            due = min(due, self._host.heard_ns + SILENCE_NS, self._host.status_due_ns)
+            due = min(due, self._host.silence_due_ns, self._host.status_due_ns)
         return due
 
     def send(self, frame: Frame) -> Outgoing:
@@ -152,40 +204,40 @@ class BoardSession:
             frame: a sound frame; only to be called while `has_credit`.
         """
         assert self._host is not None
+        assert self._host.frames is not None
         marks = BoardMarks(frame.exposed.ns, frame.grabbed.ns, frame.grabbed.ns)
         size = (frame.width_px, frame.height_px, frame.pixel_format)
         message = FrameMessage(self.session, self._sent, frame.sequence, *size, frame.exposure_ns, marks, frame.payload)
-        return Outgoing(self._host.lanes[Lane.FRAMES], message)
+        return Outgoing(self._host.frames, message)
 
     def sent(self) -> None:
         """Take note that the link took the frame."""
         self._sent += 1
 
     def unreachable(self, connection: bytes) -> list[Outgoing]:
-        """Take note that a connection is gone; a host that is still heard on the other one is asked to say hello anew."""
-        if self._host is None or connection not in self._host.lanes.values():
+        """Take note that a connection is gone; a host that is still heard on others and has no lane for frames is asked to say hello anew."""
+        host = self._host
+        if host is None or not host.knows(connection):
             return []  # a stranger's end is nothing to the host
-        self._host.lanes = {lane: known for lane, known in self._host.lanes.items() if known != connection}
-        return [
-            Outgoing(known, Knock(lane, self.session))
-            for lane, known in self._host.lanes.items()
-            if lane is Lane.CONTROL
-        ]
+        host.lose(connection)
+        return self._ask_for_frames_lane(host)
 
     def end(self, counts: BoardCounts) -> list[Outgoing]:
         """Tell the host, behind the last frame, that none will follow; from now on `tick` repeats it."""
         self._ended = True
-        return (
-            [Outgoing(self._host.lanes[Lane.FRAMES], End(self.session, counts))]
-            if self._host is not None and self.has_host
-            else []
-        )
+        host = self._host
+        return [] if host is None or host.frames is None else [Outgoing(host.frames, End(self.session, counts))]
 
     def leave(self, counts: BoardCounts) -> list[Outgoing]:
         """Say goodbye to the host, with the final account; behind the last frame where its lane is there."""
-        lanes = {} if self._host is None else self._host.lanes
-        connection = lanes.get(Lane.FRAMES, lanes.get(Lane.CONTROL))
+        host = self._host
+        connection = None if host is None else host.frames if host.frames is not None else host.account_lane
         return [] if connection is None else [Outgoing(connection, Bye(counts))]
+
+    def _ask_for_frames_lane(self, host: _Host) -> list[Outgoing]:
+        if host.frames is not None:
+            return []
+        return [Outgoing(control, Knock(Lane.CONTROL, self.session)) for control in host.controls.values()]
 
     def _account(self, host: _Host, counts: BoardCounts) -> list[Outgoing]:
         """Give the account of the frames, and mend what a lost packet could have left for ever.
@@ -194,14 +246,13 @@ class BoardSession:
         that is lost leaves a host without its frames' lane.
         """
         outgoing: list[Outgoing] = []
-        if Lane.CONTROL in host.lanes:
-            outgoing.append(Outgoing(host.lanes[Lane.CONTROL], Status(self.session, counts)))
-            if Lane.FRAMES not in host.lanes:
-                outgoing.append(Outgoing(host.lanes[Lane.CONTROL], Knock(Lane.CONTROL, self.session)))
+        if (control := host.account_lane) is not None:
+            outgoing.append(Outgoing(control, Status(self.session, counts)))
+        outgoing += self._ask_for_frames_lane(host)
         if self._ended:
             outgoing += self.end(counts)
-        elif self.has_host and not self.has_credit:
-            outgoing.append(Outgoing(host.lanes[Lane.FRAMES], Status(self.session, counts)))
+        elif host.frames is not None and not self.has_credit:
+            outgoing.append(Outgoing(host.frames, Status(self.session, counts)))
         return outgoing
 
     def _greet(self, connection: bytes, hello: HostHello, now_ns: int, counts: BoardCounts) -> list[Outgoing]:
@@ -209,9 +260,11 @@ class BoardSession:
         if host is not None and host.host_id != hello.host_id and now_ns - host.heard_ns < TAKEOVER_NS:
             return [Outgoing(connection, Refusal(RefusalReason.BUSY))]
         if host is None or host.host_id != hello.host_id:
-            self._host = host = _Host(hello.host_id, now_ns, now_ns + STATUS_NS)
-        host.heard_ns = now_ns
+            self._host = host = _Host(hello.host_id, now_ns, now_ns + STATUS_NS, now_ns + SILENCE_NS)
+        host.heard(connection, now_ns)
         if hello.lane is Lane.FRAMES:
             host.below_index = self._sent  # credit of an earlier connection is void
-        host.lanes[hello.lane] = connection
+            host.frames = connection
+        else:
+            host.controls[connection[0]] = connection
         return [Outgoing(connection, BoardHello(self.session, self._boot_id, self._camera, counts))]

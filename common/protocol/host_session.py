@@ -1,8 +1,16 @@
-"""The host's side of a session: finds the board, grants credit, echoes clocks, tells fresh frames from stale. Sans-I/O, `now_ns` passed in."""
+"""The host's side of a session over one or several links: finds the board, grants credit, echoes clocks, tells fresh frames from stale. Sans-I/O.
 
-from enum import Enum
+A link is open when the board answers hello on its control lane; all open links lead to one life of one board. Frames come over one of them, the
+carrier: the one on which the board answered hello for frames last. That answer stands in line behind the last frame of this lane, and overtakes what
+is under way on others: what it counts and has not come is lost, and a frame that comes behind a newer one stays lost (`StaleReason.LATE`).
+`now_ns` is passed in; which open link is to be the carrier is its owner's choice (`carry`).
+"""
+
+from collections import deque
+from collections.abc import Sequence
 from typing import Final, assert_never
 
+from common.protocol.host_path import HostPath
 from common.protocol.message import (
     BoardCounts,
     BoardHello,
@@ -28,80 +36,64 @@ from common.protocol.session import (
     Accepted,
     Arrived,
     Counted,
-    Echo,
+    LinkDown,
+    LinkUp,
+    OtherBoard,
     Outgoing,
     Output,
     Refused,
     Stale,
+    StaleReason,
     Vanished,
 )
 
-WAVE_ECHOES: Final = 3
-WAVE_ECHOES_EARLY: Final = 5
-"""Echoes back to back: the first wakes both sides up, the others measure without that bias (study of links, 3d)."""
+_NEVER: Final = 2**63 - 1
 
-WAVE_NS: Final = 500 * MS
-"""Between two waves. An echo costs the board as much as half a frame (bench_link): 6 a second do for a clock whose skew is known."""
+STUCK_NS: Final = 1000 * MS
+"""A link whose frames' lane leaves a hello unanswered for this long gives way to another: five hellos."""
 
-WAVE_YOUNG_NS: Final = 250 * MS
-YOUNG_NS: Final = 10_000 * MS
-"""So long after the beginning of a session the skew is hardly known, and an offset grows old quickly."""
+SILENCE_BESIDE_NS: Final = 1500 * MS
+"""The carrier is lost when unheard for this long while another link was heard: three accounts of the board and three waves have not come."""
 
-REPEATS: Final = 5
-SLOW_ECHO_NS: Final = 1 * MS
-"""An echo that took longer than any swift link's says little; while the skew is learnt it is repeated, up to so many times a wave: errors
-after ten seconds of Wi-Fi are halved by it (bench_clock)."""
+_FOREIGN_RETRY_NS: Final = 5000 * MS
+"""A link that leads to another board is asked again after this time: the cable may be moved."""
 
-WAVE_EARLY_NS: Final = 50 * MS
-EARLY_NS: Final = 1000 * MS
-"""In its first second there is no estimate worth the name."""
-
-WAVE_PATIENCE_NS: Final = 1000 * MS
-"""An echo under way is waited for this long before another wave: on a slow line a wave takes longer than the time between two."""
-
-WAVE_REST: Final = 8
-"""After a wave the line has this many times its length for other things: echoes at 115200 baud would else take 2 % of it."""
-
-WAVE_REST_YOUNG: Final = 1
-"""The same while the skew is learnt: 7 % of such a line for ten seconds."""
-
-
-class _State(Enum):
-    SEEKING = 0
-    OPEN = 1
+_MOST_MISSING: Final = 64
+"""Lost frames that are remembered, so that one which comes late is not taken for a repetition: more than any link holds."""
 
 
 class HostSession:
-    """A host's view of one link.
+    """A host's view of its board.
 
     Args:
         host_id: random id of this process's life.
-        dialled: the connections that this side opened; empty when the board dials (`?bind=1`), then its knocks tell them.
+        links: for each link the connections that this side opened; empty where the board dials (`?bind=1`), then its knocks tell them.
     """
 
-    def __init__(self, host_id: str, dialled: dict[Lane, bytes]) -> None:
+    def __init__(self, host_id: str, links: Sequence[dict[Lane, bytes]]) -> None:
         self._host_id = host_id
-        self._lanes = dict(dialled)
-        self._state = _State.SEEKING
+        self._paths = tuple(HostPath(link, dialled) for link, dialled in enumerate(links))
+        self._carrier: HostPath | None = None
+        self._wanted: HostPath | None = None
+        self._pending = False
+        self._pending_since_ns = 0
+        self._frames_hello_due_ns = 0
+        self._streams = False
         self._leaving = False
-        self._greeted: dict[Lane, BoardHello] = {}
         self._hello: BoardHello | None = None
-        self._opened_ns = 0
-        self._heard_ns = 0
-        self._hello_due_ns = 0
-        self._wave_due_ns = 0
-        self._wave = 0
-        self._wave_ns = 0
-        self._echoes_left = 0
-        self._repeats_left = 0
-        self._unanswered = False
         self._next_index = 0
         self._below_index = 0
+        self._missing: deque[int] = deque(maxlen=_MOST_MISSING)
 
     @property
     def is_open(self) -> bool:
-        """Whether a board talks to us now."""
-        return self._state is _State.OPEN
+        """Whether a board sends its frames to us now."""
+        return self._carrier is not None
+
+    @property
+    def carrier(self) -> int | None:
+        """The link that frames come over now."""
+        return None if self._carrier is None else self._carrier.link
 
     @property
     def outstanding(self) -> int:
@@ -111,9 +103,8 @@ class HostSession:
     @property
     def due_ns(self) -> int:
         """When `tick` wants to be called next, host's clock, ns."""
-        if self._state is _State.OPEN:
-            return min(self._wave_due_ns, self._heard_ns + SILENCE_NS)
-        return self._hello_due_ns
+        due_ns = min(path.due_ns for path in self._paths)
+        return min(due_ns, self._frames_hello_due_ns) if self._pending else due_ns
 
     def receive(  # noqa: PLR0911 - one line for each kind of message
         self, connection: bytes, message: Message, now_ns: int
@@ -121,54 +112,58 @@ class HostSession:
         """Take one message from a connection.
 
         Args:
-            connection: where it came from.
+            connection: where it came from; its first byte is the link's number.
             message: what came.
             now_ns: arrival of its last byte on the host's clock, ns.
 
         Returns:
             What to send, and what happened.
         """
+        path = self._paths[connection[0]]
         match message:
             case Knock():
-                return self._answer_knock(connection, message, now_ns)
+                return self._answer_knock(path, connection, message, now_ns)
             case Refusal(reason):
                 return [Refused(reason)]
             case BoardHello():
-                return self._accept(connection, message, now_ns)
+                if connection == path.lanes.get(Lane.CONTROL):
+                    return self._open(path, message, now_ns)
+                return self._accept(path, message, now_ns) if connection == path.lanes.get(Lane.FRAMES) else []
             case FrameMessage():
-                return self._take_frame(message, now_ns)
+                return self._take_frame(path, message, now_ns)
             case HostHello() | Ping() | Credit() | Steer():
                 return []  # a host's words from a board: nothing a sound board sends
             case Pong() | Status() | End():
-                return self._attend(connection, message, now_ns)
+                return self._attend(path, connection, message, now_ns)
             case Bye(counts):
-                return self._part(connection, counts, now_ns)
+                return self._part(path, connection, counts, now_ns)
             case _:
                 assert_never(message)
 
     def tick(self, now_ns: int) -> list[Output]:
-        """Do what time demands: hello again while unanswered, the next clock wave, give up a silent board."""
-        if self._state is _State.OPEN and now_ns - self._heard_ns >= SILENCE_NS:
-            return [Vanished(orderly=False), *self._seek(now_ns)]
-        if self._state is _State.SEEKING and now_ns >= self._hello_due_ns:
-            return self._say_hello(now_ns)
-        if self._state is _State.OPEN and now_ns >= self._wave_due_ns:
-            if self._unanswered and now_ns - self._wave_ns < WAVE_PATIENCE_NS:
-                self._wave_due_ns = min(now_ns + WAVE_EARLY_NS, self._wave_ns + WAVE_PATIENCE_NS)
-                return []
-            self._wave_ns = now_ns
-            age_ns = now_ns - self._opened_ns
-            early = age_ns < EARLY_NS
-            self._wave_due_ns = now_ns + (WAVE_EARLY_NS if early else WAVE_YOUNG_NS if age_ns < YOUNG_NS else WAVE_NS)
-            self._wave += 1
-            self._echoes_left = WAVE_ECHOES_EARLY if early else WAVE_ECHOES
-            self._repeats_left = REPEATS if EARLY_NS <= age_ns < YOUNG_NS else 0
-            # Credit is granted up to an index, so repeating it is harmless and mends one that a broken connection swallowed.
-            credit: list[Output] = (
-                [Outgoing(self._lanes[Lane.CONTROL], Credit(self._below_index))] if self._below_index else []
-            )
-            return [*self._ping(), *credit]
-        return []
+        """Do what time demands: hello again while unanswered, the next clock wave, give up a silent or stuck link."""
+        outputs: list[Output] = []
+        for path in self._paths:
+            if path.is_open and self._is_silent(path, now_ns):
+                outputs += self._lose(path, now_ns)
+        for path in self._paths:
+            if not path.is_open:
+                outputs += path.greet(self._host_id, now_ns)
+            elif now_ns >= path.waves.due_ns:
+                outputs += self._begin_wave(path, now_ns)
+        if self._pending and now_ns >= self._frames_hello_due_ns:
+            outputs += self._insist(now_ns)
+        return outputs
+
+    def carry(self, link: int, now_ns: int) -> list[Output]:
+        """Let frames come over that link from now on; until the board has agreed they come as before.
+
+        Args:
+            link: which; one that is not open is not asked.
+            now_ns: host's clock, ns.
+        """
+        path = self._paths[link]
+        return self._want(path, now_ns) if path.is_open and path is not self._wanted else []
 
     def grant(self, slots: int) -> list[Output]:
         """Let the board have credit for this many frames beyond the last one that came; credit is never taken back.
@@ -177,10 +172,10 @@ class HostSession:
             slots: free places for frames now.
         """
         below_index = self._next_index + slots
-        if self._state is not _State.OPEN or below_index <= self._below_index:
+        if self._carrier is None or below_index <= self._below_index:
             return []
         self._below_index = below_index
-        return [Outgoing(self._lanes[Lane.CONTROL], Credit(below_index))]
+        return [Outgoing(self._carrier.lanes[Lane.CONTROL], Credit(below_index))]
 
     def steer(self, later_ns: int) -> list[Output]:
         """Ask the board's camera to expose later.
@@ -188,118 +183,190 @@ class HostSession:
         Args:
             later_ns: by how much, less than its period.
         """
-        return [Outgoing(self._lanes[Lane.CONTROL], Steer(later_ns))] if self._state is _State.OPEN else []
+        return [] if self._carrier is None else [Outgoing(self._carrier.lanes[Lane.CONTROL], Steer(later_ns))]
 
-    def interrupted(self, now_ns: int) -> list[Output]:
-        """Take note that a connection broke: what was under way on it is gone, so both lanes are greeted anew."""
-        was_open = self.is_open
-        return [*([Vanished(orderly=False)] if was_open else []), *self._seek(now_ns)]
+    def interrupted(self, connection: bytes, now_ns: int) -> list[Output]:
+        """Take note that a connection broke: what was under way on it is gone, so its link's lanes are greeted anew."""
+        return self._lose(self._paths[connection[0]], now_ns)
 
     def leave(self) -> list[Output]:
         """Say goodbye, so that the board is free for another host at once; its last account answers."""
         self._leaving = True
-        return [Outgoing(self._lanes[Lane.CONTROL], Bye())] if self._state is _State.OPEN else []
+        return [Outgoing(path.lanes[Lane.CONTROL], Bye()) for path in self._paths if path.is_open]
 
-    def _answer_knock(self, connection: bytes, knock: Knock, now_ns: int) -> list[Output]:
-        if connection not in self._lanes.values():  # a board that dials
-            ours = self._hello is not None and knock.session == self._hello.session
-            if self._state is _State.OPEN and not ours and now_ns - self._heard_ns < TAKEOVER_NS:
+    # Links that come and go.
+
+    def _answer_knock(self, path: HostPath, connection: bytes, knock: Knock, now_ns: int) -> list[Output]:
+        lane = next((lane for lane, known in path.lanes.items() if known == connection), None)
+        if lane is None:  # a board that dials
+            if path.is_open and knock.session != path.session and now_ns - path.heard_ns < TAKEOVER_NS:
                 return []  # a second board; the first is alive
-            self._lanes[knock.lane] = connection
-        return self.interrupted(now_ns)
+            lane = knock.lane
+            path.lanes[lane] = connection
+        if lane is Lane.FRAMES and path.is_open:
+            return self._want(path, now_ns) if path is self._wanted else []
+        outputs = self._lose(path, now_ns)
+        # A board that has lost its frames' lane says so on all others; the carrier has to answer then, or gives way.
+        return outputs if self._wanted is None or self._pending else outputs + self._want(self._wanted, now_ns)
 
-    def _seek(self, now_ns: int) -> list[Output]:
-        self._state = _State.SEEKING
-        self._greeted.clear()
-        return self._say_hello(now_ns)
-
-    def _say_hello(self, now_ns: int) -> list[Output]:
-        self._hello_due_ns = now_ns + HELLO_RETRY_NS
-        return [
-            Outgoing(connection, HostHello(self._host_id, lane))
-            for lane, connection in self._lanes.items()
-            if lane not in self._greeted
-        ]
-
-    def _accept(self, connection: bytes, hello: BoardHello, now_ns: int) -> list[Output]:
-        if self._state is _State.OPEN:
+    def _open(self, path: HostPath, hello: BoardHello, now_ns: int) -> list[Output]:
+        """Take a board's hello on a control lane."""
+        if path.hello is not None:
             return []  # the answer to a hello that was said twice
-        # Both lanes must lead to the same life of the board: an answer from before its restart may still be under way on one of them.
-        self._greeted = {lane: said for lane, said in self._greeted.items() if said.session == hello.session}
-        self._greeted |= {lane: hello for lane, known in self._lanes.items() if known == connection}
-        if set(self._greeted) != set(Lane):
+        others = [other for other in self._paths if other.hello is not None and other.hello.session != hello.session]
+        path.session = hello.session
+        alive = [other for other in others if other.is_alive_beside(hello, now_ns)]
+        if alive:
+            return self._doubt(path, hello, max(other.heard_ns for other in alive), now_ns)
+        outputs = [output for other in others for output in self._lose(other, now_ns)]
+        path.open(hello, now_ns)
+        outputs.append(LinkUp(path.link, hello))
+        return outputs if self._wanted is not None else outputs + self._want(path, now_ns)
+
+    def _doubt(self, path: HostPath, hello: BoardHello, others_heard_ns: int, now_ns: int) -> list[Output]:
+        """A link leads to another life of a board than the others do: it is new, and those will fall silent, or it is another board."""
+        if path.foreign_since_ns is None:
+            path.foreign_since_ns = now_ns
+        if now_ns - path.foreign_since_ns < TAKEOVER_NS or others_heard_ns <= path.foreign_since_ns:
             return []
-        hello = self._greeted[Lane.FRAMES]  # stands in line with the frames: what it counts and has not come is lost
+        path.foreign_since_ns = None
+        path.shut(now_ns + _FOREIGN_RETRY_NS)
+        return [Outgoing(path.lanes[Lane.CONTROL], Bye()), OtherBoard(path.link, hello)]
+
+    def _is_silent(self, path: HostPath, now_ns: int) -> bool:
+        """Whether a link has been silent for too long: the carrier sooner than others, because frames have to go on."""
+        if now_ns - path.heard_ns >= SILENCE_NS:
+            return True
+        return path is self._carrier and any(
+            other.is_open and other.heard_ns - path.heard_ns >= SILENCE_BESIDE_NS for other in self._paths
+        )
+
+    def _lose(self, path: HostPath, now_ns: int) -> list[Output]:
+        """A link is lost: it is greeted anew, and frames come over another one if there is one."""
+        outputs: list[Output] = [LinkDown(path.link)] if path.is_open else []
+        path.shut(now_ns)
+        outputs += path.greet(self._host_id, now_ns)
+        if self._carrier is path:
+            self._carrier = None
+        if self._wanted is path:
+            self._wanted, self._pending = None, False
+            following = self._carrier or next((other for other in self._paths if other.is_open), None)
+            if following is not None:
+                return outputs + self._want(following, now_ns)
+        if self._streams and self._wanted is None:
+            self._streams = False
+            outputs.append(Vanished(orderly=False))
+        return outputs
+
+    # Frames' lane.
+
+    def _want(self, path: HostPath, now_ns: int) -> list[Output]:
+        self._wanted, self._pending, self._pending_since_ns = path, True, now_ns
+        return self._insist(now_ns)
+
+    def _insist(self, now_ns: int) -> list[Output]:
+        """Say hello for frames where they are wanted, or give that link up for another."""
+        assert self._wanted is not None
+        wanted = self._wanted
+        others = [path for path in self._paths if path.is_open and path is not wanted]
+        if others and now_ns - self._pending_since_ns >= STUCK_NS:
+            if self._carrier is wanted:
+                self._carrier = None
+            after = [path for path in others if path.link > wanted.link]
+            return [LinkDown(wanted.link, stuck=True), *self._want(self._carrier or (after or others)[0], now_ns)]
+        self._frames_hello_due_ns = now_ns + HELLO_RETRY_NS
+        return [*wanted.say_hello(self._host_id, Lane.FRAMES)]
+
+    def _accept(self, path: HostPath, hello: BoardHello, now_ns: int) -> list[Output]:
+        """Take a board's hello on a frames' lane."""
+        if path.hello is None:
+            return []
+        if path.hello.session != hello.session:
+            return self._lose(path, now_ns)  # the board began a new life between the two lanes
+        if path is not self._wanted:
+            # The answer to a hello of a while ago: the board may send its frames there now.
+            return [] if self._wanted is None else self._want(self._wanted, now_ns)
         resumed = self._hello is not None and self._hello.session == hello.session
-        lost = max(0, hello.counts.sent - self._next_index) if resumed else 0
-        self._next_index = self._next_index + lost if resumed else hello.counts.sent
+        if resumed:
+            lost = self._settle(hello.counts)
+        else:
+            lost, self._next_index = 0, hello.counts.sent
+            self._missing.clear()
         self._below_index = 0
-        self._wave += 1  # echoes under way are of an earlier connection, perhaps of another clock
-        self._echoes_left = 0
-        self._unanswered = False
+        path.heard_ns = now_ns
+        if not self._pending and resumed:  # the answer to a hello that was said twice: credit is void once more
+            return [Counted(hello.counts, ended=False, lost=lost)]
+        self._carrier, self._pending, self._streams = path, False, True
         self._hello = hello
-        self._state = _State.OPEN
-        self._opened_ns = self._heard_ns = self._wave_due_ns = now_ns
-        return [Accepted(hello, resumed, lost)]
+        return [Accepted(hello, resumed, lost, path.link)]
 
-    def _take_frame(self, frame: FrameMessage, now_ns: int) -> list[Output]:
+    def _take_frame(self, path: HostPath, frame: FrameMessage, now_ns: int) -> list[Output]:
         if self._hello is None or frame.session != self._hello.session:
-            return [Stale(frame, old_session=True)]
-        if frame.sent_index < self._next_index:
-            return [Stale(frame, old_session=False)]
-        lost = frame.sent_index - self._next_index
-        self._next_index = frame.sent_index + 1
-        self._heard_ns = now_ns
-        return [Arrived(frame, lost)]
+            return [Stale(frame, StaleReason.OLD_SESSION)]
+        index = frame.sent_index
+        if index < self._next_index:
+            if index not in self._missing:
+                return [Stale(frame, StaleReason.DUPLICATE)]
+            self._missing.remove(index)
+            return [Stale(frame, StaleReason.LATE)]
+        lost = self._pass_over(index)
+        self._next_index = index + 1
+        path.heard_ns = now_ns
+        return [Arrived(frame, lost, path.link)]
 
-    def _attend(self, connection: bytes, message: Pong | Status | End, now_ns: int) -> list[Output]:
-        if self._state is not _State.OPEN or self._hello is None or connection not in self._lanes.values():
+    # Accounts and echoes.
+
+    def _begin_wave(self, path: HostPath, now_ns: int) -> list[Output]:
+        control = path.lanes[Lane.CONTROL]
+        ping = path.waves.begin_wave(now_ns, standby=path is not self._carrier)
+        if ping is None:
             return []
-        self._heard_ns = now_ns
+        # Credit is granted up to an index, so repeating it is harmless and mends one that a broken connection swallowed.
+        again = path is self._carrier and self._below_index
+        return [Outgoing(control, ping), *([Outgoing(control, Credit(self._below_index))] if again else [])]
+
+    def _attend(self, path: HostPath, connection: bytes, message: Pong | Status | End, now_ns: int) -> list[Output]:
+        if path.hello is None or connection not in path.lanes.values():
+            return []
+        path.heard_ns = now_ns
         match message:
-            case Pong(wave, t0_ns, t1_ns, t2_ns):
-                if wave != self._wave:
+            case Pong():
+                answered = path.waves.answered(message, now_ns)
+                if answered is None:
                     return []
-                self._unanswered = False
-                if self._repeats_left and now_ns - t0_ns >= SLOW_ECHO_NS:
-                    self._repeats_left -= 1
-                    self._echoes_left += 1
-                age_ns = now_ns - self._opened_ns
-                if not self._echoes_left and age_ns >= EARLY_NS:
-                    rest = WAVE_REST_YOUNG if age_ns < YOUNG_NS else WAVE_REST
-                    rest_ns = min(WAVE_PATIENCE_NS, rest * (now_ns - self._wave_ns))
-                    self._wave_due_ns = max(self._wave_due_ns, now_ns + rest_ns)
-                return [Echo(wave, t0_ns, t1_ns, t2_ns, now_ns), *self._ping()]
+                echo, ping = answered
+                return [echo, *([] if ping is None else [Outgoing(path.lanes[Lane.CONTROL], ping)])]
             case Status(session, counts) | End(session, counts):
-                if session != self._hello.session:
+                if self._hello is None or session != self._hello.session:
                     return []
-                behind = connection == self._lanes[Lane.FRAMES]
+                behind = connection == path.lanes.get(Lane.FRAMES)
                 lost = self._settle(counts) if behind else 0
                 return [Counted(counts, isinstance(message, End), lost, last=behind and self._leaving)]
             case _:
                 assert_never(message)
 
-    def _part(self, connection: bytes, counts: BoardCounts, now_ns: int) -> list[Output]:
+    def _part(self, path: HostPath, connection: bytes, counts: BoardCounts, now_ns: int) -> list[Output]:
         """Take a board's goodbye. It may come on one lane just after the other one broke: its account is the session's last all the same."""
-        if self._hello is None or connection not in self._lanes.values() or counts.sent < self._next_index:
+        if self._hello is None or path.session != self._hello.session or connection not in path.lanes.values():
             return []
-        if self._state is _State.OPEN:
-            self._state = _State.SEEKING
-            self._greeted.clear()
-            self._hello_due_ns = now_ns + HELLO_RETRY_NS
-        lost = self._settle(counts) if connection == self._lanes.get(Lane.FRAMES) else 0
+        if counts.sent < self._next_index:
+            return []
+        for known in self._paths:
+            if known.is_open:
+                known.shut(now_ns + HELLO_RETRY_NS)
+        self._carrier = self._wanted = None
+        self._pending = self._streams = False
+        lost = self._settle(counts) if connection == path.lanes.get(Lane.FRAMES) else 0
         # Answered, so that the board keeps the connection until its last words were read.
         return [Outgoing(connection, Bye()), Counted(counts, ended=False, lost=lost, last=True), Vanished(orderly=True)]
 
     def _settle(self, counts: BoardCounts) -> int:
         """Take an account that came behind the last frame: what it tells of and has not come is lost. Gives how many."""
-        lost = max(0, counts.sent - self._next_index)
+        return self._pass_over(counts.sent)
+
+    def _pass_over(self, index: int) -> int:
+        """Give up the frames below an index that have not come; gives how many."""
+        lost = max(0, index - self._next_index)
+        self._missing.extend(range(max(self._next_index, index - _MOST_MISSING), index))
         self._next_index += lost
         return lost
-
-    def _ping(self) -> list[Output]:
-        if not self._echoes_left:
-            return []
-        self._echoes_left -= 1
-        self._unanswered = True
-        return [Outgoing(self._lanes[Lane.CONTROL], Ping(self._wave, 0))]

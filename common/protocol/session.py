@@ -1,10 +1,13 @@
-"""What both roles of a link's session share: what they put out, and the times after which they act.
+"""What both roles of a session share: what they put out, and the times after which they act.
+
+A session may go over several links at once. Each connection's name begins with the number of its link, so that it is unique over all of them.
 
 The state machines (`board_session`, `host_session`) are sans-I/O: messages and `now_ns` go in, a list of outputs comes out. Shells own
 sockets and clocks; they send an `Outgoing` as it is, except that `wire.encode_stamped` sets its send time at the last moment.
 """
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import Final
 
 from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Message, RefusalReason
@@ -39,11 +42,39 @@ class Outgoing:
 
 @dataclass(frozen=True, slots=True)
 class Accepted:
-    """Host: the board talks to us. `resumed` says that it is the session that we had before, of which `lost` frames never came."""
+    """Host: the board sends its frames over that link from now on.
+
+    `resumed` says that it is the session that we had before, of which `lost` frames never came.
+    """
 
     hello: BoardHello
     resumed: bool
     lost: int
+    link: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class LinkUp:
+    """Host: our board answers on that link, which may carry frames now."""
+
+    link: int
+    hello: BoardHello
+
+
+@dataclass(frozen=True, slots=True)
+class LinkDown:
+    """Host: that link is lost, or (`stuck`) leaves a hello for frames unanswered; it is greeted again and again."""
+
+    link: int
+    stuck: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class OtherBoard:
+    """Host: that link leads to another board than the one that we talk to; nothing of it is used."""
+
+    link: int
+    hello: BoardHello
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,25 +83,38 @@ class Arrived:
 
     frame: FrameMessage
     lost: int
+    link: int = 0
+
+
+class StaleReason(Enum):
+    """Why a frame that came must not be used.
+
+    LATE: a newer one had overtaken it over another link; it has been counted as lost then and stays so.
+    """
+
+    OLD_SESSION = 0
+    DUPLICATE = 1
+    LATE = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Stale:
-    """Host: a frame that a transport delivered again or of an older session. It must not be used."""
+    """Host: a frame that must not be used."""
 
     frame: FrameMessage
-    old_session: bool
+    reason: StaleReason
 
 
 @dataclass(frozen=True, slots=True)
 class Echo:
-    """Host: one clock echo. t0, t3 on the host's clock, t1, t2 on the board's; ns."""
+    """Host: one clock echo. t0, t3 on the host's clock, t1, t2 on the board's; ns. Waves are numbered for each link."""
 
     wave: int
     t0_ns: int
     t1_ns: int
     t2_ns: int
     t3_ns: int
+    link: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,4 +141,14 @@ class Vanished:
     orderly: bool
 
 
-Output = Outgoing | Accepted | Arrived | Stale | Echo | Counted | Refused | Vanished
+Output = Outgoing | Accepted | LinkUp | LinkDown | OtherBoard | Arrived | Stale | Echo | Counted | Refused | Vanished
+
+
+def connection_name(link: int, path: bytes) -> bytes:
+    """Make a connection's name unique over all links.
+
+    Args:
+        link: number of the link, below 256.
+        path: the link's own name for the connection.
+    """
+    return bytes((link,)) + path

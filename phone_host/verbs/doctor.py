@@ -21,7 +21,7 @@ EXAMPLES = """  phone-host doctor
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
-    parser.add_argument("--link", metavar="URI", help="ask the board at this link")
+    parser.add_argument("--link", action="append", metavar="URI", help="ask the board at this link; may be given again")
     parser.add_argument("--camera", metavar="URI", help="stream from this own camera for a second")
     parser.add_argument("--calibration", metavar="FILE", help="rig.yaml to check")
     parser.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder of results (default: this one)")
@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
         settings.camera, settings.link, settings.calibration, options.out, options.wait, key_folder(settings.keys)
     )
     if dict(resolved.origins)["link"] == "default":
-        question = replace(question, link="")
+        question = replace(question, links=())
     findings = examine(question)
     print(json.dumps(values(findings)) if options.json else table(findings))
     return exit_code(findings)

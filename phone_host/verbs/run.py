@@ -10,7 +10,7 @@ from pathlib import Path
 from common import logs, now
 from common.commandline import INTERRUPTED
 from common.errors import SettingsError
-from common.link.factory import open_link, parse_link, tell_insecure
+from common.link.factory import open_links, parse_link, tell_insecure
 from common.settings import Resolved, log_level, resolve
 from common.signals import StopSignals
 from common.stamp import HOST_CLOCK
@@ -20,6 +20,7 @@ from phone_host.settings import ENVIRONMENT_PREFIX, PhoneHostSettings, check, ke
 EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --calibration rig.yaml --out scan
   phone-host run --link ipc:///tmp/board --camera 'replay:right?pace=demand' --rectified --disparities 64 --pairs 20 --out scan
   phone-host run --link tcp://192.168.7.2:5555 --camera 'http://127.0.0.1:8080/video?latency_ms=120' --calibration rig.yaml --out scan
+  phone-host run --link serial:/dev/ttyACM0 --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --out scan
   phone-host run --camera 'replay:right?loop=1' --pairs 300 --json        (no depth: pairs and delays only)
 """
 
@@ -33,8 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
     parser.add_argument(
         "--link",
+        action="append",
         metavar="URI",
-        help="the board: tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE (default tcp://127.0.0.1:5555)",
+        help="the board: tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE (default tcp://127.0.0.1:5555); may be given again:"
+        " frames come over the best link that is up",
     )
     parser.add_argument("--camera", metavar="URI", help=f"the own camera: {EXAMPLE}")
     add_stereo_arguments(parser)
@@ -84,6 +87,7 @@ def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]
     """Work out the settings from file, environment and options."""
     names = ("link", "camera", "calibration", "matcher", "tolerance", "fifo", "keys", "log_level")
     given = {name: getattr(options, name, None) for name in names}
+    given["link"] = tuple(given["link"]) if given["link"] else None
     return resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given)
 
 
@@ -127,11 +131,12 @@ def run(options: argparse.Namespace) -> int:
         interpolate=options.interpolate,
         steered=frozenset(whose for whose in Whose if options.align_phase in {"either", whose.value}),
     )
-    uri = parse_link(settings.link, listens_by_default=False)
-    tell_insecure(uri)
-    link = open_link(uri, key_folder(settings.keys))
+    uris = [parse_link(uri, listens_by_default=False) for uri in settings.link]
+    for uri in uris:
+        tell_insecure(uri)
+    links = open_links(uris, key_folder(settings.keys))
     signals = StopSignals()
-    host = Host(host_settings, camera, link, core)
+    host = Host(host_settings, camera, links, core)
     live = LiveTable(host) if sys.stderr.isatty() else None
     with live or nullcontext():
         try:

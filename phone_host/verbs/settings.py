@@ -18,9 +18,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options: an option for each setting."""
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
     for item in fields(PhoneHostSettings):
+        several = isinstance(item.default, tuple)
         parser.add_argument(
             f"--{item.name.replace('_', '-')}",
-            type=type(item.default),
+            type=str if several else type(item.default),
+            action="append" if several else "store",
             metavar=item.name.rpartition("_")[2].upper(),
             help=item.metadata["doc"].replace("%", "%%"),
         )

@@ -94,7 +94,7 @@ class WatchedHost(Host):
         super().__init__(
             HostSettings(fifo=FifoSettings.parse(f"1:{policy}"), save_every=0),
             open_camera(right, HOST_CLOCK, now.monotonic_ns()),
-            open_link(parse_link(address, listens_by_default=False)),
+            [open_link(parse_link(address, listens_by_default=False))],
             StereoCore(SlowMatcher()),
             self._keep,
         )

@@ -24,9 +24,10 @@ import zmq
 from common import now
 from common.errors import UnavailableError
 from common.link.factory import open_link, parse_link
+from phone_host.accounts import SessionAccount
 from phone_host.model import BoardFrame
 from phone_host.pairqueue import PairQueue
-from phone_host.receiver import Receiver, SessionAccount
+from phone_host.receiver import Receiver
 from phone_host.sync.fifo import FifoSettings
 from tests.support.unheard import Unheard
 from tests.vm.guest import LINK_PORT, UNIT, Architecture, Guest, image_of
@@ -76,7 +77,7 @@ class OurHost:
 
         link = open_link(parse_link(address, listens_by_default=False))
         queue = Counting(FifoSettings(), None, period_ns)
-        self._receiver = Receiver(link, now.random_id(), queue, Unheard())
+        self._receiver = Receiver([link], now.random_id(), queue, Unheard())
         self._receiver.start()
 
     def close(self) -> None:

@@ -108,7 +108,8 @@ def _measured(load: str, folder: Path, fps: int, runs: int, *, fifo: bool) -> Re
 def _session(address: str) -> Iterator[tuple[float, int, ClockEstimate]]:
     """A host that comes, learns and goes; (seconds since the first echo, host's time, estimate)."""
     queue = PairQueue(FifoSettings(), None, _PERIOD_NS)
-    receiver = Receiver(open_link(parse_link(address, listens_by_default=False)), now.random_id(), queue, Unheard())
+    link = open_link(parse_link(address, listens_by_default=False))
+    receiver = Receiver([link], now.random_id(), queue, Unheard())
     receiver.start()
     start_ns = 0
     while (age_s := (now.monotonic_ns() - start_ns) / 1e9) < _LENGTH_S or not start_ns:

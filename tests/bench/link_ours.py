@@ -87,9 +87,9 @@ def receive_tandemscan(job: Job) -> Tally:
     class Stamping(Receiver):
         """Stamps frames when they are decoded and the session has taken them."""
 
-        def _accept_frame(self, frame: FrameMessage, lost: int, now_ns: int) -> None:
+        def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
             tally.arrived(frame.sequence, frame.marks.sent_ns, len(frame.payload))
-            super()._accept_frame(frame, lost, now_ns)
+            super()._accept_frame(frame, lost, link, now_ns)
 
     class NoPairing(PairQueue):
         """Ends the frames' way: pairing is no part of a link."""
@@ -98,7 +98,7 @@ def receive_tandemscan(job: Job) -> Tally:
             pass
 
     queue = NoPairing(FifoSettings(_SLOTS), None, 1_000_000_000 // (job.fps or 30))
-    receiver = Stamping(_open(job.address), now.random_id(), queue, Unheard())
+    receiver = Stamping([_open(job.address)], now.random_id(), queue, Unheard())
     receiver.start()
     while not receiver.ended and receiver.failure is None:
         time.sleep(0.1)

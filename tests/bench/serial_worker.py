@@ -27,7 +27,7 @@ from common.link.stream import StreamLink
 from common.protocol.framing import Side
 from common.protocol.host_session import HostSession
 from common.protocol.message import FrameMessage, Lane
-from common.protocol.session import Arrived, Echo, Outgoing, Output
+from common.protocol.session import Arrived, Echo, Outgoing, Output, connection_name
 from common.protocol.wire import decode, encode_stamped
 from tests.bench.link_ours import OpenLine
 from tests.bench.machine import be_quiet
@@ -172,7 +172,7 @@ def receive_ours(descriptor: int, frames: int) -> dict[str, float]:
 def play_host(uri: str, seconds: float) -> dict[str, object]:
     """The host's role: two frames of credit, as `phone-host` grants on such a link; every echo and frame is noted."""
     link = open_link(parse_link(uri, listens_by_default=False))
-    session = HostSession("bench", link.dialled)
+    session = HostSession("bench", [{lane: connection_name(0, path) for lane, path in link.dialled.items()}])
     poller = zmq.Poller()
     poller.register(link.pollables[0], zmq.POLLIN)
     echoes: list[tuple[int, int]] = []
@@ -186,7 +186,7 @@ def play_host(uri: str, seconds: float) -> dict[str, object]:
             match output:
                 case Outgoing(connection, message):
                     header, payload = encode_stamped(message, now.monotonic_ns)
-                    link.send(connection, header, payload)
+                    link.send(connection[1:], header, payload)
                 case Echo():
                     echoes.append((output.t3_ns, output.t3_ns - output.t0_ns - (output.t2_ns - output.t1_ns)))
                 case Arrived(frame, missed):
@@ -200,7 +200,11 @@ def play_host(uri: str, seconds: float) -> dict[str, object]:
         for incoming in link.receive():
             if isinstance(incoming, Packet):
                 handle(
-                    session.receive(incoming.connection, decode(incoming.header, incoming.payload), now.monotonic_ns())
+                    session.receive(
+                        connection_name(0, incoming.connection),
+                        decode(incoming.header, incoming.payload),
+                        now.monotonic_ns(),
+                    )
                 )
         if now.monotonic_ns() >= session.due_ns:
             handle(session.tick(now.monotonic_ns()))

@@ -197,11 +197,11 @@ def _line_seeds() -> list[bytes]:
 
 def session(data: bytes) -> None:
     """Sound messages of a hostile peer in any order: both roles and the clock go on, and what they answer can be written."""
-    lanes = {Lane.FRAMES: b"f", Lane.CONTROL: b"c"}
-    host, board, clock = HostSession("host", lanes), BoardSession("s", "boot", _CAMERA), ClockEstimator()
+    lanes = {Lane.FRAMES: b"\0f", Lane.CONTROL: b"\0c"}
+    host, board, clock = HostSession("host", [lanes]), BoardSession("s", "boot", _CAMERA), ClockEstimator()
     now_ns = 10**12
     for number, part in enumerate(_parts(data)):
-        lane = b"f" if part[:1] == b"f" else b"c"
+        lane = b"\0f" if part[:1] == b"f" else b"\0c"
         try:
             message = decode(part[1 : 1 + MAX_HEADER_BYTES], b"")
         except ProtocolError:
@@ -232,6 +232,7 @@ def _session_seeds() -> list[bytes]:
         b"f" + hello,
         b"c" + hello,
         *pongs,
+        b"f" + hello,
         b"f" + encode(SOUND_MESSAGES[4])[0],
         b"c" + encode(SOUND_MESSAGES[7])[0],
     ]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from common.frame import PixelFormat
 from common.protocol.host_session import HostSession
 from common.protocol.message import BoardCounts, BoardHello, CameraDescription, Lane, Pacing, Ping, Pong
-from common.protocol.session import Echo, Outgoing, Output
+from common.protocol.session import Echo, Outgoing, Output, connection_name
 
 US, MS, SECOND_NS = 1_000, 1_000_000, 1_000_000_000
 HOURS_NS = 5 * 3600 * SECOND_NS
@@ -22,7 +22,7 @@ _UNIT_BYTES = 256 + 11
 """A chunk with its frame (DESIGN, decision 2)."""
 
 _BITS_PER_BYTE = 10
-_LANES = {Lane.FRAMES: b"frames", Lane.CONTROL: b"control"}
+_LANES = {lane: connection_name(0, lane.name.encode()) for lane in (Lane.CONTROL, Lane.FRAMES)}
 _CAMERA = CameraDescription("simulated", 640, 480, PixelFormat.MJPEG, 33 * MS, Pacing.CLOCK)
 
 
@@ -162,7 +162,7 @@ def waves(
     Yields:
         At the end of each wave: host's time, and the wave's echoes.
     """
-    session, now_ns = HostSession("host", _LANES), clocks.start_ns
+    session, now_ns = HostSession("host", [_LANES]), clocks.start_ns
     hello = BoardHello("board", "boot", _CAMERA, BoardCounts())
     for lane in _LANES.values():
         session.receive(lane, hello, now_ns)

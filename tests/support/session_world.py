@@ -1,6 +1,6 @@
 """A board and hosts wired together in memory, on simulated time, over connections that may lose, repeat and break.
 
-Each lane is a connection with a queue for each direction: order holds within a queue, never between two. A connection that breaks takes
+Each lane of each link is a connection with a queue for each direction: order holds within a queue, never between two. A connection that breaks takes
 what was under way with it; the side that had dialled gets word of it and a fresh connection. The world itself checks what must always hold.
 """
 
@@ -20,11 +20,29 @@ from common.protocol.message import (
     Message,
     Pacing,
 )
-from common.protocol.session import MS, Accepted, Arrived, Counted, Echo, Outgoing, Output, Refused, Stale, Vanished
+from common.protocol.session import (
+    MS,
+    Accepted,
+    Arrived,
+    Counted,
+    Echo,
+    LinkDown,
+    LinkUp,
+    OtherBoard,
+    Outgoing,
+    Output,
+    Refused,
+    Stale,
+    Vanished,
+    connection_name,
+)
 from common.stamp import Stamp
 
 CAMERA = CameraDescription("simulated", 640, 480, PixelFormat.MJPEG, 33 * MS, Pacing.CLOCK)
 STEP_NS = 20 * MS
+
+Place = tuple[int, Lane]
+"""A lane of a link, by the link's number."""
 
 
 class Broken:
@@ -45,13 +63,14 @@ class HostNode:
 
     number: int
     session: HostSession
-    wires: dict[Lane, Wire] = field(default_factory=dict)
-    names: dict[Lane, bytes] = field(default_factory=dict)
+    wires: dict[Place, Wire] = field(default_factory=dict)
+    names: dict[Place, bytes] = field(default_factory=dict)
     board_session: str = ""
     base_sent: int = 0
     received: int = 0
     lost: int = 0
     arrived: list[tuple[str, int]] = field(default_factory=list)
+    carriers: list[int] = field(default_factory=list)
     stale: list[Stale] = field(default_factory=list)
     others: list[Output] = field(default_factory=list)
     slots: int = 1
@@ -62,16 +81,19 @@ class World:
 
     Args:
         board_dials: whether the board opens the connections (then there is one host).
+        links: how many lead from the board to each host.
     """
 
-    def __init__(self, *, board_dials: bool = False) -> None:
+    def __init__(self, *, board_dials: bool = False, links: int = 1) -> None:
         self.now_ns = 10**12
+        self.places = tuple((link, lane) for link in range(links) for lane in Lane)
+        self.cut: set[Place] = set()
         self.board_dials = board_dials
         self.lives = 0
         self.sent: dict[str, int] = {}
         self.credit: dict[str, int] = {}
         self.camera_runs = True
-        self.wires: dict[bytes, tuple[HostNode, Lane, Wire]] = {}
+        self.wires: dict[bytes, tuple[HostNode, Place, Wire]] = {}
         self.hosts: list[HostNode] = []
         self.board = self._new_board()
         self.add_host()
@@ -80,65 +102,82 @@ class World:
 
     def add_host(self) -> HostNode:
         """One more host comes."""
-        self.hosts.append(HostNode(len(self.hosts), HostSession("", {})))
+        self.hosts.append(HostNode(len(self.hosts), HostSession("", [{}])))
         return self.restart_host(self.hosts[-1])
 
     def restart_board(self) -> None:
         """The board's process dies and a new life begins."""
         self.board = self._new_board()
         for host in self.hosts:
-            for lane in Lane:
-                self.break_lane(host, lane)
+            for place in self.places:
+                self.break_lane(host, place)
 
     def restart_host(self, host: HostNode) -> HostNode:
         """A host's process dies without a word and a new one begins."""
         self.lives += 1
-        dialled = {} if self.board_dials else {lane: lane.name.encode() for lane in Lane}
+        numbers = sorted({link for link, _ in self.places})
+        dialled: list[dict[Lane, bytes]] = [
+            {} if self.board_dials else {lane: _dialled((link, lane)) for lane in Lane} for link in numbers
+        ]
         fresh = HostNode(host.number, HostSession(f"host-{self.lives}", dialled), host.wires)
         self.hosts[self.hosts.index(host)] = fresh
-        for lane in Lane:
-            self.break_lane(fresh, lane, tell=self.board_dials)
+        for place in self.places:
+            self.break_lane(fresh, place, tell=self.board_dials)
         return fresh
 
-    def break_lane(self, host: HostNode, lane: Lane, *, tell: bool = True) -> None:
+    def break_lane(self, host: HostNode, place: Place, *, tell: bool = True) -> None:
         """A connection breaks: what was under way is gone, the dialler gets word and a new connection."""
         self.lives += 1
-        name = f"{host.number}-{lane.name}-{self.lives}".encode()
+        link, lane = place
+        name = connection_name(link, f"{host.number}-{lane.name}-{self.lives}".encode())
         wire = Wire()
-        self.wires = {known: held for known, held in self.wires.items() if held[2] is not host.wires.get(lane)}
-        host.wires[lane] = wire
+        self.wires = {known: held for known, held in self.wires.items() if held[2] is not host.wires.get(place)}
+        host.wires[place] = wire
         if self.board_dials:
-            host.names[lane] = name
-            self.wires[lane.name.encode()] = self.wires[name] = (host, lane, wire)
+            host.names[place] = name
+            self.wires[_dialled(place)] = self.wires[name] = (host, place, wire)
             queue = wire.to_board
         else:
-            host.names[lane] = lane.name.encode()
-            self.wires[name] = (host, lane, wire)
+            host.names[place] = _dialled(place)
+            self.wires[name] = (host, place, wire)
             queue = wire.to_host
         if tell:
             queue.append(Broken())
 
-    def deliver(self, host: HostNode, lane: Lane, *, to_board: bool, keep: bool = False) -> bool:
+    def cut_link(self, link: int) -> None:
+        """Nothing arrives over this link any more, without word to anybody."""
+        self.cut |= {(link, lane) for lane in Lane}
+
+    def mend_link(self, link: int) -> None:
+        """The link works again; what was under way is gone."""
+        for lane in Lane:
+            self.cut.discard((link, lane))
+
+    def deliver(self, host: HostNode, place: Place, *, to_board: bool, keep: bool = False) -> bool:
         """Let one message arrive; `keep` leaves a second copy of it under way."""
-        queue = host.wires[lane].to_board if to_board else host.wires[lane].to_host
+        queue = host.wires[place].to_board if to_board else host.wires[place].to_host
+        if place in self.cut:
+            news = [item for item in queue if isinstance(item, Broken)]  # each side learns of its own end
+            queue.clear()
+            queue.extend(news)
         if not queue:
             return False
         message = queue[0] if keep and not isinstance(queue[0], Broken) else queue.popleft()
         if to_board:
-            self._board_takes(host, lane, message)
+            self._board_takes(host, place, message)
         else:
-            self._host_takes(host, lane, message)
+            self._host_takes(host, place, message)
         return True
 
-    def drop(self, host: HostNode, lane: Lane, *, to_board: bool) -> None:
+    def drop(self, host: HostNode, place: Place, *, to_board: bool) -> None:
         """Lose one message without a sound."""
-        queue = host.wires[lane].to_board if to_board else host.wires[lane].to_host
+        queue = host.wires[place].to_board if to_board else host.wires[place].to_host
         if queue and not isinstance(queue[0], Broken):
             queue.popleft()
 
     def inject(self, host: HostNode, frame: FrameMessage) -> None:
         """A transport delivers a frame that it had delivered before."""
-        self._host_takes(host, Lane.FRAMES, frame)
+        self._host_takes(host, (0, Lane.FRAMES), frame)
 
     def pass_time(self, duration_ns: int) -> None:
         """Let time pass; both sides do what it demands, the board sends what it may, hosts grant what they like."""
@@ -173,9 +212,9 @@ class World:
         """Let everything under way arrive, and the answers to it."""
         for _ in range(2000):
             moved = [
-                self.deliver(host, lane, to_board=to_board)
+                self.deliver(host, place, to_board=to_board)
                 for host in self.hosts
-                for lane in Lane
+                for place in self.places
                 for to_board in (True, False)
             ]
             if not any(moved):
@@ -194,16 +233,16 @@ class World:
         self.lives += 1
         session = f"board-{self.lives}"
         self.sent[session] = 0
-        dialled = tuple((lane, lane.name.encode()) for lane in Lane) if self.board_dials else ()
+        dialled = tuple((place[1], _dialled(place)) for place in self.places) if self.board_dials else ()
         return BoardSession(session, "boot", CAMERA, dialled)
 
-    def _board_name(self, host: HostNode, lane: Lane) -> bytes:
+    def _board_name(self, host: HostNode, place: Place) -> bytes:
         if self.board_dials:
-            return lane.name.encode()
-        return next(name for name, (_, _, wire) in self.wires.items() if wire is host.wires[lane])
+            return _dialled(place)
+        return next(name for name, (_, _, wire) in self.wires.items() if wire is host.wires[place])
 
-    def _board_takes(self, host: HostNode, lane: Lane, message: Message | Broken) -> None:
-        name = self._board_name(host, lane)
+    def _board_takes(self, host: HostNode, place: Place, message: Message | Broken) -> None:
+        name = self._board_name(host, place)
         if isinstance(message, Broken):
             self._board_says(self.board.unreachable(name))
         else:
@@ -218,36 +257,39 @@ class World:
         if found is None:
             self._board_says(self.board.unreachable(outgoing.connection))
             return False
-        _, lane, wire = found
+        _, place, wire = found
         if isinstance(outgoing.message, FrameMessage):
-            assert lane is Lane.FRAMES
+            assert place[1] is Lane.FRAMES
             frame = outgoing.message
             assert frame.sent_index < self.credit.get(frame.session, 0), "a frame was sent without credit"
         wire.to_host.append(outgoing.message)
         return True
 
-    def _host_takes(self, host: HostNode, lane: Lane, message: Message | Broken) -> None:
+    def _host_takes(self, host: HostNode, place: Place, message: Message | Broken) -> None:
+        name = host.names[place]
         if isinstance(message, Broken):
-            self._host_does(host, host.session.interrupted(self.now_ns))
+            self._host_does(host, host.session.interrupted(name, self.now_ns))
         else:
-            self._host_does(host, host.session.receive(host.names[lane], message, self.now_ns))
+            self._host_does(host, host.session.receive(name, message, self.now_ns))
 
     def _host_does(self, host: HostNode, outputs: list[Output]) -> None:
         for output in outputs:
             match output:
                 case Outgoing(connection, message):
                     self._host_sends(host, connection, message)
-                case Accepted(hello, resumed, lost):
+                case Accepted(hello, resumed, lost, link):
+                    host.carriers.append(link)
                     assert lost >= 0
                     assert resumed == (host.board_session == hello.session)
                     if not resumed:
                         host.board_session, host.base_sent = hello.session, hello.counts.sent
                         host.received = host.lost = 0
                     host.lost += lost
-                case Arrived(frame, lost):
+                case Arrived(frame, lost, _):
                     assert lost >= 0
                     assert frame.session == host.board_session, "a frame of an old session was taken"
-                    assert (frame.session, frame.sent_index) not in host.arrived, "a frame was taken twice"
+                    newest = host.arrived[-1] if host.arrived else ("", -1)
+                    assert newest[0] != frame.session or newest[1] < frame.sent_index, "a frame was taken twice or late"
                     host.arrived.append((frame.session, frame.sent_index))
                     host.received += 1
                     host.lost += lost
@@ -256,14 +298,19 @@ class World:
                 case Counted(_, _, lost):
                     assert lost >= 0
                     host.lost += lost
-                case Echo() | Refused() | Vanished():
+                case Echo() | Refused() | Vanished() | LinkUp() | LinkDown() | OtherBoard():
                     host.others.append(output)
 
     def _host_sends(self, host: HostNode, connection: bytes, message: Message) -> None:
         if isinstance(message, Credit):
             known = self.credit.get(host.board_session, 0)
             self.credit[host.board_session] = max(known, message.below_index)
-        for lane, name in host.names.items():
+        for place, name in host.names.items():
             if name == connection:
-                assert not isinstance(message, HostHello) or message.lane is lane
-                host.wires[lane].to_board.append(message)
+                assert not isinstance(message, HostHello) or message.lane is place[1]
+                host.wires[place].to_board.append(message)
+
+
+def _dialled(place: Place) -> bytes:
+    """What the side that dials calls a connection."""
+    return connection_name(place[0], place[1].name.encode())

@@ -18,15 +18,16 @@ def settings(module: str, *arguments: str, **environment: str) -> subprocess.Com
 def test_every_setting_of_the_host_is_an_option_and_named_as_its_origin() -> None:
     """Each setting that is given as an option shows its value and `--NAME`."""
     given = {
-        "link": "tcp://board:5555", "camera": "replay:right", "calibration": "rig.yaml", "matcher": "block",
+        "link": "serial:/dev/ttyACM0", "camera": "replay:right", "calibration": "rig.yaml", "matcher": "block",
         "tolerance": "5", "fifo": "2:block", "keys": "my-keys", "log_level": "info",
     }  # fmt: skip
     words = [word for name, value in given.items() for word in (f"--{name.replace('_', '-')}", value)]
+    words += ["--link", "tcp://board:5555"]
     done = settings("phone_host.cli", "--json", *words)
     assert done.returncode == 0, done.stderr
+    read = given | {"tolerance": 5.0, "link": ["serial:/dev/ttyACM0", "tcp://board:5555"]}
     assert json.loads(done.stdout) == {
-        name: {"value": 5.0 if name == "tolerance" else value, "origin": f"--{name.replace('_', '-')}"}
-        for name, value in given.items()
+        name: {"value": value, "origin": f"--{name.replace('_', '-')}"} for name, value in read.items()
     }
 
 

@@ -40,7 +40,7 @@ def test_pairs_do_not_get_older_on_a_slow_host(fifo: str, tmp_path: Path) -> Non
         host = Host(
             HostSettings(fifo=policy, pairs=12),
             camera,
-            open_link(parse_link(link, listens_by_default=False)),
+            [open_link(parse_link(link, listens_by_default=False))],
             core,
             keep,
         )

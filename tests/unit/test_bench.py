@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from common.errors import SettingsError
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts
+from phone_host.accounts import LinkAccount, SessionAccount
 from phone_host.bench import WARM_UP_S, CaseResult, after_warm_up, rig_of
 from phone_host.bench_analysis import Analysis, analyse
 from phone_host.bench_cases import (
@@ -33,7 +34,6 @@ from phone_host.boardprocess import BoardAccount
 from phone_host.delays import DELAYS, STAGES
 from phone_host.emulate import PROFILES
 from phone_host.pairqueue import PairCounts
-from phone_host.receiver import LinkAccount, SessionAccount
 from phone_host.sync.fifo import FifoSettings
 
 UNDER = Conditions("a machine", "a date", "sgbm", FifoSettings(), 4.0, ((Interface("rfcomm"), "no radio"),))

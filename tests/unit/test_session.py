@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from common.frame import PixelFormat
 from common.ledger import BoardMarks
-from common.protocol.host_session import YOUNG_NS
 from common.protocol.message import (
     BoardCounts,
     BoardHello,
@@ -33,13 +32,16 @@ from common.protocol.session import (
     SILENCE_NS,
     STATUS_NS,
     TAKEOVER_NS,
+    Accepted,
     Counted,
     Echo,
     Outgoing,
     Output,
     Refused,
+    StaleReason,
     Vanished,
 )
+from common.protocol.waves import YOUNG_NS
 from common.protocol.wire import decode, encode_stamped
 from tests.support.session_world import CAMERA, World
 
@@ -65,6 +67,7 @@ class Event:
     lane: Lane
     to_board: bool
     amount: int
+    link: int = 0
 
 
 EVENTS = st.lists(
@@ -85,13 +88,13 @@ def happen(world: World, event: Event, seen: list[FrameMessage]) -> None:
     match event.what:
         case What.DELIVER:
             for _ in range(event.amount % 7 + 1):
-                world.deliver(host, event.lane, to_board=event.to_board)
+                world.deliver(host, (event.link, event.lane), to_board=event.to_board)
         case What.DROP:
-            world.drop(host, event.lane, to_board=event.to_board)
+            world.drop(host, (event.link, event.lane), to_board=event.to_board)
         case What.REPEAT:
-            world.deliver(host, event.lane, to_board=event.to_board, keep=True)
+            world.deliver(host, (event.link, event.lane), to_board=event.to_board, keep=True)
         case What.BREAK:
-            world.break_lane(host, event.lane)
+            world.break_lane(host, (event.link, event.lane))
         case What.RESTART_BOARD:
             world.restart_board()
         case What.RESTART_HOST:
@@ -101,7 +104,7 @@ def happen(world: World, event: Event, seen: list[FrameMessage]) -> None:
                 world.inject(host, seen[event.amount % len(seen)])
         case What.WAIT:
             world.pass_time(event.amount * MS)
-    under_way = world.hosts[0].wires[Lane.FRAMES].to_host
+    under_way = world.hosts[0].wires[0, Lane.FRAMES].to_host
     seen += [message for message in under_way if isinstance(message, FrameMessage)]
 
 
@@ -146,7 +149,8 @@ def test_frames_that_come_back_are_never_taken(*, events: list[Event], board_dia
         stale = len(host.stale)
         world.inject(host, frame(session, index))
         assert len(host.stale) == stale + 1
-        assert host.stale[-1].old_session == (session != host.board_session)
+        expected = StaleReason.DUPLICATE if session == host.board_session else StaleReason.OLD_SESSION
+        assert host.stale[-1].reason is expected
 
 
 def frame(session: str, sent_index: int) -> FrameMessage:
@@ -162,13 +166,13 @@ def test_one_broken_lane_and_the_words_about_it_lost(lane: Lane, lost_words: int
     world = World(board_dials=board_dials)
     world.settle(1000 * MS)
     host = world.hosts[0]
-    world.break_lane(host, lane)
+    world.break_lane(host, (0, lane))
     other = Lane.CONTROL if lane is Lane.FRAMES else Lane.FRAMES
     for _ in range(lost_words):
-        world.deliver(host, lane, to_board=board_dials)
+        world.deliver(host, (0, lane), to_board=board_dials)
         world.pass_time(20 * MS)
         for to_board in (True, False):
-            world.drop(host, other, to_board=to_board)
+            world.drop(host, (0, other), to_board=to_board)
     before = len(host.arrived)
     world.settle()
     assert len(host.arrived) > before + 20
@@ -181,7 +185,7 @@ def test_a_lost_frame_does_not_take_its_credit_along(*, board_dials: bool) -> No
     world.settle(1000 * MS)
     host = world.hosts[0]
     world.shoot()
-    world.drop(host, Lane.FRAMES, to_board=False)
+    world.drop(host, (0, Lane.FRAMES), to_board=False)
     before = len(host.arrived)
     world.settle(1000 * MS)
     assert len(host.arrived) > before
@@ -193,16 +197,19 @@ def test_an_answer_of_a_dead_board_opens_nothing() -> None:
     world = World()
     world.pass_time(20 * MS)
     host = world.hosts[0]
-    world.deliver(host, Lane.FRAMES, to_board=True)
-    late = host.wires[Lane.FRAMES].to_host[-1]
+    for to_board in (True, False):
+        world.deliver(host, (0, Lane.CONTROL), to_board=to_board)
+    world.deliver(host, (0, Lane.FRAMES), to_board=True)
+    late = host.wires[0, Lane.FRAMES].to_host[-1]
     assert isinstance(late, BoardHello)
     world.restart_board()
     for lane in Lane:
-        host.wires[lane].to_board.clear()
-        world.deliver(host, lane, to_board=False)
-    host.session.receive(host.names[Lane.FRAMES], late, world.now_ns)
-    world.drop(host, Lane.FRAMES, to_board=True)
-    world.drop(host, Lane.FRAMES, to_board=True)
+        world.deliver(host, (0, lane), to_board=False)
+    for to_board in (True, False):
+        world.deliver(host, (0, Lane.CONTROL), to_board=to_board)
+    assert not any(
+        isinstance(output, Accepted) for output in host.session.receive(host.names[0, Lane.FRAMES], late, world.now_ns)
+    )
     world.settle(1000 * MS)
     assert host.board_session == world.board.session
     assert host.arrived
@@ -218,7 +225,7 @@ def test_a_second_host_waits_until_the_first_is_silent() -> None:
     assert Refused(RefusalReason.BUSY) in second.others
     assert len(first.arrived) > 60
     for lane in Lane:  # the first one falls silent
-        world.wires = {name: held for name, held in world.wires.items() if held[2] is not first.wires[lane]}
+        world.wires = {name: held for name, held in world.wires.items() if held[2] is not first.wires[0, lane]}
     silent_ns = world.now_ns
     world.hosts.remove(first)
     while not second.arrived:
@@ -256,7 +263,7 @@ def test_a_silent_board_is_given_up() -> None:
     world.settle(300 * MS)
     host = world.hosts[0]
     heard_ns = world.now_ns
-    host.session.receive(host.names[Lane.CONTROL], Status(world.board.session, BoardCounts()), heard_ns)
+    host.session.receive(host.names[0, Lane.CONTROL], Status(world.board.session, BoardCounts()), heard_ns)
     assert Vanished(orderly=False) not in host.session.tick(heard_ns + SILENCE_NS - 1)
     assert host.session.is_open
     assert Vanished(orderly=False) in host.session.tick(heard_ns + SILENCE_NS)
@@ -271,7 +278,7 @@ def test_a_boards_goodbye_gives_its_last_account() -> None:
     counts = BoardCounts(sent + 9, sent + 3)
     [goodbye] = world.board.leave(counts)
     assert goodbye.message == Bye(counts)
-    frames = host.names[Lane.FRAMES]
+    frames = host.names[0, Lane.FRAMES]
     outputs = host.session.receive(frames, goodbye.message, world.now_ns)
     assert outputs == [Outgoing(frames, Bye()), Counted(counts, ended=False, lost=3, last=True), Vanished(orderly=True)]
     assert not host.session.is_open
@@ -284,9 +291,9 @@ def test_a_goodbye_counts_also_when_the_other_lane_broke_first() -> None:
     world = World()
     world.settle(300 * MS)
     host = world.hosts[0]
-    host.session.interrupted(world.now_ns)
+    host.session.interrupted(host.names[0, Lane.FRAMES], world.now_ns)
     counts = BoardCounts(100, 90)
-    control = host.names[Lane.CONTROL]
+    control = host.names[0, Lane.CONTROL]
     assert host.session.receive(control, Bye(BoardCounts(1, 1)), world.now_ns) == []
     outputs = host.session.receive(control, Bye(counts), world.now_ns)
     assert outputs == [Outgoing(control, Bye()), Counted(counts, ended=False, last=True), Vanished(orderly=True)]
@@ -302,7 +309,7 @@ def test_the_end_is_said_until_it_is_heard() -> None:
     heard: list[object] = []
     for _ in range(50):
         world.pass_time(20 * MS)
-        heard += [message for message in host.wires[Lane.FRAMES].to_host if isinstance(message, End)]
+        heard += [message for message in host.wires[0, Lane.FRAMES].to_host if isinstance(message, End)]
         world.deliver_all()
     assert End(world.board.session, world.counts) in heard
 
@@ -312,7 +319,7 @@ def test_echoes_of_an_old_wave_are_ignored() -> None:
     world = World()
     world.settle(300 * MS)
     host = world.hosts[0]
-    control = host.names[Lane.CONTROL]
+    control = host.names[0, Lane.CONTROL]
     [ping] = [
         output.message
         for output in host.session.tick(host.session.due_ns)
@@ -332,7 +339,7 @@ def test_a_refusal_for_the_version_reaches_the_host() -> None:
     for reason in RefusalReason:
         world = World()
         host = world.hosts[0]
-        assert host.session.receive(host.names[Lane.CONTROL], Refusal(reason), world.now_ns) == [Refused(reason)]
+        assert host.session.receive(host.names[0, Lane.CONTROL], Refusal(reason), world.now_ns) == [Refused(reason)]
         assert not host.session.is_open
         assert any(
             isinstance(output, Outgoing) and isinstance(output.message, HostHello)
@@ -372,7 +379,7 @@ def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, e
     world = World()
     world.settle(1500 * MS)
     host = world.hosts[0]
-    control = host.names[Lane.CONTROL]
+    control = host.names[0, Lane.CONTROL]
     for begin_ns, expected in ((world.now_ns, echoes), (world.now_ns + YOUNG_NS, 3)):
         now_ns, heard = begin_ns, 0
         outputs: list[Output] = []
@@ -391,7 +398,7 @@ def test_a_wish_to_steer_is_given_once() -> None:
     world = World(board_dials=False)
     world.settle()
     host = world.hosts[0]
-    connection = next(name for name, (_, lane, _) in world.wires.items() if lane is Lane.CONTROL)
+    connection = next(name for name, (_, place, _) in world.wires.items() if place == (0, Lane.CONTROL))
     (asked,) = host.session.steer(7 * MS)
     assert isinstance(asked, Outgoing)
     for message, given_ns in ((asked.message, 7 * MS), (Steer(CAMERA.period_ns * 5 + 3), 3)):

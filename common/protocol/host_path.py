@@ -1,0 +1,66 @@
+"""One link as the host sees it: whether the board answers there, with which session, and its clock waves. Sans-I/O, `now_ns` passed in."""
+
+from common.protocol.message import BoardHello, HostHello, Lane
+from common.protocol.session import HELLO_RETRY_NS, SILENCE_NS, TAKEOVER_NS, Outgoing
+from common.protocol.waves import Waves
+
+
+class HostPath:
+    """The state of one link.
+
+    Args:
+        link: its number.
+        dialled: the connections that this side opened; empty when the board dials, then its knocks tell them.
+    """
+
+    def __init__(self, link: int, dialled: dict[Lane, bytes]) -> None:
+        self.link = link
+        self.lanes = dict(dialled)
+        self.waves = Waves(link)
+        self.hello: BoardHello | None = None
+        self.session = ""
+        self.opened_ns = 0
+        self.heard_ns = 0
+        self.foreign_since_ns: int | None = None
+        self._hello_due_ns = 0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether our board answers here."""
+        return self.hello is not None
+
+    @property
+    def due_ns(self) -> int:
+        """When the session wants to act for this link next, ns."""
+        return self._hello_due_ns if self.hello is None else min(self.waves.due_ns, self.heard_ns + SILENCE_NS)
+
+    def is_alive_beside(self, hello: BoardHello, now_ns: int) -> bool:
+        """Whether the board that answers here still lives, though another life of a board has said this hello on another link.
+
+        A new life on the same boot means that the old one died, unless it was heard of late; a boot takes longer than silence is borne.
+        """
+        same_boot = self.hello is not None and self.hello.boot_id == hello.boot_id
+        return not same_boot or now_ns - self.heard_ns < TAKEOVER_NS
+
+    def open(self, hello: BoardHello, now_ns: int) -> None:
+        """Take note that our board answers."""
+        self.hello = hello
+        self.foreign_since_ns = None
+        self.opened_ns = self.heard_ns = now_ns
+        self.waves.open(now_ns)
+
+    def shut(self, hello_due_ns: int) -> None:
+        """Take note that the board is not there any more; it is greeted again from then on."""
+        self.hello = None
+        self._hello_due_ns = hello_due_ns
+
+    def greet(self, host_id: str, now_ns: int) -> list[Outgoing]:
+        """Say hello on the control lane, if it is due."""
+        if self.hello is not None or now_ns < self._hello_due_ns:
+            return []
+        self._hello_due_ns = now_ns + HELLO_RETRY_NS
+        return self.say_hello(host_id, Lane.CONTROL)
+
+    def say_hello(self, host_id: str, lane: Lane) -> list[Outgoing]:
+        """Say hello on a lane, if it is known."""
+        return [Outgoing(self.lanes[lane], HostHello(host_id, lane))] if lane in self.lanes else []

@@ -1,0 +1,98 @@
+"""What the host saw of a board and its links, in figures. Written by the receiver's thread only, read by others at leisure."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from common.protocol.message import BoardCounts
+from phone_host.delays import Series
+
+
+@dataclass(slots=True)
+class SessionAccount:
+    """One life of a board as the host saw it; closed accounts are kept for the report.
+
+    Attributes:
+        session: the board's session id.
+        first: the board's account when this host was accepted.
+        latest: the board's newest account.
+        received: frames that came.
+        lost: frames that were sent and never came (gaps).
+        duplicate: frames that a transport delivered again, dropped.
+        late: frames that came behind a newer one over another link, dropped; they are counted in `lost`.
+        old_session: frames of an older life of the board, dropped.
+        ended: whether the board said that no frame follows.
+        vanished: whether the board went without a word: what it sent after `latest` is unknown.
+    """
+
+    session: str
+    first: BoardCounts
+    latest: BoardCounts
+    received: int = 0
+    lost: int = 0
+    duplicate: int = 0
+    late: int = 0
+    old_session: int = 0
+    ended: bool = False
+    vanished: bool = False
+
+
+@dataclass(slots=True)
+class LinkTally:
+    """What one link did.
+
+    Attributes:
+        name: as it stands in delays.jsonl: its kind, with a number where there are more of that kind.
+        frames: that came over it.
+        bytes: of their images.
+        carried: how often the stream came to it.
+        lost: how often it was lost, or stuck, after it had been up.
+        is_up: whether the board answers there now.
+        age: how old the frames were when they came, ns.
+    """
+
+    name: str
+    frames: int = 0
+    bytes: int = 0
+    carried: int = 0
+    lost: int = 0
+    is_up: bool = False
+    age: Series = field(default_factory=Series)
+
+
+@dataclass(slots=True)
+class LinkAccount:
+    """What the receiver has seen so far; written by its thread only, read by others at leisure.
+
+    Attributes:
+        sessions: lives of the board.
+        links: in the order of the command line.
+        connects: how often the board was found.
+        switches: how often the stream went from one link to another.
+        garbage: packets that were none of ours.
+        no_clock: frames that came before the clock was known.
+    """
+
+    sessions: list[SessionAccount] = field(default_factory=list)
+    links: tuple[LinkTally, ...] = ()
+    connects: int = 0
+    switches: int = 0
+    garbage: int = 0
+    no_clock: int = 0
+
+
+def link_names(kinds: Sequence[str]) -> list[str]:
+    """Name links so that each name is there once.
+
+    Args:
+        kinds: of the links, in order.
+
+    Returns:
+        The kind for the first of each, `kind-2` for the second and so on.
+    """
+    seen: Counter[str] = Counter()
+    names = []
+    for kind in kinds:
+        seen[kind] += 1
+        names.append(kind if seen[kind] == 1 else f"{kind}-{seen[kind]}")
+    return names

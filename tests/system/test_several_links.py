@@ -1,0 +1,180 @@
+"""Both programs over two links at once: one is taken away and given back; numbered images are paired right all the while, and all is counted."""
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.numbered import saved_numbers, write_film
+from tests.support.programs import board, free_port, host, ledgers, lines, until
+from tests.support.pty_line import PtyLine
+
+FPS = 20
+FRAMES = 2000  # 100 s: longer than any test here, so that a number names one moment
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A replay URI of numbered images; on the clock, so that two replays show the same number at the same time."""
+    folder = write_film(tmp_path_factory.mktemp("film") / "numbered", FRAMES)
+    return f"replay:{folder}?fps={FPS}&loop=1"
+
+
+@pytest.fixture
+def cable(tmp_path: Path) -> Iterator[PtyLine]:
+    """A cable as fast as gadget serial on the board is thought to be."""
+    with PtyLine(tmp_path, bytes_per_s=3e6, delay_ns=300_000) as line:
+        yield line
+
+
+def with_links(verb: list[str], *links: str) -> list[str]:
+    """Arguments of a program with these links."""
+    return [*verb, *(word for link in links for word in ("--link", link))]
+
+
+def carriers(out: Path) -> list[str]:
+    """The links that pairs came over, each once for each time that it took over."""
+    names = [ledger["link"] for ledger in ledgers(out)]
+    return [name for number, name in enumerate(names) if number == 0 or names[number - 1] != name]
+
+
+def check(out: Path, report: Any, account: Any) -> None:
+    """Saved pairs show the same number twice, in order; ledgers add up; every frame of the one session is accounted for over all links."""
+    numbers = saved_numbers(out)
+    assert numbers
+    assert all(left == right for left, right in numbers)
+    kept = ledgers(out)
+    assert [ledger["sequence"] for ledger in kept] == sorted({ledger["sequence"] for ledger in kept})
+    for ledger in kept:
+        delays = ("capture_ns", "outbox_ns", "propagation_ns", "pairing_ns", "queuing_ns", "processing_ns")
+        assert sum(ledger[name] for name in delays) == ledger["end_to_end_ns"]
+    (session,) = report["sessions"]
+    assert session["tail"] == "known"
+    assert session["grabbed"] == session["sent"] + sum(session["dropped"].values()) + session["waiting"]
+    assert session["sent"] == session["received"] + session["lost"]
+    assert session["received"] == sum(link["frames"] for link in report["links"])
+    frames = report["frames"]
+    assert frames["received"] == frames["paired"] + frames["held"] + sum(frames["orphaned"].values())
+    assert account["grabbed"] == account["sent"] + sum(account["dropped"].values())
+
+
+def test_a_pulled_cable_and_back(film: str, cable: PtyLine, tmp_path: Path) -> None:
+    """Pairs come over serial, over TCP when the cable is pulled, over serial again when it is back; in one session, each told with its link."""
+    out = tmp_path / "out"
+    board_uri, host_uri = cable.uris
+    tcp = f"tcp://127.0.0.1:{free_port()}"
+    receiving = ["run", "--camera", film, "--out", str(out), "--save-every", "1", "--json", "--log-level", "info"]
+    with (
+        board(with_links(["run", "--camera", film, "--json"], board_uri, tcp), tmp_path) as sender,
+        host(with_links(receiving, host_uri, tcp), tmp_path) as receiver,
+    ):
+        until(lambda: lines(out / "delays.jsonl") >= 10 and carriers(out)[-1] == "serial", "pairs over the cable")
+        cable.pull()
+        before = lines(out / "delays.jsonl")
+        until(lambda: lines(out / "delays.jsonl") >= before + 20 and carriers(out)[-1] == "tcp", "pairs over TCP")
+        cable.plug()
+        until(lambda: carriers(out)[-1] == "serial", "pairs over the cable again")
+        assert receiver.stop() == 0
+        assert sender.stop() == 0
+    report = receiver.json()
+    check(out, report, sender.json())
+    serial, over_tcp = report["links"]
+    assert (serial["link"], over_tcp["link"]) == ("serial", "tcp")
+    assert serial["lost"] == 1
+    assert report["switches"] == serial["carried"] + over_tcp["carried"] - 1 >= 2
+    assert "link_switched source=serial target=tcp" in receiver.stderr
+    assert "link_switched source=tcp target=serial" in receiver.stderr
+
+
+def test_a_line_that_falls_silent_gives_way(film: str, cable: PtyLine, tmp_path: Path) -> None:
+    """A cable that swallows all bytes without a word gives way to TCP; no frame is paired twice or wrongly."""
+    out = tmp_path / "out"
+    board_uri, host_uri = cable.uris
+    tcp = f"tcp://127.0.0.1:{free_port()}"
+    receiving = ["run", "--camera", film, "--out", str(out), "--save-every", "1", "--json", "--log-level", "info"]
+    with (
+        board(with_links(["run", "--camera", film, "--json"], board_uri, tcp), tmp_path) as sender,
+        host(with_links(receiving, host_uri, tcp), tmp_path) as receiver,
+    ):
+        until(lambda: lines(out / "delays.jsonl") >= 10 and carriers(out)[-1] == "serial", "pairs over the cable")
+        for way in cable.ways:
+            way.spoil = lambda _: b""
+        before = lines(out / "delays.jsonl")
+        until(lambda: lines(out / "delays.jsonl") >= before + 20 and carriers(out)[-1] == "tcp", "pairs over TCP")
+        for way in cable.ways:
+            way.spoil = bytes
+        until(lambda: carriers(out)[-1] == "serial", "pairs over the cable again")
+        assert receiver.stop() == 0
+        assert sender.stop() == 0
+    check(out, receiver.json(), sender.json())
+
+
+def test_two_links_of_one_kind_and_one_that_comes_later(film: str, tmp_path: Path) -> None:
+    """Two addresses of one board have names of their own; a link whose device appears during the run is taken into use."""
+    out = tmp_path / "out"
+    ipc = f"ipc://{tmp_path}/link"
+    ports = [f"tcp://127.0.0.1:{free_port()}" for _ in range(2)]
+    serial = (f"serial:{tmp_path}/ttyBoard", f"serial:{tmp_path}/ttyHost")
+    receiving = ["run", "--camera", film, "--out", str(out), "--save-every", "1", "--json", "--log-level", "info"]
+    with (
+        board(with_links(["run", "--camera", film, "--json"], ipc, *ports, serial[0]), tmp_path) as sender,
+        host(with_links(receiving, serial[1], *ports, ipc), tmp_path) as receiver,
+    ):
+        until(lambda: lines(out / "delays.jsonl") >= 10, "pairs")
+        assert carriers(out)[-1] in {"tcp", "tcp-2", "ipc"}
+        with PtyLine(tmp_path, bytes_per_s=3e6, delay_ns=300_000):
+            until(lambda: carriers(out)[-1] == "serial", "pairs over the cable that was plugged in")
+            assert receiver.stop() == 0
+            assert sender.stop() == 0
+    report = receiver.json()
+    check(out, report, sender.json())
+    assert [link["link"] for link in report["links"]] == ["serial", "tcp", "tcp-2", "ipc"]
+
+
+def test_two_boards_are_refused(film: str, tmp_path: Path) -> None:
+    """A host whose links lead to two boards ends with exit 3 and one line that says so."""
+    links = [f"ipc://{tmp_path}/link{number}" for number in range(2)]
+    with (
+        board(with_links(["run", "--camera", film], links[0]), tmp_path, "board1"),
+        board(with_links(["run", "--camera", film], links[1]), tmp_path, "board2") as second,
+    ):
+        with host(with_links(["run", "--camera", film], *links), tmp_path) as receiver:
+            assert receiver.wait() == 3
+            told = [line for line in receiver.stderr.splitlines() if "error:" in line]
+            assert len(told) == 1
+            assert "different boards" in told[0]
+            assert "Traceback" not in receiver.stderr
+        with host(with_links(["run", "--camera", film, "--pairs", "3"], links[1]), tmp_path, "host2") as other:
+            assert other.wait() == 0  # the second board was said goodbye to
+        assert second.process.poll() is None
+
+
+@pytest.mark.parametrize("killed", ["board", "host"])
+def test_either_side_may_be_killed(film: str, killed: str, cable: PtyLine, tmp_path: Path) -> None:
+    """A killed board or host is replaced, and pairs flow again over the same two links."""
+    board_uri, host_uri = cable.uris
+    ipc = f"ipc://{tmp_path}/link"
+    sending = with_links(["run", "--camera", film], board_uri, ipc)
+    receiving = with_links(["run", "--camera", film, "--save-every", "1"], host_uri, ipc)
+    outs = [tmp_path / "out1", tmp_path / "out2"]
+    with (
+        host([*receiving, "--out", str(outs[0])], tmp_path, "host1") as first,
+        board(sending, tmp_path, "board1") as second,
+    ):
+        until(lambda: lines(outs[0] / "delays.jsonl") >= 10, "pairs before")
+        if killed == "host":
+            first.send(signal.SIGKILL)
+            first.wait()
+            with host([*receiving, "--out", str(outs[1])], tmp_path, "host2") as third:
+                until(lambda: lines(outs[1] / "delays.jsonl") >= 10, "pairs for the second host")
+                assert third.stop() == 0
+        else:
+            second.send(signal.SIGKILL)
+            second.wait()
+            before = lines(outs[0] / "delays.jsonl")
+            with board(sending, tmp_path, "board2"):
+                until(lambda: lines(outs[0] / "delays.jsonl") >= before + 10, "pairs of the second board")
+                assert first.stop() == 0
+    assert all(left == right for out in outs if out.exists() for left, right in saved_numbers(out))

@@ -1,0 +1,287 @@
+"""One session over two links: cut, mended, chosen in any order, on simulated time. The world itself checks that frames come once and in order."""
+
+from dataclasses import dataclass
+from enum import Enum, auto
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.frame import PixelFormat
+from common.ledger import BoardMarks
+from common.protocol.host_session import STUCK_NS
+from common.protocol.message import BoardCounts, BoardHello, Bye, Credit, FrameMessage, HostHello, Lane, Message, Ping
+from common.protocol.session import (
+    MS,
+    SILENCE_NS,
+    STATUS_NS,
+    TAKEOVER_NS,
+    LinkDown,
+    OtherBoard,
+    Outgoing,
+    StaleReason,
+)
+from tests.support.session_world import CAMERA, HostNode, World
+
+LINKS = 2
+
+
+class What(Enum):
+    """What may happen to two links."""
+
+    DELIVER = auto()
+    DROP = auto()
+    REPEAT = auto()
+    BREAK = auto()
+    CUT = auto()
+    MEND = auto()
+    CARRY = auto()
+    RESTART_BOARD = auto()
+    RESTART_HOST = auto()
+    WAIT = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One misfortune, some luck, or a choice of the host's."""
+
+    what: What
+    link: int
+    lane: Lane
+    to_board: bool
+    amount: int
+
+
+EVENTS = st.lists(
+    st.builds(
+        Event,
+        st.sampled_from([What.DELIVER] * 8 + [What.WAIT] * 6 + [What.CARRY] * 3 + list(What)),
+        st.integers(0, LINKS - 1),
+        st.sampled_from(Lane),
+        st.booleans(),
+        st.integers(1, 700),
+    ),
+    max_size=60,
+)
+
+
+def happen(world: World, event: Event) -> None:
+    """Let an event happen."""
+    host, place = world.hosts[0], (event.link, event.lane)
+    match event.what:
+        case What.DELIVER:
+            for _ in range(event.amount % 7 + 1):
+                world.deliver(host, place, to_board=event.to_board)
+        case What.DROP:
+            world.drop(host, place, to_board=event.to_board)
+        case What.REPEAT:
+            world.deliver(host, place, to_board=event.to_board, keep=True)
+        case What.BREAK:
+            world.break_lane(host, place)
+        case What.CUT:
+            world.cut_link(event.link)
+        case What.MEND:
+            world.mend_link(event.link)
+        case What.CARRY:
+            world._host_does(host, host.session.carry(event.link, world.now_ns))
+        case What.RESTART_BOARD:
+            world.restart_board()
+        case What.RESTART_HOST:
+            world.restart_host(host)
+        case What.WAIT:
+            world.pass_time(event.amount * MS)
+
+
+@given(events=EVENTS, board_dials=st.booleans(), slots=st.integers(1, 4), alive=st.integers(0, LINKS))
+@settings(deadline=None, max_examples=200)
+def test_frames_flow_over_any_link_that_is_up(
+    *, events: list[Event], board_dials: bool, slots: int, alive: int
+) -> None:
+    """After any events, with one link dead without a sound or none, frames flow within silence and a second; each is received or lost."""
+    world = World(board_dials=board_dials, links=LINKS)
+    world.hosts[0].slots = slots
+    for event in events:
+        happen(world, event)
+    for link in range(LINKS):
+        world.mend_link(link)
+        if alive not in {link, LINKS}:
+            world.cut_link(link)
+    world.settle(SILENCE_NS + 4000 * MS)
+    host = world.hosts[0]
+    host.slots = slots
+    before = len(host.arrived)
+    world.settle(200 * MS)
+    assert len(host.arrived) >= before + 4
+    assert host.board_session == world.board.session
+    world.camera_runs = False
+    world.settle(2 * STATUS_NS)
+    assert world.sent[host.board_session] == host.base_sent + host.received + host.lost
+
+
+def settled(*, board_dials: bool = False) -> World:
+    """A world in which frames come over link 0 and link 1 stands by."""
+    world = World(board_dials=board_dials, links=LINKS)
+    world.settle(1000 * MS)
+    host = world.hosts[0]
+    world._host_does(host, host.session.carry(0, world.now_ns))
+    world.settle(100 * MS)
+    assert host.session.carrier == 0
+    return world
+
+
+def shoot(world: World) -> None:
+    """Let the board have credit for one frame, and send it."""
+    host = world.hosts[0]
+    world._host_does(host, host.session.grant(1))
+    carrier = host.session.carrier
+    assert carrier is not None
+    while world.deliver(host, (carrier, Lane.CONTROL), to_board=True):
+        pass
+    sent = world.counts.sent
+    world.shoot()
+    assert world.counts.sent == sent + 1
+
+
+@pytest.mark.parametrize("board_dials", [False, True])
+def test_a_broken_link_costs_nothing_but_what_was_under_way(*, board_dials: bool) -> None:
+    """When the carrier breaks frames come over the other link: at once if the host is told, within STUCK_NS if the board is; one is lost."""
+    world = settled(board_dials=board_dials)
+    host = world.hosts[0]
+    before, lost, begin_ns = len(host.arrived), host.lost, world.now_ns
+    shoot(world)
+    for lane in Lane:
+        world.break_lane(host, (0, lane))
+    world.cut_link(0)
+    while host.session.carrier != 1:
+        world.pass_time(20 * MS)
+        world.deliver_all()
+    assert world.now_ns - begin_ns <= (STUCK_NS + 200 * MS if board_dials else 60 * MS)
+    world.settle(200 * MS)
+    assert len(host.arrived) >= before + 3
+    assert host.lost == lost + 1
+    assert len({session for session, _ in host.arrived}) == 1
+
+
+@pytest.mark.parametrize("board_dials", [False, True])
+def test_a_choice_moves_the_stream_at_the_cost_of_one_round_trip(*, board_dials: bool) -> None:
+    """The host's choice moves the stream to the other link and back in the same session; only the frame under way may be lost."""
+    world = settled(board_dials=board_dials)
+    host = world.hosts[0]
+    for link in (1, 0, 1):
+        before = len(host.arrived)
+        world._host_does(host, host.session.carry(link, world.now_ns))
+        world.settle(200 * MS)
+        assert host.session.carrier == link
+        assert len(host.arrived) >= before + 3
+    assert host.lost <= 3
+
+
+def test_the_old_links_last_frame_comes_late() -> None:
+    """A frame that the old link still held when the new one overtook it is lost to pairing, told as late once and as a repetition then."""
+    world = settled()
+    host = world.hosts[0]
+    shoot(world)
+    [late] = [m for m in host.wires[0, Lane.FRAMES].to_host if isinstance(m, FrameMessage)]
+    world._host_does(host, host.session.carry(1, world.now_ns))
+    for to_board in (True, False):
+        world.deliver(host, (1, Lane.FRAMES), to_board=to_board)
+    assert host.session.carrier == 1
+    assert host.lost == 1
+    shoot(world)
+    world.deliver(host, (1, Lane.FRAMES), to_board=False)
+    assert host.arrived[-1][1] == late.sent_index + 1
+    world.deliver(host, (0, Lane.FRAMES), to_board=False)
+    world.inject(host, late)
+    assert [stale.reason for stale in host.stale] == [StaleReason.LATE, StaleReason.DUPLICATE]
+    world.settle(100 * MS)
+    world.camera_runs = False
+    world.settle(2 * STATUS_NS)
+    assert world.sent[host.board_session] == host.base_sent + host.received + host.lost
+
+
+def test_a_half_dead_link_is_given_up() -> None:
+    """A link whose control is heard and whose frames' lane leaves hello unanswered is told as stuck after STUCK_NS; the stream stays."""
+    world = settled()
+    host = world.hosts[0]
+    world.cut.add((1, Lane.FRAMES))
+    begin_ns = world.now_ns
+    before = len(host.arrived)
+    world._host_does(host, host.session.carry(1, world.now_ns))
+    while LinkDown(1, stuck=True) not in host.others:
+        world.settle(20 * MS)
+        assert world.now_ns - begin_ns < STUCK_NS + 300 * MS
+    world.settle(200 * MS)
+    assert host.session.carrier == 0
+    assert len(host.arrived) >= before + (STUCK_NS // (40 * MS))
+
+
+def test_a_link_that_comes_up_later_stands_by() -> None:
+    """A link that works only after a while is greeted then and takes no frame unless it is chosen; then it does."""
+    world = World(links=LINKS)
+    world.cut_link(0)
+    world.settle(2000 * MS)
+    host = world.hosts[0]
+    assert host.carriers == [1]
+    world.mend_link(0)
+    world.settle(500 * MS)
+    assert host.carriers == [1]
+    world._host_does(host, host.session.carry(0, world.now_ns))
+    world.settle(100 * MS)
+    assert host.carriers == [1, 0]
+
+
+def test_another_board_on_the_second_link_is_told_and_left_alone() -> None:
+    """A link that leads to another board while ours is alive is told within two seconds, is said goodbye to, and no frame of it is taken."""
+    world = settled()
+    host = world.hosts[0]
+    for lane in Lane:
+        world.break_lane(host, (1, lane))
+    world.cut_link(1)
+    world.settle(20 * MS)
+    other = BoardHello("other", "another boot", CAMERA, BoardCounts())
+    control = host.names[1, Lane.CONTROL]
+    begin_ns = world.now_ns
+    while OtherBoard(1, other) not in host.others:
+        world._host_does(host, host.session.receive(control, other, world.now_ns))
+        world.settle(200 * MS)
+        assert world.now_ns - begin_ns < TAKEOVER_NS + 500 * MS
+    foreign = FrameMessage("other", 3, 3, 1, 1, PixelFormat.MJPEG, None, BoardMarks(0, 0, 0), b"")
+    world._host_does(host, host.session.receive(host.names[1, Lane.FRAMES], foreign, world.now_ns))
+    assert host.stale[-1].reason is StaleReason.OLD_SESSION
+    assert host.session.receive(control, Bye(BoardCounts(99, 99)), world.now_ns) == []
+    before = len(host.arrived)
+    world.settle(200 * MS)
+    assert len(host.arrived) >= before + 4
+    assert host.board_session == world.board.session
+
+
+def test_a_goodbye_is_said_on_every_link() -> None:
+    """A leaving host says goodbye on all open links, and the board's last account comes behind its last frame, once."""
+    world = settled()
+    host = world.hosts[0]
+    farewell = host.session.leave()
+    assert [o.message for o in farewell if isinstance(o, Outgoing)] == [Bye(), Bye()]
+    world._host_does(host, farewell)
+    world.deliver(host, (1, Lane.CONTROL), to_board=True)
+    assert not world.board.has_host
+    world.deliver_all()
+    assert world.sent[host.board_session] == host.base_sent + host.received + host.lost
+
+
+def test_a_standby_costs_few_words() -> None:
+    """A link that carries no frames gets no credit and no account, and after ten seconds one wave of three echoes a second."""
+    world = settled()
+    world.settle(12_000 * MS)
+    said: list[object] = []
+    sends = world._host_sends
+
+    def listen(host: HostNode, connection: bytes, message: Message) -> None:
+        if connection[0] == 1:
+            said.append(message)
+        sends(host, connection, message)
+
+    world._host_sends = listen  # type: ignore[method-assign]  # only listens
+    world.settle(4000 * MS)
+    assert not any(isinstance(message, Credit | HostHello) for message in said)
+    assert 9 <= sum(isinstance(message, Ping) for message in said) <= 15
+    assert not world.hosts[0].lost
