@@ -36,8 +36,8 @@ _FULL_RETRY_NS: Final = 2_000_000
 
 _LONGEST_WAIT_MS: Final = 1000
 
-_CAMERA_RETRY_MS: Final = 250
-"""A camera that was missing at the start is found within this time: opening a node that is not there costs 20 us."""
+_CAMERA_RETRY_MS: Final = 500
+"""A camera that was missing at the start is found within this time, half of what recovery may take; a look at /dev costs a board 7 ms."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,14 +81,16 @@ def taken(path: Path) -> TakenError:
 
 def video_nodes() -> list[Path]:
     """All nodes of the kernel's V4L2 devices by number, whatever they give and whoever may open them."""
-    return sorted(Path("/dev").glob("video[0-9]*"), key=lambda path: (len(path.name), path.name))
+    return sorted(
+        (path for path in _listed(Path("/dev"), "video") if path.name[5:].isdigit()),
+        key=lambda path: int(path.name[5:]),
+    )
 
 
 def capture_nodes() -> list[Path]:
     """All capture nodes, those with a name in /dev/v4l/by-id first, in name order; metadata and output nodes are left out."""
-    named = sorted(_BY_ID.glob("*")) if _BY_ID.is_dir() else []
     nodes: dict[Path, Path] = {}
-    for path in (*named, *video_nodes()):
+    for path in (*_listed(_BY_ID), *video_nodes()):
         nodes.setdefault(path.resolve(), path)
     return [path for path in nodes.values() if _captures(path)]
 
@@ -99,10 +101,19 @@ def lasting_name(path: Path) -> Path:
         return path
     target = path.resolve()
     for folder in (_BY_ID, _BY_PATH):
-        for link in sorted(folder.glob("*")) if folder.is_dir() else ():
+        for link in _listed(folder):
             if link.resolve() == target:
                 return link
     return path
+
+
+def _listed(folder: Path, prefix: str = "") -> list[Path]:
+    """What is in a folder, in name order; nothing where there is no such folder. A board that waits for its camera asks four times a second."""
+    try:
+        names = os.listdir(folder)  # noqa: PTH208 - makes a path of what is wanted only: a third of the time of `glob`
+    except OSError:
+        return []
+    return [folder / name for name in sorted(names) if name.startswith(prefix)]
 
 
 def _captures(path: Path) -> bool:
