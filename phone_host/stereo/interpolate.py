@@ -14,6 +14,9 @@ from phone_host.model import Image
 _ROUNDS: Final = 2
 """The motion is known where things are in the later image, and wanted where they are in the new one: a fixed point, close after two rounds."""
 
+_LEAST_PX: Final = 16
+"""The flow refuses smaller images; they come back as they are."""
+
 LARGEST_PART: Final = 1.0
 """Farther than the time between the two images nothing is guessed."""
 
@@ -36,7 +39,7 @@ class Interpolator:
         Returns:
             The image, of the same shape.
         """
-        if part == 0.0:
+        if part == 0.0 or min(later.shape[:2]) < _LEAST_PX:
             return later
         greys = [image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in (later, earlier)]
         flow = np.asarray(self._flow.calc(greys[0], greys[1], np.empty(0, np.float32)), dtype=np.float32)

@@ -43,3 +43,21 @@ def test_cameras_out_of_step_are_steered(arguments: list[str], most_ms: float, t
         assert phase["time_skew_ms"] == pytest.approx(PHASE_MS, abs=1)
         assert abs(phase["drift_ppm"]) < 100
         assert "alignment" not in phase
+
+
+def test_the_boards_image_is_taken_to_the_hosts_moment(tmp_path: Path) -> None:
+    """With --interpolate every pair but perhaps the first passes through that stage, its cost stands beside the others, and the delays still add up."""
+    images, address = film(tmp_path / "film"), f"tcp://127.0.0.1:{free_port()}"
+    uri = f"replay:{images}?fps={FPS}&loop=1"
+    out = tmp_path / "out"
+    with board(["run", "--camera", f"{uri}&phase_ms={PHASE_MS}", "--link", address], tmp_path):
+        run = ["run", "--link", address, "--camera", uri, "--pairs", "20", "--out", str(out), "--json", "--interpolate"]
+        with host(run, tmp_path) as running:
+            assert running.wait() == 0, running.stderr
+            report = running.json()
+    records = ledgers(out)
+    # Reading the clock twice takes a microsecond, decoding and bending an image at least a hundred.
+    assert sum(record["stages_ns"]["interpolate"] > 50_000 for record in records) >= len(records) - 1
+    assert all(sum(record["stages_ns"].values()) <= record["processing_ns"] for record in records)
+    assert report["stages_ms"]["interpolate"]["p50"] > 0
+    assert report["time_skew_ms"]["p50"] == pytest.approx(PHASE_MS, abs=1)

@@ -10,7 +10,7 @@ from phone_host.formats.pfm import read_pfm
 from tests.support.programs import ledgers, until
 from tests.vm.conftest import READOUT_MS
 from tests.vm.guest import UNIT, Guest
-from tests.vm.stream import NUMBER_ROWS, Film, Skew, check_journal, streaming
+from tests.vm.stream import FPS, NUMBER_ROWS, Film, Skew, check_journal, streaming
 from tests.vm.webcam import Webcam
 
 pytestmark = pytest.mark.timeout(600)  # the first test boots the board
@@ -116,3 +116,22 @@ def test_a_resting_camera_starts_for_a_host(
         stream.more(10, "after the rest")
         stream.finish(skew)
     assert webcam.starts > before
+
+
+def test_a_camera_out_of_step_is_steered_by_restarting_it(
+    guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
+) -> None:
+    """A webcam that exposes 37 ms after the host's is restarted at the right moment by the board: the pairs' time skew falls to a few ms."""
+    until(lambda: not webcam.streaming, "the camera rests, so that the host's coming starts it")
+    webcam.start_with_phase(37_000_000)
+    starts = webcam.starts
+    with streaming(guest, film.right, tmp_path / "out", ("--align-phase", "board")) as stream:
+        until(lambda: "state=aligned" in stream.receiver.stderr, "both cameras are in step")
+        period_ms = 1000 / FPS
+        phase_ms = (webcam.phase_ns / 1e6 + period_ms / 2) % period_ms - period_ms / 2
+        stream.more(5, "in step")
+        alignment = stream.finish(skew)["phase"]["alignment"]
+    assert abs(alignment["before_ms"]) > 25  # 37, and some ms on the way into the driver
+    assert webcam.starts >= starts + 2
+    # What the stamps cannot tell: the way into the driver of a board whose processor is emulated.
+    assert abs(phase_ms) < 15

@@ -41,7 +41,8 @@ class Webcam:
     """A camera that can be plugged into a guest.
 
     It shows image number floor(t * fps) of this machine's CLOCK_MONOTONIC, as a replay does, with the middle of its exposure at k / fps:
-    half the exposure time and half the readout later the first byte leaves.
+    half the exposure time and half the readout later the first byte leaves. From `start_with_phase` on its sensor runs as most webcams' do:
+    only while it streams, first exposed a fixed time after the start, so that each start gives it another phase.
 
     Args:
         frames: JPEGs, shown in turn.
@@ -60,6 +61,10 @@ class Webcam:
         self.starts = 0
         """How often a driver has started the stream."""
         self.streaming = False
+        self.start_phase_ns: int | None = None
+        self.start_latency_ns: int | None = None
+        self.phase_ns = 0
+        """How much later than k / fps it exposes since the newest start."""
         self.settings: dict[tuple[int, int], int] = {}
         """Its controls as they stand, by (unit, selector)."""
         self.set_requests: list[tuple[tuple[int, int], int]] = []
@@ -74,6 +79,10 @@ class Webcam:
     def plugged(self) -> bool:
         """Whether a guest has it."""
         return self._thread is not None and self._thread.is_alive()
+
+    def start_with_phase(self, phase_ns: int) -> None:
+        """Let the next start give exposures so much later than k / fps; every later start is as late after its own command as that one was."""
+        self.start_phase_ns = phase_ns
 
     def plug(self, guest: Guest, usb_port: int = 0) -> None:
         """Plug it into a guest's USB port, and wait until the port took it."""
@@ -130,6 +139,7 @@ class _Device:
             deque()
         )  # (image, due_ns) of each transfer that the driver has not yet offered anew
         self._first: tuple[int, int] | None = None
+        self._phase_ns = 0
 
     def run(self) -> None:
         """Serve until the connection ends."""
@@ -223,7 +233,18 @@ class _Device:
         self._camera.starts += 1
         self._rest = b""
         self._taken.clear()
-        self._number = math.floor((time.monotonic_ns() - self._delay_ns()) * self._rate_hz() / 1e9) + 1
+        now_ns = time.monotonic_ns()
+        self._set_phase(now_ns)
+        self._number = math.floor((now_ns - self._phase_ns - self._delay_ns()) * self._rate_hz() / 1e9) + 1
+
+    def _set_phase(self, now_ns: int) -> None:
+        camera, period_ns = self._camera, 10**9 // self._rate_hz()
+        if camera.start_phase_ns is not None:
+            self._phase_ns, camera.start_phase_ns = camera.start_phase_ns, None
+            camera.start_latency_ns = (self._phase_ns - now_ns) % period_ns
+        elif camera.start_latency_ns is not None:
+            self._phase_ns = (now_ns + camera.start_latency_ns) % period_ns
+        camera.phase_ns = self._phase_ns
 
     def _stop(self) -> None:
         self._streaming = self._camera.streaming = False
@@ -241,7 +262,7 @@ class _Device:
         while self._streaming and self._waiting:
             now_ns = time.monotonic_ns()
             if not self._rest:
-                due_ns = round(self._number * 1e9 / self._rate_hz()) + self._delay_ns()
+                due_ns = round(self._number * 1e9 / self._rate_hz()) + self._phase_ns + self._delay_ns()
                 if now_ns < due_ns:
                     return (due_ns - now_ns) / 1e9
                 self._begin_frame(now_ns, due_ns)
@@ -263,6 +284,7 @@ class _Device:
         number = self._number + skipped
         self._number = number + 1
         due_ns += round(skipped * 1e9 / self._rate_hz())
+        due_ns -= self._phase_ns  # image k belongs to k / fps: what its exposure was later is told as lateness
         image = number % len(camera._frames)
         camera.late_ns[image] = (now_ns - due_ns, now_ns - due_ns)
         self._first = (image, due_ns)
