@@ -19,8 +19,9 @@ class PhoneHostSettings:
     """Settings of phone-host run, from a TOML file, the environment and options."""
 
     link: tuple[str, ...] = setting(
-        ("tcp://127.0.0.1:5555",),
-        "links to the board; frames come over the best that is up, the first where some are alike",
+        (),
+        "links to the board; frames come over the best that is up, the first where some are alike; none: the last board that was used, the one"
+        " on the USB cable, one on this machine, or one that announces itself on the network",
     )
     camera: str = setting("", "own camera URI, for example replay:PATH?fps=30&loop=1")
     calibration: str = setting("", "rig.yaml of the two cameras")
@@ -45,8 +46,6 @@ def check(settings: PhoneHostSettings) -> None:
         check_camera(settings.camera)
     for uri in settings.link:
         parse_link(uri, listens_by_default=False)
-    if not settings.link:
-        raise SettingsError("link names no link", "give at least one, for example tcp://192.168.7.2:5555")
     if doubled := next((uri for uri in settings.link if settings.link.count(uri) > 1), None):
         raise SettingsError(f"link {doubled!r} is given twice", "give each link once")
     FifoSettings.parse(settings.fifo)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from common import logs, now
 from common.commandline import INTERRUPTED
 from common.errors import SettingsError
+from common.keys import usual_keys
 from common.link.factory import open_link, parse_link
 from common.settings import log_level
 from common.signals import StopSignals
@@ -121,7 +122,7 @@ def _footage(options: argparse.Namespace, signals: StopSignals) -> "Footage":
     if options.frames is not None:
         return read(options.frames)
     camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns())
-    link = open_link(parse_link(options.link, listens_by_default=False))
+    link = open_link(parse_link(options.link, listens_by_default=False), usual_keys())
     progress, advance = _progress("filming")
     wait_ns = None if options.wait is None else round(options.wait * 1e9)
     with progress:

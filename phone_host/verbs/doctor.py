@@ -3,7 +3,6 @@
 import argparse
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 from common.doctor.finding import exit_code, table, values
@@ -32,13 +31,10 @@ def run(options: argparse.Namespace) -> int:
     """Check, and print what was found."""
     if not (math.isfinite(options.wait) and options.wait >= 0):
         raise SettingsError(f"--wait {options.wait}", "give seconds, 0 or more")
-    resolved = resolve_settings(options)
-    settings = resolved.values
+    settings = resolve_settings(options).values
     question = Question(
         settings.camera, settings.link, settings.calibration, options.out, options.wait, key_folder(settings.keys)
     )
-    if dict(resolved.origins)["link"] == "default":
-        question = replace(question, links=())
     findings = examine(question)
     print(json.dumps(values(findings)) if options.json else table(findings))
     return exit_code(findings)

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--link",
         action="append",
         metavar="URI",
-        help="the board: tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE (default tcp://127.0.0.1:5555); may be given again:"
+        help="the board: tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE (default: the board is looked for); may be given again:"
         " frames come over the best link that is up",
     )
     parser.add_argument("--camera", metavar="URI", help=f"the own camera: {EXAMPLE}")
@@ -94,6 +94,7 @@ def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]
 
 def run(options: argparse.Namespace) -> int:
     """Run until stopped, the pairs are reached or a stream ends."""
+    from phone_host.discovery import remember  # noqa: PLC0415
     from phone_host.host import EndReason, Host, HostSettings  # noqa: PLC0415 - OpenCV, only now
     from phone_host.live import LiveTable  # noqa: PLC0415
     from phone_host.model import Side, TimeOffset  # noqa: PLC0415
@@ -132,10 +133,12 @@ def run(options: argparse.Namespace) -> int:
         interpolate=options.interpolate,
         steered=frozenset(whose for whose in Whose if options.align_phase in {"either", whose.value}),
     )
-    uris = [parse_link(uri, listens_by_default=False) for uri in settings.link]
+    keys = key_folder(settings.keys)
+    named = settings.link or (_find(keys.path, options.wait),)
+    uris = [parse_link(uri, listens_by_default=False) for uri in named]
     for uri in uris:
         tell_insecure(uri)
-    links = open_links(uris, key_folder(settings.keys))
+    links = open_links(uris, keys)
     signals = StopSignals()
     host = Host(host_settings, camera, links, core)
     live = LiveTable(host) if sys.stderr.isatty() else None
@@ -145,6 +148,8 @@ def run(options: argparse.Namespace) -> int:
         except BaseException:
             host.results.finish(build(host.facts("failed")))
             raise
+    if host.receiver.hello is not None and len(named) == 1 and "?" not in named[0] and named[0].startswith("tcp://"):
+        remember(keys.path, named[0])
     host.results.flush()
     facts = host.facts(ended.value)
     report = build(facts)
@@ -154,6 +159,16 @@ def run(options: argparse.Namespace) -> int:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     return _CHECK_FAILED if too_few or not host.results.complete else 0
+
+
+def _find(state: Path, wait_s: float | None) -> str:
+    """Look for a board and say which one it is."""
+    from phone_host.discovery import find_board  # noqa: PLC0415 - only without --link
+
+    print("phone-host: looking for a board (--link names one)", file=sys.stderr)
+    link = find_board(state, lambda: now.monotonic_ns() / 1e9, wait_s)
+    print(f"phone-host: found {link}", file=sys.stderr)
+    return link
 
 
 def _check_numbers(options: argparse.Namespace) -> None:

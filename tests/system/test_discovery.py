@@ -1,0 +1,115 @@
+"""`phone-host run` without --link finds the board that is meant, in a network that this machine has to itself."""
+
+import json
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from phone_host.discovery import SERVICE, remember
+from tests.support.numbered import write_film
+from tests.support.programs import PATIENCE_S
+
+ROOT = Path(__file__).resolve().parents[2]
+_ALONE = [
+    "unshare",
+    "-rn",
+    "sh",
+    "-c",
+    'ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo && exec "$@"',
+    "-",
+]
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A few images."""
+    return write_film(tmp_path_factory.mktemp("discovery") / "film", 20)
+
+
+def played(scene: str, film: Path, folder: Path) -> list[dict[str, Any]]:
+    """Play a scene of tests/support/discovery_scenes.py in a network of its own."""
+    pytest.importorskip("zeroconf")
+    if not shutil.which("ip") or subprocess.run([*_ALONE, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("this machine gives no network of one's own (unshare -rn, ip)")
+    (folder / "film").symlink_to(film)
+    command = [*_ALONE, sys.executable, "-m", "tests.support.discovery_scenes", scene, str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=2 * PATIENCE_S, check=False, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    said: list[dict[str, Any]] = json.loads(done.stdout)
+    return said
+
+
+def test_a_board_that_announces_itself_is_found(film: Path, tmp_path: Path) -> None:
+    """The only board that both announces itself and answers is taken; one that is announced but gone does not count."""
+    (said,) = played("announced", film, tmp_path)
+    assert said["code"] == 0, said["err"]
+    assert "found tcp://127.0.0.2:6001" in said["err"]
+
+
+def test_several_boards_are_listed(film: Path, tmp_path: Path) -> None:
+    """With two boards the host ends with exit 3 and one line that names both and the option to choose."""
+    (said,) = played("several", film, tmp_path)
+    assert said["code"] == 3
+    last = said["err"].splitlines()[-1]
+    for part in ("2 boards answer", "bone at tcp://127.0.0.2:6001", "pi at tcp://127.0.0.2:6002", "--link"):
+        assert part in last
+
+
+def test_the_last_board_comes_first(film: Path, tmp_path: Path) -> None:
+    """A board that was used before is taken though another one announces itself, too; when it is gone, the other one."""
+    first, again, other = played("last", film, tmp_path)
+    assert (first["code"], again["code"], other["code"]) == (0, 0, 0), (first, again, other)
+    assert "found tcp://127.0.0.2:6001" in first["err"]
+    assert "found tcp://127.0.0.2:6001" in again["err"]
+    assert "found tcp://127.0.0.2:6002" in other["err"]
+
+
+@pytest.mark.parametrize(("scene", "link"), [("here", "tcp://127.0.0.1:5555")])
+def test_a_board_on_this_machine_is_found(scene: str, link: str, film: Path, tmp_path: Path) -> None:
+    """Without any mDNS a board on this machine's usual port is found."""
+    (said,) = played(scene, film, tmp_path)
+    assert said["code"] == 0, said["err"]
+    assert f"found {link}" in said["err"]
+
+
+def test_the_board_on_the_usb_cable_is_found_and_asks_for_keys(film: Path, tmp_path: Path) -> None:
+    """The gadget's address is tried; a board there that is no peer yet ends in one line with the command that pairs."""
+    (said,) = played("gadget", film, tmp_path)
+    assert "found tcp://192.168.7.2:5555" in said["err"]
+    assert said["code"] == 3
+    assert "phone-host pair --link tcp://192.168.7.2:5555" in said["err"].splitlines()[-1]
+
+
+def test_what_does_not_greet_as_zeromq_is_no_board(film: Path, tmp_path: Path) -> None:
+    """A foreign service on the usual port is passed over; when nothing else answers in time, one line says what was tried."""
+    (said,) = played("foreign", film, tmp_path)
+    assert said["code"] == 3
+    last = said["err"].splitlines()[-1]
+    for part in ("no board answers", "192.168.7.2", "mDNS", "--link"):
+        assert part in last
+
+
+def test_the_board_announces_what_the_host_looks_for() -> None:
+    """The static service for avahi has the type and port that discovery expects, and takes the board's own name."""
+    group = ET.parse(ROOT / "deploy" / "board" / "tandemscan.service.xml").getroot()
+    assert group.findtext("service/type") == SERVICE.removesuffix(".local.")
+    assert group.findtext("service/port") == "5555"
+    name = group.find("name")
+    assert name is not None
+    assert (name.text, name.get("replace-wildcards")) == ("%h", "yes")
+
+
+@pytest.mark.parametrize("text", ["", "tcp://", "tcp://x:y", "ipc:///x", "\ud800", "tcp://127.0.0.1:5555 rm"])
+def test_a_spoiled_memory_is_no_board(text: str, tmp_path: Path) -> None:
+    """Whatever stands in the file of the last board is a tcp link or nothing."""
+    from phone_host.discovery import _last  # noqa: PLC0415
+
+    (tmp_path / "last-board").write_bytes(text.encode("utf-8", "surrogatepass"))
+    assert _last(tmp_path) == []
+    remember(tmp_path, "tcp://192.0.2.1:5555")
+    assert _last(tmp_path) == ["tcp://192.0.2.1:5555"]
