@@ -48,7 +48,7 @@ def _follow(context: "zmq.Context[zmq.Socket[bytes]]", keys: KeyFolder, seconds:
         if not doors or now_ns - heard_ns > _SILENCE_NS:
             raise UnavailableError(
                 f"no running board-agent with a secured link uses the keys in {keys.path}",
-                "start it with a link such as tcp://*:5555; sudo shows the service's keys",
+                "start it with a link such as tcp://*:5555 and a camera plugged in; for the service use sudo",
             )
         for door in doors:
             if door.poll(0, zmq.POLLOUT):

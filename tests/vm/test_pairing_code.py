@@ -87,11 +87,12 @@ def check_state(guest: Guest, public: str) -> None:
     assert [peer["key"] for peer in shown["peers"]] == [public]
 
 
-def test_the_owner_pairs_on_the_boards_terminal(guest: Guest) -> None:
-    """`board-agent pair` as root shows a code that a second host can use at once, and tells who came."""
+def test_the_owner_pairs_on_the_boards_terminal(guest: Guest, webcam: Webcam) -> None:
+    """`board-agent pair` as root shows a code that a host can use at once, and tells who came."""
+    assert webcam.plugged
     guest.configure(CAMERA, secured=True)
     try:
-        until(lambda: guest.code("test -S /var/lib/tandemscan/pairing-5555") == 0, "the agent serves")
+        guest.until("StatusText", "waiting for a host", "the agent serves")
         owner = guest.popen("board-agent pair --seconds 120")
         assert owner.stdout is not None
         code = owner.stdout.readline().decode().split()[-1]
