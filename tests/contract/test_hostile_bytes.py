@@ -14,7 +14,8 @@ from common.protocol.duplex import GAP_NS, Change, Duplex
 from common.protocol.framing import Side
 from common.protocol.message import FrameMessage, Lane
 from common.protocol.wire import decode, encode
-from tests.fuzz.targets import SOUND_MESSAGES, TARGETS
+from tests.fuzz.protocols import SOUND_MESSAGES
+from tests.fuzz.targets import TARGETS
 from tests.support.messages import mutated
 
 CORPUS = Path(__file__).parents[1] / "fuzz" / "corpus"

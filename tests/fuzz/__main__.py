@@ -21,7 +21,8 @@ from rich.progress import Progress, TaskID
 from rich.table import Table
 
 from tests.bench.machine import machine
-from tests.fuzz.targets import TARGETS, Target
+from tests.fuzz.target import Target
+from tests.fuzz.targets import TARGETS
 
 CORPUS = Path(__file__).parent / "corpus"
 _BUILD = Path("build/fuzz")
