@@ -11,9 +11,6 @@ import numpy as np
 
 from phone_host.model import Image
 
-_ROUNDS: Final = 2
-"""The motion is known where things are in the later image, and wanted where they are in the new one: a fixed point, close after two rounds."""
-
 _LEAST_PX: Final = 16
 """The flow refuses smaller images; they come back as they are."""
 
@@ -25,8 +22,10 @@ class Interpolator:
     """Bends images in time; keeps the flow's working memory."""
 
     def __init__(self) -> None:
-        # Of the flows in OpenCV's main modules the one with the best ratio of error to time (Kroeger et al., 2016).
-        self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+        # Of the flows in OpenCV's main modules the one with the best ratio of error to time (Kroeger et al., 2016); its fastest
+        # preset leaves the same depth error on moving things as the next one (3.4 mm, test_interpolate) in a seventh of the time.
+        self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
+        self._grid = np.empty((0, 0, 2), dtype=np.float32)
 
     def back(self, earlier: Image, later: Image, part: float) -> Image:
         """Make the image of a moment.
@@ -43,11 +42,11 @@ class Interpolator:
             return later
         greys = [image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in (later, earlier)]
         flow = np.asarray(self._flow.calc(greys[0], greys[1], np.empty(0, np.float32)), dtype=np.float32)
-        height, width = later.shape[:2]
-        x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
-        at_x, at_y = x, y
-        for _ in range(_ROUNDS):
-            moved = np.asarray(cv2.remap(flow, at_x, at_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
-            at_x, at_y = x - np.float32(part) * moved[..., 0], y - np.float32(part) * moved[..., 1]
-        bent = cv2.remap(later, at_x, at_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        if self._grid.shape[:2] != later.shape[:2]:
+            axes = (np.arange(length, dtype=np.float32) for length in later.shape[1::-1])
+            self._grid = np.stack(np.meshgrid(*axes), axis=-1)
+        # The motion is known where things are in the later image, and wanted where they are in the new one: the error is a motion's change over
+        # its own length. Looking it up there (a fixed point) made no difference to depth, at four times the cost.
+        places = self._grid - np.float32(part) * flow
+        bent = cv2.remap(later, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload] # stubs know no pair of columns
         return np.asarray(bent, dtype=np.uint8)
