@@ -10,6 +10,9 @@ from common.ledger import PairLedger, StageTimes
 EXACT: Final = 65536
 """Up to this many pairs (36 minutes at 30 per second) percentiles are exact; beyond, every 2nd, 4th, … pair is kept."""
 
+SAMPLE: Final = 4096
+"""More points than a plot has pixels; some 3 MB."""
+
 DELAYS: Final = ("capture", "outbox", "propagation", "pairing", "queuing", "processing", "end_to_end", "starvation")
 STAGES: Final = tuple(stage.name for stage in fields(StageTimes))
 OTHERS: Final = ("time_skew", "uncertainty")
@@ -75,6 +78,24 @@ class Series:
         p50, p95, p99 = (float(p) for p in np.percentile(values, (50, 95, 99)))
         greatest = float(self._max if last is None else values.max())
         return Spread(self._count, p50, p95, p99, greatest, self._sum / self._count)
+
+
+class Sample:
+    """Ledgers of a run for its plots: all of them up to SAMPLE, then every 2nd, 4th, … one."""
+
+    def __init__(self) -> None:
+        self.ledgers: list[PairLedger] = []
+        self._stride = 1
+        self._count = 0
+
+    def add(self, ledger: PairLedger) -> None:
+        """Take one pair's ledger."""
+        if self._count % self._stride == 0:
+            self.ledgers.append(ledger)
+            if len(self.ledgers) > SAMPLE:
+                self.ledgers = self.ledgers[::2]
+                self._stride *= 2
+        self._count += 1
 
 
 class DelayStatistics:

@@ -2,15 +2,12 @@
 
 from collections.abc import Sequence
 
-import cv2
-
 from common import now
 from common.ledger import PairLedger
 from phone_host.demo import CheckedPair, DepthErrors
-from phone_host.formats.preview import colour_disparity, colour_range_px
-from phone_host.model import Image
-from phone_host.report import RunFacts, board_drops, phase_lines
-from phone_host.report_page import Figure, PageData, Picture, Table, Verdict, delay_series, page
+from phone_host.report import RunFacts
+from phone_host.report_page import Figure, PageData, Verdict, delay_series, page
+from phone_host.run_page import camera_table, drops_table, notes, pictures
 
 _GOOD_PERCENT = 0.6
 """Depth error that the figures of the stereo core allow at 2 m; the demo's scene lies between 0.7 and 2.5 m."""
@@ -36,13 +33,13 @@ def demo_page(facts: RunFacts, errors: DepthErrors, last: CheckedPair | None, le
             verdict=verdict,
             sentence=sentence,
             figures=_figures(facts, errors),
-            pictures=_pictures(last),
+            pictures=pictures(last.processed if last else None),
             delays=delay_series(ledgers),
-            tables=(Table("Frames and pairs that were not used", ("what", "count"), _drops(facts)),),
+            tables=(drops_table(facts), camera_table(facts.camera)),
             notes=(
                 "The truth is the rendered scene itself: exact depth at every pixel that both cameras see.",
                 "Board and host share one clock here, so the clock's true offset is 0; what is plotted is what the echoes could prove.",
-                *phase_lines(facts.phase, facts.alignment),
+                *notes(facts),
             ),
         )
     )
@@ -80,47 +77,3 @@ def _figures(facts: RunFacts, errors: DepthErrors) -> tuple[Figure, ...]:
         Figure("time skew", f"{skew.p50_ns / 1e3:.0f}", "us", f"median; 99 % below {skew.p99_ns / 1e3:.0f} us"),
         Figure("clock uncertainty", f"{uncertainty.p50_ns / 1e3:.0f}", "us", "median over the pairs"),
     )
-
-
-def _pictures(last: CheckedPair | None) -> tuple[Picture, ...]:
-    if last is None or last.processed.disparity is None:
-        return ()
-    disparity = last.processed.disparity
-    coloured = colour_disparity(disparity, *colour_range_px(disparity))
-    return (
-        Picture("left: the board's camera, rectified", _jpeg(last.processed.pair.left)),
-        Picture("right: the host's camera, rectified", _jpeg(last.processed.pair.right)),
-        Picture("disparity: bright is near, black is none", _png(coloured)),
-    )
-
-
-def _drops(facts: RunFacts) -> tuple[tuple[str, str], ...]:
-    rows = [
-        *(
-            (f"frames dropped on the board: {reason.replace('_', ' ')}", count)
-            for reason, count in board_drops(facts.link).items()
-        ),
-        ("frames lost on the link", sum(account.lost for account in facts.link.sessions)),
-        *(
-            (f"board frames without partner: {reason.replace('_', ' ')}", count)
-            for reason, count in facts.counts.board_orphans
-        ),
-        *(
-            (f"host frames without partner: {reason.replace('_', ' ')}", count)
-            for reason, count in facts.counts.host_orphans
-        ),
-        ("pairs that gave way in a full FIFO", facts.counts.dropped),
-    ]
-    return tuple((what, str(count)) for what, count in rows)
-
-
-def _jpeg(image: Image) -> bytes:
-    done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 88])
-    assert done
-    return data.tobytes()
-
-
-def _png(image: Image) -> bytes:
-    done, data = cv2.imencode(".png", image)
-    assert done
-    return data.tobytes()

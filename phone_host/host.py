@@ -15,7 +15,7 @@ from common.ledger import PairLedger
 from common.link.base import Link
 from common.logs import event
 from common.protocol.message import Pacing, RefusalReason, Steering
-from phone_host.delays import DelayStatistics
+from phone_host.delays import DelayStatistics, Sample
 from phone_host.model import FramePair, Side, TimeOffset
 from phone_host.motion import MotionMeter
 from phone_host.pairqueue import PairQueue
@@ -105,6 +105,8 @@ class Host:
     ) -> None:
         self.settings = settings
         self.delays = DelayStatistics()
+        self.sample = Sample()
+        self.last: Processed | None = None
         self.results = Results(settings.out, settings.save_every)
         own = camera.description
         on_demand = own.pacing is Pacing.DEMAND
@@ -335,6 +337,8 @@ class Host:
         ledger = self._ledger(pair, processed, dequeued_ns, before_write_ns, done_ns)
         self.results.append(ledger)
         self.delays.add(ledger)
+        self.sample.add(ledger)
+        self.last = processed
         self.first_done_ns = self.first_done_ns or done_ns
         self.last_done_ns = done_ns
         self.processed += 1

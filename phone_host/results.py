@@ -130,17 +130,20 @@ class Results:
             self._pending_bytes -= len(self._pending.pop(0))
             self._lost_lines += 1
 
-    def finish(self, report: dict[str, object]) -> None:
+    def finish(self, report: dict[str, object], page: str = "") -> None:
         """Write report.json and close.
 
         Args:
             report: the JSON object to write.
+            page: the HTML document to write beside it as index.html; empty: none.
         """
         if self._folder is None:
             return
         self.flush()
         try:
             write_text(self._folder / "report.json", json.dumps(report, indent=1) + "\n")
+            if page:
+                write_text(self._folder / "index.html", page)
         except OSError as error:
             self._failed(error)
         os.close(self._file)
@@ -182,6 +185,7 @@ class Results:
 
 def _remove_earlier(folder: Path) -> None:
     """Remove what an earlier run left in the folder, or it would be taken for this one's; nothing else is touched."""
-    (folder / "report.json").unlink(missing_ok=True)
+    for name in ("report.json", "index.html"):
+        (folder / name).unlink(missing_ok=True)
     for pair in folder.glob("pair-[0-9][0-9][0-9][0-9][0-9][0-9]*"):
         shutil.rmtree(pair)

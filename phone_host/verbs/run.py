@@ -72,7 +72,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wait", type=float, metavar="S", help="wait this long for an absent board, then exit 3 (default: for ever)"
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for delays.jsonl, report.json and saved pairs")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder for delays.jsonl, report.json, index.html and saved pairs"
+    )
     parser.add_argument(
         "--save-every",
         type=int,
@@ -99,6 +101,7 @@ def run(options: argparse.Namespace) -> int:
     from phone_host.live import LiveTable  # noqa: PLC0415
     from phone_host.model import Side, TimeOffset  # noqa: PLC0415
     from phone_host.report import build, summary  # noqa: PLC0415
+    from phone_host.run_page import run_page  # noqa: PLC0415
     from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
     from phone_host.sync.phase import Whose  # noqa: PLC0415
     from phone_host.verbs.stereo_options import build_core  # noqa: PLC0415
@@ -153,7 +156,8 @@ def run(options: argparse.Namespace) -> int:
     host.results.flush()
     facts = host.facts(ended.value)
     report = build(facts)
-    host.results.finish(report)
+    page = run_page(facts, host.last, board_side, host.sample.ledgers) if options.out else ""
+    host.results.finish(report, page)
     print(json.dumps(report) if options.json else summary(facts))
     if signals.interrupted:
         return INTERRUPTED

@@ -54,12 +54,17 @@ def test_skew_and_motion_make_a_warning_and_rest_makes_none(tmp_path: Path) -> N
     for name, film in (("moving", moving), ("still", still)):
         link = f"ipc://{tmp_path}/{name}-link"
         receiving = ["run", "--camera", f"replay:{film}?fps=15&loop=1", "--link", link, "--pairs", "60", "--json"]
+        receiving += ["--out", str(tmp_path / name / "out")]
         with (
             board(["run", "--camera", f"replay:{film}?fps=20&loop=1", "--link", link], tmp_path, f"{name}-board"),
             host(receiving, tmp_path, f"{name}-host") as receiver,
         ):
             assert receiver.wait() == 0
         report = receiver.json()
+        page = (tmp_path / name / "out" / "index.html").read_text()
+        assert "Queue: the processor" in page
+        assert "The own camera" in page
+        assert ("depth is wrong" in page) is (name == "moving")
         doubted[name] = [warning["doubt"] for warning in report["warnings"]]
         assert ("depth_doubtful" in receiver.stderr) is (name == "moving")
         if name == "moving":

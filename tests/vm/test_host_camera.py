@@ -106,6 +106,9 @@ def test_two_webcams_are_paired_and_a_pulled_one_comes_back(
     check_delays(tmp_path / "out")
     check_counts(report)
     check_journal(machine)
+    page = (tmp_path / "out" / "index.html").read_text()
+    for row in ("<td>unplugged</td><td>1</td>", "<td>held: focus</td><td>45</td>"):
+        assert row in page
     camera = report["host_frames"]["camera"]
     assert (camera["unplugged"], camera["returned"]) == (1, 1)
     assert camera["held"]["focus"] == uvc.CONTROLS[uvc.FOCUS].found
