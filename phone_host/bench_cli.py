@@ -31,7 +31,7 @@ _EXAMPLES = """examples:
 Runs a board-agent process and the host for each link, size, quality and rate, and prints each delay's p50, p95, p99 and maximum. The
 first second of each run is left out of the statistics. A board elsewhere is measured with what its own camera shows: its size, quality and
 rate cannot be set from here. --out gets
-delay-bench.json, delay-bench.html (plots, the queueing model beside the measurement) and trace.json for Perfetto.
+delay-bench.json, delay-bench.html (plots, the queueing model beside the measurement), delay-bench.svg and trace.json for Perfetto.
 """
 
 _NOTHING_MEASURED = 4
@@ -114,7 +114,7 @@ def _run(options: argparse.Namespace) -> int:
         parse_sizes,
     )
     from phone_host.bench_links import obstacle  # noqa: PLC0415
-    from phone_host.bench_page import page  # noqa: PLC0415
+    from phone_host.bench_page import figure, page  # noqa: PLC0415
     from phone_host.bench_report import as_json, conditions  # noqa: PLC0415
     from phone_host.emulate import parse_profiles  # noqa: PLC0415
     from phone_host.trace import TracedRun, trace_json  # noqa: PLC0415
@@ -150,6 +150,8 @@ def _run(options: argparse.Namespace) -> int:
             "delay-bench.html": page(outcome.results, under, analysis),
             "trace.json": trace_json([TracedRun(str(result.case), result.ledgers) for result in outcome.results]),
         }
+        if any(result.ledgers for result in outcome.results):
+            files["delay-bench.svg"] = figure(outcome.results, under)
         _write(options.out, files)
     if outcome.failure is not None:
         raise outcome.failure

@@ -20,12 +20,16 @@ from phone_host.bench_report import (
 )
 from phone_host.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
 from phone_host.plot_scale import duration_text
-from phone_host.plots import Budget, Part, Quantity, Strips, budgets, distributions, legend
+from phone_host.plots import STYLE, Budget, Part, Quantity, Strips, budgets, distributions, legend
 from phone_host.prediction import Figures, values_of
 from phone_host.report_page import DelaySeries, delay_series, document, section, two_widths
 
 _PALETTE: Final = 8
 _HALF_PX: Final = 450
+_FIGURE_PX: Final = 760
+_LETTER_PX: Final = 8
+"""Room for a letter of 12 px text, generously."""
+
 
 _FIT_WORDS: Final = (
     "Propagation, from the first byte written to the last received, is a latency and the bytes over a rate: the line of least absolute deviations "
@@ -58,6 +62,45 @@ def page(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -
     cards += [_card(group) for group in grouped(results)]
     cards.append(section("How this was measured", _method(results, under), ""))
     return document("delay-bench", head + "".join(cards))
+
+
+def figure(results: Sequence[CaseResult], under: Conditions) -> str:
+    """One picture for a README: where the time goes over each interface, for the images that most interfaces were measured with.
+
+    Args:
+        results: what was measured; at least one with pairs.
+        under: machine, date, settings.
+
+    Returns:
+        An SVG file that stands alone, in light and dark.
+    """
+    groups = grouped([result for result in results if result.ledgers])
+    chosen = max(groups, key=len)
+    measured = [(str(result.case.interface), delay_series(result.ledgers)) for result in chosen]
+    bars = [Budget(name, tuple(_mean(quantity) for quantity in series.delays)) for name, series in measured]
+    day = under.date.partition("T")[0]
+    emulated = ", emulated interfaces" if all(result.case.interface.profile for result in chosen) else ""
+    title = f"Mean delays of a pair, {chosen[0].case.images}{emulated}, {day}"
+    return _standalone(title, [(one.label, one.colour) for one in measured[0][1].delays], budgets(bars, _FIGURE_PX))
+
+
+def _standalone(title: str, labels: Sequence[tuple[str, int]], plot: str) -> str:
+    """A plot as an SVG file of its own, with a title and a legend above it."""
+    width_px, height_px = (int(part) for part in plot.partition('viewBox="0 0 ')[2].partition('"')[0].split())
+    x, names = 0, ""
+    for name, colour in labels:
+        names += f'<rect x="{x}" y="32" width="11" height="11" rx="2" style="fill:var(--c{colour})"/>'
+        names += f'<text x="{x + 16}" y="42">{escape(name)}</text>'
+        x += 30 + _LETTER_PX * len(name)
+    colours = (
+        ":root{--ink:#1a1e24;--ink2:#5c6570;--line:#e2e6ea}"
+        "@media (prefers-color-scheme:dark){:root{--ink:#e9ecf0;--ink2:#9ba5b1;--line:#2b323b}}"
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox="0 0 {width_px} {height_px + 60}"><title>{escape(title)}</title>'
+        f'<style>{colours}{STYLE}</style><text class="strong" x="0" y="16" font-size="15" font-weight="600">{escape(title)}</text>{names}'
+        f'<svg y="60" width="{width_px}" height="{height_px}"{plot.removeprefix("<svg")}</svg>\n'
+    )
 
 
 def _method(results: Sequence[CaseResult], under: Conditions) -> str:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 from typing import Any
 
@@ -28,7 +29,7 @@ from phone_host.bench_cases import (
     parse_rates,
     parse_sizes,
 )
-from phone_host.bench_page import page
+from phone_host.bench_page import figure, page
 from phone_host.bench_report import Conditions, as_json, losses, rows
 from phone_host.boardprocess import BoardAccount
 from phone_host.delays import DELAYS, STAGES
@@ -293,3 +294,14 @@ def test_page_is_whole_html_and_refers_to_nothing_outside() -> None:
     assert "rfcomm was not run: no radio" in text
     assert "640x480 JPEG 80 at 30" in text
     assert "320x240 JPEG 80 at 15" in text
+
+
+def test_figure_is_an_svg_file_of_its_own() -> None:
+    """The picture for a README parses as XML, names every interface and delay, carries its colours and refers to nothing outside."""
+    text = figure([result(), result(link="ipc")], UNDER)
+    root = ET.fromstring(text)
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    words = {element.text for element in root.iter("{http://www.w3.org/2000/svg}text")}
+    assert {"tcp", "ipc", "capture", "processing"} <= words
+    assert "prefers-color-scheme:dark" in text
+    assert "href" not in text
