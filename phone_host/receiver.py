@@ -39,14 +39,12 @@ from phone_host.pairqueue import PairQueue
 from phone_host.sync.choice import LinkChoice
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.clocks import LinkClocks
+from phone_host.sync.flow import MOST, Flow
 
 _LOG = logging.getLogger(__name__)
 
 _LONGEST_WAIT_MS: Final = 50
 """The pair queue's patience is checked at least this often."""
-
-_MOST_UNDER_WAY: Final = 4
-"""Frames under way at most, however long the link: more would only be older."""
 
 _UNKNOWN_NS: Final = 2**62
 """Transit time of a frame before the first one has come: no link is taken for swift before it was measured."""
@@ -95,6 +93,7 @@ class Receiver:
         self._clock = LinkClocks(len(dialled))
         self._boot_id = ""
         self._hello: BoardHello | None = None
+        self._flow = Flow()
         self._streamed_over: int | None = None
         self._transit_ns = _UNKNOWN_NS
         self._poller = zmq.Poller()
@@ -241,15 +240,17 @@ class Receiver:
         if hello.camera.pacing is Pacing.DEMAND or self._queue.held_back_by_credit:
             self._handle(self._session.grant(self._queue.free_slots()), now_ns)
             return
-        # One frame under way, more only where the link is longer than a period: each further one would be older when used.
-        # A link that itself holds the next frame back, so that a newer one may take its place, always has credit for that one too.
-        periods = math.floor((self._clock.round_trip_ns(carrier) or 0) / hello.camera.period_ns)
-        needed = min(_MOST_UNDER_WAY, 1 + max(periods, int(self._links[carrier].self_paced)))
+        needed = self._flow.window
+        if self._links[carrier].self_paced:
+            # It holds the next frame back itself, so that a newer one may take its place: it always has credit for that one too, and for
+            # as many more as its round trip is periods long, which echoes tell truly there, for they pass by the frames.
+            periods = math.floor((self._clock.round_trip_ns(carrier) or 0) / hello.camera.period_ns)
+            needed = min(MOST, 1 + max(1, periods))
         if self._session.outstanding < needed:
             # A swift link never has two frames under way, whatever the credit: then several are granted at once, which spares the
             # board most wake-ups (a fifth of its CPU time a frame, bench_link).
             swift = self._transit_ns * _SWIFT < hello.camera.period_ns
-            self._handle(self._session.grant(_MOST_UNDER_WAY if swift else needed), now_ns)
+            self._handle(self._session.grant(MOST if swift else needed), now_ns)
 
     def _handle(self, outputs: list[Output], now_ns: int) -> None:
         for output in outputs:
@@ -333,6 +334,7 @@ class Receiver:
         self._refused = None
         self._hello = hello
         self._transit_ns = _UNKNOWN_NS
+        self._flow = Flow()
         self._choice.carries(link, now_ns)
         tally, before = self.account.links[link], self._streamed_over
         self._streamed_over = link
@@ -373,6 +375,8 @@ class Receiver:
         uncertainty_ns = estimate.uncertainty_at(sent_ns)
         self._transit_ns = now_ns - marks.sent_ns
         self._choice.frame(link, self._transit_ns, now_ns)
+        if self._hello is not None:
+            self._flow.arrived(self._transit_ns, marks.sent_ns - marks.grabbed_ns, self._hello.camera.period_ns, now_ns)
         tally.age.add(now_ns - marks.exposed_ns)
         self._queue.add_board(BoardFrame(frame, tally.name, marks, now_ns, offset_ns, uncertainty_ns))
         on_demand = self._hello is not None and self._hello.camera.pacing is Pacing.DEMAND
