@@ -19,8 +19,8 @@ _QUEUED: Final = 0.6
 _WAITED: Final = 8
 """A frame waited for leave if it stood in the outbox for more than this part of a period."""
 
-_LONGEST_NS: Final = 600_000_000
-"""A frame that takes longer than this alone is held up by its bytes: the delay of a link over a satellite is half of it."""
+_LONGEST_NS: Final = 250_000_000
+"""A frame that takes longer than this alone is held up by its bytes: radio links of all kinds and continents have less delay."""
 
 _SMOOTH: Final = 4
 _BASE_SPAN_NS: Final = 10_000_000_000

@@ -1,0 +1,135 @@
+"""One clock estimate of several links: the hard bound holds and is never wider than any link's own, and the loss of the best link is survived."""
+
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from common.protocol.session import Echo
+from phone_host.sync.clock import ClockEstimator
+from phone_host.sync.clocks import LinkClocks, moved
+from tests.support.clock_sim import (
+    MS,
+    PPM_PER_MINUTE,
+    SECOND_NS,
+    DriftingClocks,
+    Profile,
+    heavy_tails,
+    loaded_line,
+    loopback,
+    one_sided,
+    standing_queue,
+    waves,
+    wifi,
+)
+
+SERIAL = loaded_line(0.64e6, 2.5 * MS, 1.25 * MS)
+
+
+def mixed(
+    clocks: DriftingClocks, profiles: tuple[Profile, ...], chance: random.Random, seconds: int
+) -> Iterator[tuple[int, list[Echo]]]:
+    """The waves of several links to one board, in the order of their ends."""
+    told = []
+    for link, profile in enumerate(profiles):
+        for now_ns, echoes in waves(clocks, profile(chance), chance, seconds):
+            told.append((now_ns, [replace(echo, link=link) for echo in echoes]))
+    yield from sorted(told, key=lambda wave: wave[0])
+
+
+@pytest.mark.parametrize(
+    "profiles",
+    [(loopback, SERIAL), (wifi, SERIAL), (one_sided, wifi), (standing_queue, one_sided), (heavy_tails, wifi, loopback)],
+    ids=lambda profiles: "+".join(profile.__name__ for profile in profiles),
+)
+def test_the_bound_is_that_of_all_links_and_holds(profiles: tuple[Profile, ...]) -> None:
+    """Whatever the links do, the true offset is within the bound, now and later; and the limits are no wider than those of any link alone."""
+    for seed in range(4):
+        chance = random.Random(seed)
+        clocks = DriftingClocks(chance, PPM_PER_MINUTE)
+        together, alone = LinkClocks(len(profiles)), [ClockEstimator() for _ in profiles]
+        for now_ns, echoes in mixed(clocks, profiles, chance, 20):
+            for echo in echoes:
+                together.add(echo)
+                alone[echo.link].add(echo)
+            estimate = together.estimate
+            assert estimate is not None
+            for ahead_ns in (-100 * MS, 0, 200 * MS, 20 * SECOND_NS):
+                board_ns = clocks.board(max(clocks.start_ns, now_ns + ahead_ns))
+                error = abs(estimate.offset_at(board_ns) - clocks.origin_ns - clocks.offset(board_ns))
+                told = estimate.to_host(board_ns)
+                assert error <= told.bound_ns + 2
+                assert told.uncertainty_ns <= told.bound_ns
+            low_ns, high_ns = estimate.limits_at(estimate.reference_ns)
+            for other in alone:
+                if other.estimate is not None:
+                    own_low_ns, own_high_ns = other.estimate.limits_at(estimate.reference_ns)
+                    assert low_ns >= own_low_ns - 1
+                    assert high_ns <= own_high_ns + 1
+
+
+@pytest.mark.parametrize("second", [SERIAL, wifi], ids=["serial", "wifi"])
+def test_the_uncertainty_holds_beside_a_slow_link_and_after_the_swift_one(second: Profile) -> None:
+    """Of nearly symmetric links the stated 99.9 % hold while both are there and after the swift one is lost; what it taught is kept."""
+    errors: list[bool] = []
+    for seed in range(25):
+        chance = random.Random(100 + seed)
+        clocks = DriftingClocks(chance, PPM_PER_MINUTE)
+        together, slow = LinkClocks(2), ClockEstimator()
+        lost_ns = clocks.start_ns + 12 * SECOND_NS
+        for now_ns, echoes in mixed(clocks, (loopback, second), chance, 20):
+            for echo in echoes:
+                if echo.link == 1 or now_ns < lost_ns:
+                    together.add(echo)
+                if echo.link == 1:
+                    slow.add(echo)
+            if together.estimate is None or now_ns < clocks.start_ns + SECOND_NS:
+                continue
+            board_ns = clocks.board(now_ns)
+            truth = clocks.offset(board_ns)
+            error = abs(together.estimate.offset_at(board_ns) - clocks.origin_ns - truth)
+            errors.append(error > together.estimate.uncertainty_at(board_ns) + 1)
+            if lost_ns + SECOND_NS < now_ns < lost_ns + 4 * SECOND_NS and slow.estimate is not None:
+                assert together.estimate.uncertainty_at(board_ns) <= slow.estimate.uncertainty_at(board_ns)
+    assert sum(errors) <= max(2, 0.002 * len(errors))
+
+
+def test_a_link_that_contradicts_shows_a_jump() -> None:
+    """After a clock jumped, the link that is heard first is believed, though the other one still swears by the old time."""
+    chance = random.Random(7)
+    clocks = DriftingClocks(chance, PPM_PER_MINUTE)
+    together = LinkClocks(2)
+    for _, echoes in mixed(clocks, (loopback, wifi), chance, 5):
+        for echo in echoes:
+            together.add(echo)
+    before = together.estimate
+    assert before is not None
+    late = replace(echoes[-1], wave=10**6, link=1)
+    jump_ns = 3 * SECOND_NS
+    host_ns = late.t3_ns + 100 * MS
+    board_ns = clocks.board(host_ns) + jump_ns
+    together.add(Echo(10**6, host_ns, board_ns, board_ns, host_ns + 5 * MS, 1))
+    after = together.estimate
+    assert after is not None
+    assert after.offset_at(board_ns) - before.offset_at(board_ns) == pytest.approx(-jump_ns, abs=10 * MS)
+
+
+def test_an_estimate_told_at_another_moment_says_no_more_than_before() -> None:
+    """Moving an estimate to another moment narrows neither its limits nor its uncertainty, wherever one looks."""
+    chance = random.Random(3)
+    clocks = DriftingClocks(chance, PPM_PER_MINUTE)
+    estimator = ClockEstimator()
+    for _, echoes in waves(clocks, wifi(chance), chance, 5):
+        for echo in echoes:
+            estimator.add(echo)
+    estimate = estimator.estimate
+    assert estimate is not None
+    for by_ns in (-2 * SECOND_NS, SECOND_NS, 60 * SECOND_NS):
+        shifted = moved(estimate, estimate.reference_ns + by_ns)
+        for look_ns in (-5 * SECOND_NS, 0, 30 * SECOND_NS, 120 * SECOND_NS):
+            board_ns = estimate.reference_ns + look_ns
+            assert shifted.offset_at(board_ns) == pytest.approx(estimate.offset_at(board_ns), abs=2)
+            assert shifted.limits_at(board_ns)[0] <= estimate.limits_at(board_ns)[0] + 2
+            assert shifted.limits_at(board_ns)[1] >= estimate.limits_at(board_ns)[1] - 2
+            assert shifted.uncertainty_at(board_ns) >= estimate.uncertainty_at(board_ns) - 2
