@@ -69,5 +69,5 @@ def test_the_window_is_bounded() -> None:
     """However long the link, no more than MOST frames are under way."""
     flow = Flow()
     for number in range(1000):
-        flow.arrived(400 * MS, 30 * MS, PERIOD_NS, number * PERIOD_NS)
+        flow.arrived(200 * MS, 30 * MS, PERIOD_NS, number * PERIOD_NS)
     assert flow.window == MOST
