@@ -221,9 +221,9 @@ class Guest:
         self.put(package, "/root")
         self.sh(f"dpkg -i /root/{package.name}")
 
-    def configure(self, camera: str, *, secured: bool = False) -> None:
-        """Set the service's camera, open its link on every network, to everybody unless it is to be secured, and restart it."""
-        link = f"tcp://*:{LINK_PORT}" if secured else f"tcp://*:{LINK_PORT}?insecure=1"
+    def configure(self, camera: str, link: str = f"tcp://*:{LINK_PORT}?insecure=1", *, secured: bool = False) -> None:
+        """Set the service's camera and its link, by default one on every network, open to everybody unless it is to be secured, and restart it."""
+        link = f"tcp://*:{LINK_PORT}" if secured else link
         edits = (f'camera = "{camera}"', f'link = ["{link}"]')
         script = " ".join(f"-e {shlex.quote(f's|^{edit.split()[0]} = .*|{_literal(edit)}|')}" for edit in edits)
         self.sh(f"sed -i {script} /etc/tandemscan/board-agent.toml && systemctl restart {UNIT}")

@@ -134,10 +134,23 @@ class Stream:
 
 
 @contextmanager
-def streaming(guest: Guest, right: Path, out: Path, arguments: tuple[str, ...] = ()) -> Iterator[Stream]:
-    """Run a host against the guest's board for the length of a block; every pair is saved."""
+def streaming(
+    guest: Guest, right: Path, out: Path, arguments: tuple[str, ...] = (), link: str = ""
+) -> Iterator[Stream]:
+    """Run a host against the guest's board for the length of a block; every pair is saved. Without a link over the guest's network."""
     camera = f"replay:{right}?fps={FPS}&loop=1"
-    command = ["run", "--camera", camera, "--link", guest.link, "--out", str(out), "--save-every", "1", "--json"]
+    command = [
+        "run",
+        "--camera",
+        camera,
+        "--link",
+        link or guest.link,
+        "--out",
+        str(out),
+        "--save-every",
+        "1",
+        "--json",
+    ]
     out.parent.mkdir(parents=True, exist_ok=True)
     with host([*command, "--log-level", "info", *arguments], out.parent, f"{out.name}-host") as receiver:
         yield Stream(receiver, out)

@@ -1,0 +1,47 @@
+"""The links' contract suite, run in the guest where the real devices are."""
+
+import tempfile
+from pathlib import Path
+from typing import Final
+
+from tests.vm.conftest import ROOT
+from tests.vm.guest import Guest
+
+_FILES: Final = (
+    "tests/__init__.py",
+    "tests/contract/__init__.py",
+    "tests/contract/test_link.py",
+    "tests/support/__init__.py",
+    "tests/support/devices.py",
+    "tests/support/links.py",
+    "tests/support/pty_line.py",
+)
+_PATIENCE_S: Final = 180
+"""For one condition: three times as long as elsewhere, as the processor is emulated."""
+
+_LIMIT_S: Final = 1500
+"""For all of it: a minute and a half on an idle machine."""
+
+
+def run_contract(guest: Guest, transport: str) -> str:
+    """Run it on one transport, with the sources of this checkout; fails as it fails.
+
+    Returns:
+        The last line of pytest: how many passed, how many were skipped.
+    """
+    guest.code("rm -rf /root/suite")
+    with tempfile.TemporaryDirectory() as folder:
+        suite = Path(folder) / "suite"
+        for name in _FILES:
+            (suite / name).parent.mkdir(parents=True, exist_ok=True)
+            (suite / name).write_bytes((ROOT / name).read_bytes())
+        guest.put(suite, "/root")
+    guest.put(ROOT / "common", "/root/suite")
+    running = guest.popen(
+        f"cd /root/suite && TEST_PATIENCE_S={_PATIENCE_S} exec python3 -m pytest -q -p no:cacheprovider --import-mode=importlib "
+        f"-W error tests/contract/test_link.py -k {transport} 2>&1"
+    )
+    with running:
+        told = running.communicate(timeout=_LIMIT_S)[0].decode()
+    assert running.returncode == 0, told[-5000:]
+    return told.strip().splitlines()[-1]

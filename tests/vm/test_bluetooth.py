@@ -1,0 +1,112 @@
+"""RFCOMM between two virtual Bluetooth controllers of the kernel's; a fresh guest for each test, as a test may leave the stack in disarray."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.support.programs import until
+from tests.vm.conftest import CAMERA, READOUT_MS, booted
+from tests.vm.contract import run_contract
+from tests.vm.extension import extension
+from tests.vm.guest import Architecture, Guest
+from tests.vm.stream import FPS, Film, Stream, check_journal, streaming, webcam_skew
+from tests.vm.webcam import Webcam
+
+pytestmark = pytest.mark.timeout(1800)  # each test boots a board of its own
+
+BOARD, HOST = "00:AA:01:00:00:00", "00:AA:01:01:00:01"
+"""Addresses that btvirt gives."""
+
+CHANNEL = 1
+_AIR = "modprobe -a hci_vhci rfcomm; (setsid btvirt -l2 >/root/btvirt.log 2>&1 &); until [ -e /sys/class/bluetooth/hci1 ]; do sleep 0.2; done"
+_SWITCH_ON = "for h in hci0 hci1; do until hciconfig $h up && hciconfig $h piscan; do sleep 0.2; done; done 2>/dev/null"
+
+
+@pytest.fixture
+def radio() -> Iterator[Guest]:
+    """A fresh board with two controllers, without bluetoothd."""
+    with booted(Architecture.AMD64) as guest:
+        guest.sh(f"{_AIR}; {_SWITCH_ON}")
+        yield guest
+        assert "list_del corruption" not in guest.console
+
+
+@pytest.fixture
+def serving(radio: Guest, package: Path, film: Film) -> Iterator[tuple[Guest, Webcam]]:
+    """The board's service on a channel of the first controller, its webcam plugged in."""
+    camera = Webcam(film.frames, FPS, READOUT_MS * 1_000_000)
+    radio.install(package)
+    try:
+        camera.plug(radio)
+        radio.configure(CAMERA, f"rfcomm://*/{CHANNEL}?unpaired=1")
+        radio.until("StatusText", "waiting for a host", "the service listens")
+        yield radio, camera
+        check_journal(radio)
+    finally:
+        camera.close()
+
+
+def test_the_contract_on_rfcomm(radio: Guest) -> None:
+    """The RFCOMM link keeps the links' contract: order, integrity, sizes, restarts, back-pressure, half-open peers."""
+    told = run_contract(radio, "rfcomm")
+    assert re.match(r"\d\d passed, 4 skipped", told), told
+
+
+def test_pairs_over_rfcomm_and_an_adapter_that_goes_and_comes(
+    serving: tuple[Guest, Webcam], film: Film, tmp_path: Path
+) -> None:
+    """Pairs are right over RFCOMM; either adapter switched off and on again brings the same session of the same process back."""
+    guest, camera = serving
+    process = guest.show("MainPID")
+    far_end = ("rfcomm", HOST, BOARD, str(CHANNEL))
+    with extension(guest, *far_end) as link, streaming(guest, film.right, tmp_path / "out", (), link) as stream:
+        stream.more(30, "over RFCOMM")
+        for adapter in ("hci0", "hci1"):
+            _switch_off_and_on(guest, adapter, stream)
+            stream.more(10, f"after {adapter} is back")
+        report = stream.finish(webcam_skew(camera.late_ns))
+    assert len(report["sessions"]) == 1
+    assert guest.show("MainPID") == process
+
+
+def _switch_off_and_on(guest: Guest, adapter: str, stream: Stream) -> None:
+    lost = stream.receiver.stderr.count("board_gone")
+    guest.sh(f"hciconfig {adapter} down")
+    guest.until("StatusText", "waiting for a host", "the board gives the host up")
+    until(lambda: stream.receiver.stderr.count("board_gone") > lost, "the host gives the board up")
+    guest.sh(f"until hciconfig {adapter} up; do sleep 0.2; done 2>/dev/null; hciconfig {adapter} piscan")
+
+
+def test_the_record_is_published_and_published_again(package: Path) -> None:
+    """With bluetoothd the channel is found by asking the board; a restarted daemon is told anew; a stopped service withdraws the record."""
+    ask = (
+        "import socket, sys; sys.path.insert(0, '/usr/lib/tandemscan'); from common.link.sdp import *; "
+        "s = socket.socket(socket.AF_BLUETOOTH, socket.SOCK_SEQPACKET, socket.BTPROTO_L2CAP); s.settimeout(20); "
+        f"s.connect(('{BOARD}', PSM)); s.send(query()); print(channel_in(s.recv(65536)))"
+    )
+    with booted(Architecture.AMD64) as radio:
+
+        def found() -> str:
+            return radio.sh(f'timeout 30 python3 -Pc "{ask}" 2>/dev/null || echo nobody').strip()
+
+        radio.sh(_AIR)
+        radio.install(package)
+        radio.sh("mkdir /srv/frames && printf 'P5 2 2 255\nabcd' >/srv/frames/1.pgm")
+        radio.configure("replay:/srv/frames?fps=10&loop=1", "rfcomm://*/7")
+        radio.until("StatusText", "waiting for a host", "the service listens")
+        until(lambda: "bluetooth_record_missing" in radio.journal(), "the missing daemon is told")
+        # The daemon first: it refuses an adapter that somebody else has switched on.
+        radio.sh("systemctl unmask bluetooth && systemctl start bluetooth")
+        until(lambda: radio.sh("timeout 20 bluetoothctl list").count("Controller") == 2, "the daemon has both adapters")
+        radio.sh(f"timeout 60 sh -c '{_SWITCH_ON}'")
+        until(lambda: found() == "7", "the channel is found by asking")
+        radio.sh("systemctl stop board-agent")
+        until(lambda: found() == "0", "a service that has stopped is not found")
+        radio.sh("systemctl start board-agent")
+        until(lambda: found() == "7", "the channel is found again")
+        told = radio.journal().count("bluetooth_record_published")
+        radio.sh("systemctl restart bluetooth")
+        until(lambda: radio.journal().count("bluetooth_record_published") > told, "a restarted daemon is told")
+        assert "Traceback" not in radio.journal()

@@ -1,0 +1,170 @@
+"""One USB cable as network card and serial port: the package's gadget on the kernel's dummy controller, its host end in the same machine."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.support.programs import ledgers, until
+from tests.vm.conftest import CAMERA, ROOT
+from tests.vm.contract import run_contract
+from tests.vm.extension import extension
+from tests.vm.guest import Guest
+from tests.vm.stream import Film, Skew, check_journal, streaming
+from tests.vm.webcam import Webcam
+
+pytestmark = pytest.mark.timeout(1800)  # the first test boots the board, the contract suite runs in it
+
+GADGET = "board-gadget"
+BOARD_END = "/dev/tandemscan-host"
+HOST_END = "/dev/tandemscan-board"
+CONTROLLER = "dummy_udc.0"
+GADGETS = "/sys/kernel/config/usb_gadget"
+OURS = f"{GADGETS}/tandemscan"
+
+
+@pytest.fixture(scope="module")
+def cabled(guest: Guest) -> Iterator[Guest]:
+    """The board with its gadget up, and the host's end of the cable under its stable names."""
+    guest.sh(f"systemctl start {GADGET}")
+    assert guest.show("ConditionResult", GADGET) == "no", "without a controller there is nothing to do"
+    guest.put(ROOT / "deploy" / "host" / "70-tandemscan.rules", "/etc/udev/rules.d")
+    guest.sh("udevadm control --reload; modprobe -a dummy_hcd cdc_acm cdc_ncm")
+    guest.sh(f"systemctl start {GADGET}")
+    _await_ends(guest)
+    yield guest
+    guest.sh(f"systemctl stop {GADGET}; rm /etc/udev/rules.d/70-tandemscan.rules; modprobe -r dummy_hcd")
+    guest.configure(CAMERA)
+
+
+@pytest.fixture
+def serving(cabled: Guest, webcam: Webcam) -> Iterator[Guest]:
+    """The board's service on the gadget's serial port; afterwards it is up and has never shown a traceback."""
+    assert webcam.plugged
+    cabled.configure(CAMERA, f"serial:{BOARD_END}")
+    cabled.until("StatusText", "waiting for a host", "the service has opened the port")
+    yield cabled
+    check_journal(cabled)
+
+
+def _await_ends(guest: Guest) -> None:
+    until(
+        lambda: guest.code(f"test -e {BOARD_END} && test -e {HOST_END}") == 0, "both ends of the cable have their names"
+    )
+
+
+def test_the_contract_on_gadget_serial(cabled: Guest) -> None:
+    """The serial link keeps the links' contract on the real devices of a cable: order, integrity, sizes, restarts, back-pressure."""
+    cabled.sh("systemctl stop board-agent")  # it may have the port
+    told = run_contract(cabled, "gadget")
+    assert re.match(r"\d\d passed, 4 skipped", told), told
+
+
+def test_pairs_over_gadget_serial(serving: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
+    """30 pairs come over the cable's serial port: the right images, delays that add up, every frame counted."""
+    with (
+        extension(serving, "tty", HOST_END) as link,
+        streaming(serving, film.right, tmp_path / "out", (), link) as stream,
+    ):
+        stream.more(30, "over the serial port")
+        report = stream.finish(skew)
+    assert {ledger["link"] for ledger in ledgers(tmp_path / "out")} == {"serial"}
+    assert [session["tail"] for session in report["sessions"]] == ["known"]
+
+
+def test_a_cable_pulled_and_replugged(serving: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
+    """Pulled while streaming, twice, the cable brings the same session of the same process back once it is plugged in again."""
+    process = serving.show("MainPID")
+    with (
+        extension(serving, "tty", HOST_END) as link,
+        streaming(serving, film.right, tmp_path / "out", (), link) as stream,
+    ):
+        for _ in range(2):
+            stream.more(10, "before the pull")
+            lost = stream.receiver.stderr.count("board_gone")
+            serving.sh(f"echo > {OURS}/UDC")
+            serving.until("StatusText", "waiting for a host", "the board gives the host up")
+            until(lambda lost=lost: stream.receiver.stderr.count("board_gone") > lost, "the host gives the board up")  # type: ignore[misc]  # bound now
+            assert serving.code(f"test -e {HOST_END}") != 0
+            serving.sh(f"echo {CONTROLLER} > {OURS}/UDC")
+            stream.more(10, "after the plug")
+        report = stream.finish(skew)
+    assert len(report["sessions"]) == 1
+    assert serving.show("MainPID") == process
+
+
+def test_the_network_over_the_same_cable(cabled: Guest) -> None:
+    """The host end is a network card of its own name, behind which 192.168.7.2 answers; an address is offered to the host there."""
+    cabled.sh("ip netns add laptop && ip link set tandemscan0 netns laptop")
+    try:
+        cabled.sh("ip -n laptop addr add 192.168.7.1/24 dev tandemscan0 && ip -n laptop link set tandemscan0 up")
+        ask = "import socket; print(socket.create_connection(('192.168.7.2', 22), 60).recv(4))"
+        assert "SSH-" in cabled.sh(f'ip netns exec laptop python3 -c "{ask}"')
+        card = cabled.sh(f"cat {OURS}/functions/ncm.0/ifname").strip()
+        until(lambda: "0.0.0.0%" + card + ":67" in cabled.sh("ss -lun"), "addresses are offered on the cable")
+    finally:
+        cabled.sh("ip netns del laptop")
+
+
+def test_no_login_prompt_on_the_port(cabled: Guest) -> None:
+    """A getty that is started for the port does not run, and one for another port does."""
+    cabled.sh("systemctl start serial-getty@ttyGS0")
+    assert cabled.show("ActiveState", "serial-getty@ttyGS0") == "inactive"
+    assert cabled.show("ConditionResult", "serial-getty@ttyGS0") == "no"
+    cabled.sh("systemctl --no-block start serial-getty@ttyGS9")
+    assert cabled.show("ConditionResult", "serial-getty@ttyGS9") == "yes" or "ttyGS9" in cabled.sh(
+        "systemctl list-jobs"
+    )
+    cabled.sh("systemctl stop serial-getty@ttyGS9")
+
+
+def test_a_stop_leaves_nothing_though_the_port_is_open(serving: Guest) -> None:
+    """Stopped while the service has the port open, the gadget goes without a trace, and a new start is found by the service again."""
+    process = serving.show("MainPID")
+    serving.sh(f"systemctl stop {GADGET}")
+    assert (
+        serving.sh(
+            f"ls {GADGETS} /dev | grep -e tandemscan -e ttyGS -e retired; ls /run/board-gadget 2>/dev/null; true"
+        )
+        == ""
+    )
+    serving.sh(f"systemctl start {GADGET}")
+    _await_ends(serving)
+    until(
+        lambda: serving.code(f"ls -l /proc/{process}/fd | grep -q $(readlink -f {BOARD_END})") == 0,
+        "the service has the port again",
+    )
+
+
+def test_the_images_own_gadget_gives_way_and_gets_its_controller_back(cabled: Guest) -> None:
+    """Where another gadget has the only controller ours takes its place, says so, and gives it back when it stops."""
+    other = f"{GADGETS}/image"
+    cabled.sh(f"systemctl stop {GADGET}")
+    parts = f"{other}/strings/0x409 {other}/configs/c.1 {other}/functions/ncm.other"
+    cabled.sh(
+        f"mkdir -p {parts} && ln -s {other}/functions/ncm.other {other}/configs/c.1/ && echo {CONTROLLER} > {other}/UDC"
+    )
+    try:
+        cabled.sh(f"systemctl start {GADGET}")
+        _await_ends(cabled)
+        assert cabled.sh(f"cat {OURS}/UDC").strip() == CONTROLLER
+        assert "in place of image" in cabled.journal(GADGET)
+        cabled.sh(f"systemctl stop {GADGET}")
+        assert cabled.sh(f"cat {other}/UDC").strip() == CONTROLLER
+    finally:
+        cabled.sh(f"echo > {other}/UDC; rm {other}/configs/c.1/ncm.other; rmdir {parts} {other}")
+    cabled.sh(f"systemctl start {GADGET}")
+    _await_ends(cabled)
+
+
+def test_a_controller_that_a_module_holds_is_named(cabled: Guest) -> None:
+    """A controller that an old gadget module has cannot be taken: one line names both and the remedy, with exit 3."""
+    cabled.sh(f"systemctl stop {GADGET} && modprobe g_serial")
+    try:
+        assert cabled.code(f"systemctl start {GADGET}") != 0
+        assert cabled.show("ExecMainStatus", GADGET) == "3"
+        assert f"{CONTROLLER} is held by g_serial: unload that module" in cabled.journal(GADGET)
+    finally:
+        cabled.sh(f"modprobe -r g_serial; systemctl reset-failed {GADGET}; systemctl start {GADGET}")
+    _await_ends(cabled)
