@@ -196,9 +196,12 @@ def _images(images: Images) -> str:
 
 def _changes(target: Target) -> list[tuple[str, Target]]:
     images = target.images
+    # A JPEG's bytes go with its pixels, at the same quality of the same scene.
+    smaller = Images(images.width_px // 2, images.height_px // 2, images.period_ns, images.size_bytes / 4)
     return [
         (f"{_images(images)}, as it was run", target),
         ("camera twice as fast", replace(target, images=replace(images, period_ns=images.period_ns / 2))),
+        (f"{smaller.width_px}x{smaller.height_px}", replace(target, images=smaller)),
         ("half the bytes", replace(target, images=replace(images, size_bytes=images.size_bytes / 2))),
         ("matcher twice as fast", replace(target, processing_factor=0.5)),
         ("matcher four times slower", replace(target, processing_factor=4.0)),

@@ -212,6 +212,22 @@ def test_a_signal_ends_the_benchmark_and_its_children(number: signal.Signals, co
     assert running.json()["runs"] == []
 
 
+def test_what_was_measured_before_ctrl_c_is_written(tmp_path: Path) -> None:
+    """Interrupted in the second of two runs: exit 130, and the first run stands in the files and on stdout."""
+    out = tmp_path / "out"
+    with bench([*SHORT[:4], "--fps", "10,20", "--seconds", "1", "--json", "--out", str(out)], tmp_path) as running:
+        until(lambda: bool(boards_of(running)), "a board process of the first run")
+        (first,) = boards_of(running)
+        until(lambda: bool(set(boards_of(running)) - {first}), "a board process of the second run")
+        assert running.stop(signal.SIGINT) == 130
+    report = running.json()
+    assert report["runs"][0]["camera_rate_hz"] == 10
+    assert report["runs"][0]["measured_pairs"] > 0
+    assert json.loads((out / "delay-bench.json").read_text()) == report
+    assert "interrupted after" in running.stderr
+    assert not [pid for pid in boards_of(running) if is_running(pid)]
+
+
 def test_a_board_that_dies_is_one_clear_line(tmp_path: Path) -> None:
     """When the board process is killed under it, the benchmark says so and exits 3."""
     with bench([*SHORT, "--seconds", "600"], tmp_path) as running:
