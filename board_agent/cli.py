@@ -105,8 +105,8 @@ def _keys(options: argparse.Namespace) -> int:
     folder = key_folder(_resolve(options).values.keys)
     change(folder, forget=options.forget, new=options.new, add=options.add, address="", when=now.wall_time())
     print(keys_listing(folder, as_json=options.json))
-    if options.new or options.forget:
-        print("board-agent: a running service keeps its key and its connections until it is restarted", file=sys.stderr)
+    if options.new:
+        print("board-agent: a running service keeps its old key until it is restarted", file=sys.stderr)
     return 0
 
 

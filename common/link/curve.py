@@ -69,16 +69,21 @@ class Guard:
         self._keys = keys
         self._state = keys.peers_state
         self._names = _names(keys)
+        self._users = _users(self._names)
+        self._is_sound = True
         self._denied = Seldom()
         self._let_in = ""
         self.socket = context.socket(zmq.REP)
         self.socket.bind(zap.ENDPOINT)
 
-    @property
     def knows_nobody(self) -> bool:
-        """Whether no peer is known at all."""
+        """Look whether no peer is known at all; of a file that is bad nothing is known."""
         self._refresh()
-        return not self._names
+        return self._is_sound and not self._names
+
+    def knows(self, part: zmq.Frame) -> bool:
+        """Whether the sender of a message is still known: it may have been forgotten since it was let in."""
+        return part.get("User-Id") in self._users
 
     def answer(self) -> None:
         """Answer all who are at the door."""
@@ -95,7 +100,7 @@ class Guard:
             elif name != self._let_in:
                 self._let_in = name
                 _LOG.info(event("key_known", peer=name, address=request.address))
-            self.socket.send_multipart(zap.deny(request) if name is None else zap.allow(request, name))
+            self.socket.send_multipart(zap.deny(request) if name is None else zap.allow(request, _user(request.key)))
 
     def _refresh(self) -> None:
         """Read the known keys if their file has changed; while it is bad nobody is let in."""
@@ -104,10 +109,11 @@ class Guard:
             return
         self._state = state
         try:
-            self._names = _names(self._keys)
+            self._names, self._is_sound = _names(self._keys), True
         except TandemError as error:
-            self._names = {}
+            self._names, self._is_sound = {}, False
             _LOG.error(event("peers_unreadable", problem=error))
+        self._users = _users(self._names)
 
 
 def secure_listener(sock: "zmq.Socket[bytes]", own: OwnKey) -> None:
@@ -136,3 +142,12 @@ def _allow_envelope(sock: "zmq.Socket[bytes]") -> None:
 
 def _names(keys: KeyFolder) -> dict[bytes, str]:
     return {z85.decode(peer.key.encode()): peer.name for peer in keys.peers()}
+
+
+def _user(key: bytes) -> str:
+    """What stands for a peer in ZeroMQ's user ids; a name could pass to another key."""
+    return z85.encode(key).decode()
+
+
+def _users(names: dict[bytes, str]) -> frozenset[str]:
+    return frozenset(_user(key) for key in names)

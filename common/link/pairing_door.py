@@ -34,6 +34,7 @@ from common.protocol.pairing_code import (
     code_text,
 )
 from common.protocol.pairing_wire import MAX_WORD_BYTES, decode_word, encode_word
+from common.protocol.zap import plain_address
 
 _LOG = logging.getLogger(__name__)
 
@@ -143,7 +144,7 @@ class Door:
             self._control.send_multipart([connection, self._state.encode()], _NOW)
 
     def _open_or_close(self, now_ns: int) -> None:
-        wanted = now_ns < self._owner_until_ns or self._guard.knows_nobody
+        wanted = now_ns < self._owner_until_ns or self._guard.knows_nobody()
         if wanted == self._is_open:
             return
         try:
@@ -253,6 +254,6 @@ def _socket(context: "zmq.Context[zmq.Socket[bytes]]", most_bytes: int) -> "zmq.
 
 def _peer_address(part: zmq.Frame) -> str:
     try:
-        return str(part.get("Peer-Address"))
+        return plain_address(str(part.get("Peer-Address")))
     except zmq.ZMQError:
         return "unknown"

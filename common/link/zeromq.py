@@ -112,9 +112,20 @@ def _send(sock: zmq.Socket[bytes], prefix: list[bytes], header: bytes, payload: 
     return SendResult.SENT
 
 
+def _receive_known(sock: zmq.Socket[bytes], connection: bytes, guard: "Guard") -> Iterator[Incoming]:
+    """Take one packet off a socket that has one; what comes from a peer that was forgotten meanwhile is thrown away."""
+    header = sock.recv(_NOW, copy=False)
+    packet = _complete(sock, connection, header)
+    if guard.knows(header):
+        yield packet
+
+
 def _receive(sock: zmq.Socket[bytes], connection: bytes) -> Incoming:
     """Take one packet off a socket that has one."""
-    header = sock.recv(_NOW, copy=False)
+    return _complete(sock, connection, sock.recv(_NOW, copy=False))
+
+
+def _complete(sock: zmq.Socket[bytes], connection: bytes, header: zmq.Frame) -> Incoming:
     if not header.more:
         return Packet(connection, header.bytes, b"")
     payload = sock.recv(_NOW, copy=False)
@@ -197,7 +208,11 @@ class ZeroMqListener(_AlwaysReady):
         if self._door:
             self._door.answer()
         while is_readable(self._socket):
-            yield _receive(self._socket, self._socket.recv(_NOW))
+            connection = self._socket.recv(_NOW)
+            if self._guard:
+                yield from _receive_known(self._socket, connection, self._guard)
+            else:
+                yield _receive(self._socket, connection)
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Hand a packet over for one connection."""

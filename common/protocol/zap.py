@@ -52,17 +52,22 @@ def read_request(parts: Sequence[bytes]) -> ZapRequest:
         raise ProtocolError("a request for authentication is not of RFC 27", "update ZeroMQ")
     _, request_id, _, address, _, mechanism, *credentials = parts
     is_key = mechanism == _CURVE and len(credentials) == 1 and len(credentials[0]) == KEY_BYTES
-    return ZapRequest(request_id, address.decode("ascii", "replace"), credentials[0] if is_key else b"")
+    return ZapRequest(request_id, plain_address(address.decode("ascii", "replace")), credentials[0] if is_key else b"")
 
 
-def allow(request: ZapRequest, name: str) -> list[bytes]:
+def plain_address(address: str) -> str:
+    """Give a network address as people know it: IPv4 without the prefix that it has on a socket of both versions."""
+    return address.removeprefix("::ffff:")
+
+
+def allow(request: ZapRequest, user: str) -> list[bytes]:
     """Give the answer that lets a peer in.
 
     Args:
         request: what was asked.
-        name: under which the peer is known; every message of its carries it as its user id.
+        user: what stands for the peer; every message of its carries it as its user id.
     """
-    return [_VERSION, request.request_id, b"200", b"OK", name.encode(), b""]
+    return [_VERSION, request.request_id, b"200", b"OK", user.encode(), b""]
 
 
 def deny(request: ZapRequest) -> list[bytes]:

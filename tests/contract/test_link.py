@@ -123,7 +123,7 @@ def _sockets(address: str) -> None:
 def _open_to_all(ends: Ends) -> None:
     """Only for transports on which a stranger is heard."""
     if ends.keys is not None:
-        pytest.skip("strangers are not heard where keys are asked for; test_secured_link.py shows it")
+        pytest.skip("strangers are not heard where keys are asked for; tests/system/test_hostile_peers.py shows it")
 
 
 @pytest.fixture

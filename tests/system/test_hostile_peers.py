@@ -1,6 +1,7 @@
 """Strangers at a board's tcp port, and an allowed host that talks nonsense: the stream goes on, the log stays short, memory bounded."""
 
 import random
+import resource
 import socket
 import struct
 from collections.abc import Iterator
@@ -127,14 +128,15 @@ def test_strangers_do_not_disturb_a_stream(target: Target) -> None:
 
 
 def test_thousands_of_connections(target: Target) -> None:
-    """3000 quick connections and 500 that stay open and silent: the stream goes on, and all that they took is given back."""
+    """3000 quick connections and 350 that stay open, more than the board may have: the stream goes on, and all is given back."""
     with target.streaming():
         before_kb, before_files = target.memory_kb, target.descriptors
         for _ in range(3000):
             with suppress(OSError):
                 target.dial().close()
+        resource.prlimit(target.agent.process.pid, resource.RLIMIT_NOFILE, (256, 4096))
         with ExitStack() as held:
-            for _ in range(500):
+            for _ in range(350):
                 with suppress(OSError):
                     held.enter_context(target.dial())
             assert target.memory_kb - before_kb < _MOST_KB
@@ -226,3 +228,27 @@ def test_garbage_at_the_door(target: Target) -> None:
         until(lambda: "pairing_garbage" in target.agent.stderr, "the log tells of it")
         assert target.memory_kb - before_kb < _MOST_KB
     assert target.log_lines <= _MOST_LINES + 5, target.agent.stderr
+
+
+def test_a_forgotten_host_gets_no_more_frames(target: Target) -> None:
+    """A host that is forgotten while it streams is cut off, though its connection lives; another key of the same name would be let in."""
+    out = target.folder / "out"
+    arguments = [
+        "run",
+        "--link",
+        target.link,
+        "--camera",
+        f"replay:{target.folder / 'film'}?fps=30&loop=1",
+        "--out",
+        str(out),
+    ]
+    keys = ["--keys", str(target.folder / "h"), "--save-every", "0", "--log-level", "info"]
+    with host([*arguments, *keys], target.folder, "victim") as running:
+        until(lambda: lines(out / "delays.jsonl") > 10, "frames come")
+        folder = KeyFolder(target.folder / "b")
+        folder.forget("victim")
+        folder.add(Peer("victim", KeyFolder(target.folder / "other").own().public, ""))
+        until(lambda: "host_gone" in target.agent.stderr, "the board hears it no longer")
+        until(lambda: "board_gone" in running.stderr, "the host notices")
+        assert running.stop() == 0, running.stderr
+    assert target.agent.stderr.count("host_connected") == 1

@@ -1,11 +1,14 @@
 """Link URIs: what they mean, and which make no sense."""
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.errors import SettingsError
-from common.link.factory import LinkUri, open_link, parse_link
+from common.errors import SettingsError, UnavailableError
+from common.keys import KeyFolder, Peer
+from common.link.factory import LinkUri, needs_keys, open_link, parse_link
 
 
 @given(
@@ -79,6 +82,10 @@ def test_bluetooth_devices() -> None:
         "tcp://host:5555?bind",
         "tcp://host:5555?bind=1&connect=1",
         "tcp://host:5555?bond=1",
+        "tcp://host:5555?insecure=0",
+        "tcp://host:5555?insecure",
+        "ipc://x?insecure=1",
+        "serial:/dev/ttyS1?insecure=1",
         "ipc://x?timeout=3",
         "ipc://x?baud=9600",
         "serial:",
@@ -103,3 +110,46 @@ def test_addresses_that_cannot_be_dialled_are_refused(address: str) -> None:
     """An address without a host, or one that the transport cannot take, is the user's mistake and told at once."""
     with pytest.raises(SettingsError):
         open_link(LinkUri(address, listens=False))
+
+
+@pytest.mark.parametrize(
+    ("uri", "asks"),
+    [
+        ("tcp://*:5555", True),
+        ("tcp://0.0.0.0:5555", True),
+        ("tcp://192.168.7.2:5555", True),
+        ("tcp://eth0:5555", True),
+        ("tcp://board.local:5555", True),
+        ("tcp://[fe80::1]:5555", True),
+        ("tcp://localhost.example.org:5555", True),
+        ("tcp://127.0.0.1;192.168.1.9:5555", True),
+        ("tcp://127.0.0.1:5555", False),
+        ("tcp://127.9.9.9:5555", False),
+        ("tcp://localhost:5555", False),
+        ("tcp://[::1]:5555", False),
+        ("tcp://*:5555?insecure=1", False),
+        ("ipc:///tmp/x", False),
+        ("serial:/dev/ttyGS0", False),
+    ],
+)
+def test_what_other_machines_can_reach_asks_for_keys(uri: str, *, asks: bool) -> None:
+    """Tcp beyond loopback is for known keys unless it is said to be insecure; what only this machine reaches is open."""
+    assert needs_keys(parse_link(uri, listens_by_default=True)) is asks
+
+
+@pytest.mark.parametrize("listens", [True, False])
+def test_without_keys_nothing_beyond_this_machine_is_opened(listens: bool) -> None:  # noqa: FBT001 - one of two values
+    """No caller that forgets the keys can open a link to other machines: it is refused, and insecure=1 is named."""
+    with pytest.raises(SettingsError, match="insecure=1"):
+        open_link(LinkUri("tcp://192.0.2.1:5555", listens=listens))
+
+
+def test_an_unknown_board_is_named_with_the_command_that_helps(tmp_path: Path) -> None:
+    """Dialling a board that is no peer says how to pair; with several peers it lists them."""
+    keys = KeyFolder(tmp_path)
+    with pytest.raises(UnavailableError, match=r"phone-host pair --link tcp://192\.0\.2\.1:5555"):
+        open_link(LinkUri("tcp://192.0.2.1:5555", listens=False), keys)
+    keys.add(Peer("bone", "a" * 40, "", "tcp://192.0.2.2:5555"))
+    keys.add(Peer("pi", "b" * 40, "", "tcp://192.0.2.3:5555"))
+    with pytest.raises(UnavailableError, match=r"bone at tcp://192\.0\.2\.2:5555, pi at"):
+        open_link(LinkUri("tcp://192.0.2.1:5555", listens=False), keys)
