@@ -206,7 +206,7 @@ class Board:
         try:
             for process in (self.guest.emulator_pid, os.getpid()):
                 for thread in Path(f"/proc/{process}/task").iterdir():
-                    os.sched_setscheduler(int(thread.name), os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, priority)
+                    os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, priority)
         except PermissionError:
             return False
         return True
