@@ -9,6 +9,7 @@ import numpy as np
 from common.ledger import PairLedger
 from phone_host.bench import CaseResult
 from phone_host.bench_cases import Case, Interface
+from phone_host.bench_changes import Change
 from phone_host.emulate import PROFILES
 from phone_host.fits import DelayFit
 from phone_host.prediction import (
@@ -69,11 +70,13 @@ class WhatIf:
         interface: its name.
         setting: what is different, in words.
         figures: predicted; or why not.
+        asked_for: whether the user named it (`--predict`).
     """
 
     interface: str
     setting: str
     figures: Figures | Unknown
+    asked_for: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +104,13 @@ class Analysis:
         return float(np.median(errors)) if errors else float("nan")
 
 
-def analyse(results: Sequence[CaseResult], fifo: FifoSettings) -> Analysis:
+def analyse(results: Sequence[CaseResult], fifo: FifoSettings, changes: Sequence[Change] = ()) -> Analysis:
     """Look at all runs together.
 
     Args:
         results: what was measured.
         fifo: the queue of all runs.
+        changes: settings that the user wants predicted, for each interface.
     """
     useful = [result for result in results if result.ledgers]
     cells = [_cell(result, fifo) for result in useful]
@@ -120,7 +124,7 @@ def analyse(results: Sequence[CaseResult], fifo: FifoSettings) -> Analysis:
         InterfaceFit(mine[0].case.interface, tuple(mine), fit_of(_all_ledgers(mine), intervals=True))
         for mine in by_interface.values()
     ]
-    return Analysis(tuple(fits), tuple(checked), tuple(_what_ifs(cells, fifo)))
+    return Analysis(tuple(fits), tuple(checked), tuple(_what_ifs(cells, fifo, changes)))
 
 
 def typical_and_slow(result: CaseResult) -> tuple[int, int]:
@@ -160,7 +164,7 @@ def _all_ledgers(results: Sequence[CaseResult]) -> tuple[PairLedger, ...]:
     return tuple(ledger for result in results for ledger in result.ledgers)
 
 
-def _what_ifs(cells: Sequence[Cell], fifo: FifoSettings) -> list[WhatIf]:
+def _what_ifs(cells: Sequence[Cell], fifo: FifoSettings, changes: Sequence[Change]) -> list[WhatIf]:
     """Each interface's heaviest run with one thing changed, and the profiles that nobody ran in place of its link."""
     found = []
     heaviest: dict[str, Cell] = {}
@@ -172,6 +176,10 @@ def _what_ifs(cells: Sequence[Cell], fifo: FifoSettings) -> list[WhatIf]:
         if isinstance(link, LinkModel):
             target = Target(cell.interface, link, cell.images, fifo)
             found += [WhatIf(cell.interface, words, foretell(one, cells)) for words, one in _changes(target)]
+            found += [
+                WhatIf(cell.interface, change.words, foretell(change.applied(target), cells), asked_for=True)
+                for change in changes
+            ]
     if heaviest:
         base = max(heaviest.values(), key=_load)
         for profile in PROFILES:

@@ -26,6 +26,7 @@ _EXAMPLES = """examples:
   delay-bench --links tcp,ipc,serial --size 320x240,640x480 --quality 50,80 --fps 15,30 --seconds 20 --out bench
   delay-bench --emulate usb-serial,bluetooth,wifi --size 320x240 --quality 50 --fps 10 --out interfaces
   delay-bench --links tcp://192.168.7.2:5555 --seconds 30 --json
+  delay-bench --size 320x240,640x480 --predict size=1280x720,fps=30 --predict link=bluetooth,processing=4
   delay-bench --emulate list
 
 Runs a board-agent process and the host for each link, size, quality and rate, and prints each delay's p50, p95, p99 and maximum. The
@@ -85,6 +86,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--seconds", type=float, default=4.0, metavar="S", help="length of each run after its warm-up (default 4)"
     )
+    parser.add_argument(
+        "--predict",
+        action="append",
+        default=[],
+        metavar="CHANGES",
+        help="predict a setting that is not run, for example fps=60,size=640x480,kB=40,fifo=4:block,processing=0.5,link=wifi",
+    )
     parser.add_argument("--matcher", default="sgbm", metavar="NAME", help="stereo matcher (default sgbm)")
     parser.add_argument(
         "--fifo",
@@ -113,13 +121,14 @@ def _run(options: argparse.Namespace) -> int:
         parse_rates,
         parse_sizes,
     )
+    from phone_host.bench_changes import parse_changes  # noqa: PLC0415
     from phone_host.bench_links import obstacle  # noqa: PLC0415
     from phone_host.bench_page import figure, page  # noqa: PLC0415
     from phone_host.bench_report import as_json, conditions  # noqa: PLC0415
     from phone_host.emulate import parse_profiles  # noqa: PLC0415
     from phone_host.trace import TracedRun, trace_json  # noqa: PLC0415
 
-    settings = _settings(options)
+    settings, changes = _settings(options), parse_changes(options.predict)
     asked = interfaces(
         parse_links(options.links) if options.links else (), parse_profiles(options.emulate) if options.emulate else ()
     )
@@ -138,7 +147,7 @@ def _run(options: argparse.Namespace) -> int:
     planned = (*cases([interface for interface in here if not interface.is_remote], *matrix), *boards)
     outcome = _measure(planned, settings, signals)
     under = conditions(settings, not_run)
-    analysis = analyse(outcome.results, settings.fifo)
+    analysis = analyse(outcome.results, settings.fifo, changes)
     report = as_json(outcome.results, under, analysis)
     if options.json:
         print(json.dumps(report))

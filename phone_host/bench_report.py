@@ -270,17 +270,26 @@ def fit_lines(analysis: Analysis) -> list[str]:
 
 
 def prediction_lines(analysis: Analysis) -> list[str]:
-    """Each run beside its prediction from the other runs, for the terminal."""
-    if len(analysis.checked) < 2:
-        return []
-    lines = ["", "end-to-end p50 and pairs/s, measured and predicted from the other runs:"]
-    for one in analysis.checked:
+    """Each run beside its prediction from the other runs, and what the user wanted to be predicted, for the terminal."""
+    lines = []
+    if len(analysis.checked) > 1:
+        lines = ["", "end-to-end p50 and pairs/s, measured and predicted from the other runs:"]
+    for one in analysis.checked if lines else ():
         seen, said = one.measured, one.predicted
         found = f"{one.case.interface} {one.case.short}: {duration_text(seen.end_to_end_p50_ns)}, {seen.pairs_per_s:.1f}/s; "
         if isinstance(said, Unknown):
             lines.append(f"{found}no prediction: {said.reason}")
         else:
             lines.append(f"{found}{duration_text(said.end_to_end_p50_ns)}, {said.pairs_per_s:.1f}/s")
+    asked = [one for one in analysis.what_ifs if one.asked_for]
+    if asked:
+        lines += ["", "predicted, not run:"]
+    for what_if in asked:
+        if isinstance(what_if.figures, Unknown):
+            lines.append(f"{what_if.interface} {what_if.setting}: no prediction: {what_if.figures.reason}")
+            continue
+        texts = zip(PREDICTION_COLUMNS[2:-1], _figure_texts(what_if.figures), strict=False)
+        lines.append(f"{what_if.interface} {what_if.setting}: {', '.join(f'{name} {text}' for name, text in texts)}")
     return lines
 
 

@@ -83,6 +83,7 @@ def test_every_delay_is_measured_and_every_frame_accounted_for(tmp_path: Path) -
         (["--emulate", "wifi", "--links", "rfcomm"], "tcp or ipc or serial"),
         (["--quality", "101"], "--quality"),
         (["--fifo", "0"], "--fifo"),
+        (["--predict", "speed=60"], "processing=0.5"),
         (["--size", "large"], "--size"),
         (["--fps", "0"], "--fps"),
         (["--seconds", "0"], "--seconds"),
@@ -158,7 +159,21 @@ def test_profiles_are_listed() -> None:
 def test_a_matrix_foretells_each_run_from_the_others(tmp_path: Path) -> None:
     """Two qualities and two rates over one link: sizes differ, so there is a line with an interval, a prediction for each run, and settings not run."""
     with bench(
-        ["--links", "ipc", "--size", "160x120", "--quality", "40,95", "--fps", "10,20", "--seconds", "1", "--json"],
+        [
+            "--links",
+            "ipc",
+            "--size",
+            "160x120",
+            "--quality",
+            "40,95",
+            "--fps",
+            "10,20",
+            "--seconds",
+            "1",
+            "--predict",
+            "fps=5,link=uart",
+            "--json",
+        ],
         tmp_path,
     ) as running:
         assert running.wait() == 0, running.stderr
@@ -176,6 +191,11 @@ def test_a_matrix_foretells_each_run_from_the_others(tmp_path: Path) -> None:
     faster = settings["camera twice as fast"]["pair_rate_hz"]
     assert faster > next(value for name, value in settings.items() if "as it was run" in name)["pair_rate_hz"]
     assert {one["link"] for one in report["not_run_settings"]} > {"bluetooth (serial)", "wifi (tcp)"}
+    # A frame of the greatest runs over 115200 baud: 11 520 bytes a second, and no result comes faster than a frame.
+    asked = settings["fps=5,link=uart"]
+    frame_bytes = max(run["mean_frame_bytes"] for run in report["runs"])
+    assert asked["propagation_p50_ms"] == pytest.approx(1 + frame_bytes / 11.52, rel=0.1)
+    assert asked["pair_rate_hz"] <= 5.01
 
 
 def test_a_full_disk_is_said_and_the_table_is_not_lost(tmp_path: Path) -> None:
