@@ -161,8 +161,8 @@ class PairQueue:
                 self._count(self._board_orphans, OrphanReason.STREAM_ENDED.value)
                 return
             delay_ns = frame.received_ns - frame.marks.exposed_ns
-            # The study of links found bursts up to twice the usual delay; the slow decay follows a link that gets faster.
-            self._host_wait_ns = min(_SLOWEST_NS, max(delay_ns, self._host_wait_ns * 63 // 64))
+            # Where bytes take the time a frame that is a fifth larger comes as much later; the slow decay follows a link that gets faster.
+            self._host_wait_ns = min(_SLOWEST_NS, max(delay_ns * 5 // 4, self._host_wait_ns * 63 // 64))
             self._board_bytes += len(frame.message.payload)
             self._newest.append(frame)
             exposed_ns = frame.marks.exposed_ns + self._time_offset_ns

@@ -38,7 +38,11 @@ _QUEUE_PACKETS: Final = 8
 
 _LINGER_MS: Final = 500
 _HEARTBEAT_MS: Final = 1000
-_HEARTBEAT_TIMEOUT_MS: Final = 3000
+_HEARTBEAT_TIMEOUT_MS: Final = 30_000
+"""ZeroMQ hears a peer by whole packets: at 100 kbit/s a frame of 50 KB takes 4 s, and a shorter time would cut the link before any has come. That a
+peer has gone is noticed by the session, and by TCP itself as soon as there is somebody to answer."""
+
+_SET_UP_MS: Final = 3000
 _RECONNECT_MS: Final = 50
 _RECONNECT_MAX_MS: Final = 400
 """A peer that comes back is met within this time, well below the second allowed for recovery."""
@@ -85,8 +89,8 @@ def _configure(sock: zmq.Socket[bytes], most_bytes: int) -> None:
         (zmq.RCVBUF, _SOCKET_BUFFER_BYTES),
         (zmq.HEARTBEAT_IVL, _HEARTBEAT_MS),
         (zmq.HEARTBEAT_TIMEOUT, _HEARTBEAT_TIMEOUT_MS),
-        (zmq.HANDSHAKE_IVL, _HEARTBEAT_TIMEOUT_MS),
-        (zmq.CONNECT_TIMEOUT, _HEARTBEAT_TIMEOUT_MS),
+        (zmq.HANDSHAKE_IVL, _SET_UP_MS),
+        (zmq.CONNECT_TIMEOUT, _SET_UP_MS),
         (zmq.RECONNECT_IVL, _RECONNECT_MS),
         (zmq.RECONNECT_IVL_MAX, _RECONNECT_MAX_MS),
         (zmq.IPV6, 1),

@@ -1,8 +1,13 @@
 """One link as the host sees it: whether the board answers there, with which session, and its clock waves. Sans-I/O, `now_ns` passed in."""
 
+from typing import Final
+
 from common.protocol.message import BoardHello, HostHello, Lane
-from common.protocol.session import HELLO_RETRY_NS, SILENCE_NS, TAKEOVER_NS, Outgoing
+from common.protocol.session import HELLO_RETRY_NS, MS, SILENCE_NS, TAKEOVER_NS, Outgoing
 from common.protocol.waves import Waves
+
+MOST_SILENCE_NS: Final = 30_000 * MS
+"""A link on which frames are known to take long is borne with for as long as this."""
 
 
 class HostPath:
@@ -22,6 +27,7 @@ class HostPath:
         self.opened_ns = 0
         self.heard_ns = 0
         self.foreign_since_ns: int | None = None
+        self.silence_ns = SILENCE_NS
         self._hello_due_ns = 0
 
     @property
@@ -32,7 +38,7 @@ class HostPath:
     @property
     def due_ns(self) -> int:
         """When the session wants to act for this link next, ns."""
-        return self._hello_due_ns if self.hello is None else min(self.waves.due_ns, self.heard_ns + SILENCE_NS)
+        return self._hello_due_ns if self.hello is None else min(self.waves.due_ns, self.heard_ns + self.silence_ns)
 
     def is_alive_beside(self, hello: BoardHello, now_ns: int) -> bool:
         """Whether the board that answers here still lives, though another life of a board has said this hello on another link.
@@ -48,6 +54,10 @@ class HostPath:
         self.foreign_since_ns = None
         self.opened_ns = self.heard_ns = now_ns
         self.waves.open(now_ns)
+
+    def lived(self, now_ns: int) -> None:
+        """Take note of a frame that came after the link was given up for silent: on a slow link all else waits behind a frame."""
+        self.silence_ns = min(MOST_SILENCE_NS, max(self.silence_ns, 2 * (now_ns - self.heard_ns)))
 
     def shut(self, hello_due_ns: int) -> None:
         """Take note that the board is not there any more; it is greeted again from then on."""

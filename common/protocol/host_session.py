@@ -31,7 +31,6 @@ from common.protocol.message import (
 from common.protocol.session import (
     HELLO_RETRY_NS,
     MS,
-    SILENCE_NS,
     TAKEOVER_NS,
     Accepted,
     Arrived,
@@ -235,7 +234,7 @@ class HostSession:
 
     def _is_silent(self, path: HostPath, now_ns: int) -> bool:
         """Whether a link has been silent for too long: the carrier sooner than others, because frames have to go on."""
-        if now_ns - path.heard_ns >= SILENCE_NS:
+        if now_ns - path.heard_ns >= path.silence_ns:
             return True
         return path is self._carrier and any(
             other.is_open and other.heard_ns - path.heard_ns >= SILENCE_BESIDE_NS for other in self._paths
@@ -311,6 +310,8 @@ class HostSession:
             return [Stale(frame, StaleReason.LATE)]
         lost = self._pass_over(index)
         self._next_index = index + 1
+        if not path.is_open:
+            path.lived(now_ns)
         path.heard_ns = now_ns
         return [Arrived(frame, lost, path.link)]
 

@@ -3,6 +3,7 @@
 import random
 import signal
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -121,6 +122,34 @@ def test_either_side_may_be_killed(film: str, cable: PtyLine, tmp_path: Path) ->
     assert len({ledger["session"] for ledger in ledgers(outs[0])}) == 2
     for out in outs:
         assert all(left == right for left, right in saved_numbers(out))
+
+
+@pytest.mark.parametrize(("bytes_per_s", "pairs"), [(11_520, 8), (80_000, 40)], ids=["115200 baud", "80 kB/s"])
+def test_a_slow_line_carries_fresh_frames(film: str, bytes_per_s: float, pairs: int, tmp_path: Path) -> None:
+    """On a line that carries a tenth or the half of the frames each one that is sent was the newest, takes what its bytes need, and finds its partner."""
+    out = tmp_path / "out"
+    with PtyLine(tmp_path, bytes_per_s=bytes_per_s, delay_ns=5_000_000) as line:
+        board_uri, host_uri = line.uris
+        receiving = ["run", "--camera", film, "--link", host_uri, "--out", str(out), "--save-every", "1", "--json"]
+        with (
+            host([*receiving, "--pairs", str(pairs)], tmp_path) as receiver,
+            board(["run", "--camera", film, "--link", board_uri, "--json"], tmp_path) as sender,
+        ):
+            assert receiver.wait() == 0
+            assert sender.stop() == 0
+            report = receiver.json()
+    check(out, report, sender.json())
+    kept = ledgers(out)
+    assert all(ledger["propagation_ns"] >= ledger["bytes"] / bytes_per_s * 1e9 for ledger in kept)
+    assert report["frames"]["orphaned"].get("no_partner", 0) <= 1  # the first, before the line's delay was known
+    sequences = [ledger["sequence"] for ledger in kept]
+    steps = [after - before for before, after in pairwise(sequences)]
+    least = round(min(ledger["bytes"] for ledger in kept) / bytes_per_s * FPS)
+    assert min(steps) >= max(
+        1, least - 1
+    )  # between two that are sent the others were replaced on the board, none waits in the line
+    (session,) = report["sessions"]
+    assert session["dropped"]["replaced"] > 0
 
 
 def test_a_missing_port_is_told_in_one_line(film: str, tmp_path: Path) -> None:

@@ -269,6 +269,32 @@ def test_a_silent_board_is_given_up() -> None:
     assert Vanished(orderly=False) in host.session.tick(heard_ns + SILENCE_NS)
 
 
+def test_a_link_that_was_only_slow_is_borne_with() -> None:
+    """Where a frame takes five seconds and all else waits behind it, the board is given up once at most; then the host waits long enough."""
+    world = World()
+    world.settle(1000 * MS)
+    host = world.hosts[0]
+    for _ in range(4):
+        before = len(host.arrived)
+        while len(host.wires[0, Lane.FRAMES].to_host) == 0:
+            world.pass_time(20 * MS)
+            while world.deliver(host, (0, Lane.CONTROL), to_board=True):
+                pass
+            while world.deliver(host, (0, Lane.FRAMES), to_board=True):
+                pass
+        for _ in range(250):
+            world.pass_time(20 * MS)
+            for lane in Lane:
+                while world.deliver(host, (0, lane), to_board=True):
+                    pass
+        world.deliver_all()
+        assert len(host.arrived) > before
+    assert host.others.count(Vanished(orderly=False)) <= 1
+    world.camera_runs = False
+    world.settle(2 * STATUS_NS)
+    assert world.sent[host.board_session] == host.base_sent + host.received + host.lost
+
+
 def test_a_boards_goodbye_gives_its_last_account() -> None:
     """A board that leaves on purpose is known as such, with its final counts and what they show as lost, and is sought again."""
     world = World()
