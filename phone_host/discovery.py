@@ -5,6 +5,7 @@ Only what greets as ZeroMQ does counts as a board's port; whether it is the righ
 
 import ipaddress
 import socket
+import sys
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from common import now
 from common.errors import UnavailableError
 
 SERVICE: Final = "_tandemscan._tcp.local."
@@ -76,6 +78,14 @@ def find_board(state: Path, now_s: Callable[[], float], wait_s: float | None) ->
         if now_s() >= deadline_s:
             tried = ", ".join(near)
             raise UnavailableError(f"no board answers at {tried}, nor by mDNS{_why_not()}", "start it, or give --link")
+
+
+def find_aloud(state: Path, wait_s: float | None) -> str:
+    """As `find_board`, telling on stderr that it looks and what it has found."""
+    sys.stderr.write("phone-host: looking for a board (--link names one)\n")
+    link = find_board(state, lambda: now.monotonic_ns() / 1e9, wait_s)
+    sys.stderr.write(f"phone-host: found {link}\n")
+    return link
 
 
 def remember(state: Path, link: str) -> None:

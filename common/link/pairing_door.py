@@ -106,7 +106,7 @@ class Door:
         self._desk = Desk(Identity(z85.decode(keys.own().public.encode()), name), os.urandom)
         self._socket = _socket(context, MAX_WORD_BYTES)
         self._control = _socket(context, MAX_WORD_BYTES)
-        self._bind_control(keys.path / f"{CONTROL_PREFIX}{_port(address)}")
+        self._bind_control(keys.path / f"{CONTROL_PREFIX}{clean_name(address.removeprefix('tcp://'))}")
         self._is_open = False
         self._bound = ""
         self._owner_until_ns = 0

@@ -10,18 +10,21 @@ from common.errors import DataError, SettingsError, UnavailableError
 from common.link.factory import needs_keys, parse_link
 from common.protocol.pairing_code import CODE_DIGITS, read_code
 
-EXAMPLES = """  phone-host pair --link tcp://192.168.7.2:5555
+EXAMPLES = """  phone-host pair
+  phone-host pair --link tcp://192.168.7.2:5555
   phone-host pair --link tcp://raspberrypi.local:5555 --code 123456        (the code that `board-agent pair` shows)
 
 The board shows a code of six digits: in its journal (journalctl -u board-agent), or where `sudo board-agent pair` runs.
 """
 
 _TRIES = 3
+_PATIENCE_S = 20.0
+"""A board that is not named is looked for so long: it is there, since its owner stands before it."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
-    parser.add_argument("--link", metavar="URI", required=True, help="the board: tcp://HOST:PORT")
+    parser.add_argument("--link", metavar="URI", help="the board: tcp://HOST:PORT (default: the board is looked for)")
     parser.add_argument("--code", metavar="DIGITS", help="the code, if the board shows it already")
     parser.add_argument(
         "--pairing-port", type=int, metavar="PORT", help="the board's door (default: the port behind the link's)"
@@ -32,14 +35,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Pair; asks for the code on the terminal."""
+    from phone_host.discovery import find_aloud  # noqa: PLC0415
     from phone_host.pairing_call import PairingCall  # noqa: PLC0415 - ZeroMQ, only now
     from phone_host.settings import chosen_keys  # noqa: PLC0415
 
-    link = parse_link(options.link, listens_by_default=False)
+    keys = chosen_keys(options.config, options.keys)
+    link = parse_link(options.link or find_aloud(keys.path, _PATIENCE_S), listens_by_default=False)
     if not link.address.startswith("tcp://") or link.listens:
         raise SettingsError(f"link {options.link!r} needs no keys", "pair over tcp://HOST:PORT")
     door = _door(link.address, options.pairing_port)
-    keys = chosen_keys(options.config, options.keys)
     used: set[int] = set()
     while True:
         with closing(PairingCall(door, keys)) as call:

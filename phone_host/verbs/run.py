@@ -96,7 +96,7 @@ def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]
 
 def run(options: argparse.Namespace) -> int:
     """Run until stopped, the pairs are reached or a stream ends."""
-    from phone_host.discovery import remember  # noqa: PLC0415
+    from phone_host.discovery import find_aloud, remember  # noqa: PLC0415
     from phone_host.host import EndReason, Host, HostSettings  # noqa: PLC0415 - OpenCV, only now
     from phone_host.live import LiveTable  # noqa: PLC0415
     from phone_host.model import Side, TimeOffset  # noqa: PLC0415
@@ -137,7 +137,7 @@ def run(options: argparse.Namespace) -> int:
         steered=frozenset(whose for whose in Whose if options.align_phase in {"either", whose.value}),
     )
     keys = key_folder(settings.keys)
-    named = settings.link or (_find(keys.path, options.wait),)
+    named = settings.link or (find_aloud(keys.path, options.wait),)
     uris = [parse_link(uri, listens_by_default=False) for uri in named]
     for uri in uris:
         tell_insecure(uri)
@@ -163,16 +163,6 @@ def run(options: argparse.Namespace) -> int:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     return _CHECK_FAILED if too_few or not host.results.complete else 0
-
-
-def _find(state: Path, wait_s: float | None) -> str:
-    """Look for a board and say which one it is."""
-    from phone_host.discovery import find_board  # noqa: PLC0415 - only without --link
-
-    print("phone-host: looking for a board (--link names one)", file=sys.stderr)
-    link = find_board(state, lambda: now.monotonic_ns() / 1e9, wait_s)
-    print(f"phone-host: found {link}", file=sys.stderr)
-    return link
 
 
 def _check_numbers(options: argparse.Namespace) -> None:

@@ -31,14 +31,24 @@ def announce(stack: ExitStack, name: str, address: str, port: int) -> None:
     )
 
 
-def serve(stack: ExitStack, folder: Path, name: str, address: str, port: int) -> Any:
-    """Run a board, open to everybody on loopback, until the stack is left."""
+def serve(stack: ExitStack, folder: Path, name: str, link: str, *more: str) -> Any:
+    """Run a board until the stack is left."""
     camera = f"replay:{folder / 'film'}?pace=demand&loop=1"
-    link = f"tcp://{address}:{port}"
-    option = "" if address.startswith("127.") else "?insecure=1"
-    agent = stack.enter_context(board(["run", "--camera", camera, "--link", link + option], folder, name))
+    agent = stack.enter_context(board(["run", "--camera", camera, "--link", link, *more], folder, name))
     until(lambda: " serving " in agent.stderr, f"{name} serves")
     return agent
+
+
+def pair(folder: Path, agent: Any) -> dict[str, Any]:
+    """Pair with a board that nobody names, by the code in its log."""
+    command = [sys.executable, "-P", "-m", "phone_host.cli", "pair", "--keys", str(folder / "keys")]
+    pairing = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    until(lambda: "pairing_code code=" in agent.stderr or pairing.poll() is not None, "the board shows a code")
+    code = agent.stderr.partition("pairing_code code=")[2][:6]
+    err = pairing.communicate(f"{code}\n", timeout=60)[1]
+    return {"code": pairing.returncode, "err": err}
 
 
 def look(folder: Path, *options: str, name: str = "host", wait: str = "20") -> dict[str, Any]:
@@ -61,43 +71,68 @@ def look(folder: Path, *options: str, name: str = "host", wait: str = "20") -> d
         return {"code": running.wait(), "err": running.stderr}
 
 
-def scene(name: str, folder: Path) -> list[dict[str, Any]]:
-    """Play one scene; gives what each host said."""
-    with ExitStack() as stack:
-        match name:
-            case "announced":
-                serve(stack, folder, "bone", "127.0.0.2", 6001)
-                announce(stack, "bone", "127.0.0.2", 6001)
-                announce(stack, "gone", "127.0.0.2", 6002)  # announced by a responder, but nobody serves there
-                return [look(folder)]
-            case "several":
-                for number, board_name in enumerate(("bone", "pi")):
-                    serve(stack, folder, board_name, "127.0.0.2", 6001 + number)
-                    announce(stack, board_name, "127.0.0.2", 6001 + number)
-                return [look(folder)]
-            case "last":
-                agent = serve(stack, folder, "bone", "127.0.0.2", 6001)
-                announce(stack, "bone", "127.0.0.2", 6001)
-                first = look(folder, name="first")
-                serve(stack, folder, "pi", "127.0.0.2", 6002)
-                announce(stack, "pi", "127.0.0.2", 6002)
-                again = look(folder, name="again")
-                assert agent.stop(signal.SIGTERM) == 0
-                return [first, again, look(folder, name="other")]
-            case "here":
-                serve(stack, folder, "bone", "127.0.0.1", PORT)
-                return [look(folder)]
-            case "gadget":
-                subprocess.run(["ip", "addr", "add", "192.168.7.2/32", "dev", "lo"], check=True)
-                serve(stack, folder, "bone", "192.168.7.2", PORT)
-                return [look(folder)]
-            case "foreign":
-                stranger = stack.enter_context(socket.create_server(("127.0.0.1", PORT)))
-                assert stranger.getsockname()[1] == PORT
-                return [look(folder, wait="1")]
-            case _:
-                raise AssertionError(name)
+def announced(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
+    """One board announces itself and serves, one is announced and gone."""
+    serve(stack, folder, "bone", "tcp://127.0.0.2:6001")
+    announce(stack, "bone", "127.0.0.2", 6001)
+    announce(stack, "gone", "127.0.0.2", 6002)
+    return [look(folder)]
 
+
+def several(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
+    """Two boards."""
+    for number, name in enumerate(("bone", "pi")):
+        serve(stack, folder, name, f"tcp://127.0.0.2:{6001 + number}")
+        announce(stack, name, "127.0.0.2", 6001 + number)
+    return [look(folder)]
+
+
+def last(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
+    """A board is used, another one comes, the first one goes."""
+    agent = serve(stack, folder, "bone", "tcp://127.0.0.2:6001")
+    announce(stack, "bone", "127.0.0.2", 6001)
+    first = look(folder, name="first")
+    serve(stack, folder, "pi", "tcp://127.0.0.2:6002")
+    announce(stack, "pi", "127.0.0.2", 6002)
+    again = look(folder, name="again")
+    assert agent.stop(signal.SIGTERM) == 0
+    return [first, again, look(folder, name="other")]
+
+
+def here(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
+    """A board on this machine."""
+    serve(stack, folder, "bone", f"tcp://127.0.0.1:{PORT}")
+    return [look(folder)]
+
+
+def gadget(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
+    """A board at the gadget's address, open to everybody."""
+    plug_cable()
+    serve(stack, folder, "bone", f"tcp://192.168.7.2:{PORT}?insecure=1")
+    return [look(folder)]
+
+
+def cable(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
+    """A board at the gadget's address that is paired and used."""
+    plug_cable()
+    agent = serve(stack, folder, "bone", f"tcp://192.168.7.2:{PORT}", "--keys", str(folder / "board-keys"))
+    return [pair(folder, agent), look(folder)]
+
+
+def foreign(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
+    """Something else on the usual port."""
+    stack.enter_context(socket.create_server(("127.0.0.1", PORT)))
+    return [look(folder, wait="1")]
+
+
+def plug_cable() -> None:
+    """Give this network the gadget's address."""
+    subprocess.run(["ip", "addr", "add", "192.168.7.2/32", "dev", "lo"], check=True)
+
+
+SCENES = {play.__name__: play for play in (announced, several, last, here, gadget, cable, foreign)}
 
 if __name__ == "__main__":
-    print(json.dumps(scene(sys.argv[1], Path(sys.argv[2]))))
+    with ExitStack() as left:
+        told = SCENES[sys.argv[1]](left, Path(sys.argv[2]))
+    print(json.dumps(told))

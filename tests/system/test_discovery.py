@@ -84,6 +84,15 @@ def test_the_board_on_the_usb_cable_is_found_and_asks_for_keys(film: Path, tmp_p
     assert "phone-host pair --link tcp://192.168.7.2:5555" in said["err"].splitlines()[-1]
 
 
+def test_from_a_cable_to_pairs_without_an_address(film: Path, tmp_path: Path) -> None:
+    """With a board on the cable `phone-host pair` and `phone-host run` need nothing but the code: the board is found, paired, and streams."""
+    paired, said = played("cable", film, tmp_path)
+    assert paired["code"] == 0, paired["err"]
+    assert said["code"] == 0, said["err"]
+    assert "found tcp://192.168.7.2:5555" in paired["err"]
+    assert "found tcp://192.168.7.2:5555" in said["err"]
+
+
 def test_what_does_not_greet_as_zeromq_is_no_board(film: Path, tmp_path: Path) -> None:
     """A foreign service on the usual port is passed over; when nothing else answers in time, one line says what was tried."""
     (said,) = played("foreign", film, tmp_path)
