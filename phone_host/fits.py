@@ -20,7 +20,13 @@ _MOST: Final = 1200
 """More points are thinned evenly: they would not change the line, and the bootstrap draws them 200 times."""
 
 _BLOCK: Final = 15
-"""Neighbours drawn together: half a second at 30 frames a second, longer than a hitch of the machine."""
+"""Neighbours drawn together: half a second at 30 frames a second, longer than a hitch of the machine ..."""
+
+_TRIES: Final = 20
+"""A series in which this is not enough to meet both sizes has one frame that is unlike all others: no interval can be drawn from that."""
+
+_LEAST_BLOCKS: Final = 8
+"""... but of a short series fewer, else every draw would be the same and the interval would claim to know all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +35,7 @@ class DelayFit:
 
     Attributes:
         latency_ns: delay of no bytes at all; NaN where all frames were of one size.
-        latency_low_ns: lower end of its interval.
+        latency_low_ns: lower end of its interval; NaN where too few frames were of another size.
         latency_high_ns: upper end.
         ns_per_byte: slope; NaN where all frames were of one size.
         slope_low: lower end of its interval, ns a byte.
@@ -90,7 +96,8 @@ def fit_delay(size_bytes: Values, delay_ns: Values, draws: int = _DRAWS) -> Dela
     if draws:
         generator = np.random.default_rng(x.size)  # the same data give the same interval
         drawn = np.array([_line(x[chosen], y[chosen]) for chosen in _blocks(x, draws, generator)])
-        low, high = np.asarray(np.percentile(drawn, (2.5, 97.5), axis=0), np.float64)
+        if len(drawn) == draws:
+            low, high = np.asarray(np.percentile(drawn, (2.5, 97.5), axis=0), np.float64)
     return DelayFit(latency, low[0], high[0], slope, low[1], high[1], int(size_bytes.size), left)
 
 
@@ -115,13 +122,15 @@ def _line(x: Values, y: Values) -> tuple[float, float]:
 
 def _blocks(x: Values, draws: int, generator: np.random.Generator) -> list[NDArray[np.int64]]:
     """Indices of resampled series that have more than one size."""
-    block = min(_BLOCK, x.size)
+    block = max(1, min(_BLOCK, x.size // _LEAST_BLOCKS))
     count = -(-x.size // block)
     chosen: list[NDArray[np.int64]] = []
-    while len(chosen) < draws:
+    for _ in range(_TRIES * draws):
+        if len(chosen) == draws:
+            break
         starts = generator.integers(0, x.size - block + 1, count)
         indices = (starts[:, np.newaxis] + np.arange(block)).ravel()[: x.size]
-        if x[indices].min() < x[indices].max() or x.size <= block:
+        if x[indices].min() < x[indices].max():
             chosen.append(indices)
     return chosen
 

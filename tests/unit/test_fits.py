@@ -65,3 +65,27 @@ def test_sizes_that_make_no_difference_give_no_upper_end() -> None:
     fit = fit_delay(size, 1e6 + random.exponential(1e6, 300))
     assert fit.most_bytes_per_s == math.inf
     assert 0 < fit.least_bytes_per_s < math.inf
+
+
+@pytest.mark.parametrize("count", [4, 10, 20])
+def test_few_frames_give_a_wide_interval_not_none(count: int) -> None:
+    """A handful of noisy frames tells little: the intervals have room, and hold the truth's neighbourhood."""
+    random = np.random.default_rng(count)
+    size = np.repeat([10_000.0, 30_000.0], count // 2)
+    fit = fit_delay(size, 1e6 + 100.0 * size + random.exponential(1e6, count))
+    assert fit.latency_high_ns - fit.latency_low_ns > 1e5
+    assert fit.slope_low < fit.ns_per_byte < fit.slope_high or fit.slope_low < 100.0 < fit.slope_high
+
+
+def test_two_frames_are_enough_for_a_line() -> None:
+    """Two sizes, one frame each: a line, without any error."""
+    fit = fit_delay(np.array([1e4, 2e4]), np.array([1e6, 2e6]))
+    assert fit.ns_per_byte == pytest.approx(100.0, rel=1e-3)
+
+
+def test_a_single_frame_of_another_size_gives_no_interval() -> None:
+    """One odd frame among a thousand is no ground for an interval, and looking for one comes to an end."""
+    size = np.full(1000, 3e4)
+    size[500] = 1e4
+    fit = fit_delay(size, 1e6 + 100.0 * size)
+    assert math.isnan(fit.slope_low) or fit.slope_low <= fit.slope_high
