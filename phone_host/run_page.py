@@ -40,7 +40,7 @@ def run_page(facts: RunFacts, last: Processed | None, board_side: Side, ledgers:
             figures=_figures(facts) if facts.processed else (),
             pictures=pictures(last, board_side),
             delays=delay_series(ledgers),
-            tables=(drops_table(facts), camera_table(facts.camera)),
+            tables=(*links_tables(facts), drops_table(facts), camera_table(facts.camera)),
             notes=notes(facts),
         )
     )
@@ -55,6 +55,20 @@ def notes(facts: RunFacts) -> tuple[str, ...]:
         *(f"Warning: {item.sentence}. Remedy: {item.remedy}." for item in concerns(time_and_motion(facts))),
         *phase_lines(facts.phase, facts.alignment),
     )
+
+
+def links_tables(facts: RunFacts) -> tuple[Table, ...]:
+    """The links side by side, where there were several."""
+    if len(facts.link.links) < 2:
+        return ()
+    rows = []
+    for tally in facts.link.links:
+        age = tally.age.spread()
+        ages = f"{age.p50_ns / 1e6:.1f} ms; {age.p95_ns / 1e6:.1f} ms" if age.count else "-"
+        rows.append((tally.name, str(tally.frames), str(tally.carried), str(tally.lost), ages))
+    title = f"Links: the stream went from one to another {facts.link.switches} times"
+    columns = ("link", "frames", "times it took over", "times it was lost", "age of frames on arrival: median; p95")
+    return (Table(title, columns, tuple(rows)),)
 
 
 def camera_table(health: CameraHealth) -> Table:
