@@ -70,6 +70,24 @@ def test_a_pulled_camera_is_missed_and_found_again(
     assert guest.show("MainPID") == process
 
 
+def test_a_camera_whose_firmware_hangs_ends_in_the_watchdog(
+    guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
+) -> None:
+    """A camera that answers nothing holds its driver in the kernel, where no program can be left: the watchdog restarts the service, and it streams on."""
+    restarts, timeouts = int(guest.show("NRestarts")), guest.journal().count("Watchdog timeout")
+    with streaming(guest, film.right, tmp_path / "out") as stream:
+        stream.more(10, "before the hang")
+        webcam.hung = True
+        try:
+            late = "the watchdog sees that the loop stands still"
+            until(lambda: guest.journal().count("Watchdog timeout") > timeouts, late)
+        finally:
+            webcam.hung = False
+        until(lambda: int(guest.show("NRestarts")) > restarts, "the service is started anew")
+        stream.more(10, "after the hang")
+        stream.finish(skew)
+
+
 def test_a_camera_that_comes_after_the_service_is_served(
     guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
 ) -> None:

@@ -58,6 +58,8 @@ class Webcam:
         self.truncate_every = 0
         """Every which frame loses its second half; 0: none."""
         self.truncated = 0
+        self.hung = False
+        """Whether its firmware has stopped: it answers nothing, but is on the bus."""
         self.starts = 0
         """How often a driver has started the stream."""
         self.streaming = False
@@ -135,6 +137,7 @@ class _Device:
         self._odd = False
         self._number = 0
         self._rest = b""
+        self._ignored: set[int] = set()  # sequence numbers of requests that never got an answer
         self._taken: deque[tuple[int, int] | None] = (
             deque()
         )  # (image, due_ns) of each transfer that the driver has not yet offered anew
@@ -159,7 +162,9 @@ class _Device:
             found = [item for item in self._waiting if item[0] == unlinked]
             for item in found:
                 self._waiting.remove(item)
-            self._socket.sendall(struct.pack(">5Ii24x", _RET_UNLINK, sequence, 0, 0, 0, _UNLINKED if found else 0))
+            known = bool(found) or unlinked in self._ignored
+            self._ignored.discard(unlinked)
+            self._socket.sendall(struct.pack(">5Ii24x", _RET_UNLINK, sequence, 0, 0, 0, _UNLINKED if known else 0))
             return
         assert command == _SUBMIT, command
         (length,) = struct.unpack_from(">i", header, 24)
@@ -167,6 +172,9 @@ class _Device:
         if endpoint:
             self._waiting.append((sequence, length))
             self._note_taken()
+            return
+        if self._camera.hung:
+            self._ignored.add(sequence)
             return
         answer = self._control(header[40:48], out)
         if answer is None:
@@ -259,7 +267,7 @@ class _Device:
 
     def _feed(self) -> float:
         """Give image data to the transfers that wait for it; tells how long there is nothing to do, s."""
-        while self._streaming and self._waiting:
+        while self._streaming and self._waiting and not self._camera.hung:
             now_ns = time.monotonic_ns()
             if not self._rest:
                 due_ns = round(self._number * 1e9 / self._rate_hz()) + self._phase_ns + self._delay_ns()
