@@ -113,6 +113,8 @@ def _keys(options: argparse.Namespace) -> int:
 def _pair(options: argparse.Namespace) -> int:
     from board_agent.pair import follow  # noqa: PLC0415 - needed by this verb alone
 
+    if not 0 < options.seconds < _LONGEST_IDLE_S:
+        raise SettingsError(f"--seconds {options.seconds:g}", "give seconds, more than 0")
     name = ""
     for state in follow(key_folder(_resolve(options).values.keys), options.seconds):
         name = state.paired

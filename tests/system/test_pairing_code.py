@@ -1,6 +1,8 @@
 """Both programs get to know each other by a code, over real sockets, with the real commands."""
 
 import json
+import os
+import pty
 import re
 import signal
 import socket
@@ -195,12 +197,54 @@ def test_three_wrong_codes_are_followed_by_a_pause(rig: Rig) -> None:
         assert owner.wait() == 0
 
 
+def test_on_a_terminal_a_wrong_code_is_asked_again(rig: Rig) -> None:
+    """Who mistypes on a terminal gets another try with the new code; the old one is not taken again."""
+    master, slave = pty.openpty()
+    command = ["pair", "--link", rig.link, "--keys", rig.host_keys]
+    err = rig.folder / "pair.err"
+    with err.open("wb") as said:
+        pairing = subprocess.Popen([sys.executable, "-P", "-m", "phone_host.cli", *command], stdin=slave, stderr=said)
+    os.close(slave)
+    try:
+        until(lambda: len(rig.codes()) == 1 and "type it" in err.read_text(), "the first code is asked for")
+        os.write(master, b"%06d\n" % ((int(rig.codes()[0]) + 1) % 10**CODE_DIGITS))
+        until(lambda: len(rig.codes()) == 2 and err.read_text().count("type it") == 2, "the second code is asked for")
+        os.write(master, f"{rig.codes()[1][:3]} {rig.codes()[1][3:]}\n".encode())
+        assert pairing.wait(60) == 0, err.read_text()
+    finally:
+        pairing.kill()
+        pairing.wait()
+        os.close(master)
+    assert "the code was wrong" in err.read_text() or "not proved" in err.read_text()
+
+
 def test_without_an_agent_pair_says_so(tmp_path: Path) -> None:
     """`board-agent pair` with nobody to talk to, and `phone-host pair` with nobody there, end with exit 3 and the remedy in one line."""
     with program("board_agent.cli", ["pair", "--keys", str(tmp_path)], tmp_path, "pair") as alone:
         assert alone.wait() == 3
     assert "no running board-agent" in alone.stderr
     assert alone.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("module", "options", "named"),
+    [
+        ("board_agent.cli", ["pair", "--seconds", "nan"], "--seconds nan"),
+        ("board_agent.cli", ["keys", "--forget", "nobody"], "nobody"),
+        ("board_agent.cli", ["keys", "--add", "phone", "short"], "short"),
+        ("phone_host.cli", ["keys", "--add", "bone", "serial:/dev/ttyACM0", "a" * 40], "serial:/dev/ttyACM0"),
+        ("phone_host.cli", ["pair", "--link", "ipc:///tmp/board"], "ipc:///tmp/board"),
+        ("phone_host.cli", ["pair", "--link", "tcp://127.0.0.1:65535"], "65535"),
+        ("phone_host.cli", ["pair", "--link", "tcp://127.0.0.1:5555", "--pairing-port", "0"], "--pairing-port 0"),
+    ],
+)
+def test_what_makes_no_sense_is_one_line(module: str, options: list[str], named: str, tmp_path: Path) -> None:
+    """A wrong option of keys or pair ends with exit 2 and one line that names it; no key is trusted or forgotten."""
+    with program(module, [*options, "--keys", str(tmp_path)], tmp_path, "wrong") as wrong:
+        assert wrong.wait() == 2
+    assert named in wrong.stderr
+    assert wrong.stderr.count("\n") == 1
+    assert KeyFolder(tmp_path).peers() == ()
 
 
 def test_keys_are_shown_and_never_the_secret_one(tmp_path: Path) -> None:
