@@ -4,7 +4,7 @@ In a folder a frame's name is its stamp: `board/<ns>.jpg` and `host/<ns>.jpg`, n
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -86,7 +86,7 @@ class _Unmoved:
 
 
 def film(
-    link: Link,
+    links: Sequence[Link],
     camera: Camera,
     seconds: float,
     wait_ns: int | None,
@@ -97,7 +97,7 @@ def film(
     """Keep what both cameras take.
 
     Args:
-        link: open link to the board; closed by this.
+        links: open links to the board; closed by this.
         camera: the own camera, open; closed by this.
         seconds: how long, from the board's first frame on.
         wait_ns: an absent board is waited for this long; None for ever.
@@ -112,9 +112,10 @@ def film(
     source = Source(camera, keeper.add_host)
     if source.on_demand:
         camera.close()
-        link.close()
+        for link in links:
+            link.close()
         raise DataError("a camera with pace=demand has no time of its own", "use pace=clock")
-    receiver = Receiver([link], now.random_id(), keeper, _Unmoved())
+    receiver = Receiver(links, now.random_id(), keeper, _Unmoved())
     receiver.start()
     source.start()
     waiting = threading.Event()

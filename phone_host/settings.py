@@ -28,6 +28,10 @@ class PhoneHostSettings:
     matcher: str = setting("sgbm", "stereo matcher")
     tolerance: float = setting(0.0, "greatest time skew of a pair, ms; 0 = half of the longer frame period")
     fifo: str = setting("1:drop-oldest", "DEPTH:POLICY of the queue before the stereo pipeline")
+    align_phase: str = setting(
+        "", "which camera is steered until both expose together: either, board or host; empty: none"
+    )
+    interpolate: bool = setting(default=False, doc="move the board's image to the host's moment along the optical flow")
     keys: str = setting("", "folder of this machine's key and the boards that it knows; empty: ~/.config/tandemscan")
     log_level: str = setting("warning", "debug, info, warning or error")
 
@@ -52,6 +56,8 @@ def check(settings: PhoneHostSettings) -> None:
     matchers = [name.value for name in MatcherName]
     if settings.matcher not in matchers:
         raise SettingsError(f"matcher {settings.matcher!r} is unknown", f"give {' or '.join(matchers)}")
+    if settings.align_phase not in {"", "either", "board", "host"}:
+        raise SettingsError(f"align_phase is {settings.align_phase!r}", "give either, board or host, or nothing")
     if not (math.isfinite(settings.tolerance) and settings.tolerance >= 0):
         raise SettingsError(f"tolerance is {settings.tolerance:g}", "give ms, 0 or more")
 

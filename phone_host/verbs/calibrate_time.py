@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 from common import logs, now
 from common.commandline import INTERRUPTED
 from common.errors import SettingsError
-from common.keys import usual_keys
-from common.link.factory import open_link, parse_link
+from common.link.factory import open_links, parse_link, tell_insecure
 from common.settings import log_level
 from common.signals import StopSignals
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import EXAMPLE, open_camera
 from phone_host.formats.json_text import json_text
+from phone_host.settings import key_folder
 from phone_host.verbs.outputs import require_file, require_folder, unwritable
 
 if TYPE_CHECKING:
@@ -42,7 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what both cameras film: the page of --pattern, a lamp or LED switched at irregular moments, or, with a calibrated rig,"
         " anything with texture that moves up and down (default screen)",
     )
-    parser.add_argument("--link", default="tcp://127.0.0.1:5555", metavar="URI", help="the board (default %(default)s)")
+    parser.add_argument("--link", metavar="URI", help="the board (default: the one that is found, as for run)")
+    parser.add_argument("--keys", default="", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
     parser.add_argument("--camera", metavar="URI", help=f"the own camera: {EXAMPLE}")
     parser.add_argument("--frames", type=Path, metavar="DIR", help="instead of both: frames kept by an earlier run")
     parser.add_argument("--seconds", type=float, default=20.0, metavar="S", help="how long to film (default 20)")
@@ -117,16 +118,20 @@ def _progress(text: str) -> "tuple[Any, Callable[[float], None]]":
 
 
 def _footage(options: argparse.Namespace, signals: StopSignals) -> "Footage":
+    from phone_host.discovery import find_aloud  # noqa: PLC0415
     from phone_host.footage import film, keep, read  # noqa: PLC0415
 
     if options.frames is not None:
         return read(options.frames)
     camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns())
-    link = open_link(parse_link(options.link, listens_by_default=False), usual_keys())
+    keys = key_folder(options.keys)
+    uri = parse_link(options.link or find_aloud(keys.path, options.wait), listens_by_default=False)
+    tell_insecure(uri)
+    links = open_links([uri], keys)
     progress, advance = _progress("filming")
     wait_ns = None if options.wait is None else round(options.wait * 1e9)
     with progress:
-        footage = film(link, camera, options.seconds, wait_ns, stop=lambda: signals.stop, advance=advance)
+        footage = film(links, camera, options.seconds, wait_ns, stop=lambda: signals.stop, advance=advance)
     if options.keep:
         try:
             keep(footage, options.out)

@@ -64,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--interpolate",
         action="store_true",
+        default=None,
         help="move the board's image to the host's moment along the optical flow, where no camera can be steered",
     )
     parser.add_argument(
@@ -88,7 +89,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
     """Work out the settings from file, environment and options."""
-    names = ("link", "camera", "calibration", "matcher", "tolerance", "fifo", "keys", "log_level")
+    names = (
+        "link",
+        "camera",
+        "calibration",
+        "matcher",
+        "tolerance",
+        "fifo",
+        "align_phase",
+        "interpolate",
+        "keys",
+        "log_level",
+    )
     given = {name: getattr(options, name, None) for name in names}
     given["link"] = tuple(given["link"]) if given["link"] else None
     return resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given)
@@ -133,8 +145,8 @@ def run(options: argparse.Namespace) -> int:
         out=options.out,
         save_every=options.save_every,
         time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
-        interpolate=options.interpolate,
-        steered=frozenset(whose for whose in Whose if options.align_phase in {"either", whose.value}),
+        interpolate=settings.interpolate,
+        steered=frozenset(whose for whose in Whose if settings.align_phase in {"either", whose.value}),
     )
     keys = key_folder(settings.keys)
     named = settings.link or (find_aloud(keys.path, options.wait),)

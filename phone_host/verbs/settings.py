@@ -18,9 +18,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options: an option for each setting."""
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
     for item in fields(PhoneHostSettings):
-        several = isinstance(item.default, tuple)
+        several, option = isinstance(item.default, tuple), f"--{item.name.replace('_', '-')}"
+        if isinstance(item.default, bool):
+            parser.add_argument(option, action="store_true", default=None, help=item.metadata["doc"])
+            continue
         parser.add_argument(
-            f"--{item.name.replace('_', '-')}",
+            option,
             type=str if several else type(item.default),
             action="append" if several else "store",
             metavar=item.name.rpartition("_")[2].upper(),

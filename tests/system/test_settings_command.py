@@ -19,13 +19,13 @@ def test_every_setting_of_the_host_is_an_option_and_named_as_its_origin() -> Non
     """Each setting that is given as an option shows its value and `--NAME`."""
     given = {
         "link": "serial:/dev/ttyACM0", "camera": "replay:right", "calibration": "rig.yaml", "matcher": "block",
-        "tolerance": "5", "fifo": "2:block", "keys": "my-keys", "log_level": "info",
+        "tolerance": "5", "fifo": "2:block", "align_phase": "board", "keys": "my-keys", "log_level": "info",
     }  # fmt: skip
     words = [word for name, value in given.items() for word in (f"--{name.replace('_', '-')}", value)]
-    words += ["--link", "tcp://board:5555"]
+    words += ["--link", "tcp://board:5555", "--interpolate"]
     done = settings("phone_host.cli", "--json", *words)
     assert done.returncode == 0, done.stderr
-    read = given | {"tolerance": 5.0, "link": ["serial:/dev/ttyACM0", "tcp://board:5555"]}
+    read = given | {"interpolate": True, "tolerance": 5.0, "link": ["serial:/dev/ttyACM0", "tcp://board:5555"]}
     assert json.loads(done.stdout) == {
         name: {"value": value, "origin": f"--{name.replace('_', '-')}"} for name, value in read.items()
     }
@@ -40,6 +40,8 @@ def test_every_setting_of_the_host_is_an_option_and_named_as_its_origin() -> Non
         ("phone_host.cli", "PHONE_HOST_LINK", "carrier-pigeon://x"),
         ("phone_host.cli", "PHONE_HOST_CAMERA", "replay:x?fps=0"),
         ("phone_host.cli", "PHONE_HOST_LOG_LEVEL", "loud"),
+        ("phone_host.cli", "PHONE_HOST_ALIGN_PHASE", "both"),
+        ("phone_host.cli", "PHONE_HOST_INTERPOLATE", "perhaps"),
         ("board_agent.cli", "BOARD_AGENT_IDLE_AFTER", "-1"),
         ("board_agent.cli", "BOARD_AGENT_LINK", "tcp://*:5555 tcp://nowhere"),
         ("board_agent.cli", "BOARD_AGENT_CAMERA", "v4l2:auto?size=big"),
