@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 
 Values = NDArray[np.float64]
 
+LIKE_SIZES: Final = 1.2
+"""Frames within this factor of each other are of one size: a line through them would be carried far beyond what was measured, to no bytes at all."""
+
 _STEPS: Final = 60
 _DRAWS: Final = 200
 _MOST: Final = 1200
@@ -34,10 +37,10 @@ class DelayFit:
     """delay = latency + ns_per_byte * bytes, with intervals that hold the true line in 95 % of like measurements.
 
     Attributes:
-        latency_ns: delay of no bytes at all; NaN where all frames were of one size.
+        latency_ns: delay of no bytes at all; NaN where all frames were of about one size.
         latency_low_ns: lower end of its interval; NaN where too few frames were of another size.
         latency_high_ns: upper end.
-        ns_per_byte: slope; NaN where all frames were of one size.
+        ns_per_byte: slope; NaN where all frames were of about one size.
         slope_low: lower end of its interval, ns a byte.
         slope_high: upper end, ns a byte.
         points: frames that were looked at.
@@ -82,12 +85,12 @@ def fit_delay(size_bytes: Values, delay_ns: Values, draws: int = _DRAWS) -> Dela
         draws: of the bootstrap; 0: no intervals (NaN).
 
     Returns:
-        The fit; NaN throughout where fewer than two sizes are there.
+        The fit; NaN throughout where all frames are of about one size (LIKE_SIZES).
     """
     every = max(1, -(-size_bytes.size // _MOST))
     x, y = size_bytes[::every], delay_ns[::every]
     nan = float("nan")
-    if x.size < 2 or x.min() == x.max():
+    if x.size < 2 or x.max() < LIKE_SIZES * x.min():
         return DelayFit(nan, nan, nan, nan, nan, nan, int(size_bytes.size), nan)
     latency, slope = _line(x, y)
     left = float(np.median(np.abs(y - latency - slope * x)))

@@ -12,15 +12,12 @@ import numpy as np
 
 from common.ledger import PairLedger
 from phone_host.emulate import Profile
-from phone_host.fits import DelayFit, Values, fit_delay
+from phone_host.fits import LIKE_SIZES, DelayFit, Values, fit_delay
 from phone_host.queue_model import LinkModel, Predicted, Setting, predict
 from phone_host.sync.fifo import FifoSettings
 
 _FRAMES: Final = 3000
 """Frames that a prediction runs: the p95 of 3000 values is known to 0.4 percentage points of rank."""
-
-_NEAR_SIZE: Final = 1.2
-"""Where all frames were within this factor of one size, their delay stands for frames of that size only."""
 
 _SEED: Final = 1
 
@@ -199,9 +196,9 @@ def learn_link(interface: str, images: Images, cells: Sequence[Cell]) -> LinkMod
     ledgers = [ledger for cell in mine for ledger in cell.ledgers]
     size = values_of(ledgers, lambda ledger: ledger.bytes)
     delay = values_of(ledgers, lambda ledger: ledger.propagation_ns)
-    if size.max() < _NEAR_SIZE * size.min():
+    if size.max() < LIKE_SIZES * size.min():
         wanted = float(np.median(images.size_bytes))
-        if not size.min() / _NEAR_SIZE <= wanted <= size.max() * _NEAR_SIZE:
+        if not size.min() / LIKE_SIZES <= wanted <= size.max() * LIKE_SIZES:
             return Unknown(f"frames of one size only were measured over {interface}")
         # No line can be told from frames of one size; how much of it is latency hardly matters for frames of the same.
         latency_ns, ns_per_byte = 0.5 * float(np.median(delay)), 0.5 * float(np.median(delay / size))

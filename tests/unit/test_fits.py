@@ -56,6 +56,8 @@ def test_one_size_gives_no_line() -> None:
         assert math.isnan(fit.ns_per_byte)
         assert math.isnan(fit.bytes_per_s)
         assert fit.points == count
+    alike = np.linspace(45_000.0, 50_000.0, 50)
+    assert math.isnan(fit_delay(alike, 100.0 * alike).latency_ns)
 
 
 def test_sizes_that_make_no_difference_give_no_upper_end() -> None:
