@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Final, Protocol
 
-import zmq
-
 from common import now
 from common.errors import ProtocolError, UnavailableError
 from common.link.base import Broken, Garbage, Incoming, Link, Packet
+from common.link.wait import Waiter
 from common.logs import event
 from common.protocol.host_session import HostSession
 from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Pacing, RefusalReason
@@ -96,10 +95,8 @@ class Receiver:
         self._flow = Flow()
         self._streamed_over: int | None = None
         self._transit_ns = _UNKNOWN_NS
-        self._poller = zmq.Poller()
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-        for pollable in (*(item for link in links for item in link.pollables), self._wake_read):
-            self._poller.register(pollable, zmq.POLLIN)
+        self._waiter = Waiter([*(item for link in links for item in link.pollables), self._wake_read])
         self._stopping = False
         self._later_ns = 0
         self._settled = False
@@ -180,7 +177,7 @@ class Receiver:
         self._handle(farewell, now.monotonic_ns())
         deadline_ns = now.monotonic_ns() + _FAREWELL_NS
         while farewell and not self._settled and (left_ns := deadline_ns - now.monotonic_ns()) > 0:
-            self._poller.poll(left_ns // 1_000_000 + 1)
+            self._waiter.wait(left_ns // 1_000_000 + 1)
             self._receive()
 
     def _receive(self) -> None:
@@ -194,10 +191,10 @@ class Receiver:
         links_due_ns = min(link.due_ns for link in self._links)
         due_ns = min(self._session.due_ns, links_due_ns)
         wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
-        ready = self._poller.poll(wait_ms)
+        ready = self._waiter.wait(wait_ms)
         if ready or now.monotonic_ns() >= links_due_ns:
             self._receive()
-            if any(item == self._wake_read for item, _ in ready):
+            if self._wake_read in ready:
                 os.read(self._wake_read, 4096)
         now_ns = now.monotonic_ns()
         if now_ns >= self._session.due_ns:

@@ -70,7 +70,7 @@ class Link(Protocol):
 
     @property
     def pollables(self) -> Sequence[Any]:
-        """Sockets or file descriptors to wait on with a zmq.Poller; readable means that `receive` has something."""
+        """Sockets or file descriptors to wait on with a Waiter; readable means that `receive` has something."""
 
     @property
     def due_ns(self) -> int:
