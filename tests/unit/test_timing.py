@@ -189,8 +189,10 @@ def test_a_lamp_that_says_too_little_is_named(switches: int, words: str) -> None
 
 # A scene.
 
+FRAMES = 33
 
-def moving(amplitude_m: tuple[float, float, float], spin_rad_s: float = 0.3) -> Scene:
+
+def moving(amplitude_m: tuple[float, float, float], spin_rad_s: float) -> Scene:
     """The demo's scene with a cube and a ball that swing and turn."""
     swing = Path(amplitude_m, (0.5, 0.0, 0.0), 1.6, (0.0, 1.0, 0.0), spin_rad_s)
     base = demo_scene()
@@ -199,28 +201,34 @@ def moving(amplitude_m: tuple[float, float, float], spin_rad_s: float = 0.3) -> 
     return Scene(tuple(bodies), base.light)
 
 
-def film_scene(scene: Scene, offset_s: float, board_side: Side, frames: int) -> Measured:
-    """Film a scene with the demo's rig; the host's stamps are late by `offset_s`, and it exposes 9 ms after the board."""
-    rig = replace(unlike_rig(), board_side=board_side)
+@cache
+def rendered(amplitude_m: tuple[float, float, float], spin_rad_s: float) -> dict[Side, list[tuple[float, Image]]]:
+    """The scene as both cameras of the demo's rig see it, with the moments; the right one exposes 9 ms after the left."""
+    rig, scene = unlike_rig(), moving(amplitude_m, spin_rad_s)
+    views = zip(Side, (rig.left, rig.right), rig_poses(rig), (WEBCAM_LOOK, PHONE_LOOK), strict=True)
+    film = {}
+    for side, camera, pose, look in views:
+        renderer = Renderer(scene, camera, pose, look)
+        moments = [k / 30 + (0.009 if side is Side.RIGHT else 0.0) for k in range(FRAMES)]
+        film[side] = [(moment, renderer.frame(moment)) for moment in moments]
+    return film
+
+
+def film_scene(film: dict[Side, list[tuple[float, Image]]], offset_s: float, board_side: Side) -> Measured:
+    """Measure the offset of two cameras of which the host's has stamps that are late."""
     images: dict[str, Image] = {}
     sides: dict[Side, list[Shot]] = {Side.LEFT: [], Side.RIGHT: []}
-    for side, camera, pose, look in zip(
-        Side, (rig.left, rig.right), rig_poses(rig), (WEBCAM_LOOK, PHONE_LOOK), strict=True
-    ):
-        renderer = Renderer(scene, camera, pose, look)
-        is_host = side is not board_side
-        for k in range(frames):
-            t_s = k / 30 + (0.009 if is_host else 0.0)
+    for side, frames in film.items():
+        late_s = offset_s if side is not board_side else 0.0
+        for k, (moment_s, image) in enumerate(frames):
             name = f"{side.value} {k}"
-            images[name] = renderer.frame(t_s)
-            late_s = offset_s if is_host else 0.0
-            image = EncodedImage(b"", PixelFormat.MJPEG, camera.width_px, camera.height_px, name)
-            sides[side].append(Shot(10**14 + round((t_s + late_s) * 1e9), image))
+            images[name] = image
+            encoded = EncodedImage(b"", PixelFormat.MJPEG, image.shape[1], image.shape[0], name)
+            sides[side].append(Shot(10**14 + round((moment_s + late_s) * 1e9), encoded))
     progress: list[float] = []
-    rectifier = Rectifier(rig)
-    found = measure_scene(
-        sides[board_side], sides[board_side.other], rectifier, lambda shot: images[shot.image.name], progress.append
-    )
+    rectifier = Rectifier(replace(unlike_rig(), board_side=board_side))
+    board, host = sides[board_side], sides[board_side.other]
+    found = measure_scene(board, host, rectifier, lambda shot: images[shot.image.name], progress.append)
     assert progress == sorted(progress)
     return found
 
@@ -228,7 +236,7 @@ def film_scene(scene: Scene, offset_s: float, board_side: Side, frames: int) -> 
 @pytest.mark.parametrize(("offset", "board_side"), [(0.013, Side.LEFT), (-0.024, Side.RIGHT)])
 def test_a_moving_scene_gives_the_offset(offset: float, board_side: Side) -> None:
     """From a rendered scene that moves up and down the known offset is found within the stated uncertainty, whichever side the board is."""
-    measured = film_scene(moving((0.05, 0.10, 0.0)), offset, board_side, 33)
+    measured = film_scene(rendered((0.05, 0.10, 0.0), 0.3), offset, board_side)
     found, doubt = offset_ms(measured)
     assert abs(found - offset * 1e3) <= doubt < 3
     best = measured.offsets_s[int(measured.misfits.argmin())]
@@ -240,5 +248,5 @@ def test_a_moving_scene_gives_the_offset(offset: float, board_side: Side) -> Non
 def test_motion_along_the_rows_is_not_enough() -> None:
     """A scene that moves sideways only says nothing of time: the error says so, with what to do."""
     with pytest.raises(DataError, match="motion up or down") as caught:
-        film_scene(moving((0.10, 0.0, 0.0), spin_rad_s=0.0), 0.01, Side.LEFT, 32)
+        film_scene(rendered((0.10, 0.0, 0.0), 0.0), 0.01, Side.LEFT)
     assert "up and down" in caught.value.remedy
