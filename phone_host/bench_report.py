@@ -1,5 +1,6 @@
 """What the delay benchmark measured, as a JSON object and as rows of tables. Pure. Every number's unit stands in its key."""
 
+import math
 import os
 import platform
 from collections.abc import Sequence
@@ -264,6 +265,9 @@ def fit_lines(analysis: Analysis) -> list[str]:
     """Each interface's latency and rate for the terminal, with their 95 % intervals."""
     lines = []
     for one in analysis.fits:
+        if math.isnan(one.fit.ns_per_byte):
+            lines.append(f"{one.interface}: frames of one size only, so latency and rate cannot be told apart")
+            continue
         name, latency, latency_reach, rate, rate_reach, *_ = fit_rows(replace(analysis, fits=(one,)))[0]
         lines.append(f"{name}: propagation = {latency} ({latency_reach}) + bytes / {rate} ({rate_reach})")
     return lines
