@@ -153,14 +153,14 @@ def test_slow_drift_is_corrected_again_and_again() -> None:
 
 @pytest.mark.parametrize(("follows", "drift"), [(False, 0.0), (True, 3000e-6)])
 def test_a_camera_that_does_not_follow_is_given_up_in_words(follows: bool, drift: float) -> None:  # noqa: FBT001
-    """A sensor that runs on through restarts, or drifts away faster than it can be steered, is left alone after four attempts, and the report says so."""
+    """A sensor that runs on through restarts, or drifts away faster than it can be steered, is left alone after six attempts, and the report says so."""
     pair = Pair(
         PhaseController(Steering.RESTART, Steering.NONE, has_phase=True), 12.0 * MS, drift=drift, follows=follows
     )
     pair.run(120, random.Random(2))
     alignment = pair.controller.alignment
     assert alignment.state is Aligning.GIVEN_UP
-    assert len(pair.corrections) == 4
+    assert len(pair.corrections) == 6
     assert "board's camera does not follow" in alignment.words
     assert "--interpolate" in alignment.words
 
