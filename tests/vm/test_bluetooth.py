@@ -57,41 +57,52 @@ def test_the_contract_on_rfcomm(radio: Guest) -> None:
 def test_pairs_over_rfcomm_and_an_adapter_that_goes_and_comes(
     serving: tuple[Guest, Webcam], film: Film, tmp_path: Path
 ) -> None:
-    """Pairs are right over RFCOMM; either adapter switched off and on again brings the same session of the same process back."""
+    """Pairs are right over RFCOMM; the adapters switched off and on again, in either order, bring the same session of the same process back."""
     guest, camera = serving
     process = guest.show("MainPID")
     far_end = ("rfcomm", HOST, BOARD, str(CHANNEL))
     with extension(guest, *far_end) as link, streaming(guest, film.right, tmp_path / "out", (), link) as stream:
         stream.more(30, "over RFCOMM")
-        for adapter in ("hci0", "hci1"):
-            _switch_off_and_on(guest, adapter, stream)
-            stream.more(10, f"after {adapter} is back")
+        # btvirt does not tell one controller that the other has gone, as a radio does after its supervision timeout, and the kernel
+        # then takes the old connection for the new one: so the two go one after the other.
+        for adapters in ("hci0 hci1", "hci1 hci0"):
+            _switch_off_and_on(guest, adapters, stream)
+            stream.more(10, f"after {adapters} came back")
         report = stream.finish(webcam_skew(camera.late_ns))
     assert len(report["sessions"]) == 1
     assert guest.show("MainPID") == process
 
 
-def _switch_off_and_on(guest: Guest, adapter: str, stream: Stream) -> None:
+def _switch_off_and_on(guest: Guest, adapters: str, stream: Stream) -> None:
     lost = stream.receiver.stderr.count("board_gone")
-    guest.sh(f"hciconfig {adapter} down")
+    guest.sh(f"for h in {adapters}; do hciconfig $h down; done")
     guest.until("StatusText", "waiting for a host", "the board gives the host up")
     until(lambda: stream.receiver.stderr.count("board_gone") > lost, "the host gives the board up")
-    guest.sh(f"until hciconfig {adapter} up; do sleep 0.2; done 2>/dev/null; hciconfig {adapter} piscan")
+    guest.sh(_SWITCH_ON)
 
 
 def test_the_record_is_published_and_published_again(package: Path) -> None:
     """With bluetoothd the channel is found by asking the board; a restarted daemon is told anew; a stopped service withdraws the record."""
-    ask = (
-        "import socket, sys; sys.path.insert(0, '/usr/lib/tandemscan'); from common.link.sdp import *; "
-        "s = socket.socket(socket.AF_BLUETOOTH, socket.SOCK_SEQPACKET, socket.BTPROTO_L2CAP); s.settimeout(20); "
-        f"s.connect(('{BOARD}', PSM)); s.send(query()); print(channel_in(s.recv(65536)))"
-    )
+    # bluetoothd may refuse one of the two, when the kernel has not put it to rest yet: the other one is asked then.
+    ask = f"""
+import socket, sys
+sys.path.insert(0, "/usr/lib/tandemscan")
+from common.link.sdp import PSM, channel_in, query
+for own, other in (("{HOST}", "{BOARD}"), ("{BOARD}", "{HOST}")):
+    asking = socket.socket(socket.AF_BLUETOOTH, socket.SOCK_SEQPACKET, socket.BTPROTO_L2CAP)
+    asking.settimeout(20)
+    asking.bind((own, 0))
+    asking.connect((other, PSM))
+    asking.send(query())
+    print(channel_in(asking.recv(65536)))
+"""
     with booted(Architecture.AMD64) as radio:
 
-        def found() -> str:
-            return radio.sh(f'timeout 30 python3 -Pc "{ask}" 2>/dev/null || echo nobody').strip()
+        def found() -> set[str]:
+            return set(radio.sh("timeout 50 python3 -P /root/ask.py 2>/dev/null || echo nobody").split())
 
         radio.sh(_AIR)
+        radio.write("/root/ask.py", ask)
         radio.install(package)
         radio.sh("mkdir /srv/frames && printf 'P5 2 2 255\nabcd' >/srv/frames/1.pgm")
         radio.configure("replay:/srv/frames?fps=10&loop=1", "rfcomm://*/7")
@@ -99,13 +110,12 @@ def test_the_record_is_published_and_published_again(package: Path) -> None:
         until(lambda: "bluetooth_record_missing" in radio.journal(), "the missing daemon is told")
         # The daemon first: it refuses an adapter that somebody else has switched on.
         radio.sh("systemctl unmask bluetooth && systemctl start bluetooth")
-        until(lambda: radio.sh("timeout 20 bluetoothctl list").count("Controller") == 2, "the daemon has both adapters")
         radio.sh(f"timeout 60 sh -c '{_SWITCH_ON}'")
-        until(lambda: found() == "7", "the channel is found by asking")
+        until(lambda: "7" in found(), "the channel is found by asking")
         radio.sh("systemctl stop board-agent")
-        until(lambda: found() == "0", "a service that has stopped is not found")
+        until(lambda: found() == {"0"}, "a service that has stopped is not found")
         radio.sh("systemctl start board-agent")
-        until(lambda: found() == "7", "the channel is found again")
+        until(lambda: "7" in found(), "the channel is found again")
         told = radio.journal().count("bluetooth_record_published")
         radio.sh("systemctl restart bluetooth")
         until(lambda: radio.journal().count("bluetooth_record_published") > told, "a restarted daemon is told")
