@@ -204,7 +204,11 @@ class HostSession:
             path.lanes[lane] = connection
         if lane is Lane.FRAMES and path.is_open:
             return self._want(path, now_ns) if path is self._wanted else []
-        outputs = self._lose(path, now_ns)
+        if path.is_open and knock.session == path.session:
+            path.heard_ns = now_ns
+            outputs: list[Output] = [*path.say_hello(self._host_id, Lane.CONTROL)]
+        else:
+            outputs = self._lose(path, now_ns)
         # A board that has lost its frames' lane says so on all others; the carrier has to answer then, or gives way.
         return outputs if self._wanted is None or self._pending else outputs + self._want(self._wanted, now_ns)
 
