@@ -1,0 +1,113 @@
+"""How long the stream pauses when the carrier is lost, and when the better link is back: `python -m tests.bench.bench_links [--help]`.
+
+Both programs over a serial cable (a pseudo terminal, 3 MB/s) and tcp or ipc, JPEGs of 5 KB at 30 per second, so that the cable is the better link. The cable is pulled so many times, or falls
+silent without a word. A pause is the time between the last frame over one link and the first over the other, as they came to the host (delays.jsonl);
+33 ms of it are the camera's period. The way back is a choice, made after the cable has proved itself for a second, and twice as long after each loss;
+its pause is what the change costs. Figures to reach for a pulled
+cable (DESIGN, section 7): median 1 s, p95 2 s; a silent one is known as lost after 1.5 s.
+"""
+
+import argparse
+import statistics
+import tempfile
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from tests.bench.machine import machine
+from tests.support.numbered import write_film
+from tests.support.programs import board, free_port, host, ledgers, lines, until
+from tests.support.pty_line import PtyLine
+
+_FPS = 30
+
+
+def main() -> None:
+    """Measure and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--losses", type=int, default=3, help="how often the cable is lost in each way (default 3)")
+    options = parser.parse_args()
+    print(machine())
+    print(
+        f"{'cable':>8} {'other':>6} {'to the other, ms: p50':>22} {'max':>8} {'back, ms: p50':>14} {'max':>8} {'lost a switch':>14}"
+    )
+    for way in ("pulled", "silent"):
+        for other in ("tcp", "ipc"):
+            with tempfile.TemporaryDirectory() as folder:
+                there_ms, back_ms, lost = measure(Path(folder), way, other, options.losses)
+            row = [statistics.median(there_ms), max(there_ms), statistics.median(back_ms), max(back_ms)]
+            print(f"{way:>8} {other:>6} {row[0]:22.0f} {row[1]:8.0f} {row[2]:14.0f} {row[3]:8.0f} {lost:14.1f}")
+
+
+def measure(folder: Path, way: str, other: str, losses: int) -> tuple[list[float], list[float], float]:
+    """Lose the cable and give it back.
+
+    Args:
+        folder: for the run.
+        way: `pulled` or `silent`.
+        other: kind of the other link.
+        losses: how often.
+
+    Returns:
+        Pauses at the loss and at the return, ms, and frames lost a switch.
+    """
+    film = write_film(folder / "film", 300)
+    camera = ["--camera", f"replay:{film}?fps={_FPS}&loop=1"]
+    address = f"tcp://127.0.0.1:{free_port()}" if other == "tcp" else f"ipc://{folder}/link"
+    out = folder / "out"
+    with PtyLine(folder, bytes_per_s=3e6, delay_ns=300_000) as cable:
+        links = [["--link", uri, "--link", address] for uri in cable.uris]
+        run = ["run", *camera, "--json"]
+        with (
+            board([*run, *links[0]], folder),
+            host([*run, *links[1], "--out", str(out), "--save-every", "0"], folder) as receiver,
+        ):
+            _wait(out, "serial", 30)
+            for _ in range(losses):
+                mend = _lose(cable, way)
+                _wait(out, other, 30)
+                mend()
+                _wait(out, "serial", 30)
+            receiver.stop()
+        report = receiver.json()
+        kept = ledgers(out)
+    changes = [(a, b) for a, b in pairwise(kept) if a["link"] != b["link"]]
+    there = [_pause_ms(a, b) for a, b in changes if b["link"] == other]
+    back = [_pause_ms(a, b) for a, b in changes if b["link"] == "serial"]
+    lost = sum(session["lost"] for session in report["sessions"]) / max(1, report["switches"])
+    return there, back, lost
+
+
+def _pause_ms(before: dict[str, Any], after: dict[str, Any]) -> float:
+    return float(after["received_ns"] - before["received_ns"]) / 1e6
+
+
+def _lose(cable: PtyLine, way: str) -> Callable[[], None]:
+    """Lose the cable; gives what brings it back."""
+    if way == "pulled":
+        cable.pull()
+        return cable.plug
+    for direction in cable.ways:
+        direction.spoil = lambda _: b""
+
+    def mend() -> None:
+        for direction in cable.ways:
+            direction.spoil = bytes
+
+    return mend
+
+
+def _wait(out: Path, link: str, pairs: int) -> None:
+    """Wait for so many pairs in a row over a link."""
+
+    def came() -> bool:
+        if lines(out / "delays.jsonl") < pairs:
+            return False
+        return all(ledger["link"] == link for ledger in ledgers(out)[-pairs:])
+
+    until(came, f"{pairs} pairs over {link}")
+
+
+if __name__ == "__main__":
+    main()
