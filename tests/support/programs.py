@@ -1,6 +1,7 @@
 """The real programs as child processes: started, watched by condition, stopped by their own pid."""
 
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -21,7 +22,10 @@ class Program:
         self.out = folder / f"{name}.out"
         self.err = folder / f"{name}.err"
         with self.out.open("wb") as out, self.err.open("wb") as err:
-            self.process = subprocess.Popen([sys.executable, "-P", "-m", module, *arguments], stdout=out, stderr=err)
+            # What a program remembers between its lives stays in the test's own folder, too.
+            environment = {**os.environ, "XDG_CONFIG_HOME": str(folder / "config")}
+            command = [sys.executable, "-P", "-m", module, *arguments]
+            self.process = subprocess.Popen(command, stdout=out, stderr=err, env=environment)
 
     @property
     def stderr(self) -> str:
