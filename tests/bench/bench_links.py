@@ -1,10 +1,10 @@
 """How long the stream pauses when the carrier is lost, and when the better link is back: `python -m tests.bench.bench_links [--help]`.
 
-Both programs over a serial cable (a pseudo terminal, 3 MB/s) and tcp or ipc, JPEGs of 5 KB at 30 per second, so that the cable is the better link. The cable is pulled so many times, or falls
-silent without a word. A pause is the time between the last frame over one link and the first over the other, as they came to the host (delays.jsonl);
-33 ms of it are the camera's period. The way back is a choice, made after the cable has proved itself for a second, and twice as long after each loss;
-its pause is what the change costs. Figures to reach for a pulled
-cable (DESIGN, section 7): median 1 s, p95 2 s; a silent one is known as lost after 1.5 s.
+Both programs over a serial cable (a pseudo terminal, 3 MB/s) and tcp or ipc, JPEGs of 5 KB at 30 per second, so that the cable is the better link.
+The cable is pulled so many times, or falls silent without a word. A pause is the time between the last frame over one link and the first over the
+other, as they came to the host (delays.jsonl); 33 ms of it are the camera's period. The way back is a choice, made after the cable has proved
+itself for a second, and for twice as long after each loss; its pause is what the change costs. Figures to reach for a pulled cable (DESIGN, section
+7): median 1 s, p95 2 s; a silent one is known as lost after 1.5 s.
 """
 
 import argparse
