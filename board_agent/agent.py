@@ -16,6 +16,7 @@ from common.camera.factory import open_camera
 from common.errors import ProtocolError, UnavailableError
 from common.frame import Frame
 from common.link.base import Broken, Garbage, Link, Packet, SendResult
+from common.link.several import SeveralLinks
 from common.link.wait import Waiter
 from common.logs import event
 from common.protocol.board_session import BoardSession
@@ -137,6 +138,7 @@ class Agent:
         self._alone_since_ns = now.monotonic_ns()
         self._camera = camera
         self._links = links
+        self._several = SeveralLinks(links)
         self._wake = wake
         self._on_demand = camera.description.pacing is Pacing.DEMAND
         self._outbox = Outbox()
@@ -208,9 +210,8 @@ class Agent:
 
     def _receive(self) -> None:
         """Take all packets."""
-        for index, link in enumerate(self._links):
-            for incoming in link.receive():
-                self._take(index, incoming)
+        for index, incoming in self._several.receive():
+            self._take(index, incoming)
 
     def _watch_camera(self) -> None:
         """Wait on the camera's descriptor, which changes when a device is lost and comes back."""

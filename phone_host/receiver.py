@@ -11,6 +11,7 @@ from typing import Final, Protocol
 from common import now
 from common.errors import ProtocolError, UnavailableError
 from common.link.base import Broken, Garbage, Incoming, Link, Packet
+from common.link.several import SeveralLinks
 from common.link.wait import Waiter
 from common.logs import event
 from common.protocol.host_session import HostSession
@@ -81,6 +82,7 @@ class Receiver:
 
     def __init__(self, links: Sequence[Link], host_id: str, queue: PairQueue, listener: BoardListener) -> None:
         self._links = tuple(links)
+        self._several = SeveralLinks(links)
         self._queue = queue
         self._listener = listener
         dialled = [
@@ -182,9 +184,8 @@ class Receiver:
 
     def _receive(self) -> None:
         """Take all that has come."""
-        for number, link in enumerate(self._links):
-            for incoming in link.receive():
-                self._take(number, incoming, now.monotonic_ns())
+        for number, incoming in self._several.receive():
+            self._take(number, incoming, now.monotonic_ns())
 
     def _step(self) -> None:
         now_ns = now.monotonic_ns()
