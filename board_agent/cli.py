@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from board_agent.sd_notify import Notifier
-from board_agent.settings import ENVIRONMENT_PREFIX, BoardSettings, key_folder
+from board_agent.settings import ENVIRONMENT_PREFIX, SERVICE_SETTINGS, BoardSettings, key_folder
 from board_agent.status import StatusLine
 from common import logs, now
 from common.camera.base import CameraHealth, health_values
 from common.camera.factory import EXAMPLE, open_camera, parse_camera
 from common.commandline import INTERRUPTED, ExamplesFirstParser, run_command
 from common.errors import SettingsError
-from common.keys import change
+from common.keys import KeyFolder, change
 from common.keys import listing as keys_listing
 from common.link.factory import open_links, parse_link, tell_insecure
 from common.protocol.message import BoardCounts
@@ -102,7 +102,7 @@ def _add_keys_options(keys: argparse.ArgumentParser, pair: argparse.ArgumentPars
 
 
 def _keys(options: argparse.Namespace) -> int:
-    folder = key_folder(_resolve(options).values.keys)
+    folder = _key_folder(options)
     change(folder, forget=options.forget, new=options.new, add=options.add, address="", when=now.wall_time())
     print(keys_listing(folder, as_json=options.json))
     if options.new:
@@ -116,7 +116,7 @@ def _pair(options: argparse.Namespace) -> int:
     if not 0 < options.seconds < _LONGEST_IDLE_S:
         raise SettingsError(f"--seconds {options.seconds:g}", "give seconds, more than 0")
     name = ""
-    for state in follow(key_folder(_resolve(options).values.keys), options.seconds):
+    for state in follow(_key_folder(options), options.seconds):
         name = state.paired
         if state.code and not name:
             asks = f"{state.asking} asks; " if state.asking else ""
@@ -125,6 +125,13 @@ def _pair(options: argparse.Namespace) -> int:
             )
     print(json.dumps({"paired": name}) if options.json else f"paired with {name}")
     return 0
+
+
+def _key_folder(options: argparse.Namespace) -> KeyFolder:
+    """The folder of whoever is meant; without any choice that of the service, where it is installed."""
+    if not (options.config or options.keys) and SERVICE_SETTINGS.is_file():
+        options.config = SERVICE_SETTINGS
+    return key_folder(_resolve(options).values.keys)
 
 
 def _resolve(options: argparse.Namespace) -> Resolved[BoardSettings]:
@@ -165,7 +172,7 @@ def _cameras(options: argparse.Namespace) -> int:
 
 def _doctor(options: argparse.Namespace) -> int:
     """Check what `run` would use; without any choice that is what the service uses, where it is installed."""
-    from board_agent.doctor import SERVICE_SETTINGS, examine  # noqa: PLC0415 - needed by this verb alone
+    from board_agent.doctor import examine  # noqa: PLC0415 - needed by this verb alone
     from common.doctor.finding import exit_code, table, values  # noqa: PLC0415
 
     if not (options.config or options.camera or options.link) and SERVICE_SETTINGS.is_file():

@@ -3,16 +3,18 @@
 from pathlib import Path
 from typing import Final
 
-from board_agent.settings import BoardSettings
+from board_agent.settings import BoardSettings, key_folder
 from common.doctor import machine
 from common.doctor.camera_probe import examine_camera
 from common.doctor.finding import Finding, fail, ok
+from common.doctor.key_checks import check_keys
 from common.doctor.link_probe import examine_link
 from common.doctor.machine_checks import check_clocks, check_disk, check_power, check_usb_log
 from common.doctor.unit_check import check_unit
+from common.keys import SERVICE_FOLDER, KeyFolder
+from common.link.factory import needs_keys, parse_link
 
 UNIT: Final = "board-agent"
-SERVICE_SETTINGS: Final = Path("/etc/tandemscan/board-agent.toml")
 _LOG_FOLDERS: Final = (Path("/var/log/journal"), Path("/run/log/journal"))
 
 
@@ -41,6 +43,9 @@ def examine(settings: BoardSettings, file: Path | None) -> list[Finding]:
         )
     for uri in settings.link:
         findings += examine_link(uri, user, unit, listens_by_default=True)
+    if any(needs_keys(parse_link(uri, listens_by_default=True)) for uri in settings.link):
+        is_service = account is not None and not settings.keys
+        findings.append(check_keys(KeyFolder(SERVICE_FOLDER) if is_service else key_folder(settings.keys), user))
     log = machine.read_kernel_log()
     findings += check_clocks(machine.read_clocks(Path(__file__).parent))
     folders = [Path("/"), *(folder for folder in _LOG_FOLDERS if folder.is_dir())]

@@ -3,11 +3,15 @@
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from common.keys import KeyFolder, default_folder
 from common.settings import setting
 
 ENVIRONMENT_PREFIX = "BOARD_AGENT"
+
+SERVICE_SETTINGS: Final = Path("/etc/tandemscan/board-agent.toml")
+"""What the package's service is run with."""
 
 
 @dataclass(frozen=True, slots=True)

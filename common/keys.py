@@ -69,6 +69,11 @@ class KeyFolder:
     def __init__(self, path: Path) -> None:
         self.path = path
 
+    @property
+    def has_key(self) -> bool:
+        """Whether a key was made already."""
+        return _exists(self.path / _KEY_FILE)
+
     def own(self) -> OwnKey:
         """Give this machine's keys; makes them when there are none.
 

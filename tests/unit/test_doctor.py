@@ -1,7 +1,9 @@
 """The doctor's verdicts: each reading gives the finding that a person would give, with a remedy wherever something is wrong."""
 
+import os
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -22,6 +24,7 @@ from common.doctor.camera_checks import (
     check_taken,
 )
 from common.doctor.finding import Finding, Verdict, exit_code, fail, ok, table, values, warn
+from common.doctor.key_checks import check_keys
 from common.doctor.link_checks import LinkReadings, check_link
 from common.doctor.machine_checks import (
     Bluetooth,
@@ -39,6 +42,7 @@ from common.doctor.machine_checks import (
 )
 from common.doctor.unit_check import Unit, check_unit
 from common.frame import PixelFormat
+from common.keys import KeyFolder, Peer
 
 OK, WARN, FAIL = Verdict.OK, Verdict.WARN, Verdict.FAIL
 SERVICE = Account("tandemscan", 995, frozenset({995, 44, 20}), is_me=False)
@@ -342,3 +346,26 @@ def test_exit_code_and_counts_agree(drawn: list[tuple[Verdict, str]]) -> None:
     """Exit 4 exactly when the object counts a failed check."""
     findings = [Finding("x", verdict, text) for verdict, text in drawn]
     assert (exit_code(findings) == 4) is (values(findings)["failed"] > 0)
+
+
+def test_keys_are_judged_without_making_any(tmp_path: Path) -> None:
+    """No folder and no host warn, a host is named, files of others and open ones fail; an absent key is not made by looking."""
+    me = Account("me", os.geteuid(), frozenset(), is_me=True)
+    folder = KeyFolder(tmp_path / "keys")
+    assert check_keys(folder, me).verdict is Verdict.WARN
+    assert not folder.path.exists()
+    folder.path.mkdir(mode=0o700)
+    assert check_keys(folder, me).verdict is Verdict.WARN
+    assert not list(folder.path.iterdir())
+    own = folder.own()
+    folder.add(Peer("phone", own.public, ""))
+    known = check_keys(folder, me)
+    assert known.verdict is Verdict.OK
+    assert "phone" in known.text
+    stranger = check_keys(folder, replace(me, name="tandemscan", uid=os.geteuid() + 1))
+    assert stranger.verdict is Verdict.FAIL
+    assert "chown -R tandemscan" in stranger.remedy
+    (folder.path / "key").chmod(0o644)
+    opened = check_keys(folder, me)
+    assert opened.verdict is Verdict.FAIL
+    assert "chmod 600" in opened.remedy

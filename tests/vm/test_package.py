@@ -80,6 +80,17 @@ def test_the_launcher_ignores_a_foreign_common(installed: Guest) -> None:
     installed.sh("rm -r /tmp/x")
 
 
+def test_keys_are_those_of_the_service(installed: Guest) -> None:
+    """Without options `keys` shows the folder that the service's settings name."""
+    settings = "/etc/tandemscan/board-agent.toml"
+    installed.sh(f"cp -p {settings} /root/good && sed -i 's,^keys = .*,keys = \"/run/other\",' {settings}")
+    try:
+        shown = json.loads(installed.sh("board-agent keys --json"))
+    finally:
+        installed.sh(f"mv /root/good {settings}; rm -rf /run/other")
+    assert shown["folder"] == "/run/other"
+
+
 def test_byte_code_is_compiled_on_installation(installed: Guest) -> None:
     """Each module has its byte code, because the service itself may not write any."""
     assert installed.sh("find /usr/lib/tandemscan -name '*.py' | wc -l") == installed.sh(

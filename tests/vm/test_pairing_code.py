@@ -85,6 +85,10 @@ def check_state(guest: Guest, public: str) -> None:
     shown = json.loads(guest.sh("board-agent keys --json"))
     assert shown["folder"] == STATE
     assert [peer["key"] for peer in shown["peers"]] == [public]
+    checks = json.loads(guest.sh("board-agent doctor --json || true"))["checks"]
+    assert [(check["verdict"], check["finding"]) for check in checks if check["what"] == "keys"] == [
+        ("ok", f"{STATE} knows {shown['peers'][0]['name']}")
+    ]
 
 
 def test_the_owner_pairs_on_the_boards_terminal(guest: Guest, webcam: Webcam) -> None:

@@ -1,0 +1,37 @@
+"""The folder of keys of links that other machines reach: may its user read it, and does it know anybody. Nothing is made or changed."""
+
+from common.doctor.access import Account
+from common.doctor.finding import Finding, fail, ok, warn
+from common.errors import TandemError
+from common.keys import KeyFolder
+
+
+def check_keys(folder: KeyFolder, account: Account) -> Finding:  # noqa: PLR0911 - one for each state of the folder
+    """Judge a board's folder of keys.
+
+    Args:
+        folder: of this machine's key and of those that may connect.
+        account: who is to read it.
+    """
+    path = folder.path
+    try:
+        if not path.exists():
+            return warn("keys", f"{path} is not there yet, so nobody is known", "start the agent, then pair a host")
+        # Files of keys are for their owner only, so whoever is to read them must own them; root may read all.
+        owners = {item.name: item.stat().st_uid for item in path.iterdir() if item.is_file()}
+        if folder.has_key:
+            folder.own()
+        peers = folder.peers()
+    except PermissionError:
+        return warn("keys", f"{path} may not be read", "ask again as root: sudo")
+    except OSError as error:
+        return fail("keys", f"{path} cannot be used ({error.strerror})", "name another folder with --keys")
+    except TandemError as error:
+        return fail("keys", error.problem, error.remedy)
+    foreign = sorted(name for name, uid in owners.items() if uid != account.uid)
+    if foreign and account.uid != 0:
+        problem = f"{', '.join(foreign)} in {path} may not be read by user {account.name}"
+        return fail("keys", problem, f"sudo chown -R {account.name}: {path}")
+    if not peers:
+        return warn("keys", f"{path} knows no host yet", "run phone-host pair on the host; the journal shows the code")
+    return ok("keys", f"{path} knows {', '.join(peer.name for peer in peers)}")
