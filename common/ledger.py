@@ -10,14 +10,14 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True, slots=True)
 class StageTimes:
-    """How long each stage of processing took, ns; together at most the processing delay."""
+    """How long each stage of processing took, ns, in the order in which they run; together at most the processing delay."""
 
     decode: int = 0
+    interpolate: int = 0
     rectify: int = 0
     match: int = 0
     reproject: int = 0
     write: int = 0
-    interpolate: int = 0
 
 
 @dataclass(frozen=True, slots=True)

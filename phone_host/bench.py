@@ -5,6 +5,7 @@ one. The first second of a run (`WARM_UP_S`) is left out of its statistics: cach
 of the whole run.
 """
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -51,8 +52,9 @@ class CaseResult:
     Attributes:
         case: which.
         ledgers: of the pairs after the warm-up, in the order in which they were done.
-        measured_s: from the end of the warm-up to the last pair, s.
-        bound_ns: of the clock estimate at the run's end, hard; NaN without one.
+        measured_s: from the last pair of the warm-up to the last pair, s; 0 without pairs after it.
+        uncertainty_ns: of the clock estimate at the run's end; NaN without one.
+        bound_ns: of the same estimate, hard; never smaller.
         board: the board's account of the whole run.
         link: the receiver's account of it.
         counts: of frames and pairs on the host.
@@ -64,6 +66,7 @@ class CaseResult:
     case: Case
     ledgers: tuple[PairLedger, ...]
     measured_s: float
+    uncertainty_ns: float
     bound_ns: float
     board: BoardAccount
     link: LinkAccount
@@ -176,9 +179,10 @@ def run_case(
             return None
         board, relay = ends.stop(host.receiver.account)
     estimate = host.receiver.estimate
-    bound_ns = float(estimate.bound_ns) if estimate is not None else float("nan")
+    uncertainty_ns = float("nan") if estimate is None else float(estimate.uncertainty_ns)
+    bound_ns = float("nan") if estimate is None else float(estimate.bound_ns)
     accounts = (host.receiver.account, host.queue.counts, host.processed, host.undecodable, relay)
-    return CaseResult(case, kept, measured_s, bound_ns, board, *accounts)
+    return CaseResult(case, kept, measured_s, uncertainty_ns, bound_ns, board, *accounts)
 
 
 def _finished(host: Host, ends: Ends, seconds: float, stop: Callable[[], bool]) -> Callable[[], bool]:
@@ -202,12 +206,13 @@ def after_warm_up(ledgers: Sequence[PairLedger]) -> tuple[tuple[PairLedger, ...]
         ledgers: of a run, in the order in which they were done.
 
     Returns:
-        The pairs done later, and the time from the end of the warm-up to the last of them, s.
+        The pairs done later, and the time from the last pair of the warm-up to the last of them, s: as many intervals as pairs.
     """
     if not ledgers:
         return (), 0.0
-    begin_ns = ledgers[0].done_ns + round(WARM_UP_S * 1e9)
-    return tuple(ledger for ledger in ledgers if ledger.done_ns > begin_ns), (ledgers[-1].done_ns - begin_ns) / 1e9
+    end_ns = ledgers[0].done_ns + round(WARM_UP_S * 1e9)
+    first = bisect_right(ledgers, end_ns, key=lambda ledger: ledger.done_ns)
+    return tuple(ledgers[first:]), (ledgers[-1].done_ns - ledgers[first - 1].done_ns) / 1e9
 
 
 def _core(size: Size, matcher: MatcherName) -> StereoCore:

@@ -120,7 +120,7 @@ def _method(results: Sequence[CaseResult], under: Conditions) -> str:
 def _glance(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> str:
     missing = "".join(f"<li>{escape(str(one))} was not run: {escape(reason)}</li>" for one, reason in under.not_run)
     content = _table(FIT_COLUMNS, fit_rows(analysis)) + (f"<ul>{missing}</ul>" if missing else "")
-    words = f"{len(results)} runs. Propagation = latency + bytes / rate; the clock's uncertainty is the 95th percentile of the worst run."
+    words = f"{len(results)} runs. Propagation = latency + bytes / rate; the clock's uncertainty and its hard bound are those at the end of the run that knew it worst."
     return section("The interfaces", words, content)
 
 

@@ -149,6 +149,7 @@ def _run(result: CaseResult) -> dict[str, object]:
         "stages": {name: _spread(statistics.spread(name)) for name in STAGES},
         "time_skew": _spread(statistics.spread("time_skew")),
         "clock_uncertainty": {f"{key}_us": _number(value / 1e3) for key, value in _percentiles(uncertainty).items()},
+        "clock_uncertainty_at_end_us": _number(result.uncertainty_ns / 1e3),
         "clock_bound_at_end_us": _number(result.bound_ns / 1e3),
         "whole_run": _counts(result),
         "line": None if result.relay is None else asdict(result.relay),
@@ -196,10 +197,19 @@ def _number(value: float) -> float | None:
 
 
 def summary_line(result: CaseResult) -> str:
-    """Rate, losses and clock of one run in a line."""
+    """Pairs, rate, losses and clock of one run in a line; uncertainty and bound of the clock are of one moment, so the bound is the wider."""
     lost = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in losses(result).items()) or "nothing"
-    uncertainty_us = statistics_of(result).spread("uncertainty").p95_ns / 1e3
-    return f"{result.pairs_per_second:.1f} pairs/s, clock +-{uncertainty_us:.0f} us (p95; +-{result.bound_ns / 1e3:.0f} us whatever the link does), whole run lost: {lost}"
+    if result.ledgers:
+        worst_us = statistics_of(result).spread("uncertainty").p95_ns / 1e3
+        pairs = f"{len(result.ledgers)} pairs, {result.pairs_per_second:.1f}/s, clock of the pairs +-{worst_us:.0f} us (p95)"
+    else:
+        pairs = "no pairs"
+    at_end = (
+        "clock not known at the end"
+        if math.isnan(result.bound_ns)
+        else f"at the end +-{result.uncertainty_ns / 1e3:.0f} us (+-{result.bound_ns / 1e3:.0f} us whatever the link does)"
+    )
+    return f"{pairs}, {at_end}, whole run lost: {lost}"
 
 
 def rate_text(bytes_per_s: float) -> str:
@@ -214,8 +224,7 @@ def fit_rows(analysis: Analysis) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for one in analysis.fits:
         fit = one.fit
-        uncertainty_ns = max(statistics_of(result).spread("uncertainty").p95_ns for result in one.results)
-        bound_ns = max(result.bound_ns for result in one.results)
+        worst = max(one.results, key=lambda result: result.uncertainty_ns)
         lost = sum(account.lost for result in one.results for account in result.link.sessions)
         sent = sum(result.board.sent for result in one.results)
         rows.append(
@@ -227,8 +236,8 @@ def fit_rows(analysis: Analysis) -> list[tuple[str, ...]]:
                 f"{rate_text(fit.least_bytes_per_s)} to {rate_text(fit.most_bytes_per_s)}",
                 duration_text(fit.typical_error_ns),
                 f"{fit.points}",
-                f"\u00b1{duration_text(uncertainty_ns)}",
-                f"\u00b1{duration_text(bound_ns)}",
+                f"\u00b1{duration_text(worst.uncertainty_ns)}",
+                f"\u00b1{duration_text(worst.bound_ns)}",
                 f"{lost} of {sent}",
             )
         )

@@ -3,7 +3,7 @@
 import logging
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
 from typing import Final
@@ -353,7 +353,7 @@ class Host:
     def _ledger(
         self, pair: FramePair, processed: Processed, dequeued_ns: int, before_write_ns: int, done_ns: int
     ) -> PairLedger:
-        board, stages = pair.board, processed.stages
+        board = pair.board
         return PairLedger(
             session=board.message.session,
             sequence=board.message.sequence,
@@ -367,14 +367,7 @@ class Host:
             dequeued_ns=dequeued_ns,
             done_ns=done_ns,
             previous_done_ns=self.last_done_ns or pair.queued_ns,
-            stages=type(stages)(
-                stages.decode,
-                stages.rectify,
-                stages.match,
-                stages.reproject,
-                done_ns - before_write_ns,
-                stages.interpolate,
-            ),
+            stages=replace(processed.stages, write=done_ns - before_write_ns),
             time_skew_ns=pair.time_skew_ns,
             offset_ns=board.offset_ns,
             uncertainty_ns=board.uncertainty_ns,

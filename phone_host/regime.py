@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
+from phone_host.sync.fifo import Overflow
+
 _BUSY: Final = 0.9
 """From this share of its time on the processor counts as the bottleneck: with random arrivals a queue's length grows as 1 / (1 - share)."""
 
@@ -44,6 +46,7 @@ class RunFigures:
         offered: pairs formed, for each that was processed.
         frame_bytes: length of a board frame.
         propagation_ns: of a board frame.
+        overflow: of the FIFO; with `block` the board is held back, so what is offered says nothing about what could be.
     """
 
     pairs: int
@@ -56,6 +59,7 @@ class RunFigures:
     offered: float
     frame_bytes: float
     propagation_ns: float
+    overflow: Overflow = Overflow.DROP_OLDEST
 
     @property
     def busy(self) -> float:
@@ -116,7 +120,7 @@ def _starved_by_link(figures: RunFigures, waits: str) -> Judgement:
     scale = math.sqrt(figures.period_ns / figures.arrival_ns)
     how = f"(about {100 * scale:.0f} % of width and height, or a lower JPEG quality)"
     remedies = (
-        f"smaller frames: {fitting_bytes / 1000:.1f} instead of {figures.frame_bytes / 1000:.1f} KB would bring them all {how}",
+        f"smaller frames: {fitting_bytes / 1000:.1f} instead of {figures.frame_bytes / 1000:.1f} kB would bring them all {how}",
         f"another link: it would have to carry {wanted_bytes / 1e6:.2f} MB/s, this one carries {rate_bytes / 1e6:.2f}",
         f"fewer frames asked of the camera (fps={_rate(figures.arrival_ns)}): no more pairs, but none dropped on the board",
     )
@@ -125,13 +129,17 @@ def _starved_by_link(figures: RunFigures, waits: str) -> Judgement:
 
 def _backlog(figures: RunFigures) -> Judgement:
     """Processing is slower than arrival."""
-    arrival_ns = min(figures.arrival_ns, figures.period_ns or figures.arrival_ns)
+    # Never more often than the cameras show images: the ends of a short run make it seem so.
+    arrival_ns = max(figures.arrival_ns, figures.period_ns)
+    if figures.overflow is Overflow.BLOCK and figures.period_ns:
+        arrival_ns = figures.period_ns
+    scale = _fitting_scale(figures, arrival_ns)
+    others = "the others wait in the FIFO or are dropped" if scale < 1 else "it just keeps up"
     text = (
         f"the processor is busy for {100 * figures.busy:.0f} % of the time: {_ms(figures.processing_ns)} ms of work for each pair, "
-        f"while {_rate(arrival_ns)} a second are offered; the others wait in the FIFO or are dropped"
+        f"while {_rate(arrival_ns)} a second are offered; {others}"
     )
     remedies = []
-    scale = _fitting_scale(figures, arrival_ns)
     if scale < 1:
         remedies.append(
             f"smaller images: {100 * scale:.0f} % of width and height would do "

@@ -168,9 +168,8 @@ def age_bound(facts: RunFacts) -> str:
 
 def summary(facts: RunFacts) -> str:
     """Say in a few lines what the run was."""
-    lines = [
-        f"{facts.processed} pairs in {facts.seconds:.1f} s ({facts.pairs_per_second:.1f} /s), ended: {facts.ended.replace('_', ' ')}"
-    ]
+    rate = "" if math.isnan(facts.pairs_per_second) else f" in {facts.seconds:.1f} s ({facts.pairs_per_second:.1f} /s)"
+    lines = [f"{facts.processed} pairs{rate}, ended: {facts.ended.replace('_', ' ')}"]
     if facts.processed:
         lines.append(f"{'delay, ms':14} {'p50':>9} {'p95':>9} {'p99':>9} {'max':>9}")
         for name in DELAYS:
@@ -302,6 +301,7 @@ def figures(facts: RunFacts) -> RunFigures:
         offered=counts.paired / processed if processed else 1.0,
         frame_bytes=delays.frame_bytes,
         propagation_ns=delays.spread("propagation").mean_ns,
+        overflow=facts.fifo.overflow,
     )
 
 

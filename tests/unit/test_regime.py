@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phone_host.regime import Judgement, Regime, RunFigures, judge
+from phone_host.sync.fifo import Overflow
 
 MS = 1_000_000
 NAN = float("nan")
@@ -57,6 +58,28 @@ def test_a_slow_processor_has_a_backlog() -> None:
     assert 80 * share**3 + 20 * share**2 == pytest.approx(100 / 3, rel=0.03)  # the share is told in whole per cent
     assert numbers(matcher) == [pytest.approx(100 / 3 - 20, abs=0.05), 80.0]
     assert "fps=10" in fewer
+
+
+def test_a_backlog_behind_a_slow_link_names_what_the_link_brings() -> None:
+    """Cameras show 30 a second, the link brings 15, each takes 100 ms: 15 are offered, and a matcher must get by with 66.7 ms."""
+    run = figures(period_ms=100 / 3, arrival_ms=200 / 3, processing_ms=100, match_ms=80)
+    judgement = judge(run)
+    assert judgement.regime is Regime.BACKLOG
+    assert "while 15 a second are offered" in judgement.sentence
+    assert numbers(judgement.remedies[1])[0] == pytest.approx(200 / 3 - 20, abs=0.05)
+
+
+def test_a_fifo_that_blocks_hides_what_the_cameras_offer() -> None:
+    """With `block` the board sends no more than is taken: what the processor misses is told from the cameras' rate."""
+    run = replace(figures(period_ms=100 / 3, arrival_ms=100, processing_ms=100), overflow=Overflow.BLOCK)
+    assert "while 30 a second are offered" in judge(run).sentence
+
+
+def test_a_processor_that_just_keeps_up_is_not_said_to_drop() -> None:
+    """95 ms of work for a pair every 100 ms: it is busy, and nothing waits for good."""
+    judgement = judge(figures(period_ms=100, arrival_ms=100, processing_ms=95))
+    assert judgement.regime is Regime.BACKLOG
+    assert "dropped" not in judgement.sentence
 
 
 def test_a_processor_that_keeps_up_waits_for_the_cameras() -> None:

@@ -87,7 +87,7 @@ def ledger(number: int, delays_ms: tuple[int, ...] = (1, 2, 3, 4, 5, 20), start_
     """A pair's ledger with the six delays given in ms."""
     marks = np.cumsum([start_ms, *delays_ms]) * 1_000_000
     exposed, grabbed, sent, received, queued, dequeued, done = (int(mark) for mark in marks)
-    stages = StageTimes(1_000_000, 2_000_000, 10_000_000, 3_000_000, 4_000_000)
+    stages = StageTimes(1_000_000, 0, 2_000_000, 10_000_000, 3_000_000, 4_000_000)
     board = BoardMarks(exposed, grabbed, sent)
     return PairLedger(
         "s", number, number, 1, "tcp", board, received, received, queued, dequeued, done, queued, stages, -7000, 0, 9000
@@ -199,7 +199,7 @@ def test_series_hold_what_the_ledgers_say() -> None:
     assert series.end_to_end.values_ns.tolist() == [35e6, 46e6]
     # Done at 35 ms and at 40 + 46 ms.
     assert series.time_s == pytest.approx([0.0, 0.051])
-    assert [quantity.values_ns[0] for quantity in series.stages] == [1e6, 2e6, 10e6, 3e6, 4e6, 0.0]
+    assert [quantity.values_ns[0] for quantity in series.stages] == [1e6, 0.0, 2e6, 10e6, 3e6, 4e6]
     assert series.time_skew.values_ns[0] == -7000.0
     assert series.uncertainty.values_ns[0] == 9000.0
 

@@ -18,7 +18,7 @@ def runs(draw: st.DrawFn) -> tuple[PairLedger, ...]:
     done_ns = 10**15
     ledgers = []
     for number in range(draw(st.integers(0, 12))):
-        stages = StageTimes(*draw(st.lists(st.integers(0, 10**7), min_size=5, max_size=5)))
+        stages = StageTimes(*draw(st.lists(st.integers(0, 10**7), min_size=6, max_size=6)))
         rest_ns = draw(st.integers(0, 10**6))
         dequeued_ns = done_ns + draw(st.integers(0, 10**8))
         queued_ns = dequeued_ns - draw(st.integers(0, 10**9))
