@@ -6,6 +6,7 @@ the order of bytes, all that follows the first OPEN or ACCEPT of a number belong
 """
 
 import struct
+from collections import deque
 from enum import Enum
 from typing import Final
 
@@ -17,6 +18,9 @@ _NUMBERS: Final = 1 << 32
 
 RETRY_NS: Final = 100_000_000
 """Between two attempts to be heard; a peer that comes back is met within this time."""
+
+_MOST_WAITING: Final = 4
+"""Words that wait for room on the line: only the newest of a kind means anything, and a peer that talks without reading must not fill memory."""
 
 
 class News(Enum):
@@ -47,7 +51,7 @@ class Contact:
         self._number = number if self._dials else None
         self._up = False
         self._due_ns = 0
-        self._say: list[tuple[_Word, int]] = [] if self._dials else [(_Word.WHO, 0)]
+        self._say: deque[tuple[_Word, int]] = deque([] if self._dials else [(_Word.WHO, 0)], _MOST_WAITING)
 
     @property
     def is_up(self) -> bool:
@@ -87,7 +91,8 @@ class Contact:
         if self._dials and not self._up and now_ns >= self._due_ns:
             self._due_ns = now_ns + RETRY_NS
             self._say.append((_Word.OPEN, self.number))
-        said, self._say = self._say, []
+        said = tuple(self._say)
+        self._say.clear()
         return [
             Unit(UnitKind.CONTACT, first=True, last=True, number=0, body=_WORD.pack(word.value, number))
             for word, number in said
@@ -102,7 +107,9 @@ class Contact:
     def interrupt(self) -> None:
         """Take note that the line was lost: the other end has to be met anew, and cannot be told."""
         self._part()
-        self._say = [] if self._dials else [(_Word.WHO, 0)]
+        self._say.clear()
+        if not self._dials:
+            self._say.append((_Word.WHO, 0))
 
     def _hear_as_dialler(self, word: _Word, number: int) -> News:
         if word is _Word.ACCEPT and number == self._number and not self._up:

@@ -1,9 +1,9 @@
 """Two machines learn each other's public keys over an open line, and a code that a person carries from one to the other proves them. Sans-I/O.
 
 The board shows six digits, the host's owner types them. For each of their 20 bits both commit to that bit, with a fresh nonce and bound to
-both keys and names, before either opens its commitment. Whoever stands between has keys of its own in its commitments, so that it must guess
-each bit before it can know it: one attempt succeeds with 2^-20, and a failed one spends the code. A recording gives nothing to try codes
-against: it holds only a spent code. Source: Bluetooth Core Specification 5.4, Vol 2 Part H, 7.2.3 (authentication stage 1, passkey entry)
+both keys and names, before either opens its commitment. Whoever guesses at the board succeeds with 2^-20, and a failed attempt spends the
+code. Whoever stands between has keys of its own in its commitments; it hears the host's bits one by one until its own guess of one is wrong
+there, and must guess the rest at the board: 21 x 2^-20. A recording gives nothing to try codes against: it holds only a spent code. Source: Bluetooth Core Specification 5.4, Vol 2 Part H, 7.2.3 (authentication stage 1, passkey entry)
 and 7.7.1 (f1 = HMAC-SHA-256), here over the keys' and names' digest, with the round and the side in each commitment.
 
 Rules: a code serves one attempt; after three failed ones there is a pause, which grows (`Desk`). `now_ns` and chance are passed in.

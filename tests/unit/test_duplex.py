@@ -1,6 +1,7 @@
 """Both directions of a line in virtual time: meeting, lanes, the bound on what waits, loss, and hostile bytes."""
 
 import random
+import struct
 
 import pytest
 from hypothesis import given, settings
@@ -8,7 +9,7 @@ from hypothesis import strategies as st
 
 from common.protocol.chunking import Whole
 from common.protocol.duplex import Change, Duplex
-from common.protocol.framing import MAX_BODY_BYTES, UNIT_OVERHEAD_BYTES, Side, Unit, UnitKind, unit_parts
+from common.protocol.framing import MAX_BODY_BYTES, UNIT_OVERHEAD_BYTES, Deframer, Side, Unit, UnitKind, unit_parts
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
 from tests.support.virtual_line import VirtualLine
@@ -275,3 +276,23 @@ def test_hostile_units_neither_fill_memory_nor_raise() -> None:
                 assert len(event.header) <= MAX_HEADER_BYTES
                 assert len(event.payload) <= MAX_BODY_BYTES < MAX_PAYLOAD_BYTES
         end.take(made.now_ns)
+
+
+def test_a_peer_that_talks_and_never_reads_is_not_answered_for_ever() -> None:
+    """However often the host says OPEN and CLOSE and talks as a stranger while the line takes nothing, a few words wait; the newest answer is among them."""
+    end = Duplex(BOARD, 5)
+    for number in range(10_000):
+        for unit in (
+            _word(0, number),
+            _word(3, number),
+            Unit(UnitKind.CONTROL, first=True, last=True, number=0, body=b"?"),
+        ):  # OPEN, CLOSE
+            end.feed(b"".join(unit_parts(HOST, unit)), number * S)
+    said = [bytes(unit.body) for unit in Deframer(BOARD).feed(end.take(10_000 * S))]
+    assert len(said) <= 4
+    assert bytes(_word(1, 9_999).body) in said  # ACCEPT
+
+
+def _word(value: int, number: int) -> Unit:
+    """A unit of contact, by its number on the wire."""
+    return Unit(UnitKind.CONTACT, first=True, last=True, number=0, body=struct.pack("<BI", value, number))

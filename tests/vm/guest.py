@@ -4,6 +4,7 @@ Two network cards: eth0 for the test's orders and the webcam, eth1 for the board
 nothing else. The disk image is never changed; what a test writes is gone when the guest stops.
 """
 
+import json
 import shlex
 import subprocess
 import tarfile
@@ -17,6 +18,7 @@ from tests.support.programs import PATIENCE_S, free_port
 
 _ROOT: Final = Path(__file__).resolve().parents[2]
 LINK_PORT: Final = 5555
+OPEN_TO_ALL: Final = f"tcp://*:{LINK_PORT}?insecure=1"
 UNIT: Final = "board-agent"
 
 _BOOT_S: Final = 180.0
@@ -221,10 +223,10 @@ class Guest:
         self.put(package, "/root")
         self.sh(f"dpkg -i /root/{package.name}")
 
-    def configure(self, camera: str, link: str = f"tcp://*:{LINK_PORT}?insecure=1", *, secured: bool = False) -> None:
-        """Set the service's camera and its link, by default one on every network, open to everybody unless it is to be secured, and restart it."""
-        link = f"tcp://*:{LINK_PORT}" if secured else link
-        edits = (f'camera = "{camera}"', f'link = ["{link}"]')
+    def configure(self, camera: str, *links: str, secured: bool = False) -> None:
+        """Set the service's camera and its links, by default one on every network, open to everybody unless it is to be secured, and restart it."""
+        links = links or (f"tcp://*:{LINK_PORT}" if secured else OPEN_TO_ALL,)
+        edits = (f'camera = "{camera}"', f"link = {json.dumps(links)}")
         script = " ".join(f"-e {shlex.quote(f's|^{edit.split()[0]} = .*|{_literal(edit)}|')}" for edit in edits)
         self.sh(f"sed -i {script} /etc/tandemscan/board-agent.toml && systemctl restart {UNIT}")
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.programs import ledgers, until
+from tests.support.programs import ledgers, lines, until
 from tests.vm.conftest import CAMERA, ROOT
 from tests.vm.contract import run_contract
 from tests.vm.extension import extension
-from tests.vm.guest import Guest
+from tests.vm.guest import OPEN_TO_ALL, Guest
 from tests.vm.stream import Film, Skew, check_journal, streaming
 from tests.vm.webcam import Webcam
 
@@ -92,6 +92,40 @@ def test_a_cable_pulled_and_replugged(serving: Guest, film: Film, skew: Skew, tm
         report = stream.finish(skew)
     assert len(report["sessions"]) == 1
     assert serving.show("MainPID") == process
+
+
+def test_a_pulled_cable_gives_way_to_the_network_and_takes_over_again(
+    cabled: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
+) -> None:
+    """The stream goes on over TCP when the cable is pulled and comes back to it once plugged in: one session, every frame counted, each pair right."""
+    assert webcam.plugged
+    cabled.configure(CAMERA, f"serial:{BOARD_END}", OPEN_TO_ALL)
+    cabled.until("StatusText", "waiting for a host", "the service has opened both links")
+    out = tmp_path / "out"
+    with (
+        extension(cabled, "tty", HOST_END) as link,
+        streaming(cabled, film.right, out, ("--link", cabled.link), link) as stream,
+    ):
+        until(lambda: _carrier(out) == "serial", "pairs over the cable")
+        cabled.sh(f"echo > {OURS}/UDC")
+        until(lambda: _carrier(out) == "tcp", "pairs over the network")
+        stream.more(10, "over the network")
+        cabled.sh(f"echo {CONTROLLER} > {OURS}/UDC")
+        until(lambda: _carrier(out) == "serial", "pairs over the cable again")
+        stream.more(10, "over the cable again")
+        report = stream.finish(skew)
+    (session,) = report["sessions"]
+    assert session["tail"] == "known"
+    assert session["received"] == sum(tally["frames"] for tally in report["links"])
+    assert report["switches"] >= 2
+    sequences = [ledger["sequence"] for ledger in ledgers(out)]
+    assert sequences == sorted(set(sequences)), "a frame was paired twice or out of order"
+    check_journal(cabled)
+
+
+def _carrier(out: Path) -> str:
+    """The link of the newest pair; empty while there is none."""
+    return str(ledgers(out)[-1]["link"]) if lines(out / "delays.jsonl") else ""
 
 
 def test_the_network_over_the_same_cable(cabled: Guest) -> None:
