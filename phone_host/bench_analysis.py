@@ -10,7 +10,7 @@ from common.ledger import PairLedger
 from phone_host.bench import CaseResult
 from phone_host.bench_cases import Case, Interface
 from phone_host.bench_changes import Change
-from phone_host.emulate import PROFILES
+from phone_host.emulate import PROFILES, Profile
 from phone_host.fits import DelayFit
 from phone_host.prediction import (
     Cell,
@@ -92,6 +92,11 @@ class Analysis:
     fits: tuple[InterfaceFit, ...]
     checked: tuple[Checked, ...]
     what_ifs: tuple[WhatIf, ...]
+
+    @property
+    def predicted_runs(self) -> int:
+        """How many runs could be predicted from the others."""
+        return sum(isinstance(one.predicted, Figures) for one in self.checked)
 
     @property
     def typical_error(self) -> float:
@@ -177,7 +182,12 @@ def _what_ifs(cells: Sequence[Cell], fifo: FifoSettings, changes: Sequence[Chang
             target = Target(cell.interface, link, cell.images, fifo)
             found += [WhatIf(cell.interface, words, foretell(one, cells)) for words, one in _changes(target)]
             found += [
-                WhatIf(cell.interface, change.words, foretell(change.applied(target), cells), asked_for=True)
+                WhatIf(
+                    cell.interface,
+                    change.words + _left_out(change.profile),
+                    foretell(change.applied(target), cells),
+                    asked_for=True,
+                )
                 for change in changes
             ]
     if heaviest:
@@ -187,10 +197,14 @@ def _what_ifs(cells: Sequence[Cell], fifo: FifoSettings, changes: Sequence[Chang
             if str(interface) not in heaviest:
                 link = nominal_link(profile, self_paced=profile.carrier in _SELF_PACED)
                 target = Target(str(interface), link, base.images, fifo)
-                found.append(
-                    WhatIf(str(interface), f"{_images(base.images)}, from its figures alone", foretell(target, cells))
-                )
+                words = f"{_images(base.images)}, from its figures alone{_left_out(profile)}"
+                found.append(WhatIf(str(interface), words, foretell(target, cells)))
     return found
+
+
+def _left_out(profile: Profile | None) -> str:
+    """What of a profile the model does not know, in words."""
+    return ", without its losses" if profile is not None and (profile.byte_loss or profile.stall_share) else ""
 
 
 def _load(cell: Cell) -> float:

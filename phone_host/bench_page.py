@@ -157,7 +157,7 @@ def _model(analysis: Analysis) -> str:
         return section("The model beside the measurement", "One run alone predicts nothing: measure two or more.", "")
     error = analysis.typical_error
     share = (
-        f" Half of the predicted medians of end-to-end are within {100.0 * error:.0f} % of the measured ones."
+        f" {analysis.predicted_runs} of {len(analysis.checked)} runs could be predicted; the median error of the end-to-end medians is {100.0 * error:.0f} %."
         if not math.isnan(error)
         else ""
     )

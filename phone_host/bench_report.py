@@ -75,6 +75,7 @@ def as_json(results: Sequence[CaseResult], under: Conditions, analysis: Analysis
         "runs": [_run(result) for result in results],
         "interfaces": [_interface(one) for one in analysis.fits],
         "predictions": [_checked(one) for one in analysis.checked],
+        "predicted_runs": analysis.predicted_runs,
         "typical_prediction_error_percent": _number(100.0 * analysis.typical_error),
         "not_run_settings": [_what_if(one) for one in analysis.what_ifs],
         "not_run": [{"link": str(interface), "reason": reason} for interface, reason in under.not_run],

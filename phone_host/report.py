@@ -198,11 +198,12 @@ def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
     if phase is not None:
         drift = (
             ""
-            if math.isnan(phase.drift)
+            if not math.isfinite(phase.beat_s)
             else f", drifts by {phase.drift * 1e6:+.1f} ppm, comes round in {phase.beat_s:.0f} s"
         )
+        side = "before" if phase.time_skew_ns < 0 else "after"
         lines.append(
-            f"phase: the board exposes {phase.time_skew_ns / _MS:+.1f} of {phase.period_ns / _MS:.1f} ms after the host{drift}"
+            f"phase: the board exposes {abs(phase.time_skew_ns) / _MS:.1f} of {phase.period_ns / _MS:.1f} ms {side} the host{drift}"
         )
     if alignment is not None:
         lines.append(f"alignment: {alignment.state.value}: {alignment.words}")

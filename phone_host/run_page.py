@@ -101,15 +101,23 @@ def _figures(facts: RunFacts) -> tuple[Figure, ...]:
     end_to_end, skew = facts.delays.spread("end_to_end"), facts.delays.spread("time_skew")
     uncertainty = facts.delays.spread("uncertainty")
     pairs = f"{facts.processed} pairs in {facts.seconds:.1f} s"
-    moves = "not measured" if np.isnan(facts.motion_px_s) else f"{facts.motion_px_s:.0f}"
     return (
-        Figure("pairs per second", f"{facts.pairs_per_second:.1f}", "/s", pairs),
+        _measured("pairs per second", facts.pairs_per_second, 1, "/s", pairs),
         Figure(
             "end-to-end", f"{end_to_end.p50_ns / 1e6:.0f}", "ms", f"median; 99 % below {end_to_end.p99_ns / 1e6:.0f} ms"
         ),
         Figure("time skew", f"{skew.p50_ns / 1e6:.1f}", "ms", f"median; 95 % below {skew.p95_ns / 1e6:.1f} ms"),
         Figure("clock uncertainty", f"{uncertainty.p50_ns / 1e3:.0f}", "us", "median over the pairs"),
-        Figure("image motion", moves, "px/s", "the fastest tenth of the own camera's image"),
+        _measured("image motion", facts.motion_px_s, 0, "px/s", "the fastest tenth of the own camera's image"),
+    )
+
+
+def _measured(label: str, value: float, decimals: int, unit: str, note: str) -> Figure:
+    """A figure that may not be known (NaN)."""
+    return (
+        Figure(label, "-", "", f"not measured; {note}")
+        if np.isnan(value)
+        else Figure(label, f"{value:.{decimals}f}", unit, note)
     )
 
 

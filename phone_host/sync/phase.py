@@ -202,7 +202,7 @@ class PhaseController:
         elif self._steering is Steering.NONE:
             self._state = Aligning.IMPOSSIBLE
             self._words = (
-                "neither camera can be steered: --interpolate moves the board's image to the host's time instead"
+                "no camera that may be steered can be: --interpolate moves the board's image to the host's time instead"
             )
         self._settled_ns = -(2**63)
         self._deadline_ns = 2**63
@@ -238,7 +238,7 @@ class PhaseController:
                 self._state, self._aligned_ns = Aligning.ALIGNED, now_ns
             if self._aligned_ns is not None and now_ns - self._aligned_ns >= _PATIENCE_NS:
                 self._tries = 0
-            self._words = f"in step to {abs(skew_ns) / _MS:.1f} ms after {self._corrections} corrections"
+            self._words = f"in step to {abs(skew_ns) / _MS:.1f} ms, corrections: {self._corrections}"
             return None
         if self._tries >= _TRIES:
             self._give_up(f"{_TRIES} corrections left {abs(skew_ns) / _MS:.1f} ms")

@@ -101,7 +101,7 @@ def _write_pattern(options: argparse.Namespace) -> int:
         options.pattern.parent.mkdir(parents=True, exist_ok=True)
         write_text(options.pattern, pattern_page())
     except OSError as error:
-        raise unwritable(options.pattern, error) from error
+        raise unwritable(options.pattern, error, "--pattern") from error
     print(json_text({"pattern": str(options.pattern)}) if options.json else f"written to {options.pattern}")
     return 0
 
@@ -205,20 +205,20 @@ def _store(options: argparse.Namespace, measured: "Measured", report: dict[str, 
     from phone_host.formats.rig_yaml import write_time_offset  # noqa: PLC0415
     from phone_host.misfit_plot import misfit_svg  # noqa: PLC0415
 
-    where = options.out or options.calibration
+    where, option = options.out, "--out"
     try:
         if options.out is not None:
             options.out.mkdir(parents=True, exist_ok=True)
             write_text(options.out / "report.json", json_text(report, indent=2) + "\n")
             write_text(options.out / "time-offset.svg", misfit_svg(measured))
         if options.calibration is not None:
-            where = options.calibration
+            where, option = options.calibration, "--calibration"
             write_time_offset(options.calibration, measured.offset)
         else:
             print("phone-host: no --calibration: the result is stored nowhere", file=sys.stderr)
     except OSError as error:
         assert where is not None
-        raise unwritable(where, error) from error
+        raise unwritable(where, error, option) from error
 
 
 def _summary(report: dict[str, Any]) -> str:

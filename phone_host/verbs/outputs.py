@@ -25,17 +25,18 @@ def require_file(out: Path) -> None:
         raise UnavailableError(f"{out} is no file", "name another --out")
 
 
-def unwritable(out: Path, error: OSError) -> UnavailableError:
+def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableError:
     """What to say when results cannot be written.
 
     Args:
         out: what the user gave.
         error: what the operating system said.
+        option: with which it was given.
 
     Returns:
         The error to raise.
     """
-    return UnavailableError(f"{out} cannot be written ({error.strerror})", "free the disk, or name another --out")
+    return UnavailableError(f"{out} cannot be written ({error.strerror})", f"free the disk, or name another {option}")
 
 
 def _require_folder(folder: Path, out: Path) -> None:

@@ -143,6 +143,13 @@ def test_options_of_no_use_are_refused(arguments: list[str], words: str, tmp_pat
         assert words in running.stderr
 
 
+def test_a_page_that_cannot_be_written_names_its_own_option(tmp_path: Path) -> None:
+    """Where the pattern cannot be written the exit code is 3 and the remedy another --pattern."""
+    with host(["calibrate-time", "--pattern", "/dev/null/pattern.html"], tmp_path) as running:
+        assert running.wait() == 3
+        assert "another --pattern" in running.stderr
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")
 def test_a_browser_shows_the_pattern(tmp_path: Path) -> None:
     """The written page, opened in a real browser, shows a pattern that can be read and that has begun to count."""

@@ -30,6 +30,7 @@ from phone_host.bench_cases import (
     parse_rates,
     parse_sizes,
 )
+from phone_host.bench_changes import parse_changes
 from phone_host.bench_page import figure, page
 from phone_host.bench_report import Conditions, as_json, fit_rows, losses, rows, summary_line
 from phone_host.boardprocess import BoardAccount
@@ -39,7 +40,7 @@ from phone_host.pairqueue import PairCounts
 from phone_host.sync.fifo import FifoSettings
 
 UNDER = Conditions("a machine", "a date", "sgbm", FifoSettings(), 4.0, ((Interface("rfcomm"), "no radio"),))
-UNITS = ("_ms", "_us", "_ns", "_s", "_hz", "_px", "_bytes", "_frames", "_pairs", "_percent", "stalls")
+UNITS = ("_ms", "_us", "_ns", "_s", "_hz", "_px", "_bytes", "_frames", "_pairs", "_runs", "_percent", "stalls")
 
 
 def ledger(number: int, period_ns: int = 33_000_000) -> PairLedger:
@@ -263,6 +264,16 @@ def test_a_run_without_pairs_is_reported_without_numbers() -> None:
     assert runs[0]["pair_rate_hz"] is None
     assert {cell for row in rows([empty]) for cell in row[2:]} == {"-"}
     assert "No pair was processed" in page([empty], UNDER, analysed(empty))
+
+
+def test_a_profile_that_loses_bytes_is_predicted_without_and_says_so() -> None:
+    """The model knows rate, delay and jitter: a profile with losses is marked, asked for or not, one without is not."""
+    settings = analyse([result()], UNDER.fifo, parse_changes(["link=wifi", "link=ethernet"])).what_ifs
+    said = {one.setting if one.asked_for else one.interface: one.setting for one in settings}
+    for name in ("link=wifi, without its losses", "usb-serial-lossy (serial)", "wifi (tcp)"):
+        assert said[name].endswith(", without its losses")
+    for name in ("link=ethernet", "usb-serial (serial)"):
+        assert "losses" not in said[name]
 
 
 def test_the_table_has_a_line_for_each_stage_and_link() -> None:

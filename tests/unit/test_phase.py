@@ -176,7 +176,10 @@ def test_a_camera_that_falls_silent_is_given_up() -> None:
 
 @pytest.mark.parametrize(
     ("ways", "has_phase", "words"),
-    [((Steering.NONE, Steering.NONE), True, "neither camera"), ((Steering.GRID, Steering.GRID), False, "same fps")],
+    [
+        ((Steering.NONE, Steering.NONE), True, "no camera that may be steered"),
+        ((Steering.GRID, Steering.GRID), False, "same fps"),
+    ],
 )
 def test_what_cannot_be_steered_is_said_at_once(ways: tuple[Steering, Steering], has_phase: bool, words: str) -> None:  # noqa: FBT001
     """Without a camera that can be steered, or a phase at all, nothing is tried and the reason is given."""

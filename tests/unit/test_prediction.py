@@ -105,7 +105,7 @@ def test_processing_of_a_size_that_was_not_run_follows_its_work(others: list[Cel
 
 
 def test_settings_of_the_queue_and_the_matcher_change_what_they_should() -> None:
-    """A matcher that takes 60 ms at 25 frames/s gives 16.7 pairs/s; with `block` nothing is dropped in the FIFO but frames are replaced."""
+    """A matcher that takes 60 ms at 25 frames/s gives 16.7 pairs/s, whether the FIFO drops or blocks; a deep FIFO that drops the newest is waited through."""
     base = cell()
     link = learn_link("tcp", base.images, [base])
     assert not isinstance(link, Unknown)
@@ -114,6 +114,8 @@ def test_settings_of_the_queue_and_the_matcher_change_what_they_should() -> None
     assert made.pairs_per_s == pytest.approx(1000 / 60, rel=0.01)
     assert made.lost_share == pytest.approx(1 - 40 / 60, abs=0.01)
     assert made.starvation_p50_ns == 0.0
+    blocked = figures(foretell(replace(target, fifo=FifoSettings(1, Overflow.BLOCK)), [base]))
+    assert blocked.pairs_per_s == pytest.approx(1000 / 60, rel=0.01)
     deep = figures(foretell(replace(target, fifo=FifoSettings(4, Overflow.DROP_NEWEST)), [base]))
     # Four services wait before it, less what was left of the running one when it came.
     assert 180 * MS <= deep.queuing_p95_ns <= 240 * MS

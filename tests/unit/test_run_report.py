@@ -1,0 +1,56 @@
+"""A run's summary and page: what was not measured is said so, never as a number that is none."""
+
+import pytest
+
+from common.camera.base import CameraHealth, CameraState
+from common.ledger import BoardMarks, PairLedger, StageTimes
+from phone_host.accounts import LinkAccount
+from phone_host.delays import DelayStatistics
+from phone_host.model import Side
+from phone_host.pairqueue import PairCounts
+from phone_host.report import RunFacts, phase_lines, summary
+from phone_host.results import Unwritten
+from phone_host.run_page import run_page
+from phone_host.sync.fifo import FifoSettings
+from phone_host.sync.phase import Phase
+
+NAN = float("nan")
+MS = 1_000_000
+
+
+def facts(pairs: int) -> RunFacts:
+    """A run of some pairs, 50 ms apart, whose image motion nobody measured."""
+    delays = DelayStatistics()
+    for number in range(pairs):
+        at = number * 50 * MS
+        marks = (at + 3 * MS, at + 4 * MS, at + 4 * MS, at + 5 * MS, at + 15 * MS, at)
+        board = BoardMarks(at, at + MS, at + 2 * MS)
+        delays.add(PairLedger("s", number, number, 9, "ipc", board, *marks, StageTimes(), 0, 0, 50))
+    counts = PairCounts(received=pairs, paired=pairs, taken=pairs)
+    seconds = max(0, pairs - 1) * 0.05
+    account = (FifoSettings(), Unwritten(0, 0, ""), 0, 0, CameraHealth(CameraState.RUNNING), 50 * MS, NAN, 0)
+    return RunFacts("stopped", pairs, 0, seconds, delays, counts, LinkAccount([]), None, 25 * MS, *account)
+
+
+@pytest.mark.parametrize("pairs", [0, 1, 30])
+def test_what_was_not_measured_is_no_number(pairs: int) -> None:
+    """Neither the summary nor the page of a run of no pair, of one or of many shows `nan` or `inf`."""
+    text = summary(facts(pairs)) + run_page(facts(pairs), None, Side.LEFT, ())
+    assert not any(word in text for word in (" nan", "(nan", ">nan", " inf ", "nan<"))
+
+
+def test_a_rate_needs_two_pairs() -> None:
+    """One pair has no rate; 31 pairs 50 ms apart are 20 a second."""
+    assert summary(facts(1)).startswith("1 pairs, ended: stopped\n")
+    assert summary(facts(31)).startswith("31 pairs in 1.5 s (20.0 /s), ended: stopped\n")
+
+
+def test_the_phase_is_told_with_its_side() -> None:
+    """A board that exposes 5 ms earlier exposes before the host, and a phase that does not drift never comes round."""
+    assert phase_lines(Phase(-5.0 * MS, 50 * MS, 0.0, 0), None) == [
+        "phase: the board exposes 5.0 of 50.0 ms before the host"
+    ]
+    assert (
+        "5.0 of 50.0 ms after the host, drifts by +100.0 ppm, comes round in 500 s"
+        in phase_lines(Phase(5.0 * MS, 50 * MS, 1e-4, 0), None)[0]
+    )
