@@ -96,7 +96,7 @@ def _write_pattern(options: argparse.Namespace) -> int:
     from phone_host.formats.atomic import write_text  # noqa: PLC0415
     from phone_host.timing.screen_page import pattern_page  # noqa: PLC0415
 
-    require_file(options.pattern)
+    require_file(options.pattern, "--pattern")
     try:
         options.pattern.parent.mkdir(parents=True, exist_ok=True)
         write_text(options.pattern, pattern_page())

@@ -11,18 +11,22 @@ def require_folder(out: Path) -> None:
     Raises:
         UnavailableError: it is something else, or lies in something else.
     """
-    _require_folder(out, out)
+    _require_folder(out, out, "--out")
 
 
-def require_file(out: Path) -> None:
-    """Refuse an --out that is there and is no regular file: replacing it would take a folder, a device or a pipe away.
+def require_file(out: Path, option: str = "--out") -> None:
+    """Refuse an output that is there and is no regular file: replacing it would take a folder, a device or a pipe away.
+
+    Args:
+        out: what the user gave.
+        option: with which it was given.
 
     Raises:
         UnavailableError: it is something else, or lies in something that is no folder.
     """
-    _require_folder(out.parent, out)
+    _require_folder(out.parent, out, option)
     if out.exists() and not out.is_file():
-        raise UnavailableError(f"{out} is no file", "name another --out")
+        raise UnavailableError(f"{out} is no file", f"name another {option}")
 
 
 def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableError:
@@ -39,10 +43,10 @@ def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableE
     return UnavailableError(f"{out} cannot be written ({error.strerror})", f"free the disk, or name another {option}")
 
 
-def _require_folder(folder: Path, out: Path) -> None:
+def _require_folder(folder: Path, out: Path, option: str) -> None:
     try:
         there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     except OSError as error:
-        raise unwritable(out, error) from None
+        raise unwritable(out, error, option) from None
     if not there.is_dir():
-        raise UnavailableError(f"{there} is no folder", "name another --out")
+        raise UnavailableError(f"{there} is no folder", f"name another {option}")
