@@ -41,8 +41,8 @@ class PublishedRecord:
     def close(self) -> None:
         """Withdraw it."""
         self._stop.set()
-        if self._bus is not None:
-            self._bus.interrupt()
+        if (bus := self._bus) is not None:  # the thread may let go of it at this moment
+            bus.interrupt()
         self._thread.join(_GOODBYE_S)
 
     def _run(self) -> None:

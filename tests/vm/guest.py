@@ -17,6 +17,9 @@ from typing import Final
 from tests.support.programs import PATIENCE_S, free_port
 
 _ROOT: Final = Path(__file__).resolve().parents[2]
+NETWORK_CARD: Final = "eth1"
+"""Carries the board's link and nothing else."""
+
 LINK_PORT: Final = 5555
 OPEN_TO_ALL: Final = f"tcp://*:{LINK_PORT}?insecure=1"
 UNIT: Final = "board-agent"

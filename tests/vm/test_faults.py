@@ -7,13 +7,11 @@ from pathlib import Path
 import pytest
 
 from tests.support.programs import ledgers, until
-from tests.vm.guest import UNIT, Guest
+from tests.vm.guest import NETWORK_CARD, UNIT, Guest
 from tests.vm.stream import Film, Skew, board_accounts, check_journal, kill, streaming
 from tests.vm.webcam import Webcam
 
 pytestmark = pytest.mark.timeout(600)  # the first test boots the board
-
-NETWORK_CARD = "eth1"
 
 
 @pytest.fixture(autouse=True)
