@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from common import now
-from phone_host.delays import DELAYS, Spread
+from phone_host.delays import DELAYS, STAGES, Spread
 from phone_host.host import Host
 from phone_host.regime import judge
 from phone_host.report import board_drops, camera_troubles, figures, phase_lines
@@ -66,17 +66,25 @@ class LiveTable:
             done = now_s - self._started_s if self._seconds else self._host.processed
             self._progress.update(self._task, completed=done)
         bar = [self._progress] if self._task is not None else []
-        self._live.update(Group(self._table(), self._state(), *self._judgement(), *bar), refresh=True)
+        # What is wrong comes first: a small terminal cuts off what is below.
+        shown = Group(*self._judgement(), self._table(), self._stages(), self._state(), *bar)
+        self._live.update(shown, refresh=True)
 
     def _table(self) -> Table:
         table = Table(title=f"{self._host.processed} pairs, {self._rate:.1f} /s", title_justify="left")
         table.add_column("delay, ms")
-        for name in ("p50", "p95", "p99"):
+        for name in ("p50", "p95", "p99", "max"):
             table.add_column(name, justify="right")
         for name in (*DELAYS, "time_skew"):
             spread = self._host.delays.spread(name, _RECENT)
             table.add_row(name.replace("_", "-"), *_values_ms(spread))
         return table
+
+    def _stages(self) -> Text:
+        """Processing's shares in one line: with a row for each the warnings would leave a terminal of 24 lines."""
+        medians = [(name, self._host.delays.spread(name, _RECENT).p50_ns) for name in STAGES]
+        shares = [f"{name} {value_ns / 1e6:.1f}" for name, value_ns in medians if value_ns == value_ns]  # noqa: PLR0124 - NaN is the only value unlike itself
+        return Text(f"processing, p50 in ms: {', '.join(shares) or 'not yet'}", style="dim")
 
     def _judgement(self) -> list[Text]:
         """The queueing regime, what has befallen the own camera, and what makes depth wrong."""
@@ -90,7 +98,11 @@ class LiveTable:
     def _state(self) -> Text:
         receiver, counts = self._host.receiver, self._host.queue.counts
         estimate = receiver.estimate
-        clock = f"clock +-{estimate.uncertainty_ns / 1000:.0f} us" if estimate else "clock unknown"
+        clock = (
+            f"clock +-{estimate.uncertainty_ns / 1000:.0f} us (hard +-{estimate.bound_ns / 1000:.0f} us)"
+            if estimate
+            else "clock unknown"
+        )
         carrier = receiver.carrier
         board = f"board connected over {carrier}" if carrier else "waiting for the board"
         drops = {f"{reason} (board)": count for reason, count in board_drops(receiver.account).items()}
@@ -104,5 +116,5 @@ class LiveTable:
 
 def _values_ms(spread: Spread) -> list[str]:
     if not spread.count:
-        return ["-"] * 3
-    return [f"{value / 1e6:.3f}" for value in (spread.p50_ns, spread.p95_ns, spread.p99_ns)]
+        return ["-"] * 4
+    return [f"{value / 1e6:.3f}" for value in (spread.p50_ns, spread.p95_ns, spread.p99_ns, spread.max_ns)]

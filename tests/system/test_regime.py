@@ -77,7 +77,7 @@ def test_skew_and_motion_make_a_warning_and_rest_makes_none(tmp_path: Path) -> N
 
 
 def test_the_terminal_shows_regime_and_warning(tmp_path: Path) -> None:
-    """In a terminal the live view says who waits for whom, and warns in words."""
+    """In a terminal the live view says who waits for whom, and warns in words; processing's stages and the clock's hard bound stand beside."""
     film, link = write_moving_film(tmp_path / "moving", 100, 6), f"ipc://{tmp_path}/link"
     out = tmp_path / "out"
     command = [sys.executable, "-P", "-m", "phone_host.cli", "run", "--camera", f"replay:{film}?fps=15&loop=1"]
@@ -98,3 +98,5 @@ def test_the_terminal_shows_regime_and_warning(tmp_path: Path) -> None:
     text = shown.decode(errors="replace")
     assert "the processor has nothing to do" in text
     assert "px of error, depth is wrong" in text
+    assert "processing, p50 in ms: decode" in text
+    assert "us (hard +-" in text
