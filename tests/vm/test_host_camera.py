@@ -124,3 +124,42 @@ def test_the_hosts_doctor_streams_from_its_camera(machine: Guest, cameras: tuple
     assert checks["cv2"]["verdict"] == checks["numpy"]["verdict"] == "ok"
     assert "sound frames" in checks["stream"]["finding"]
     assert "clock known to" in checks["board"]["finding"]
+
+
+def folders(machine: Guest) -> list[str]:
+    """The folders of results that the user's unit has made, the oldest first."""
+    return machine.sh("ls -d /root/tandemscan-scans/* 2>/dev/null || true").split()
+
+
+def await_pairs(machine: Guest, runs: int) -> str:
+    """Wait until the newest of so many runs has 10 pairs; gives its folder."""
+    until(lambda: len(folders(machine)) == runs, "a folder of its own for each start")
+    newest = folders(machine)[-1]
+    until(lambda: int(machine.sh(f"wc -l < {newest}/delays.jsonl")) >= 10, "10 pairs")
+    return newest
+
+
+def test_the_users_unit_pairs_frames(machine: Guest, cameras: tuple[Webcam, Webcam]) -> None:
+    """deploy/host's unit, with a settings file as it says, is understood without a warning, pairs frames and ends in order; a later start leaves the results."""
+    assert all(camera.plugged for camera in cameras)
+    # As a unit of the system manager its home folder is root's: there a checkout's command stands in for the one of `make venv`.
+    command = "/root/tandemscan/.venv/bin/phone-host"
+    machine.sh(
+        f"install -D -m 755 /dev/stdin {command} <<'E'\n#!/bin/sh\ncd / && export PYTHONPATH=/mnt && exec python3 -P -m phone_host.cli \"$@\"\nE"
+    )
+    settings = f'link = ["tcp://127.0.0.1:{LINK_PORT}"]\ncamera = "{BY_ID.format("RIGHT")}"'
+    machine.sh(f"install -D -m 600 /dev/stdin /root/.config/tandemscan/phone-host.toml <<'E'\n{settings}\nE")
+    machine.put(ROOT / "deploy" / "host" / "phone-host.service", "/run/systemd/system")
+    unit = "/run/systemd/system/phone-host.service"
+    assert machine.sh(f"systemd-analyze verify --man=no {unit} 2>&1") == ""
+    machine.sh("systemctl daemon-reload")
+    try:
+        for runs in (1, 2):
+            machine.sh("systemctl start phone-host")
+            newest = await_pairs(machine, runs)
+            machine.sh("systemctl stop phone-host")
+            assert machine.sh("systemctl show -P Result -P NRestarts phone-host").split() == ["success", "0"]
+            check_counts(json.loads(machine.sh(f"cat {newest}/report.json")))
+    finally:
+        machine.sh(f"systemctl stop phone-host; rm -r {unit} /root/tandemscan; systemctl daemon-reload")
+    assert all(machine.sh(f"cat {folder}/report.json") for folder in folders(machine))
