@@ -104,9 +104,10 @@ class Service:
     notifier: Notifier
     status: StatusLine
 
-    def alive(self, now_ns: int, counts: BoardCounts, *, has_host: bool) -> None:
+    def alive(self, now_ns: int, counts: BoardCounts, session: BoardSession) -> None:
         """Tell it, when the notifier is due."""
-        self.notifier.alive(now_ns, self.status.text(now_ns, counts, has_host=has_host))
+        text = self.status.text(now_ns, counts, has_host=session.has_host, carrier=session.carrier)
+        self.notifier.alive(now_ns, text)
 
 
 class Agent:
@@ -176,7 +177,7 @@ class Agent:
                 self._send_all(self._session.tick(now_ns, self._outbox.counts))
             self._watch_host(now_ns)
             if self._service is not None and self._service.notifier.due(now_ns):
-                self._service.alive(now_ns, self._outbox.counts, has_host=self._session.has_host)
+                self._service.alive(now_ns, self._outbox.counts, self._session)
         if self._camera_ended and not self._stopping:
             self._drain()
         self._outbox.discard(DropReason.STOPPED)

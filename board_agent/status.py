@@ -21,17 +21,18 @@ class StatusLine:
     def __init__(self, camera: str, pacing: Pacing, links: tuple[str, ...], now_ns: int) -> None:
         self._camera = camera
         self._pacing = pacing
-        self._links = " and ".join(links)
+        self._links = links
         self._measured_ns = self._moved_ns = now_ns
         self._grabbed = 0
 
-    def text(self, now_ns: int, counts: BoardCounts, *, has_host: bool) -> str:
+    def text(self, now_ns: int, counts: BoardCounts, *, has_host: bool, carrier: int | None = None) -> str:
         """Give the line; the rate is the mean since it was asked for last.
 
         Args:
             now_ns: CLOCK_MONOTONIC now, ns.
             counts: what became of all frames so far.
             has_host: whether a host is served.
+            carrier: index of the link that its frames go to; None while there is none.
         """
         fresh = counts.grabbed - self._grabbed
         rate_hz = fresh * 1e9 / max(1, now_ns - self._measured_ns)
@@ -41,8 +42,9 @@ class StatusLine:
         silent_ns = now_ns - self._moved_ns
         if not has_host:
             self._moved_ns = now_ns  # the camera may rest
-            return f"waiting for a host on {self._links}"
+            return f"waiting for a host on {' and '.join(self._links)}"
         if self._pacing is Pacing.CLOCK and silent_ns >= _SILENT_NS:
             return f"no frame from {self._camera} for {silent_ns // 1_000_000_000} s: is it plugged in?"
         dropped = sum(count for _, count in counts.dropped)
-        return f"{rate_hz:.1f} fps, {counts.sent} sent to the host, {dropped} dropped"
+        over = "" if carrier is None else f" over {self._links[carrier]}"
+        return f"{rate_hz:.1f} fps{over}, {counts.sent} sent to the host, {dropped} dropped"

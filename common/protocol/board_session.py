@@ -113,6 +113,12 @@ class BoardSession:
         self._later_ns = 0
 
     @property
+    def carrier(self) -> int | None:
+        """Index of the link that frames go to; None without one."""
+        frames = None if self._host is None else self._host.frames
+        return None if frames is None else frames[0]
+
+    @property
     def has_host(self) -> bool:
         """Whether a host is there that frames can or soon could be sent to."""
         host = self._host

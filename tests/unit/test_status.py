@@ -26,6 +26,14 @@ def test_the_rate_is_that_of_the_time_since_the_last_line() -> None:
     assert text == "5.0 fps, 65 sent to the host, 5 dropped"
 
 
+def test_the_link_in_use_is_named() -> None:
+    """Of several links the one that carries the frames stands beside the rate; none does while none carries them."""
+    status = line()
+    text = status.text(SECOND_NS, BoardCounts(30, 30), has_host=True, carrier=1)
+    assert text == "30.0 fps over ipc:///run/x, 30 sent to the host, 0 dropped"
+    assert " over " not in status.text(2 * SECOND_NS, BoardCounts(60, 60), has_host=True, carrier=None)
+
+
 def test_a_silent_camera_is_named_with_its_silence() -> None:
     """A camera that gives nothing for seconds while a host waits is named; one frame makes it well again."""
     status = line()
