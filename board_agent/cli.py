@@ -120,9 +120,8 @@ def _pair(options: argparse.Namespace) -> int:
         name = state.paired
         if state.code and not name:
             asks = f"{state.asking} asks; " if state.asking else ""
-            print(
-                f"{asks}type this code on the host: {state.code}", file=sys.stderr if options.json else None, flush=True
-            )
+            words = f"{state.address}: {asks}type this code on the host: {state.code}"
+            print(words, file=sys.stderr if options.json else None, flush=True)
     print(json.dumps({"paired": name}) if options.json else f"paired with {name}")
     return 0
 

@@ -43,7 +43,7 @@ def _follow(context: "zmq.Context[zmq.Socket[bytes]]", keys: KeyFolder, seconds:
         poller.register(door, zmq.POLLIN)
     began_ns = heard_ns = now.monotonic_ns()
     deadline_ns = began_ns + round(seconds * 1e9)
-    shown = {id(door): DoorState("", "", "", 0) for door in doors}
+    shown = {id(door): DoorState("", "", "", "", 0) for door in doors}
     while (now_ns := now.monotonic_ns()) < deadline_ns:
         if not doors or now_ns - heard_ns > _SILENCE_NS:
             raise UnavailableError(

@@ -61,12 +61,14 @@ class DoorState:
     """What `board-agent pair` is told.
 
     Attributes:
+        address: the link that this is the door of; a board may have several, each with a code of its own.
         code: what to type on the host now.
         asking: name of the host that has asked and must now prove the code; empty if none.
         paired: name of the host that was taken in last since the command began; empty if none.
         failed: attempts that came to nothing since then.
     """
 
+    address: str
     code: str
     asking: str
     paired: str
@@ -74,14 +76,14 @@ class DoorState:
 
     def encode(self) -> bytes:
         """Its bytes."""
-        packed: bytes = msgpack.packb([self.code, self.asking, self.paired, self.failed])
+        packed: bytes = msgpack.packb([self.address, self.code, self.asking, self.paired, self.failed])
         return packed
 
     @staticmethod
     def decode(packed: bytes) -> "DoorState":
         """Read it; from the own service only."""
-        code, asking, paired, failed = msgpack.unpackb(packed)
-        return DoorState(code, asking, paired, failed)
+        address, code, asking, paired, failed = msgpack.unpackb(packed)
+        return DoorState(address, code, asking, paired, failed)
 
 
 class Door:
@@ -110,7 +112,7 @@ class Door:
         self._is_open = False
         self._bound = ""
         self._owner_until_ns = 0
-        self._state = DoorState("", "", "", 0)
+        self._state = self._before = DoorState(address, "", "", "", 0)
         self._strangers, self._troubles = Seldom(), Seldom()
         self.due_ns = 0
 
@@ -135,7 +137,7 @@ class Door:
         """Answer `board-agent pair`; it opens the door, and ends a pause when it comes."""
         if now_ns >= self._owner_until_ns:
             self._desk.pardon()
-            self._state = DoorState("", "", "", 0)
+            self._state = self._before
         self._owner_until_ns = now_ns + _OWNER_NS
         self._open_or_close(now_ns)
         self._state = replace(self._state, code=code_text(self._desk.code(now_ns)))

@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -169,6 +169,28 @@ def test_the_owner_takes_in_a_second_host(rig: Rig) -> None:
     assert len(names) == 2
     assert names[1] == f"{names[0]}-2"
     assert json.loads(out)["key"] == KeyFolder(Path(rig.board_keys)).own().public
+
+
+def test_each_link_has_a_code_of_its_own_and_is_named_beside_it(tmp_path: Path) -> None:
+    """Of a board with two links `board-agent pair` tells which code is for which; with that a host pairs at that link."""
+    first = ports()
+    second = next(port for port in iter(ports, None) if abs(port - first) > 1)
+    write_film(tmp_path / "film", 10)
+    listening = [word for port in (first, second) for word in ("--link", f"tcp://*:{port}")]
+    serving = ["run", "--camera", f"replay:{tmp_path / 'film'}?pace=demand", "--keys", str(tmp_path / "b"), *listening]
+    with ExitStack() as stack:
+        agent = stack.enter_context(board(serving, tmp_path))
+        until(lambda: " serving " in agent.stderr, "the board serves")
+        rig = Rig(agent, f"tcp://127.0.0.1:{second}", tmp_path)
+        owner = stack.enter_context(program("board_agent.cli", ["pair", "--keys", rig.board_keys], tmp_path, "pair"))
+        shown = re.compile(r"^tcp://\*:(\d+): type this code on the host: (\d{6})$", re.MULTILINE)
+        until(lambda: len(shown.findall(owner.out.read_text())) == 2, "both codes are shown")
+        codes = {int(port): code for port, code in shown.findall(owner.out.read_text())}
+        assert codes.keys() == {first, second}
+        pairing = rig.pair("--code", codes[second])
+        _, err = pairing.communicate(timeout=60)
+        assert pairing.returncode == 0, err
+        assert owner.wait() == 0, owner.stderr
 
 
 def test_three_wrong_codes_are_followed_by_a_pause(rig: Rig) -> None:
