@@ -356,15 +356,14 @@ def _door(context: "zmq.Context[zmq.Socket[bytes]]", address: str, keys: KeyFold
 
 def _explained(address: str, error: zmq.ZMQError, remedy: str) -> SettingsError | UnavailableError:
     """Sort ZeroMQ's refusal of an address by whose fault it is."""
+    why = zmq.strerror(error.errno or 0)  # the exception's own text repeats the address
     if error.errno == zmq.EADDRINUSE:
-        return TakenError(f"{address} cannot be had ({error.strerror})", remedy)
-    if error.errno in {zmq.EADDRNOTAVAIL, errno.ENODEV} or isinstance(error, zmq.ZMQBindError):
-        return UnavailableError(f"{address} cannot be had ({error.strerror})", remedy)
+        return TakenError(f"{address} cannot be had ({why})", remedy)
+    if error.errno in {zmq.EADDRNOTAVAIL, errno.ENODEV}:
+        return UnavailableError(f"{address} cannot be had ({why})", "give an address of this machine, or * for all")
     if error.errno in {errno.EPERM, errno.ENOENT, errno.EACCES}:  # the folder of an ipc path, or a port below 1024
-        return UnavailableError(
-            f"{address} cannot be opened ({error.strerror})", "check the folder and its permissions"
-        )
-    return SettingsError(f"link {address!r} makes no sense ({error.strerror})", remedy)
+        return UnavailableError(f"{address} cannot be opened ({why})", "check the folder and its permissions")
+    return SettingsError(f"link {address!r} makes no sense ({why})", remedy)
 
 
 def _check_replaceable(path: str) -> None:

@@ -153,3 +153,11 @@ def test_an_unknown_board_is_named_with_the_command_that_helps(tmp_path: Path) -
     keys.add(Peer("pi", "b" * 40, "", "tcp://192.0.2.3:5555"))
     with pytest.raises(UnavailableError, match=r"bone at tcp://192\.0\.2\.2:5555, pi at"):
         open_link(LinkUri("tcp://192.0.2.1:5555", listens=False), keys)
+
+
+@pytest.mark.parametrize("host", ["192.0.2.1", "no-such-host.invalid"])
+def test_an_address_of_another_machine_cannot_be_listened_on(host: str) -> None:
+    """Whoever listens on an address that this machine does not have is told so, once and with the remedy (192.0.2.0/24 is nobody's, RFC 5737)."""
+    uri = parse_link(f"tcp://{host}:5555?insecure=1", listens_by_default=True)
+    with pytest.raises(UnavailableError, match=r" \([A-Za-z ]+\): give an address of this machine, or \* for all$"):
+        open_link(uri)
