@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
+from common.commandline import INTERRUPTED
 from common.errors import UnavailableError
 
 _GOODBYE_S: Final = 10.0
@@ -46,7 +47,9 @@ class BoardProcess:
 
     def stop(self) -> BoardAccount:
         """Ask it to end; gives its account."""
-        self.check()
+        # Ctrl-C in a terminal reaches every process of it: then the board has ended by itself, and has given its account.
+        if self._process.poll() != INTERRUPTED:
+            self.check()
         self._process.terminate()
         try:
             said = json.loads(self._process.communicate(timeout=_GOODBYE_S)[0])

@@ -1,6 +1,7 @@
 """delay-bench as a user runs it: real processes, short."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from phone_host.boardprocess import board_process
 from tests.support.numbered import write_film
 from tests.support.programs import Program, board, free_port, program, until
 from tests.support.trace_format import checked
@@ -22,8 +24,12 @@ def bench(arguments: list[str], folder: Path) -> Any:
 
 def boards_of(running: Program) -> list[int]:
     """Pids of the board-agent processes that it started."""
+    return boards_below(running.process.pid)
+
+
+def boards_below(pid: int) -> list[int]:
     listing = subprocess.run(
-        ["ps", "-o", "pid=,args=", "--ppid", str(running.process.pid)], capture_output=True, text=True, check=False
+        ["ps", "-o", "pid=,args=", "--ppid", str(pid)], capture_output=True, text=True, check=False
     ).stdout
     return [int(line.split()[0]) for line in listing.splitlines() if "board_agent" in line]
 
@@ -230,6 +236,18 @@ def test_a_signal_ends_the_benchmark_and_its_children(number: signal.Signals, co
         assert running.stop(number) == code
         assert not is_running(board)
     assert running.json()["runs"] == []
+
+
+def test_a_board_that_ctrl_c_reached_first_gives_its_account(tmp_path: Path) -> None:
+    """A terminal's Ctrl-C goes to the board's process, too: that it has ended with 130 before it was asked to is no failure."""
+    images = write_film(tmp_path / "images", 4)
+    with board_process(f"replay:{images}?fps=20&loop=1", f"ipc://{tmp_path}/link") as serving:
+        until((tmp_path / "link").exists, "the board's socket")
+        (pid,) = boards_below(os.getpid())
+        os.kill(pid, signal.SIGINT)
+        until(lambda: not is_running(pid), "the end of the board's process")
+        account = serving.stop()
+    assert account.grabbed == account.sent + sum(count for _, count in account.dropped)
 
 
 def test_what_was_measured_before_ctrl_c_is_written(tmp_path: Path) -> None:
