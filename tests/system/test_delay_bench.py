@@ -19,7 +19,7 @@ SHORT = ["--links", "ipc", "--size", "160x120", "--fps", "15", "--seconds", "2"]
 
 
 def bench(arguments: list[str], folder: Path) -> Any:
-    return program("phone_host.bench_cli", arguments, folder, "bench")
+    return program("phone_host.bench.cli", arguments, folder, "bench")
 
 
 def boards_of(running: Program) -> list[int]:
@@ -155,7 +155,7 @@ def test_an_absent_board_elsewhere_is_exit_3(tmp_path: Path) -> None:
 
 def test_profiles_are_listed() -> None:
     """`--emulate list` names every interface with its rate and where that comes from, also as one JSON object."""
-    command = [sys.executable, "-m", "phone_host.bench_cli", "--emulate", "list"]
+    command = [sys.executable, "-m", "phone_host.bench.cli", "--emulate", "list"]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     listed = json.loads(subprocess.run([*command, "--json"], capture_output=True, text=True, check=True).stdout)
     assert {"bluetooth", "wifi", "usb-serial", "ethernet"} <= {one["name"] for one in listed["profiles"]}
@@ -208,7 +208,7 @@ def test_a_full_disk_is_said_and_the_table_is_not_lost(tmp_path: Path) -> None:
     """When the files cannot be written the command has printed its report all the same, and exits 3 with one line that names the folder."""
     out = tmp_path / "disk"
     out.mkdir()
-    bench_run = [sys.executable, "-P", "-m", "phone_host.bench_cli", *SHORT, "--json", "--out", str(out)]
+    bench_run = [sys.executable, "-P", "-m", "phone_host.bench.cli", *SHORT, "--json", "--out", str(out)]
     small = 'mount -t tmpfs -o size=8k tmpfs "$1" && shift && exec "$@"'
     command = ["unshare", "-rm", "sh", "-c", small, "sh", str(out), *bench_run]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -278,6 +278,6 @@ def test_a_board_that_dies_is_one_clear_line(tmp_path: Path) -> None:
 def test_help_opens_with_examples() -> None:
     """The first thing that --help shows below the usage is how to call it."""
     done = subprocess.run(
-        [sys.executable, "-m", "phone_host.bench_cli", "--help"], capture_output=True, text=True, check=True
+        [sys.executable, "-m", "phone_host.bench.cli", "--help"], capture_output=True, text=True, check=True
     )
     assert "examples:\n  delay-bench\n" in done.stdout

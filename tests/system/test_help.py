@@ -14,7 +14,7 @@ COMMANDS = [
         ("phone_host.cli", [verb])
         for verb in ("demo", "run", "calibrate", "calibrate-time", "stereo", "doctor", "pair", "keys", "settings")
     ),
-    ("phone_host.bench_cli", []),
+    ("phone_host.bench.cli", []),
 ]
 
 
@@ -27,10 +27,10 @@ def test_help_opens_with_examples(module: str, verb: list[str], tmp_path: Path) 
         assert running.wait() == 0
     first, second = running.out.read_text().splitlines()[:2]
     assert first == "examples:"
-    name = {"board_agent.cli": "board-agent", "phone_host.cli": "phone-host", "phone_host.bench_cli": "delay-bench"}[
+    name = {"board_agent.cli": "board-agent", "phone_host.cli": "phone-host", "phone_host.bench.cli": "delay-bench"}[
         module
     ]
     assert second.split("=")[0].strip().removeprefix("sudo ").startswith((name, "PHONE_HOST", "BOARD_AGENT"))
     # Where verbs are still to be chosen there are none of their options.
-    runs_as_it_is = bool(verb) or module == "phone_host.bench_cli"
+    runs_as_it_is = bool(verb) or module == "phone_host.bench.cli"
     assert ("--debug" in running.out.read_text()) is runs_as_it_is

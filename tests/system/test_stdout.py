@@ -11,7 +11,7 @@ COMMANDS = [
     ["board_agent.cli", "run", "--help"],
     ["phone_host.cli", "settings"],
     ["phone_host.cli", "stereo", "--help"],
-    ["phone_host.bench_cli", "--help"],
+    ["phone_host.bench.cli", "--help"],
 ]
 
 

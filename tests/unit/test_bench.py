@@ -15,9 +15,8 @@ from common.errors import SettingsError
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts
 from phone_host.accounts import LinkAccount, SessionAccount
-from phone_host.bench import WARM_UP_S, CaseResult, after_warm_up, rig_of
-from phone_host.bench_analysis import Analysis, analyse
-from phone_host.bench_cases import (
+from phone_host.bench.analysis import Analysis, analyse
+from phone_host.bench.cases import (
     LOCAL_LINKS,
     SHAPED_LINKS,
     Case,
@@ -30,9 +29,10 @@ from phone_host.bench_cases import (
     parse_rates,
     parse_sizes,
 )
-from phone_host.bench_changes import parse_changes
-from phone_host.bench_page import figure, page
-from phone_host.bench_report import Conditions, as_json, fit_rows, losses, rows, summary_line
+from phone_host.bench.changes import parse_changes
+from phone_host.bench.page import figure, page
+from phone_host.bench.report import Conditions, as_json, fit_rows, losses, rows, summary_line
+from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up, rig_of
 from phone_host.boardprocess import BoardAccount
 from phone_host.delays import DELAYS, STAGES
 from phone_host.emulate import PROFILES

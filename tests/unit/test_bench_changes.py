@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import SettingsError
-from phone_host.bench_changes import parse_changes
+from phone_host.bench.changes import parse_changes
 from phone_host.prediction import Images, Target
 from phone_host.queue_model import LinkModel
 from phone_host.sync.fifo import FifoSettings, Overflow

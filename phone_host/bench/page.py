@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from html import escape
 from typing import Final
 
-from phone_host.bench import WARM_UP_S, CaseResult
-from phone_host.bench_analysis import Analysis, InterfaceFit, typical_and_slow
-from phone_host.bench_report import (
+from phone_host.bench.analysis import Analysis, InterfaceFit, typical_and_slow
+from phone_host.bench.report import (
     FIT_COLUMNS,
     PREDICTION_COLUMNS,
     Conditions,
@@ -18,6 +17,7 @@ from phone_host.bench_report import (
     summary_line,
     what_if_rows,
 )
+from phone_host.bench.runs import WARM_UP_S, CaseResult
 from phone_host.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
 from phone_host.plot_scale import duration_text
 from phone_host.plots import STYLE, Budget, Part, Quantity, Strips, budgets, distributions, legend

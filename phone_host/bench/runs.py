@@ -20,8 +20,8 @@ from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.accounts import LinkAccount
-from phone_host.bench_cases import Case, Size
-from phone_host.bench_links import Ends, ends_of
+from phone_host.bench.cases import Case, Size
+from phone_host.bench.links import Ends, ends_of
 from phone_host.boardprocess import BoardAccount
 from phone_host.demo import NEAR_M
 from phone_host.film import JPEG_QUALITY, Film, render_films

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from common.errors import SettingsError
-from phone_host.bench_cases import Size, parse_rates, parse_sizes
+from phone_host.bench.cases import Size, parse_rates, parse_sizes
 from phone_host.emulate import Profile, parse_profiles
 from phone_host.prediction import Target, nominal_link
 from phone_host.sync.fifo import FifoSettings

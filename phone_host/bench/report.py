@@ -10,9 +10,9 @@ from typing import Final
 import zmq
 
 from common import now
-from phone_host.bench import WARM_UP_S, CaseResult, RunSettings
-from phone_host.bench_analysis import Analysis, Checked, InterfaceFit, WhatIf
-from phone_host.bench_cases import BOARD_SETS, Interface
+from phone_host.bench.analysis import Analysis, Checked, InterfaceFit, WhatIf
+from phone_host.bench.cases import BOARD_SETS, Interface
+from phone_host.bench.runs import WARM_UP_S, CaseResult, RunSettings
 from phone_host.delays import DELAYS, STAGES, DelayStatistics, Spread
 from phone_host.fits import DelayFit
 from phone_host.plot_scale import duration_text

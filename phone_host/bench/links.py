@@ -19,7 +19,7 @@ from common.keys import usual_keys
 from common.link.factory import open_link, parse_link
 from common.protocol.message import BoardHello, Pacing
 from phone_host.accounts import LinkAccount
-from phone_host.bench_cases import BOARD_SETS, Case, Interface, Size
+from phone_host.bench.cases import BOARD_SETS, Case, Interface, Size
 from phone_host.boardprocess import BoardAccount, BoardProcess, board_process, free_port
 from phone_host.emulate import NOTHING
 from phone_host.pairqueue import PairQueue

@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 
 from common.ledger import PairLedger
-from phone_host.bench import CaseResult
-from phone_host.bench_cases import Case, Interface
-from phone_host.bench_changes import Change
+from phone_host.bench.cases import Case, Interface
+from phone_host.bench.changes import Change
+from phone_host.bench.runs import CaseResult
 from phone_host.emulate import PROFILES, Profile
 from phone_host.fits import DelayFit
 from phone_host.prediction import (

@@ -15,10 +15,10 @@ from common.errors import SettingsError, TandemError, UnavailableError
 from common.signals import StopSignals
 
 if TYPE_CHECKING:
-    from phone_host.bench import CaseResult, RunSettings
-    from phone_host.bench_analysis import Analysis
-    from phone_host.bench_cases import Case, Interface, Size
-    from phone_host.bench_report import Conditions
+    from phone_host.bench.analysis import Analysis
+    from phone_host.bench.cases import Case, Interface, Size
+    from phone_host.bench.report import Conditions
+    from phone_host.bench.runs import CaseResult, RunSettings
     from phone_host.film import Film
 
 _EXAMPLES = """examples:
@@ -112,8 +112,8 @@ def _run(options: argparse.Namespace) -> int:
     if options.emulate == "list":
         _print_profiles(as_json=options.json)
         return 0
-    from phone_host.bench_analysis import analyse  # noqa: PLC0415 - OpenCV, only now
-    from phone_host.bench_cases import (  # noqa: PLC0415 - only what this run needs is loaded
+    from phone_host.bench.analysis import analyse  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.bench.cases import (  # noqa: PLC0415 - only what this run needs is loaded
         cases,
         interfaces,
         parse_links,
@@ -121,10 +121,10 @@ def _run(options: argparse.Namespace) -> int:
         parse_rates,
         parse_sizes,
     )
-    from phone_host.bench_changes import parse_changes  # noqa: PLC0415
-    from phone_host.bench_links import obstacle  # noqa: PLC0415
-    from phone_host.bench_page import figure, page  # noqa: PLC0415
-    from phone_host.bench_report import as_json, conditions  # noqa: PLC0415
+    from phone_host.bench.changes import parse_changes  # noqa: PLC0415
+    from phone_host.bench.links import obstacle  # noqa: PLC0415
+    from phone_host.bench.page import figure, page  # noqa: PLC0415
+    from phone_host.bench.report import as_json, conditions  # noqa: PLC0415
     from phone_host.emulate import parse_profiles  # noqa: PLC0415
     from phone_host.trace import TracedRun, trace_json  # noqa: PLC0415
 
@@ -172,7 +172,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _settings(options: argparse.Namespace) -> "RunSettings":
-    from phone_host.bench import RunSettings  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.bench.runs import RunSettings  # noqa: PLC0415 - OpenCV, only now
     from phone_host.stereo.match import MatcherName  # noqa: PLC0415
     from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
 
@@ -187,8 +187,8 @@ def _settings(options: argparse.Namespace) -> "RunSettings":
 
 def _remote_cases(remote: "Sequence[Interface]", signals: StopSignals) -> "list[Case]":
     """What the boards elsewhere show; an absent one is an error before anything is measured."""
-    from phone_host.bench import PATIENCE_NS  # noqa: PLC0415
-    from phone_host.bench_links import ask_board  # noqa: PLC0415
+    from phone_host.bench.links import ask_board  # noqa: PLC0415
+    from phone_host.bench.runs import PATIENCE_NS  # noqa: PLC0415
 
     found = []
     for interface in remote:
@@ -206,7 +206,7 @@ def _remote_cases(remote: "Sequence[Interface]", signals: StopSignals) -> "list[
 
 def _measure(planned: "Sequence[Case]", settings: "RunSettings", signals: StopSignals) -> _Outcome:
     """Run all cases, until a signal comes or one fails; what was measured before stays."""
-    from phone_host.bench import WARM_UP_S, film_images, run_case  # noqa: PLC0415
+    from phone_host.bench.runs import WARM_UP_S, film_images, run_case  # noqa: PLC0415
 
     outcome = _Outcome()
     run_s = _SET_UP_S + WARM_UP_S + settings.seconds
@@ -292,7 +292,7 @@ def _films(
     planned: "Sequence[Case]", size: "Size", folder: Path, advance: Callable[[], None]
 ) -> "dict[tuple[Size, int], Film]":
     """The films of one size, in all its qualities."""
-    from phone_host.bench import render  # noqa: PLC0415
+    from phone_host.bench.runs import render  # noqa: PLC0415
 
     qualities = tuple(dict.fromkeys(case.quality_percent for case in planned if case.size == size))
     try:
@@ -341,7 +341,7 @@ def _print(results: "Sequence[CaseResult]", under: "Conditions", analysis: "Anal
     from rich.console import Console  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
 
-    from phone_host.bench_report import (  # noqa: PLC0415
+    from phone_host.bench.report import (  # noqa: PLC0415
         PERCENTILES,
         fit_lines,
         grouped,
