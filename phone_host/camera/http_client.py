@@ -70,15 +70,20 @@ class Connection:
 
     def _answer(self) -> http.client.HTTPResponse:
         """The head of the server's answer; each of its bytes may be in time and the whole never come."""
-        timer = threading.Timer(_ANSWER_S, self.interrupt)
+        late = threading.Event()
+
+        def give_up() -> None:
+            late.set()  # first: an interrupted head reads like one that has ended
+            self.interrupt()
+
+        timer = threading.Timer(_ANSWER_S, give_up)
         timer.daemon = True
         timer.start()
         try:
             return self._client.getresponse()
         finally:
-            in_time = timer.is_alive()
             timer.cancel()
-            if not in_time:
+            if late.is_set():
                 raise TimeoutError
 
     def read(self, patience_s: float) -> bytes:
