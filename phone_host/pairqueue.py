@@ -88,6 +88,8 @@ class PairQueue:
         self._closed = False
         self._timeless = on_demand
         self._time_offset_ns = time_offset_ns
+        self._labelled = False
+        self._label_offset_ns: int | None = None
         self._meter: PhaseMeter | None = None
         self._newest: deque[BoardFrame] = deque(maxlen=_NEWEST)
         self._received = self._host_frames = self._paired = self._dropped = self._taken = 0
@@ -143,6 +145,7 @@ class PairQueue:
         """
         with self._changed:
             self._timeless |= on_demand
+            self._labelled, self._label_offset_ns = on_demand, None
             self._meter = PhaseMeter(board_period_ns, self._host_period_ns)
             if self._pairing is not None:
                 self._settle(self._pairing.restart(OrphanReason.STREAM_ENDED))
@@ -152,25 +155,43 @@ class PairQueue:
                     self._settle(self._pairing.finish())
                 self._pairing = Pairing(PairingSettings(self.tolerance_ns, board_period_ns, self._host_period_ns))
 
-    def add_board(self, frame: BoardFrame) -> None:
-        """Take a frame of the board."""
+    def add_board(self, frame: BoardFrame) -> int:
+        """Take a frame of the board.
+
+        Returns:
+            The stamp by which it is paired, on the host's clock, ns.
+        """
         with self._changed:
             assert self._pairing is not None
             self._received += 1
+            exposed_ns = self._stamp_of(frame)
             if self._closed:
                 self._count(self._board_orphans, OrphanReason.STREAM_ENDED.value)
-                return
+                return exposed_ns
             delay_ns = frame.received_ns - frame.marks.exposed_ns
             # Where bytes take the time a frame that is a fifth larger comes as much later; the slow decay follows a link that gets faster.
             self._host_wait_ns = min(_SLOWEST_NS, max(delay_ns * 5 // 4, self._host_wait_ns * 63 // 64))
             self._board_bytes += len(frame.message.payload)
             self._newest.append(frame)
-            exposed_ns = frame.marks.exposed_ns + self._time_offset_ns
             if self._meter is not None:
                 self._meter.add_board(exposed_ns)
             self._settle(self._pairing.add_board(exposed_ns, frame, now.monotonic_ns()))
             while self._board_bytes > _SIDE_BYTES:
                 self._settle(self._pairing.evict_oldest_board())
+            return exposed_ns
+
+    def _stamp_of(self, frame: BoardFrame) -> int:
+        """When a frame was exposed, on the host's clock.
+
+        Stamps of images shown on demand are labels, which the own camera's continue from the first one on: they all go by the first
+        one's clock offset, because a better estimate may move the others by more than a fast film's period.
+        """
+        exposed_ns = frame.marks.exposed_ns + self._time_offset_ns
+        if not self._labelled:
+            return exposed_ns
+        if self._label_offset_ns is None:
+            self._label_offset_ns = frame.offset_ns
+        return exposed_ns + self._label_offset_ns - frame.offset_ns
 
     def add_host(self, frame: Frame) -> None:
         """Take a frame of the own camera."""

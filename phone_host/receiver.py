@@ -376,9 +376,9 @@ class Receiver:
         if self._hello is not None:
             self._flow.arrived(self._transit_ns, marks.sent_ns - marks.grabbed_ns, self._hello.camera.period_ns, now_ns)
         tally.age.add(now_ns - marks.exposed_ns)
-        self._queue.add_board(BoardFrame(frame, tally.name, marks, now_ns, offset_ns, uncertainty_ns))
+        stamp_ns = self._queue.add_board(BoardFrame(frame, tally.name, marks, now_ns, offset_ns, uncertainty_ns))
         on_demand = self._hello is not None and self._hello.camera.pacing is Pacing.DEMAND
-        self._listener.frame_arrived(marks.exposed_ns, frame.sequence if on_demand else None)
+        self._listener.frame_arrived(stamp_ns, frame.sequence if on_demand else None)
 
 
 def refusal_text(reason: RefusalReason) -> tuple[str, str]:

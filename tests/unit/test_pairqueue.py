@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -227,3 +228,19 @@ def test_a_time_offset_is_taken_out_before_pairing(offset_ns: int) -> None:
     assert pair is not None
     assert pair.time_skew_ns == 0
     assert pair.board.marks.exposed_ns == start_ns
+
+
+def test_a_better_clock_estimate_moves_no_label() -> None:
+    """Images shown on demand are paired by number, however far the clock's estimate moves from one to the next."""
+    queue = PairQueue(FifoSettings(9, Overflow.DROP_NEWEST), None, 2 * MS, on_demand=True)
+    queue.begin(2 * MS, on_demand=True)
+    start_ns = now.monotonic_ns()
+    labels = []
+    for number, offset_ns in enumerate((5 * MS, 0, -7 * MS, 3 * MS)):
+        exposed_ns = start_ns + number * 2 * MS + offset_ns
+        frame = replace(board_frame(number, exposed_ns), offset_ns=offset_ns)
+        labels.append(queue.add_board(frame))
+        queue.add_host(host_frame(number, labels[0] + number * 2 * MS))
+    assert labels == [start_ns + 5 * MS + number * 2 * MS for number in range(4)]
+    assert queue.counts.paired == 4
+    check(queue.counts)

@@ -70,20 +70,19 @@ def test_a_pulled_camera_is_missed_and_found_again(
     assert guest.show("MainPID") == process
 
 
-def test_a_camera_whose_firmware_hangs_ends_in_the_watchdog(
+def test_a_camera_whose_firmware_hangs_is_overcome(
     guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
 ) -> None:
-    """A camera that answers nothing holds its driver in the kernel, where no program can be left: the watchdog restarts the service, and it streams on."""
-    restarts, timeouts = int(guest.show("NRestarts")), guest.journal().count("Watchdog timeout")
+    """A camera that answers nothing is given up, or holds its driver in the kernel until the watchdog restarts the service; then it streams on."""
+    told = ("camera_lost", "Watchdog timeout")
+    before = sum(guest.journal().count(word) for word in told)
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the hang")
         webcam.hung = True
         try:
-            late = "the watchdog sees that the loop stands still"
-            until(lambda: guest.journal().count("Watchdog timeout") > timeouts, late)
+            until(lambda: sum(guest.journal().count(word) for word in told) > before, "the hang is noticed")
         finally:
             webcam.hung = False
-        until(lambda: int(guest.show("NRestarts")) > restarts, "the service is started anew")
         stream.more(10, "after the hang")
         stream.finish(skew)
 
