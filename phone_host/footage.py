@@ -58,9 +58,10 @@ class _Keeper(PairQueue):
         """There is always room."""
         return _SLOTS
 
-    def add_board(self, frame: BoardFrame) -> None:
+    def add_board(self, frame: BoardFrame) -> int:
         """Keep a frame of the board."""
         self._keep(self.board, frame.marks.exposed_ns, frame.message, "board")
+        return frame.marks.exposed_ns
 
     def add_host(self, frame: Frame) -> None:
         """Keep a frame of the own camera, once the board's have begun."""

@@ -70,10 +70,11 @@ class OurHost:
         class Counting(PairQueue):
             """Ends the frames' way."""
 
-            def add_board(self, frame: BoardFrame) -> None:
+            def add_board(self, frame: BoardFrame) -> int:
                 counter.frames += 1
                 counter.bytes += len(frame.message.payload)
                 counter.ages_ns.append(frame.received_ns - frame.marks.exposed_ns)
+                return frame.marks.exposed_ns
 
         link = open_link(parse_link(address, listens_by_default=False))
         queue = Counting(FifoSettings(), None, period_ns)

@@ -94,8 +94,8 @@ def receive_tandemscan(job: Job) -> Tally:
     class NoPairing(PairQueue):
         """Ends the frames' way: pairing is no part of a link."""
 
-        def add_board(self, frame: BoardFrame) -> None:
-            pass
+        def add_board(self, frame: BoardFrame) -> int:
+            return frame.marks.exposed_ns
 
     queue = NoPairing(FifoSettings(_SLOTS), None, 1_000_000_000 // (job.fps or 30))
     receiver = Stamping([_open(job.address)], now.random_id(), queue, Unheard())
