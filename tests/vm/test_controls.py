@@ -37,6 +37,7 @@ def as_new(webcam: Webcam, guest: Guest) -> None:
     until(lambda: guest.code("test -e /dev/video0") != 0, "the node is gone")
     webcam.set_requests = []
     webcam.plug(guest)
+    until(lambda: guest.code("test -e /dev/video0") == 0, "the driver has made its node")
 
 
 def check_order(requests: list[tuple[tuple[int, int], int]]) -> None:
