@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from board_agent.outbox import Outbox
+from board_agent.rate_control import RateControl
 from board_agent.sd_notify import Notifier
 from board_agent.status import StatusLine
 from common import now
@@ -121,6 +122,7 @@ class Agent:
         wake: readable end of a socket that is written to by signals.
         service: told that the loop goes round; None outside a service.
         idle_ns: after this time without a host the camera rests; None: never.
+        control: chooses among the camera's modes by what the link carries; None: the camera stays as it is.
     """
 
     def __init__(
@@ -133,7 +135,9 @@ class Agent:
         *,
         service: Service | None = None,
         idle_ns: int | None = None,
+        control: RateControl | None = None,
     ) -> None:
+        self._control = control
         self._service = service
         self._idle_ns = idle_ns
         self._alone_since_ns = now.monotonic_ns()
@@ -147,6 +151,8 @@ class Agent:
             (lane, _address(i, path)) for i, link in enumerate(links) for lane, path in link.dialled.items()
         )
         self._session = BoardSession(session, boot_id, camera.description, dialled)
+        if control is not None:
+            self._session.describe(camera.description, control.rung)
         self._had_host = False
         self._camera_ended = False
         self._held_back = False
@@ -172,6 +178,8 @@ class Agent:
             if later_ns := self._session.take_steering():
                 self._camera.steer(later_ns, now_ns)
             self._flush()
+            if self._control is not None and self._control.is_due(now_ns):
+                self._adapt(self._control, now_ns)
             now_ns = now.monotonic_ns()
             if now_ns >= self._session.due_ns:
                 self._send_all(self._session.tick(now_ns, self._outbox.counts))
@@ -289,6 +297,16 @@ class Agent:
                 self._retry_ns = now.monotonic_ns() + _FULL_RETRY_NS
             case _:
                 pass  # unreachable: the frame waits for the host to come back, or for a newer one
+
+    def _adapt(self, control: RateControl, now_ns: int) -> None:
+        """Let the camera give what the link carries."""
+        if not control.update(self._outbox.counts, self._session.link, now_ns):
+            return
+        self._camera.adapt(control.mode, now_ns)
+        rung = control.rung
+        self._session.describe(self._camera.description, rung)
+        fps = round(1e9 / rung.period_ns, 2)
+        _LOG.info(event("camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality))
 
     def _send_all(self, outgoing: list[Outgoing]) -> None:
         for item in outgoing:

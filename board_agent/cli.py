@@ -10,6 +10,7 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from board_agent.rate_control import RateControl, ladder, ways
 from board_agent.sd_notify import Notifier
 from board_agent.settings import ENVIRONMENT_PREFIX, SERVICE_SETTINGS, BoardSettings, key_folder
 from board_agent.status import StatusLine
@@ -35,6 +36,7 @@ _EXAMPLES = """examples:
   board-agent run --camera 'v4l2:/dev/video0?size=640x480&fps=30' --link 'tcp://*:5555'
   board-agent run --camera 'replay:frames?fps=30&loop=1'
   board-agent run --camera 'replay:frames?pace=demand' --link ipc:///tmp/board
+  board-agent run --camera 'v4l2:auto?fps=30' --link 'rfcomm://*' --adapt quality,rate --least-fps 5
   board-agent run --config /etc/tandemscan/board-agent.toml
   board-agent cameras
   sudo board-agent pair
@@ -44,6 +46,8 @@ _EXAMPLES = """examples:
 """
 
 _LONGEST_IDLE_S: Final = 1e9
+_HIGHEST_FPS: Final = 1000
+"""Of any camera URI."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -86,6 +90,17 @@ def _parser() -> argparse.ArgumentParser:
             help="tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://*; may be given again",
         )
         verb.add_argument(
+            "--adapt",
+            metavar="WAYS",
+            help="what gives way where the link is slow (default quality,rate; '' for nothing)",
+        )
+        verb.add_argument(
+            "--least-fps",
+            type=float,
+            metavar="FPS",
+            help="lower the camera's rate to this at most (default: not at all)",
+        )
+        verb.add_argument(
             "--log-level", choices=("debug", "info", "warning", "error"), help="how much to log to stderr"
         )
     return parser
@@ -98,7 +113,7 @@ def _add_keys_options(keys: argparse.ArgumentParser, pair: argparse.ArgumentPars
     what.add_argument("--add", nargs=2, metavar=("NAME", "KEY"), help="let in a host without pairing")
     pair.add_argument("--seconds", type=float, default=300.0, metavar="S", help="wait so long for a host (default 300)")
     for verb in (keys, pair):
-        verb.set_defaults(camera=None, link=None, log_level=None)
+        verb.set_defaults(camera=None, link=None, log_level=None, adapt=None, least_fps=None)
 
 
 def _keys(options: argparse.Namespace) -> int:
@@ -135,7 +150,9 @@ def _key_folder(options: argparse.Namespace) -> KeyFolder:
 
 def _resolve(options: argparse.Namespace) -> Resolved[BoardSettings]:
     link = tuple(options.link) if options.link else None
+    adapt = None if options.adapt is None else tuple(way for way in options.adapt.split(",") if way)
     given = {"camera": options.camera, "link": link, "keys": options.keys, "log_level": options.log_level}
+    given |= {"adapt": adapt, "least_fps": options.least_fps}
     return resolve(BoardSettings, ENVIRONMENT_PREFIX, options.config, given)
 
 
@@ -157,6 +174,11 @@ def _check(settings: BoardSettings) -> None:
         parse_camera(settings.camera, "")
     for uri in settings.link:
         parse_link(uri, listens_by_default=True)
+    ways(settings.adapt)
+    if not 0 <= settings.least_fps <= _HIGHEST_FPS:
+        raise SettingsError(
+            f"least_fps is {settings.least_fps:g}", f"give frames per second up to {_HIGHEST_FPS}, 0 to keep the rate"
+        )
     if not 0 <= settings.idle_after < _LONGEST_IDLE_S:
         raise SettingsError(f"idle_after is {settings.idle_after}", "give seconds, 0 for never")
 
@@ -227,8 +249,11 @@ def _serve(settings: BoardSettings, signals: StopSignals) -> "Summary":
         _LOG.info(logs.event("serving", session=session, camera=settings.camera, links=",".join(settings.link)))
         idle_ns = round(settings.idle_after * 1e9) or None
         status = StatusLine(settings.camera, camera.description.pacing, settings.link, now.monotonic_ns())
+        modes = ladder(camera.offers, ways(settings.adapt), settings.least_fps)
+        control = RateControl(modes) if len(modes) > 1 else None
+        service = Service(notifier, status)
         summary = Agent(
-            camera, links, session, boot_id, signals.reader, service=Service(notifier, status), idle_ns=idle_ns
+            camera, links, session, boot_id, signals.reader, service=service, idle_ns=idle_ns, control=control
         ).run()
         notifier.stopping("stopped")
         return summary

@@ -26,6 +26,13 @@ class BoardSettings:
     idle_after: float = setting(
         10.0, "seconds without a host after which the camera's stream is switched off; 0: never"
     )
+    adapt: tuple[str, ...] = setting(
+        ("quality", "rate"),
+        "what of the camera gives way, in this order, where the link does not carry it: quality, rate, or nothing",
+    )
+    least_fps: float = setting(
+        0.0, "frames per second below which the rate is not lowered; 0: it stays as it was asked for"
+    )
     keys: str = setting(
         "",
         "folder of this machine's key and those that may connect; empty: /var/lib/tandemscan or ~/.config/tandemscan",

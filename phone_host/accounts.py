@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from common.protocol.message import BoardCounts
+from common.protocol.message import BoardCounts, Rung
 from phone_host.delays import Series
 
 
@@ -21,6 +21,7 @@ class SessionAccount:
         duplicate: frames that a transport delivered again, dropped.
         late: frames that came behind a newer one over another link, dropped; they are counted in `lost`.
         old_session: frames of an older life of the board, dropped.
+        rung: how far the board has lowered what its camera gives.
         ended: whether the board said that no frame follows.
         vanished: whether the board went without a word: what it sent after `latest` is unknown.
     """
@@ -33,6 +34,7 @@ class SessionAccount:
     duplicate: int = 0
     late: int = 0
     old_session: int = 0
+    rung: Rung = field(default_factory=Rung)
     ended: bool = False
     vanished: bool = False
 

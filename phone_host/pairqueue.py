@@ -155,6 +155,21 @@ class PairQueue:
                     self._settle(self._pairing.finish())
                 self._pairing = Pairing(PairingSettings(self.tolerance_ns, board_period_ns, self._host_period_ns))
 
+    def change_period(self, board_period_ns: int) -> None:
+        """The board's camera has another rate from now on; frames that wait for their partners go on waiting.
+
+        Args:
+            board_period_ns: time between two of its frames.
+        """
+        with self._changed:
+            if self._pairing is None or board_period_ns == self._board_period_ns:
+                return
+            self._board_period_ns = board_period_ns
+            self._meter = PhaseMeter(board_period_ns, self._host_period_ns)
+            changed = PairingSettings(self.tolerance_ns, board_period_ns, self._host_period_ns)
+            if not self._closed:
+                self._settle(self._pairing.change(changed, now.monotonic_ns()))
+
     def add_board(self, frame: BoardFrame) -> int:
         """Take a frame of the board.
 

@@ -6,6 +6,7 @@ import os
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Final, Protocol
 
 from common import now
@@ -15,7 +16,7 @@ from common.link.several import SeveralLinks
 from common.link.wait import Waiter
 from common.logs import event
 from common.protocol.host_session import HostSession
-from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Pacing, RefusalReason
+from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Pacing, RefusalReason, Rung
 from common.protocol.session import (
     Accepted,
     Arrived,
@@ -29,6 +30,7 @@ from common.protocol.session import (
     Refused,
     Stale,
     StaleReason,
+    Stepped,
     Vanished,
     connection_name,
 )
@@ -273,14 +275,20 @@ class Receiver:
                     self._current.latest = max(counts, self._current.latest, key=lambda account: account.grabbed)
                     self._current.ended |= ended
                     self._choice.account(counts.grabbed, now_ns, has_credit=self._session.outstanding > 0)
+                case Stepped(rung):
+                    self._note_rung(rung)
                 case Refused(reason):
                     self._refused = (reason, now_ns)
                 case Vanished(orderly):
-                    self._current.vanished = not orderly
-                    for number, tally in enumerate(self.account.links):
-                        self._choice.down(number, now_ns)
-                        tally.is_up = False
-                    _LOG.info(event("board_gone", session=self._current.session, orderly=orderly))
+                    self._note_gone(orderly=orderly, now_ns=now_ns)
+
+    def _note_gone(self, *, orderly: bool, now_ns: int) -> None:
+        """The board is not there any more, on no link."""
+        self._current.vanished = not orderly
+        for number, tally in enumerate(self.account.links):
+            self._choice.down(number, now_ns)
+            tally.is_up = False
+        _LOG.info(event("board_gone", session=self._current.session, orderly=orderly))
 
     def _count_stale(self, reason: StaleReason) -> None:
         account = self._current
@@ -343,6 +351,8 @@ class Receiver:
             self.account.sessions.append(SessionAccount(hello.session, hello.counts, hello.counts))
             self._listener.session_began()
             self._queue.begin(hello.camera.period_ns, on_demand=hello.camera.pacing is Pacing.DEMAND)
+        self._current.rung = hello.rung
+        self._queue.change_period(hello.camera.period_ns)
         if link != before:
             tally.carried += 1
         if accepted.resumed and before is not None and link != before:
@@ -355,6 +365,15 @@ class Receiver:
         size = f"{camera.width_px}x{camera.height_px}"
         found = {"session": hello.session, "resumed": accepted.resumed, "link": tally.name}
         _LOG.info(event("board_found", **found, camera=camera.name, size=size))
+
+    def _note_rung(self, rung: Rung) -> None:
+        """Go by another rate of the board's camera."""
+        assert self._hello is not None
+        self._hello = replace(self._hello, camera=replace(self._hello.camera, period_ns=rung.period_ns), rung=rung)
+        self._current.rung = rung
+        self._queue.change_period(rung.period_ns)
+        fps = round(1e9 / rung.period_ns, 2)
+        _LOG.info(event("board_camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality))
 
     def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
         account, tally = self._current, self.account.links[link]

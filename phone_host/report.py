@@ -188,7 +188,7 @@ def summary(facts: RunFacts) -> str:
     lines += [f"  {remedy}" for remedy in judge(figures(facts)).remedies]
     lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(time_and_motion(facts))]
     lines += camera_troubles(facts.camera)
-    lines += [*_links(facts.link), *_losses(facts)]
+    lines += [*rung_lines(facts.link), *_links(facts.link), *_losses(facts)]
     return "\n".join(lines)
 
 
@@ -345,6 +345,18 @@ def camera_troubles(health: CameraHealth) -> list[str]:
     return [f"own camera: {', '.join(parts)}".replace("_", " ")] if parts else []
 
 
+def rung_lines(link: LinkAccount) -> list[str]:
+    """Say how far the board has lowered what its camera gives, in one line; nothing where it never did."""
+    if not link.sessions or not link.sessions[-1].rung.changes:
+        return []
+    rung = link.sessions[-1].rung
+    quality = f", quality {rung.quality}" if rung.quality else ""
+    where = f"on rung {rung.index} of {rung.last}" if rung.index else "as it was asked for"
+    return [
+        f"board camera: {where} ({1e9 / rung.period_ns:.3g} frames/s{quality}), changed {rung.changes} times by what the link carries"
+    ]
+
+
 def board_drops(link: LinkAccount) -> dict[str, int]:
     """Frames that the board dropped while this host was connected, by reason."""
     drops: dict[str, int] = {}
@@ -416,6 +428,13 @@ def _session(facts: RunFacts, index: int) -> dict[str, object]:
         "waiting": grabbed - sent - sum(dropped.values()),
         "received": account.received,
         "lost": account.lost,
+        "camera": {
+            "rung": account.rung.index,
+            "lowest_rung": account.rung.last,
+            "changes": account.rung.changes,
+            "fps": _number(1e9 / account.rung.period_ns) if account.rung.period_ns else None,
+            "quality": account.rung.quality or None,
+        },
         "stale": {"duplicate": account.duplicate, "late": account.late, "old_session": account.old_session},
         "ended": account.ended,
         "tail": "unknown" if account.vanished else "known",

@@ -12,7 +12,7 @@ from phone_host.formats.preview import colour_disparity, colour_range_px
 from phone_host.model import Image, Side
 from phone_host.pipeline import Processed
 from phone_host.regime import Judgement, Regime, judge
-from phone_host.report import RunFacts, board_drops, figures, phase_lines, time_and_motion
+from phone_host.report import RunFacts, board_drops, figures, phase_lines, rung_lines, time_and_motion
 from phone_host.report_page import Figure, PageData, Picture, Table, Verdict, delay_series, page
 from phone_host.trust import Concern, concerns
 
@@ -54,6 +54,7 @@ def notes(facts: RunFacts) -> tuple[str, ...]:
         *(f"Would help: {remedy}." for remedy in judgement.remedies),
         *(f"Warning: {item.sentence}. Remedy: {item.remedy}." for item in concerns(time_and_motion(facts))),
         *phase_lines(facts.phase, facts.alignment),
+        *rung_lines(facts.link),
     )
 
 

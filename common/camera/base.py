@@ -45,6 +45,32 @@ class Ended:
 Grab = Frame | Spoiled | Skipped | Ended
 
 
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """What a camera can be told to give while it runs.
+
+    Attributes:
+        period_ns: nominal time between frames, ns.
+        quality: of its JPEG images in the camera's own unit, more is better; 0 where it cannot be set.
+    """
+
+    period_ns: int
+    quality: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Offers:
+    """What a camera's mode can be made of, the present values first; both empty where nothing can be changed while it runs.
+
+    Attributes:
+        periods_ns: nominal times between frames, ns, the shortest first; none is shorter than the present one.
+        qualities: of its JPEG images, the best first; none is better than the present one.
+    """
+
+    periods_ns: tuple[int, ...] = ()
+    qualities: tuple[int, ...] = ()
+
+
 class CameraState(Enum):
     """Whether frames come."""
 
@@ -112,7 +138,19 @@ class Camera(Protocol):
 
     @property
     def description(self) -> CameraDescription:
-        """Size, encoding, period and pacing."""
+        """Size, encoding, period and pacing; the period follows the mode."""
+
+    @property
+    def offers(self) -> Offers:
+        """What it can be told to give instead of what it was asked for at first; that stays the first of each."""
+
+    def adapt(self, mode: Mode, now_ns: int) -> None:
+        """Give frames of another mode from now on; a device may need a new start for it. A camera that offers none takes no notice.
+
+        Args:
+            mode: made of what it offers.
+            now_ns: CLOCK_MONOTONIC now, ns.
+        """
 
     @property
     def pollable(self) -> int | None:

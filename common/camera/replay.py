@@ -1,16 +1,16 @@
 """A camera that shows a folder of images, in name order, on a clock or on demand.
 
 pace=clock: at any moment the image is number floor(t * fps) of CLOCK_MONOTONIC, exposed exactly at k / fps; so two replays on one machine
-agree whenever they were started; `phase_ms` makes all its exposures so much later than that. pace=demand: one image for each read, nothing dropped, stamps first + k / fps.
+agree whenever they were started; `phase_ms` makes all its exposures so much later than that. A slower mode shows every n-th of these images at its own time. pace=demand: one image for each read, nothing dropped, stamps first + k / fps.
 """
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Final
 
-from common.camera.base import CameraHealth, Ended, Grab, Skipped, Spoiled
+from common.camera.base import CameraHealth, Ended, Grab, Mode, Offers, Skipped, Spoiled
 from common.camera.imagefile import SUFFIXES, ImageFile, load
 from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import Frame, FrameFault, find_fault
@@ -122,6 +122,9 @@ class ReplayCamera:
         steering = Steering.GRID if settings.pacing is Pacing.CLOCK else Steering.NONE
         self.description = CameraDescription(f"replay {name}", *size, self._period_ns, settings.pacing, steering)
         self._phase_ns = settings.phase_ns
+        strides = _STRIDES if settings.pacing is Pacing.CLOCK else ()
+        self.offers = Offers(tuple(self._period_ns * stride for stride in strides))
+        self._stride = 1
         self.pollable: int | None = None
         self.health = CameraHealth()
         self._next = self._index_at(now_ns) + 1 if settings.pacing is Pacing.CLOCK else 0
@@ -149,6 +152,16 @@ class ReplayCamera:
             self._phase_ns += later_ns
             self._due_ns = self._time_of(self._next)
 
+    def adapt(self, mode: Mode, now_ns: int) -> None:
+        """Show every n-th image only: those whose number n divides, so that two replays still show the same one at a time."""
+        del now_ns
+        if mode.period_ns not in self.offers.periods_ns:
+            return
+        self._stride = mode.period_ns // self._period_ns
+        self._next = -(-self._next // self._stride) * self._stride
+        self._due_ns = self._time_of(self._next)
+        self.description = replace(self.description, period_ns=mode.period_ns)
+
     def read(self, now_ns: int) -> list[Grab]:
         """Give the images that have become due; of several missed ones all, so that each is accounted for.
 
@@ -161,12 +174,12 @@ class ReplayCamera:
             return [self._grab(now_ns)]
         if now_ns < self._due_ns:
             return []
-        newest = self._index_at(now_ns)
+        newest = self._index_at(now_ns) // self._stride * self._stride
         # After a long stall (a stopped process) only the newest images are read; the others are told of by their number.
-        passed = max(0, newest - self._next + 1 - _BACKLOG) if self._settings.loop else 0
+        passed = max(0, (newest - self._next) // self._stride + 1 - _BACKLOG) if self._settings.loop else 0
         grabs: list[Grab] = [Skipped(self._sequence, passed)] if passed else []
         self._sequence += passed
-        self._next += passed
+        self._next += passed * self._stride
         while self._next <= newest and not (grabs and isinstance(grabs[-1], Ended)):
             grabs.append(self._grab(now_ns))
         self._due_ns = self._time_of(self._next)
@@ -187,7 +200,7 @@ class ReplayCamera:
         shown = index - self._first_shown
         if not self._settings.loop and shown >= len(self._paths):
             return Ended()
-        self._next += 1
+        self._next += self._stride
         sequence = self._sequence
         self._sequence += 1
         # On the clock the image follows from the time alone, so that two replays agree; without loop it is the first one first.
@@ -237,6 +250,9 @@ class ReplayCamera:
                 )
         return first
 
+
+_STRIDES: Final = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
+"""Every how many-th image a slower mode shows: each rate is a quarter to a half below the one before."""
 
 _BACKLOG: Final = 64
 """Most images read at once: two seconds of video, as much as a driver's ring could ever hold and more."""

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from common.camera.base import CameraHealth, CameraState, Grab
+from common.camera.base import CameraHealth, CameraState, Grab, Mode, Offers
 from common.camera.v4l2_device import capture_nodes, lasting_name
 from common.camera.v4l2_formats import Wanted
 from common.camera.v4l2_ring import RING_BUFFERS
@@ -84,6 +84,9 @@ class V4l2Camera:
             self.description = CameraDescription(
                 stream.name, width_px, height_px, stream.pixel_format, stream.period_ns, Pacing.CLOCK, Steering.RESTART
             )
+            self._rates_hz = {stream.period_ns: settings.wanted.fps}
+            self._rates_hz |= {int(1_000_000_000 / rate_hz): rate_hz for rate_hz in stream.slower_hz}
+            self.offers = Offers(tuple(self._rates_hz), stream.qualities())
             self._begin(stream, now_ns)
         except OSError as error:
             self.close()
@@ -168,6 +171,25 @@ class V4l2Camera:
         start_ns = self._exposed_ns + later_ns - self._latency_ns
         self._restart_ns = now_ns + _REST_NS + (start_ns - now_ns - _REST_NS) % period_ns
         _LOG.info(event("camera_steered", camera=self._path, later_ms=round(later_ns / 1e6, 1)))
+
+    def adapt(self, mode: Mode, now_ns: int) -> None:
+        """Set the quality while frames come; for another rate the device is opened anew: few drivers change it while they have buffers."""
+        if mode.quality != self._wishes.quality:
+            self._wishes = replace(self._wishes, quality=mode.quality)
+            try:
+                if self._stream is not None:
+                    self._stream.set_quality(mode.quality)
+            except OSError as error:
+                self._lose(error, now_ns)
+        if mode.period_ns == self.description.period_ns:
+            return
+        self.description = replace(self.description, period_ns=mode.period_ns)
+        wanted = replace(self._settings.wanted, fps=self._rates_hz[mode.period_ns])
+        self._settings = replace(self._settings, wanted=wanted)
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
+            self._try_again(now_ns)
 
     def read(self, now_ns: int) -> list[Grab]:
         """Give what has come; a device that fails is closed here and opened anew, now or later."""

@@ -86,11 +86,13 @@ class ControlWishes:
         held: value of each axis in the control's own unit (exposure: 100 us; white balance: K); an axis that is missing is left to its automatism.
         power_line: None: as it is.
         lock: whether axes that are not held are held as found, once the automatism has settled.
+        quality: of JPEG images, in the camera's own unit; 0: as it is.
     """
 
     held: tuple[tuple[Axis, int], ...] = ()
     power_line: PowerLine | None = None
     lock: bool = True
+    quality: int = 0
 
     def value(self, axis: Axis) -> int | None:
         """The value to hold an axis at; None: left to the automatism."""
@@ -133,6 +135,26 @@ _AXES: Final = {
 }
 
 
+_QUALITIES: Final = (0.75, 0.6, 0.45, 0.3)
+"""Shares of the best quality: each has about four fifths of the bytes of the one before (libjpeg's tables scale by 50 / q below 50 and 2 - q / 50 above)."""
+
+
+def lower_qualities(control: Control, present: int) -> tuple[int, ...]:
+    """Give the values by which a camera's JPEG images can be made smaller.
+
+    Its range is the driver's own; only positive values have a meaning, and larger ones are better images (ext-ctrls-jpeg).
+
+    Args:
+        control: of the quality.
+        present: its value now.
+
+    Returns:
+        Values below that, the best first.
+    """
+    wanted = (control.fitted(max(1, round(share * control.maximum))) for share in _QUALITIES)
+    return tuple(sorted({value for value in wanted if 0 < value < present}, reverse=True))
+
+
 class ControlPlan:
     """The order in which a camera's controls are set.
 
@@ -152,11 +174,21 @@ class ControlPlan:
         steps = self._maybe(abi.CID_EXPOSURE_DYNAMIC_FRAMERATE, 0)
         if wishes.power_line is not None:
             steps += self._maybe(abi.CID_POWER_LINE_FREQUENCY, wishes.power_line.value)
+        steps += self.to_set_quality(wishes.quality)
         for axis in Axis:
             value = wishes.value(axis)
             if value is not None:
                 steps += self._hold(axis, value)
         return steps
+
+    def to_set_quality(self, quality: int) -> list[Step]:
+        """How to set the quality of JPEG images, before the stream or while it runs; 0: as it is."""
+        return self._maybe(abi.CID_JPEG_COMPRESSION_QUALITY, quality) if quality else []
+
+    def quality(self) -> Control | None:
+        """The control of the JPEG images' quality, if there is one that can be read and set."""
+        control = self._by_id.get(abi.CID_JPEG_COMPRESSION_QUALITY)
+        return control if control is not None and control.can_be_set and control.can_be_read else None
 
     def to_find(self, wishes: ControlWishes) -> list[tuple[Axis, Control]]:
         """What to read once the automatisms have settled: the axes that are to be held as found."""

@@ -22,6 +22,10 @@ _SAME_RATE: Final = Fraction(1, 100)
 """Rates are the same up to this share: drivers count in 100 ns, and people write 30 for 29.97."""
 
 
+_PARTS: Final = (2, 3, 4, 6, 8, 12, 16, 24, 32)
+"""Rates of a camera that takes any, as parts of the asked one: frames of the host's camera at that rate stay in step with them."""
+
+
 @dataclass(frozen=True, slots=True)
 class SizeRange:
     """Sizes that a camera scales to: minimum, maximum and step of width and height, px."""
@@ -202,6 +206,22 @@ def choose_rate(rates: Rates, wanted: Wanted, camera: str) -> Fraction:
         if abs(rate - fps) <= fps * _SAME_RATE:
             return rate
     raise SettingsError(f"camera {camera} has no rate {rate_text(fps)} at that size", f"give one of its rates: {rates}")
+
+
+def slower_rates(rates: Rates, present_hz: Fraction) -> tuple[Fraction, ...]:
+    """Give the rates to which a camera can be slowed.
+
+    Args:
+        rates: what it offers at its size.
+        present_hz: the rate now, Hz.
+
+    Returns:
+        Rates below that, Hz, the highest first; of a camera that takes any rate between two, parts of the present one.
+    """
+    if rates.named_hz:
+        return tuple(rate for rate in rates.named_hz if rate < present_hz * (1 - _SAME_RATE))
+    low_hz = rates.between_hz[0] if rates.between_hz else present_hz
+    return tuple(present_hz / part for part in _PARTS if present_hz / part >= low_hz)
 
 
 def _usual_size(offer: FormatOffer) -> tuple[int, int]:

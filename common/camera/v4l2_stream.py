@@ -11,9 +11,9 @@ from typing import Final
 from common import now
 from common.camera import v4l2_abi as abi
 from common.camera.base import Grab, Skipped, Spoiled
-from common.camera.v4l2_controls import Axis, ControlPlan, ControlWishes, Step
+from common.camera.v4l2_controls import Axis, ControlPlan, ControlWishes, Step, lower_qualities
 from common.camera.v4l2_device import Device, PixelFormatSet, taken
-from common.camera.v4l2_formats import Choice, Wanted, choose, choose_rate, rate_text
+from common.camera.v4l2_formats import Choice, Wanted, choose, choose_rate, rate_text, slower_rates
 from common.camera.v4l2_pack import Packing, SendPart
 from common.camera.v4l2_ring import Filled, Ring
 from common.camera.v4l2_stamps import (
@@ -85,6 +85,7 @@ class Stream:
     Attributes:
         choice: encoding and size.
         period_ns: nominal time between frames, ns.
+        slower_hz: rates to which it can be slowed, Hz, the highest first.
         exposure_ns: exposure time as last read, ns; None where the camera does not tell.
         tells_exposure: whether the driver tells of each change of the exposure time.
         started_ns: when the stream was last started, CLOCK_MONOTONIC, ns.
@@ -109,6 +110,7 @@ class Stream:
             self._device.require_capture()
             self.choice = choose(self._device.formats(), settings.wanted, str(path))
             self._packing = Packing.of(self._set_format(self.choice), self.choice.pixel_format, settings.part)
+            self.slower_hz: tuple[Fraction, ...] = ()
             self.period_ns, self._timing = self._set_rate()
             self._plan = ControlPlan(self._device.controls())
             self._warn_missing(wishes)
@@ -255,6 +257,24 @@ class Stream:
             _LOG.info(event("controls_held", camera=self._device.path, **held))
         return found
 
+    def qualities(self) -> tuple[int, ...]:
+        """The qualities of JPEG images, the present one first and then those below it; empty where it cannot be set.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        control = self._plan.quality() if self.choice.pixel_format is PixelFormat.MJPEG else None
+        present = None if control is None else self._read(control.id)
+        return () if control is None or not present else (present, *lower_qualities(control, present))
+
+    def set_quality(self, quality: int) -> None:
+        """Set the quality of JPEG images; drivers take it while they stream, or refuse, which is counted.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        self._apply(self._plan.to_set_quality(quality))
+
     def _set_format(self, choice: Choice) -> PixelFormatSet:
         try:
             made = self._device.set_format(choice.letters, choice.size_px)
@@ -280,6 +300,7 @@ class Stream:
             made_hz = rate_hz
         elif abs(made_hz - rate_hz) > rate_hz / 100:
             _LOG.warning(event("other_rate", camera=path, asked=rate_text(rate_hz), nominal=rate_text(made_hz)))
+        self.slower_hz = slower_rates(rates, made_hz)
         period_ns = int(1_000_000_000 / made_hz)
         shortest_ns = min(period_ns, int(1_000_000_000 / (rates.highest_hz or Fraction(made_hz))))
         readout_ns = self._settings.readout_ns

@@ -26,6 +26,7 @@ from common.protocol.message import (
     Pong,
     Refusal,
     RefusalReason,
+    Rung,
     Status,
     Steer,
 )
@@ -105,6 +106,7 @@ class BoardSession:
         self.session = session
         self._boot_id = boot_id
         self._camera = camera
+        self._rung = Rung(period_ns=camera.period_ns)
         self._dialled = dialled
         self._knock_due_ns = 0
         self._host: _Host | None = None
@@ -123,6 +125,23 @@ class BoardSession:
         """Whether a host is there that frames can or soon could be sent to."""
         host = self._host
         return host is not None and (host.frames is not None or bool(host.controls))
+
+    @property
+    def link(self) -> int | None:
+        """Number of the link that frames go to; None while they go nowhere."""
+        host = self._host
+        return None if host is None or host.frames is None else host.frames[0]
+
+    def describe(self, camera: CameraDescription, rung: Rung) -> None:
+        """Take note that the camera gives something else from now on; the host is told with the next account, which is due now.
+
+        Args:
+            camera: what it is now.
+            rung: how far that is lowered.
+        """
+        self._camera, self._rung = camera, rung
+        if self._host is not None:
+            self._host.status_due_ns = 0
 
     @property
     def has_credit(self) -> bool:
@@ -162,7 +181,7 @@ class BoardSession:
                 return []
             case Bye():
                 # The last account goes behind the last frame, so that what it tells of and has not come is lost.
-                farewell = Status(self.session, counts)
+                farewell = Status(self.session, counts, self._rung)
                 self._host = None
                 return [] if host.frames is None else [Outgoing(host.frames, farewell)]
             case BoardHello() | Knock() | Refusal() | FrameMessage() | Pong() | Status() | End():
@@ -253,12 +272,12 @@ class BoardSession:
         """
         outgoing: list[Outgoing] = []
         if (control := host.account_lane) is not None:
-            outgoing.append(Outgoing(control, Status(self.session, counts)))
+            outgoing.append(Outgoing(control, Status(self.session, counts, self._rung)))
         outgoing += self._ask_for_frames_lane(host)
         if self._ended:
             outgoing += self.end(counts)
         elif host.frames is not None and not self.has_credit:
-            outgoing.append(Outgoing(host.frames, Status(self.session, counts)))
+            outgoing.append(Outgoing(host.frames, Status(self.session, counts, self._rung)))
         return outgoing
 
     def _greet(self, connection: bytes, hello: HostHello, now_ns: int, counts: BoardCounts) -> list[Outgoing]:
@@ -273,4 +292,5 @@ class BoardSession:
             host.frames = connection
         else:
             host.controls[connection[0]] = connection
-        return [Outgoing(connection, BoardHello(self.session, self._boot_id, self._camera, counts))]
+        told = BoardHello(self.session, self._boot_id, self._camera, counts, self._rung)
+        return [Outgoing(connection, told)]

@@ -43,6 +43,7 @@ from common.protocol.session import (
     Refused,
     Stale,
     StaleReason,
+    Stepped,
     Vanished,
 )
 
@@ -80,6 +81,7 @@ class HostSession:
         self._streams = False
         self._leaving = False
         self._hello: BoardHello | None = None
+        self._changes = 0
         self._next_index = 0
         self._below_index = 0
         self._missing: deque[int] = deque(maxlen=_MOST_MISSING)
@@ -300,7 +302,7 @@ class HostSession:
         if not self._pending and resumed:  # the answer to a hello that was said twice: credit is void once more
             return [Counted(hello.counts, ended=False, lost=lost)]
         self._carrier, self._pending, self._streams = path, False, True
-        self._hello = hello
+        self._hello, self._changes = hello, hello.rung.changes
         return [Accepted(hello, resumed, lost, path.link)]
 
     def _take_frame(self, path: HostPath, frame: FrameMessage, now_ns: int) -> list[Output]:
@@ -346,9 +348,17 @@ class HostSession:
                     return []
                 behind = connection == path.lanes.get(Lane.FRAMES)
                 lost = self._settle(counts) if behind else 0
-                return [Counted(counts, isinstance(message, End), lost, last=behind and self._leaving)]
+                counted = Counted(counts, isinstance(message, End), lost, last=behind and self._leaving)
+                return [*self._note_rung(message), counted]
             case _:
                 assert_never(message)
+
+    def _note_rung(self, message: Status | End) -> list[Output]:
+        """Tell of a camera that was set anew, once; accounts on two lanes may overtake each other."""
+        if isinstance(message, End) or message.rung.changes <= self._changes:
+            return []
+        self._changes = message.rung.changes
+        return [Stepped(message.rung)]
 
     def _part(self, path: HostPath, connection: bytes, counts: BoardCounts, now_ns: int) -> list[Output]:
         """Take a board's goodbye. It may come on one lane just after the other one broke: its account is the session's last all the same."""

@@ -11,8 +11,8 @@ from enum import Enum
 from common.frame import Buffer, PixelFormat
 from common.ledger import BoardMarks
 
-PROTOCOL_VERSION = 2
-"""2: a camera says whether it can be steered, and `Steer` asks for it."""
+PROTOCOL_VERSION = 3
+"""2: a camera says whether it can be steered, and `Steer` asks for it. 3: hello and account tell the rung."""
 
 
 class Lane(Enum):
@@ -87,6 +87,25 @@ class CameraDescription:
 
 
 @dataclass(frozen=True, slots=True)
+class Rung:
+    """How far the board has lowered what its camera gives, so that the link carries it.
+
+    Attributes:
+        index: 0: as it was asked for.
+        last: the index of the lowest rung; 0: nothing can or may be lowered.
+        changes: how often it went down or up in this session.
+        period_ns: nominal time between frames now, ns.
+        quality: of the JPEG images now, in the camera's own unit; 0 where it cannot be set.
+    """
+
+    index: int = 0
+    last: int = 0
+    changes: int = 0
+    period_ns: int = 0
+    quality: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class HostHello:
     """Host: I am here, and this connection is for that lane."""
 
@@ -102,6 +121,7 @@ class BoardHello:
     boot_id: str
     camera: CameraDescription
     counts: BoardCounts
+    rung: Rung = Rung()
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,10 +184,11 @@ class Pong:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """Board: what became of my frames so far."""
+    """Board: what became of my frames so far, and what the camera gives now."""
 
     session: str
     counts: BoardCounts
+    rung: Rung = Rung()
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Message, RefusalReason
+from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Message, RefusalReason, Rung
 
 MS: Final = 1_000_000
 
@@ -128,6 +128,13 @@ class Counted:
 
 
 @dataclass(frozen=True, slots=True)
+class Stepped:
+    """Host: the board's camera gives something else from now on."""
+
+    rung: Rung
+
+
+@dataclass(frozen=True, slots=True)
 class Refused:
     """Host: the board does not talk to us."""
 
@@ -141,7 +148,20 @@ class Vanished:
     orderly: bool
 
 
-Output = Outgoing | Accepted | LinkUp | LinkDown | OtherBoard | Arrived | Stale | Echo | Counted | Refused | Vanished
+Output = (
+    Outgoing
+    | Accepted
+    | LinkUp
+    | LinkDown
+    | OtherBoard
+    | Arrived
+    | Stale
+    | Echo
+    | Counted
+    | Stepped
+    | Refused
+    | Vanished
+)
 
 
 def connection_name(link: int, path: bytes) -> bytes:

@@ -33,6 +33,7 @@ from common.protocol.message import (
     Pong,
     Refusal,
     RefusalReason,
+    Rung,
     Status,
     Steer,
     Steering,
@@ -199,12 +200,12 @@ def _bad(problem: str) -> ProtocolError:
     return ProtocolError(problem, "the packet is dropped; check what else talks to this address")
 
 
-def _fields(message: Message) -> list[Any]:  # noqa: PLR0911 - one line for each kind of message
+def _fields(message: Message) -> list[Any]:  # noqa: C901, PLR0911, PLR0912 - one line for each kind of message
     match message:
         case HostHello(host_id, lane):
             return [host_id, lane.value]
-        case BoardHello(session, boot_id, camera, counts):
-            return [session, boot_id, *_camera_fields(camera), *_counts_fields(counts)]
+        case BoardHello(session, boot_id, camera, counts, rung):
+            return [session, boot_id, *_camera_fields(camera), *_counts_fields(counts), *_rung_fields(rung)]
         case Knock(lane, session):
             return [lane.value, session]
         case Refusal(reason):
@@ -221,7 +222,9 @@ def _fields(message: Message) -> list[Any]:  # noqa: PLR0911 - one line for each
             return [wave, _NS, _NS, t0_ns]
         case Pong(wave, t0_ns, t1_ns, t2_ns):
             return [wave, t0_ns, t1_ns, t2_ns]
-        case Status(session, counts) | End(session, counts):
+        case Status(session, counts, rung):
+            return [session, *_counts_fields(counts), *_rung_fields(rung)]
+        case End(session, counts):
             return [session, *_counts_fields(counts)]
         case Bye(counts):
             return _counts_fields(counts)
@@ -243,6 +246,10 @@ def _camera_fields(camera: CameraDescription) -> list[Any]:
         camera.pacing.value,
         camera.steering.value,
     ]
+
+
+def _rung_fields(rung: Rung) -> list[Any]:
+    return [rung.index, rung.last, rung.changes, rung.period_ns, rung.quality]
 
 
 def _counts_fields(counts: BoardCounts) -> list[Any]:
@@ -269,13 +276,13 @@ def _read(kind: type, reader: "_Reader") -> Message:  # noqa: PLR0911 - one line
     if kind is HostHello:
         return HostHello(reader.text(), reader.enum(Lane))
     if kind is BoardHello:
-        return BoardHello(reader.text(), reader.text(), reader.camera(), reader.counts())
+        return BoardHello(reader.text(), reader.text(), reader.camera(), reader.counts(), reader.rung())
     if kind is Knock:
         return Knock(reader.enum(Lane), reader.text())
     if kind is Refusal:
         return Refusal(reader.enum(RefusalReason))
     if kind is Status:
-        return Status(reader.text(), reader.counts())
+        return Status(reader.text(), reader.counts(), reader.rung())
     if kind is End:
         return End(reader.text(), reader.counts())
     if kind is Steer:
@@ -366,6 +373,9 @@ class _Reader:
         return BoardCounts(
             grabbed, sent, tuple((inner.choice(_DROP_REASONS), inner.count()) for _ in range(len(flat) // 2))
         )
+
+    def rung(self) -> Rung:
+        return Rung(self.count(), self.count(), self.count(), self._integer(0, _NS), self.count())
 
     def _next(self) -> Any:  # noqa: ANN401 - whatever msgpack found; every caller checks it
         if self._at >= len(self._items):

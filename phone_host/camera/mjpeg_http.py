@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import Final
 
 from common import now
-from common.camera.base import CameraHealth, CameraState, Grab, Skipped, Spoiled
+from common.camera.base import CameraHealth, CameraState, Grab, Mode, Offers, Skipped, Spoiled
 from common.camera.v4l2_stamps import RateMeter
 from common.errors import TandemError, UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat
@@ -97,6 +97,11 @@ class HttpCamera:
         """Readable when something has come."""
         return self._wake_read
 
+    @property
+    def offers(self) -> Offers:
+        """None: a server gives what it gives."""
+        return Offers()
+
     def due_ns(self, now_ns: int) -> int:
         """Never by time alone."""
         del now_ns
@@ -118,6 +123,9 @@ class HttpCamera:
 
     def steer(self, later_ns: int, now_ns: int) -> None:
         """Takes no notice: a server cannot be steered."""
+
+    def adapt(self, mode: Mode, now_ns: int) -> None:
+        """Takes no notice: it offers none."""
 
     @property
     def health(self) -> CameraHealth:

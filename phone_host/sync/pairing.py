@@ -134,6 +134,12 @@ class Pairing(Generic[B, H]):
         """Settle all that can be settled; also to be called when time has passed without a frame."""
         return self._settle(now_ns)
 
+    def change(self, settings: PairingSettings, now_ns: int) -> list[Outcome[B, H]]:
+        """Go by other periods and another tolerance from now on: a camera was set to another rate."""
+        self._settings = settings
+        self._undecided_since_ns = None
+        return self.decide(now_ns)
+
     def evict_host(self, before_ns: int) -> list[Outcome[B, H]]:
         """Give up host frames older than this; no board frame that old can still come."""
         outcomes: list[Outcome[B, H]] = []

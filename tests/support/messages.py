@@ -24,6 +24,7 @@ from common.protocol.message import (
     Pong,
     Refusal,
     RefusalReason,
+    Rung,
     Status,
     Steer,
     Steering,
@@ -63,17 +64,18 @@ FRAMES = st.builds(
     st.binary(max_size=40),
 )
 LANES = st.sampled_from(Lane)
+RUNGS = st.builds(Rung, NUMBERS, NUMBERS, NUMBERS, st.integers(0, 2**62), NUMBERS)
 
 MESSAGES: st.SearchStrategy[Message] = st.one_of(
     st.builds(HostHello, TEXTS, LANES),
-    st.builds(BoardHello, TEXTS, TEXTS, CAMERAS, COUNTS),
+    st.builds(BoardHello, TEXTS, TEXTS, CAMERAS, COUNTS, RUNGS),
     st.builds(Knock, LANES, TEXTS),
     st.builds(Refusal, st.sampled_from(RefusalReason)),
     st.builds(Credit, NUMBERS),
     FRAMES,
     st.builds(Ping, NUMBERS, TIMES_NS),
     st.builds(Pong, NUMBERS, TIMES_NS, TIMES_NS, TIMES_NS),
-    st.builds(Status, TEXTS, COUNTS),
+    st.builds(Status, TEXTS, COUNTS, RUNGS),
     st.builds(End, TEXTS, COUNTS),
     st.builds(Bye, COUNTS),
     st.builds(Steer, st.integers(0, 2**62)),

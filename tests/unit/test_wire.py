@@ -221,10 +221,10 @@ def test_a_refusal_can_be_said_in_any_version(reason: RefusalReason) -> None:
 
 
 def test_kinds_keep_their_numbers() -> None:
-    """The bytes of version 2 are fixed: a hello is kind 0 with id and lane, a knock kind 2 with lane and session, a refusal kind 3."""
-    assert msgpack.unpackb(encode(HostHello("h", Lane.CONTROL))[0]) == [2, 0, "h", 1]
-    assert msgpack.unpackb(encode(Knock(Lane.FRAMES, "s"))[0]) == [2, 2, 0, "s"]
-    assert msgpack.unpackb(encode(Refusal(RefusalReason.VERSION))[0]) == [2, 3, 1]
+    """The bytes of version 3 are fixed: a hello is kind 0 with id and lane, a knock kind 2 with lane and session, a refusal kind 3."""
+    assert msgpack.unpackb(encode(HostHello("h", Lane.CONTROL))[0]) == [3, 0, "h", 1]
+    assert msgpack.unpackb(encode(Knock(Lane.FRAMES, "s"))[0]) == [3, 2, 0, "s"]
+    assert msgpack.unpackb(encode(Refusal(RefusalReason.VERSION))[0]) == [3, 3, 1]
 
 
 @pytest.mark.parametrize("name", ["caf\udce9", "x" * 300, "\U0001f4f7" * 300, "\udcff" * 97])
