@@ -135,8 +135,8 @@ _AXES: Final = {
 }
 
 
-_QUALITIES: Final = (0.75, 0.6, 0.45, 0.3)
-"""Shares of the best quality: each has about four fifths of the bytes of the one before (libjpeg's tables scale by 50 / q below 50 and 2 - q / 50 above)."""
+_QUALITIES: Final = (0.85, 0.7, 0.5, 0.3)
+"""Shares of the best quality. OpenCV's JPEGs of ten photographs (Middlebury 2014, quarter size) have 55, 37, 28 and 20 % of the bytes at 95: about a third less each."""
 
 
 def lower_qualities(control: Control, present: int) -> tuple[int, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from common import now
-from common.camera.base import Camera, CameraState, Ended, Grab, Skipped, Spoiled
+from common.camera.base import Camera, CameraState, Ended, Grab, Mode, Skipped, Spoiled
 from common.errors import DataError, TandemError, UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat, find_fault
 from common.protocol.message import Pacing, Steering
@@ -166,6 +166,38 @@ def test_frames_follow_each_other_at_the_stated_period(opened: Set) -> None:
     assert abs(span_ns - (len(frames) - 1) * opened.camera.description.period_ns) <= len(frames)
 
 
+def test_every_mode_that_is_offered_can_be_had_and_left(opened: Set) -> None:
+    """What a camera offers begins with what it gives; told so, its frames and its description follow, numbered on, and back again it is as before."""
+    camera = opened.camera
+    first = camera.description
+    opened.take(1)
+    if not camera.offers.periods_ns:
+        camera.adapt(Mode(10 * first.period_ns, 1), opened.now_ns)
+        assert camera.description == first
+        assert any(isinstance(grab, Frame) for grab in opened.take(2))
+        return
+    assert camera.offers.periods_ns[0] == first.period_ns
+    assert list(camera.offers.periods_ns) == sorted(set(camera.offers.periods_ns))
+    assert list(camera.offers.qualities) == sorted(set(camera.offers.qualities), reverse=True)
+    qualities = camera.offers.qualities or (0,)
+    modes = [
+        *(Mode(period, qualities[0]) for period in camera.offers.periods_ns[:3]),
+        Mode(first.period_ns, qualities[-1]),
+    ]
+    frames: list[Frame] = []
+    for mode in [*modes, Mode(first.period_ns, qualities[0])]:
+        camera.adapt(mode, opened.now_ns)
+        assert camera.description.period_ns == mode.period_ns
+        taken = [grab for grab in opened.take(3) if isinstance(grab, Frame)]
+        for before, after in pairwise(taken):
+            assert after.sequence == before.sequence + 1
+            if not opened.is_real:
+                assert abs(after.exposed - before.exposed - mode.period_ns) <= 2
+        frames += taken
+    assert camera.description == first
+    assert all(before.exposed < after.exposed for before, after in pairwise(frames))
+
+
 def test_a_rest_is_harmless(opened: Set) -> None:
     """Told twice that nobody listens and twice that somebody does, a camera runs on, and says so."""
     opened.take(1)
@@ -191,6 +223,27 @@ def test_on_the_clock_image_k_is_exposed_at_k_over_fps(tmp_path: Path) -> None:
         assert isinstance(frame, Frame)
         assert frame.exposed.ns == round(k * 10**9 / 30)
         assert frame.payload == contents[k % IMAGES]
+
+
+@pytest.mark.parametrize("rung", range(10))
+def test_a_slower_replay_still_agrees_with_a_fast_one(tmp_path: Path, rung: int) -> None:
+    """Slowed down at any moment, a replay shows images of the other one's grid, each with the stamp and bytes that it has there, at even distances."""
+    fill(tmp_path)
+    slow, fast = (open_camera(f"replay:{tmp_path}?fps=25&loop=1", CLOCK, START_NS) for _ in range(2))
+    then_ns = START_NS + 1_000_000_000
+    slow.read(then_ns)
+    slow.adapt(Mode(slow.offers.periods_ns[rung]), then_ns)
+    end_ns = then_ns + 10_000_000_000
+    fast.read(then_ns)
+    grid: dict[int, bytes] = {}
+    while (due_ns := fast.due_ns(0)) <= end_ns:
+        grid |= {grab.exposed.ns: bytes(grab.payload) for grab in fast.read(due_ns) if isinstance(grab, Frame)}
+    shown: list[Frame] = []
+    while (due_ns := slow.due_ns(0)) <= end_ns:
+        shown += [grab for grab in slow.read(due_ns) if isinstance(grab, Frame)]
+    assert all(grid[frame.exposed.ns] == frame.payload for frame in shown)
+    assert len(shown) == pytest.approx(10e9 / slow.description.period_ns, abs=1)
+    assert {after.exposed - before.exposed for before, after in pairwise(shown)} == {slow.description.period_ns}
 
 
 @pytest.mark.parametrize("later_ns", [1, 33_333_333, 1_234_567_891, 3600 * 10**9])

@@ -1,11 +1,13 @@
 """The order and the values in which a camera's controls are set."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from common.camera import v4l2_abi as abi
-from common.camera.v4l2_controls import Axis, Control, ControlPlan, ControlWishes, PowerLine
+from common.camera.v4l2_controls import Axis, Control, ControlPlan, ControlWishes, PowerLine, lower_qualities
 
 _AUTO_EXPOSURE = Control(
     abi.CID_AUTO_EXPOSURE, "Auto Exposure", abi.CTRL_TYPE_MENU, 0, 3, 1, 3, 0, ((1, "Manual"), (3, "Aperture"))
@@ -118,3 +120,40 @@ def test_values_are_fitted_to_the_range(value: int, low: int, span: int, step: i
     assert low <= fitted <= low + span
     assert (fitted - low) % max(1, step) == 0 or fitted == low + span
     assert abs(fitted - min(max(value, low), low + span)) <= max(1, step) // 2 + 1
+
+
+_QUALITY = Control(abi.CID_JPEG_COMPRESSION_QUALITY, "Compression Quality", abi.CTRL_TYPE_INTEGER, 1, 100, 1, 80)
+
+
+def test_a_quality_is_set_before_the_stream_and_again_after_a_loss() -> None:
+    """A quality that was chosen is among what is set at every start; without a choice, or without the control, nothing is."""
+    assert _set([*ControlPlan((_QUALITY,)).to_start(ControlWishes(quality=45))]) == [("Compression Quality", 45)]
+    assert _set([*ControlPlan((_QUALITY,)).to_start(ControlWishes())]) == []
+    assert ControlPlan(_WEBCAM).to_start(ControlWishes(quality=45)) == ControlPlan(_WEBCAM).to_start(ControlWishes())
+    held = ControlWishes(quality=45).with_found(((Axis.GAIN, 20),))
+    assert _set([*ControlPlan((_QUALITY,)).to_start(held)]) == [("Compression Quality", 45)]
+
+
+def test_a_quality_that_cannot_be_set_is_none() -> None:
+    """A camera without the control, or whose driver only tells the value, offers no quality."""
+    told = replace(_QUALITY, flags=abi.CTRL_FLAG_READ_ONLY)
+    assert ControlPlan((_QUALITY,)).quality() == _QUALITY
+    assert ControlPlan((told,)).quality() is None
+    assert ControlPlan(_WEBCAM).quality() is None
+
+
+@given(st.integers(1, 50), st.integers(0, 255), st.integers(1, 7), st.data())
+def test_lower_qualities_are_values_of_the_control(minimum: int, range_: int, step: int, data: st.DataObject) -> None:
+    """Whatever range a driver has, each value is one that its control takes, below the present one, the best first, and at most four."""
+    control = replace(_QUALITY, minimum=minimum, maximum=minimum + range_, step=step)
+    present = data.draw(st.integers(control.minimum, control.maximum))
+    values = lower_qualities(control, present)
+    assert list(values) == sorted(set(values), reverse=True)
+    assert all(control.fitted(value) == value and control.minimum <= value < present for value in values)
+    assert len(values) <= 4
+
+
+def test_lower_qualities_of_the_usual_range() -> None:
+    """Of 1 to 100, the kernel's recommended range, at 80 there are three more."""
+    assert lower_qualities(_QUALITY, 80) == (70, 50, 30)
+    assert lower_qualities(_QUALITY, 30) == ()

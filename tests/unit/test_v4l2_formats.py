@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import pytest
 
-from common.camera.v4l2_formats import FormatOffer, Rates, SizeRange, Wanted, choose, choose_rate
+from common.camera.v4l2_formats import FormatOffer, Rates, SizeRange, Wanted, choose, choose_rate, slower_rates
 from common.errors import SettingsError, UnavailableError
 from common.frame import PixelFormat
 
@@ -110,3 +110,14 @@ def test_an_absent_rate_is_refused_with_the_list(rates: Rates, listed: str) -> N
     """A rate that is not there is an error that lists those that are."""
     with pytest.raises(SettingsError, match=f"no rate 25 at that size: give one of its rates: {listed}"):
         choose_rate(rates, Wanted(None, Fraction(25)), "x")
+
+
+def test_slower_rates_are_those_below() -> None:
+    """Of named rates those below the present one are offered, the highest first; of any between two, whole parts of it; of an unknown set, none."""
+    named = Rates((Fraction(30), Fraction(2997, 100), Fraction(15), Fraction(15, 2), Fraction(5)))
+    assert slower_rates(named, Fraction(30)) == (Fraction(15), Fraction(15, 2), Fraction(5))
+    assert slower_rates(named, Fraction(15)) == (Fraction(15, 2), Fraction(5))
+    assert slower_rates(named, Fraction(5)) == ()
+    between = Rates(between_hz=(Fraction(5), Fraction(60)))
+    assert slower_rates(between, Fraction(30)) == (Fraction(15), Fraction(10), Fraction(15, 2), Fraction(5))
+    assert slower_rates(Rates(), Fraction(30)) == ()
