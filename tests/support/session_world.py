@@ -33,6 +33,7 @@ from common.protocol.session import (
     Output,
     Refused,
     Stale,
+    Stepped,
     Vanished,
     connection_name,
 )
@@ -298,7 +299,7 @@ class World:
                 case Counted(_, _, lost):
                     assert lost >= 0
                     host.lost += lost
-                case Echo() | Refused() | Vanished() | LinkUp() | LinkDown() | OtherBoard():
+                case Echo() | Refused() | Vanished() | LinkUp() | LinkDown() | OtherBoard() | Stepped():
                     host.others.append(output)
 
     def _host_sends(self, host: HostNode, connection: bytes, message: Message) -> None:

@@ -43,6 +43,8 @@ def test_every_setting_of_the_host_is_an_option_and_named_as_its_origin() -> Non
         ("phone_host.cli", "PHONE_HOST_ALIGN_PHASE", "both"),
         ("phone_host.cli", "PHONE_HOST_INTERPOLATE", "perhaps"),
         ("board_agent.cli", "BOARD_AGENT_IDLE_AFTER", "-1"),
+        ("board_agent.cli", "BOARD_AGENT_ADAPT", "quality colour"),
+        ("board_agent.cli", "BOARD_AGENT_LEAST_FPS", "-2"),
         ("board_agent.cli", "BOARD_AGENT_LINK", "tcp://*:5555 tcp://nowhere"),
         ("board_agent.cli", "BOARD_AGENT_CAMERA", "v4l2:auto?size=big"),
     ],

@@ -51,7 +51,7 @@ def check(counts: PairCounts) -> None:
 @given(
     st.integers(1, 4),
     st.sampled_from(Overflow),
-    st.lists(st.tuples(st.sampled_from("bhhbbttB"), st.integers(-1, 3)), max_size=60),
+    st.lists(st.tuples(st.sampled_from("bhhbbttrB"), st.integers(-1, 3)), max_size=60),
 )
 @settings(deadline=None, max_examples=100)
 def test_account_holds_after_every_call(depth: int, overflow: Overflow, acts: list[tuple[str, int]]) -> None:
@@ -69,6 +69,8 @@ def test_account_holds_after_every_call(depth: int, overflow: Overflow, acts: li
                 queue.add_host(host_frame(host, start_ns + host * PERIOD_NS, b"x" * 100))
             case "t":
                 queue.tick()
+            case "r":
+                queue.change_period(PERIOD_NS * (2 + step))
             case _:
                 queue.begin(PERIOD_NS + step, on_demand=False)
         counts = queue.counts
@@ -244,3 +246,30 @@ def test_a_better_clock_estimate_moves_no_label() -> None:
     assert labels == [start_ns + 5 * MS + number * 2 * MS for number in range(4)]
     assert queue.counts.paired == 4
     check(queue.counts)
+
+
+def test_tolerance_and_patience_follow_the_boards_rate() -> None:
+    """Half of the longer period is the tolerance at every moment; a frame that was too far from its neighbour finds it once the period is longer."""
+    queue = queue_of()
+    start_ns = now.monotonic_ns()
+    assert queue.tolerance_ns == PERIOD_NS // 2
+    queue.add_board(board_frame(0, start_ns + 30 * MS))
+    queue.change_period(4 * PERIOD_NS)
+    assert queue.tolerance_ns == 2 * PERIOD_NS
+    assert queue.counts.held_board == 1  # it goes on waiting
+    queue.add_host(host_frame(0, start_ns + 40 * MS))
+    assert queue.counts.paired == 1
+    queue.change_period(PERIOD_NS)
+    assert queue.tolerance_ns == PERIOD_NS // 2
+    queue.add_board(board_frame(1, start_ns + 1000 * MS))
+    queue.add_host(host_frame(1, start_ns + 1030 * MS))
+    assert queue.counts.paired == 1
+    check(queue.counts)
+
+
+def test_a_tolerance_that_was_given_stays() -> None:
+    """What the user asked for does not follow the rate."""
+    queue = PairQueue(FifoSettings(1, Overflow.DROP_OLDEST), 3 * MS, PERIOD_NS)
+    queue.begin(PERIOD_NS, on_demand=False)
+    queue.change_period(4 * PERIOD_NS)
+    assert queue.tolerance_ns == 3 * MS

@@ -1,6 +1,6 @@
 """Board and host sessions talking to each other through every misfortune of a link, on simulated time."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 
 import pytest
@@ -24,6 +24,7 @@ from common.protocol.message import (
     Pong,
     Refusal,
     RefusalReason,
+    Rung,
     Status,
     Steer,
 )
@@ -35,10 +36,12 @@ from common.protocol.session import (
     Accepted,
     Counted,
     Echo,
+    LinkUp,
     Outgoing,
     Output,
     Refused,
     StaleReason,
+    Stepped,
     Vanished,
 )
 from common.protocol.waves import YOUNG_NS
@@ -431,3 +434,34 @@ def test_a_wish_to_steer_is_given_once() -> None:
         world.board.receive(connection, message, world.now_ns, BoardCounts())
         assert world.board.take_steering() == given_ns
         assert world.board.take_steering() == 0
+
+
+def test_the_host_is_told_once_of_each_rung() -> None:
+    """A camera that was set anew is told of at once, once, though accounts go over two lanes and repeat it; an account from before changes nothing."""
+    world = World()
+    world.settle(500 * MS)
+    host = world.hosts[0]
+    first, second = Rung(1, 3, 1, 66 * MS), Rung(2, 3, 2, 132 * MS)
+    for rung in (first, second):
+        camera = replace(CAMERA, period_ns=rung.period_ns)
+        world.board.describe(camera, rung)
+        assert world.board.due_ns <= world.now_ns
+        world.settle(1500 * MS)
+    assert [output for output in host.others if isinstance(output, Stepped)] == [Stepped(first), Stepped(second)]
+    late = Status(world.board.session, BoardCounts(), first)
+    outputs = host.session.receive(host.names[0, Lane.CONTROL], late, world.now_ns)
+    assert not any(isinstance(output, Stepped) for output in outputs)
+
+
+def test_a_host_that_comes_later_finds_the_camera_as_it_is() -> None:
+    """A hello describes the camera with the rung that it is on; the accounts that follow are no news."""
+    world = World()
+    world.settle(500 * MS)
+    rung = Rung(2, 3, 2, 132 * MS, 45)
+    world.board.describe(replace(CAMERA, period_ns=132 * MS), rung)
+    host = world.restart_host(world.hosts[0])
+    world.settle(3000 * MS)
+    assert host.session.is_open
+    hellos = [output.hello for output in host.others if isinstance(output, LinkUp)]
+    assert [(hello.rung, hello.camera.period_ns) for hello in hellos] == [(rung, 132 * MS)]
+    assert not any(isinstance(output, Stepped) for output in host.others)

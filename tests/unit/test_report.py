@@ -1,0 +1,20 @@
+"""What a report says in words of what the board told."""
+
+from common.protocol.message import BoardCounts, Rung
+from phone_host.accounts import LinkAccount, SessionAccount
+from phone_host.report import rung_lines
+
+
+def account(rung: Rung) -> LinkAccount:
+    """A run with one session."""
+    return LinkAccount([SessionAccount("s", BoardCounts(), BoardCounts(), rung=rung)])
+
+
+def test_a_lowered_camera_is_told_of_in_one_line() -> None:
+    """Rung, rate, quality and the number of changes are named; a camera that was never lowered is not spoken of."""
+    assert rung_lines(LinkAccount()) == []
+    assert rung_lines(account(Rung(0, 3, 0, 50_000_000))) == []
+    [line] = rung_lines(account(Rung(2, 3, 4, 133_333_333, 45)))
+    assert line == ("board camera: on rung 2 of 3 (7.5 frames/s, quality 45), changed 4 times by what the link carries")
+    [line] = rung_lines(account(Rung(0, 3, 4, 50_000_000)))
+    assert "as it was asked for (20 frames/s)" in line
