@@ -306,7 +306,8 @@ class Agent:
         rung = control.rung
         self._session.describe(self._camera.description, rung)
         fps = round(1e9 / rung.period_ns, 2)
-        _LOG.info(event("camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality))
+        size = f"{rung.width_px}x{rung.height_px}"
+        _LOG.info(event("camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality, size=size))
 
     def _send_all(self, outgoing: list[Outgoing]) -> None:
         for item in outgoing:

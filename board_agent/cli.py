@@ -92,7 +92,7 @@ def _parser() -> argparse.ArgumentParser:
         verb.add_argument(
             "--adapt",
             metavar="WAYS",
-            help="what gives way where the link is slow (default quality,rate; '' for nothing)",
+            help="what gives way where the link is slow: quality, rate, size (default quality,rate; '' for nothing)",
         )
         verb.add_argument(
             "--least-fps",

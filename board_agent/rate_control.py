@@ -7,6 +7,7 @@ these times, not for the rung: what it carries is found out from where the camer
 """
 
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 from enum import Enum
 from typing import Final
 
@@ -44,6 +45,7 @@ class Way(Enum):
 
     QUALITY = "quality"
     RATE = "rate"
+    SIZE = "size"
 
 
 def ways(names: Iterable[str]) -> frozenset[Way]:
@@ -63,7 +65,7 @@ def ways(names: Iterable[str]) -> frozenset[Way]:
 
 
 def ladder(offers: Offers, lowered: Collection[Way], least_fps: float) -> tuple[Mode, ...]:
-    """Put a camera's modes in the order in which they are tried: quality goes first, because every image is kept, then the rate.
+    """Put a camera's modes in the order in which they are tried: quality goes first, because every image is kept, then the rate, then the size.
 
     Args:
         offers: what the camera can be set to.
@@ -77,12 +79,15 @@ def ladder(offers: Offers, lowered: Collection[Way], least_fps: float) -> tuple[
         return ()
     period_ns, *longer_ns = offers.periods_ns
     quality, *lower = offers.qualities or (0,)
-    modes = [Mode(period_ns, quality)]
+    size_px, *smaller_px = offers.sizes_px or ((0, 0),)
+    modes = [Mode(period_ns, quality, size_px)]
     if Way.QUALITY in lowered:
-        modes += [Mode(period_ns, value) for value in lower]
+        modes += [replace(modes[0], quality=value) for value in lower]
     if Way.RATE in lowered and least_fps > 0:
         # A driver's period is rounded to 100 ns; a hundredth is no other rate (v4l2_formats).
-        modes += [Mode(longer, modes[-1].quality) for longer in longer_ns if longer * least_fps <= 1.01e9]
+        modes += [replace(modes[-1], period_ns=longer) for longer in longer_ns if longer * least_fps <= 1.01e9]
+    if Way.SIZE in lowered:
+        modes += [replace(modes[-1], size_px=smaller) for smaller in smaller_px]
     return tuple(modes)
 
 
@@ -112,7 +117,8 @@ class RateControl:
     @property
     def rung(self) -> Rung:
         """Where that is on the ladder."""
-        return Rung(self._index, len(self._modes) - 1, self._changes, self.mode.period_ns, self.mode.quality)
+        mode, last = self.mode, len(self._modes) - 1
+        return Rung(self._index, last, self._changes, mode.period_ns, mode.quality, *mode.size_px)
 
     def is_due(self, now_ns: int) -> bool:
         """Whether `update` wants to be called: ten times a second is enough.

@@ -28,7 +28,7 @@ class BoardSettings:
     )
     adapt: tuple[str, ...] = setting(
         ("quality", "rate"),
-        "what of the camera gives way, in this order, where the link does not carry it: quality, rate, or nothing",
+        "what of the camera gives way where the link does not carry it: quality, rate, size (in this order), or nothing",
     )
     least_fps: float = setting(
         0.0, "frames per second below which the rate is not lowered; 0: it stays as it was asked for"

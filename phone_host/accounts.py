@@ -98,3 +98,27 @@ def link_names(kinds: Sequence[str]) -> list[str]:
         seen[kind] += 1
         names.append(kind if seen[kind] == 1 else f"{kind}-{seen[kind]}")
     return names
+
+
+def rung_values(rung: Rung) -> dict[str, object]:
+    """How far the board has lowered what its camera gives, as a JSON object; None for what cannot be set."""
+    return {
+        "rung": rung.index,
+        "lowest_rung": rung.last,
+        "changes": rung.changes,
+        "fps": round(1e9 / rung.period_ns, 3) if rung.period_ns else None,
+        "quality": rung.quality or None,
+        "size": f"{rung.width_px}x{rung.height_px}" if rung.width_px else None,
+    }
+
+
+def rung_lines(link: LinkAccount) -> list[str]:
+    """The same in one line for people; nothing where the board never lowered anything."""
+    if not link.sessions or not link.sessions[-1].rung.changes:
+        return []
+    rung = link.sessions[-1].rung
+    quality = f", quality {rung.quality}" if rung.quality else ""
+    size = f", {rung.width_px}x{rung.height_px}" if rung.width_px else ""
+    where = f"on rung {rung.index} of {rung.last}" if rung.index else "as it was asked for"
+    how = f"{1e9 / rung.period_ns:.3g} frames/s{quality}{size}"
+    return [f"board camera: {where} ({how}), changed {rung.changes} times by what the link carries"]

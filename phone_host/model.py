@@ -163,6 +163,7 @@ class BoardFrame:
         received_ns: last byte arrived.
         offset_ns: host clock minus board clock as estimated then.
         uncertainty_ns: of that offset.
+        asked_px: (width, height) that the camera was asked for, px; the frame itself may be smaller. Zeros: as it is.
     """
 
     message: FrameMessage
@@ -171,6 +172,7 @@ class BoardFrame:
     received_ns: int
     offset_ns: int
     uncertainty_ns: int
+    asked_px: tuple[int, int] = (0, 0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,9 @@ from common.errors import DataError
 from common.frame import Frame
 from common.ledger import StageTimes
 from common.protocol.message import FrameMessage
-from phone_host.model import CloudImage, Disparity, FramePair, Image, RectifiedPair, Side
+from phone_host.model import BoardFrame, CloudImage, Disparity, FramePair, Image, RectifiedPair, Side
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.images import enlarged
 from phone_host.stereo.interpolate import LARGEST_PART, Interpolator
 from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_frames
 
@@ -68,6 +69,10 @@ class Pipeline:
         first, second = (board, host) if self._board_side is Side.LEFT else (host, board)
         start_ns = self._clock()
         left, right = decode_frames(first, second)
+        if self._board_side is Side.LEFT:
+            left = _at_asked_size(left, pair.board)
+        else:
+            right = _at_asked_size(right, pair.board)
         decoded_ns = self._clock()
         if self._board_side is Side.LEFT:
             left = self._at_host_time(pair, left)
@@ -100,10 +105,17 @@ class Pipeline:
         if abs(part) > LARGEST_PART:
             return image
         try:
-            earlier = decode_frame(_encoded(pair.before.message, "board"))
+            earlier = _at_asked_size(decode_frame(_encoded(pair.before.message, "board")), pair.before)
         except DataError:
             return image
         return self._interpolator.back(earlier, image, part) if earlier.shape == image.shape else image
+
+
+def _at_asked_size(image: Image, frame: BoardFrame) -> Image:
+    """The image as large as the board's camera was asked for: rig, matcher and geometry are of that size."""
+    if not any(frame.asked_px):
+        return image
+    return enlarged(image, frame.asked_px, f"board frame {frame.message.sequence}")
 
 
 def _encoded(frame: FrameMessage | Frame, whose: str) -> EncodedImage:

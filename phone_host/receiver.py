@@ -392,12 +392,15 @@ class Receiver:
         uncertainty_ns = estimate.uncertainty_at(sent_ns)
         self._transit_ns = now_ns - marks.sent_ns
         self._choice.frame(link, self._transit_ns, now_ns)
-        if self._hello is not None:
-            self._flow.arrived(self._transit_ns, marks.sent_ns - marks.grabbed_ns, self._hello.camera.period_ns, now_ns)
+        assert self._hello is not None
+        camera = self._hello.camera
+        self._flow.arrived(self._transit_ns, marks.sent_ns - marks.grabbed_ns, camera.period_ns, now_ns)
         tally.age.add(now_ns - marks.exposed_ns)
-        stamp_ns = self._queue.add_board(BoardFrame(frame, tally.name, marks, now_ns, offset_ns, uncertainty_ns))
-        on_demand = self._hello is not None and self._hello.camera.pacing is Pacing.DEMAND
-        self._listener.frame_arrived(stamp_ns, frame.sequence if on_demand else None)
+        asked_px = (camera.width_px, camera.height_px)
+        stamp_ns = self._queue.add_board(
+            BoardFrame(frame, tally.name, marks, now_ns, offset_ns, uncertainty_ns, asked_px)
+        )
+        self._listener.frame_arrived(stamp_ns, frame.sequence if camera.pacing is Pacing.DEMAND else None)
 
 
 def refusal_text(reason: RefusalReason) -> tuple[str, str]:

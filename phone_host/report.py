@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Final
 
 from common.camera.base import CameraHealth, health_values
-from phone_host.accounts import LinkAccount, LinkTally
+from phone_host.accounts import LinkAccount, LinkTally, rung_lines, rung_values
 from phone_host.delays import DELAYS, STAGES, DelayStatistics, Spread
 from phone_host.model import TimeOffset
 from phone_host.pairqueue import PairCounts
@@ -345,18 +345,6 @@ def camera_troubles(health: CameraHealth) -> list[str]:
     return [f"own camera: {', '.join(parts)}".replace("_", " ")] if parts else []
 
 
-def rung_lines(link: LinkAccount) -> list[str]:
-    """Say how far the board has lowered what its camera gives, in one line; nothing where it never did."""
-    if not link.sessions or not link.sessions[-1].rung.changes:
-        return []
-    rung = link.sessions[-1].rung
-    quality = f", quality {rung.quality}" if rung.quality else ""
-    where = f"on rung {rung.index} of {rung.last}" if rung.index else "as it was asked for"
-    return [
-        f"board camera: {where} ({1e9 / rung.period_ns:.3g} frames/s{quality}), changed {rung.changes} times by what the link carries"
-    ]
-
-
 def board_drops(link: LinkAccount) -> dict[str, int]:
     """Frames that the board dropped while this host was connected, by reason."""
     drops: dict[str, int] = {}
@@ -428,13 +416,7 @@ def _session(facts: RunFacts, index: int) -> dict[str, object]:
         "waiting": grabbed - sent - sum(dropped.values()),
         "received": account.received,
         "lost": account.lost,
-        "camera": {
-            "rung": account.rung.index,
-            "lowest_rung": account.rung.last,
-            "changes": account.rung.changes,
-            "fps": _number(1e9 / account.rung.period_ns) if account.rung.period_ns else None,
-            "quality": account.rung.quality or None,
-        },
+        "camera": rung_values(account.rung),
         "stale": {"duplicate": account.duplicate, "late": account.late, "old_session": account.old_session},
         "ended": account.ended,
         "tail": "unknown" if account.vanished else "known",

@@ -52,10 +52,12 @@ class Mode:
     Attributes:
         period_ns: nominal time between frames, ns.
         quality: of its JPEG images in the camera's own unit, more is better; 0 where it cannot be set.
+        size_px: (width, height) of its images, px; zeros where it cannot be set.
     """
 
     period_ns: int
     quality: int = 0
+    size_px: tuple[int, int] = (0, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +67,12 @@ class Offers:
     Attributes:
         periods_ns: nominal times between frames, ns, the shortest first; none is shorter than the present one.
         qualities: of its JPEG images, the best first; none is better than the present one.
+        sizes_px: (width, height) of its images, px, the largest first; all have exactly one shape and all of these periods.
     """
 
     periods_ns: tuple[int, ...] = ()
     qualities: tuple[int, ...] = ()
+    sizes_px: tuple[tuple[int, int], ...] = ()
 
 
 class CameraState(Enum):
@@ -138,7 +142,7 @@ class Camera(Protocol):
 
     @property
     def description(self) -> CameraDescription:
-        """Size, encoding, period and pacing; the period follows the mode."""
+        """Size as it was asked for, encoding, period and pacing. The period follows the mode; another size is told by the frames themselves."""
 
     @property
     def offers(self) -> Offers:

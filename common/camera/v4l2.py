@@ -86,7 +86,7 @@ class V4l2Camera:
             )
             self._rates_hz = {stream.period_ns: settings.wanted.fps}
             self._rates_hz |= {int(1_000_000_000 / rate_hz): rate_hz for rate_hz in stream.slower_hz}
-            self.offers = Offers(tuple(self._rates_hz), stream.qualities())
+            self.offers = Offers(tuple(self._rates_hz), stream.qualities(), stream.sizes_px())
             self._begin(stream, now_ns)
         except OSError as error:
             self.close()
@@ -173,7 +173,7 @@ class V4l2Camera:
         _LOG.info(event("camera_steered", camera=self._path, later_ms=round(later_ns / 1e6, 1)))
 
     def adapt(self, mode: Mode, now_ns: int) -> None:
-        """Set the quality while frames come; for another rate the device is opened anew: few drivers change it while they have buffers."""
+        """Set the quality while frames come; for another rate or size the device is opened anew: few drivers change it while they have buffers."""
         if mode.quality != self._wishes.quality:
             self._wishes = replace(self._wishes, quality=mode.quality)
             try:
@@ -181,10 +181,14 @@ class V4l2Camera:
                     self._stream.set_quality(mode.quality)
             except OSError as error:
                 self._lose(error, now_ns)
-        if mode.period_ns == self.description.period_ns:
-            return
         self.description = replace(self.description, period_ns=mode.period_ns)
-        wanted = replace(self._settings.wanted, fps=self._rates_hz[mode.period_ns])
+        fps, size_px = (
+            self._rates_hz[mode.period_ns],
+            mode.size_px if any(mode.size_px) else self._settings.wanted.size_px,
+        )
+        wanted = replace(self._settings.wanted, fps=fps, size_px=size_px)
+        if wanted == self._settings.wanted:
+            return
         self._settings = replace(self._settings, wanted=wanted)
         if self._stream is not None:
             self._stream.close()

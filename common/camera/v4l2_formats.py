@@ -1,5 +1,6 @@
 """What a V4L2 camera offers, and the choice among it. Values only: no device is touched here."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
@@ -222,6 +223,35 @@ def slower_rates(rates: Rates, present_hz: Fraction) -> tuple[Fraction, ...]:
         return tuple(rate for rate in rates.named_hz if rate < present_hz * (1 - _SAME_RATE))
     low_hz = rates.between_hz[0] if rates.between_hz else present_hz
     return tuple(present_hz / part for part in _PARTS if present_hz / part >= low_hz)
+
+
+def has_rates(rates: Rates, wanted_hz: Iterable[Fraction]) -> bool:
+    """Whether each of these rates, Hz, is offered."""
+    for rate_hz in wanted_hz:
+        try:
+            choose_rate(rates, Wanted(fps=rate_hz), "")
+        except SettingsError:
+            return False
+    return True
+
+
+def smaller_sizes(offer: FormatOffer, size_px: tuple[int, int]) -> tuple[tuple[int, int], ...]:
+    """Give the sizes of exactly the same shape below one.
+
+    Args:
+        offer: the encoding that they are wanted in.
+        size_px: (width, height) now, px.
+
+    Returns:
+        (width, height), px, the largest first; of a scaling camera the halves, thirds and quarters that it has.
+    """
+    width, height = size_px
+    if offer.size_range is not None:
+        parts = [(width // part, height // part) for part in (2, 3, 4)]
+        named = [size for size in parts if offer.size_range.holds(size)]
+    else:
+        named = list(offer.sizes_px)
+    return tuple(sorted({(w, h) for w, h in named if w < width and w * height == h * width}, reverse=True))
 
 
 def _usual_size(offer: FormatOffer) -> tuple[int, int]:

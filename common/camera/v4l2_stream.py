@@ -13,7 +13,16 @@ from common.camera import v4l2_abi as abi
 from common.camera.base import Grab, Skipped, Spoiled
 from common.camera.v4l2_controls import Axis, ControlPlan, ControlWishes, Step, lower_qualities
 from common.camera.v4l2_device import Device, PixelFormatSet, taken
-from common.camera.v4l2_formats import Choice, Wanted, choose, choose_rate, rate_text, slower_rates
+from common.camera.v4l2_formats import (
+    Choice,
+    Wanted,
+    choose,
+    choose_rate,
+    has_rates,
+    rate_text,
+    slower_rates,
+    smaller_sizes,
+)
 from common.camera.v4l2_pack import Packing, SendPart
 from common.camera.v4l2_ring import Filled, Ring
 from common.camera.v4l2_stamps import (
@@ -108,7 +117,8 @@ class Stream:
         self._device = Device(path)
         try:
             self._device.require_capture()
-            self.choice = choose(self._device.formats(), settings.wanted, str(path))
+            self._formats = self._device.formats()
+            self.choice = choose(self._formats, settings.wanted, str(path))
             self._packing = Packing.of(self._set_format(self.choice), self.choice.pixel_format, settings.part)
             self.slower_hz: tuple[Fraction, ...] = ()
             self.period_ns, self._timing = self._set_rate()
@@ -267,6 +277,18 @@ class Stream:
         present = None if control is None else self._read(control.id)
         return () if control is None or not present else (present, *lower_qualities(control, present))
 
+    def sizes_px(self) -> tuple[tuple[int, int], ...]:
+        """The present size, and the smaller ones of the same shape that have the same rates, (width, height), px.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        letters, present = self.choice.letters, self.choice.size_px
+        offer = next(offer for offer in self._formats if offer.letters == letters)
+        wanted_hz = (self._rate_hz, *self.slower_hz)
+        smaller = smaller_sizes(offer, present)
+        return (present, *(size for size in smaller if has_rates(self._device.rates(letters, size), wanted_hz)))
+
     def set_quality(self, quality: int) -> None:
         """Set the quality of JPEG images; drivers take it while they stream, or refuse, which is counted.
 
@@ -295,6 +317,7 @@ class Stream:
         path, choice = self._device.path, self.choice
         rates = self._device.rates(choice.letters, choice.size_px)
         rate_hz = choose_rate(rates, self._settings.wanted, str(path))
+        self._rate_hz = rate_hz
         made_hz = self._device.set_rate(rate_hz)
         if made_hz is None:
             made_hz = rate_hz

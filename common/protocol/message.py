@@ -69,8 +69,8 @@ class CameraDescription:
 
     Attributes:
         name: for people.
-        width_px: image width, px.
-        height_px: image height, px.
+        width_px: image width as it was asked for, px; frames of a lower rung may be smaller.
+        height_px: the same for the height.
         pixel_format: encoding of the frames.
         period_ns: nominal time between frames, ns.
         pacing: its own clock or the host's demand.
@@ -96,6 +96,8 @@ class Rung:
         changes: how often it went down or up in this session.
         period_ns: nominal time between frames now, ns.
         quality: of the JPEG images now, in the camera's own unit; 0 where it cannot be set.
+        width_px: of the images now, px; 0 where it cannot be set.
+        height_px: the same.
     """
 
     index: int = 0
@@ -103,6 +105,8 @@ class Rung:
     changes: int = 0
     period_ns: int = 0
     quality: int = 0
+    width_px: int = 0
+    height_px: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -249,7 +249,8 @@ def _camera_fields(camera: CameraDescription) -> list[Any]:
 
 
 def _rung_fields(rung: Rung) -> list[Any]:
-    return [rung.index, rung.last, rung.changes, rung.period_ns, rung.quality]
+    size = [rung.width_px, rung.height_px]
+    return [rung.index, rung.last, rung.changes, rung.period_ns, rung.quality, *size]
 
 
 def _counts_fields(counts: BoardCounts) -> list[Any]:
@@ -375,7 +376,9 @@ class _Reader:
         )
 
     def rung(self) -> Rung:
-        return Rung(self.count(), self.count(), self.count(), self._integer(0, _NS), self.count())
+        index, last, changes, period_ns = self.count(), self.count(), self.count(), self._integer(0, _NS)
+        size = [self.count(), self._integer(0, MAX_SIZE_PX), self._integer(0, MAX_SIZE_PX)]
+        return Rung(index, last, changes, period_ns, *size)
 
     def _next(self) -> Any:  # noqa: ANN401 - whatever msgpack found; every caller checks it
         if self._at >= len(self._items):

@@ -228,3 +228,28 @@ def _scan_start(jpeg: bytes) -> int:
         else:
             offset += 2 + length
     return len(jpeg)
+
+
+def enlarged(image: Image, size_px: tuple[int, int], name: str) -> Image:
+    """Enlarge an image that a camera made smaller: it shows the same view, each of its pixels the mean of some of the larger one.
+
+    Args:
+        image: (H, W) or (H, W, 3), uint8.
+        size_px: (width, height) that it shall have, px; edges of pixels coincide, not centres, as with `cv2.resize`.
+        name: how errors call it.
+
+    Returns:
+        The image itself if it has that size.
+
+    Raises:
+        DataError: its shape is another one, so that it can only show a part of the view.
+    """
+    height, width = image.shape[:2]
+    if (width, height) == size_px:
+        return image
+    if width * size_px[1] != height * size_px[0]:
+        raise DataError(
+            f"{name} is {width}x{height} px, its camera was asked for {size_px[0]}x{size_px[1]}, another shape",
+            "leave size out of the board's setting adapt",
+        )
+    return np.asarray(cv2.resize(image, size_px, interpolation=cv2.INTER_LINEAR), dtype=np.uint8)

@@ -64,7 +64,9 @@ FRAMES = st.builds(
     st.binary(max_size=40),
 )
 LANES = st.sampled_from(Lane)
-RUNGS = st.builds(Rung, NUMBERS, NUMBERS, NUMBERS, st.integers(0, 2**62), NUMBERS)
+RUNGS = st.builds(
+    Rung, NUMBERS, NUMBERS, NUMBERS, st.integers(0, 2**62), NUMBERS, st.integers(0, 16384), st.integers(0, 16384)
+)
 
 MESSAGES: st.SearchStrategy[Message] = st.one_of(
     st.builds(HostHello, TEXTS, LANES),

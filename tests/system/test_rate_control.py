@@ -1,13 +1,27 @@
 """The board lowers its camera's rate on a cable that is too slow, says so, and raises it again; nothing is lost from the account, no pair is wrong."""
 
 import json
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 
-from tests.support.numbered import saved_numbers, write_film
+from board_agent.agent import Agent
+from board_agent.rate_control import RateControl, Way, ladder
+from common import now
+from common.camera.base import Grab, Mode, Offers
+from common.camera.replay import ReplayCamera, ReplaySettings
+from common.link.factory import open_link, parse_link
+from tests.support.numbered import HEIGHT_PX, WIDTH_PX, saved_numbers, write_film
 from tests.support.programs import Program, board, host, ledgers, lines, until
 from tests.support.pty_line import PtyLine
 
@@ -79,6 +93,84 @@ def test_the_rate_follows_the_line(film: tuple[str, int], tmp_path: Path) -> Non
     assert session["camera"]["fps"] == pytest.approx(FPS, abs=0.01)
     assert "board camera: as it was asked for" in (out / "index.html").read_text()
     assert json.loads((out / "report.json").read_text())["sessions"][0]["camera"] == session["camera"]
+
+
+class TwoSizes(ReplayCamera):
+    """A replay that can show each image at half of its size: what a camera does that puts four pixels into one.
+
+    Args:
+        folder: numbered images.
+        small: the same at half of their size.
+    """
+
+    def __init__(self, folder: Path, small: Path, now_ns: int) -> None:
+        chosen = ReplaySettings(str(folder), Fraction(FPS), loop=True, clock="board")
+        super().__init__(chosen, now_ns)
+        self._small = ReplayCamera(replace(chosen, path=str(small)), now_ns)
+        whole, half = ((c.description.width_px, c.description.height_px) for c in (self, self._small))
+        self.offers = Offers(self.offers.periods_ns[:1], (), (whole, half))
+        self._shows_small = False
+
+    def adapt(self, mode: Mode, now_ns: int) -> None:
+        """Show them at one of the two sizes."""
+        self._small.read(now_ns)
+        self._shows_small = mode.size_px == self.offers.sizes_px[1]
+
+    def read(self, now_ns: int) -> list[Grab]:
+        """Both films go on; one of them is seen."""
+        both = super().read(now_ns), self._small.read(now_ns)
+        return both[self._shows_small]
+
+
+@contextmanager
+def two_sizes(film: Path, small: Path, uri: str) -> Iterator[Agent]:
+    """A board whose camera has two sizes, in a thread."""
+    camera = TwoSizes(film, small, now.monotonic_ns())
+    link = open_link(parse_link(uri, listens_by_default=True))
+    control = RateControl(ladder(camera.offers, {Way.SIZE}, 0))
+    reader, writer = socket.socketpair()
+    with reader, writer:
+        agent = Agent(camera, [link], now.random_id(), now.boot_id(), reader, control=control)
+        thread = threading.Thread(target=agent.run)
+        thread.start()
+        try:
+            yield agent
+        finally:
+            writer.send(b"\0")
+            thread.join()
+    link.close()
+
+
+def test_smaller_images_are_paired_and_enlarged(film: tuple[str, int], tmp_path: Path) -> None:
+    """On a line for half of the bytes the camera gives half of the size; the host pairs those images at the full rate and enlarges them, none is refused."""
+    uri, largest_bytes = film
+    folder = Path(uri.removeprefix("replay:").partition("?")[0])
+    small = tmp_path / "small"
+    small.mkdir()
+    for path in folder.iterdir():
+        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        assert image is not None
+        half = cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+        assert cv2.imwrite(str(small / path.name), half, [cv2.IMWRITE_JPEG_QUALITY, 92])
+    out = tmp_path / "out"
+    with PtyLine(tmp_path, bytes_per_s=largest_bytes * FPS / 2, delay_ns=1_000_000) as line:
+        board_uri, host_uri = line.uris
+        receiving = ["run", "--camera", uri, "--link", host_uri, "--out", str(out), "--save-every", "1", "--json"]
+        with host([*receiving, "--log-level", "info"], tmp_path) as receiver, two_sizes(folder, small, board_uri):
+            until(lambda: steps(out)[-25:].count(1) >= 24, "every image")
+            assert rungs(receiver)[-1] == 1
+            assert receiver.stop() == 0
+            report = receiver.json()
+    numbers = saved_numbers(out)
+    assert len(numbers) >= 25
+    assert all(left == right for left, right in numbers)
+    shapes = {np.asarray(cv2.imread(str(path / "left.png"))).shape[:2] for path in out.glob("pair-*[0-9]")}
+    assert shapes == {(HEIGHT_PX, WIDTH_PX)}
+    assert report["pairs_account"]["undecodable"] == 0
+    [session] = report["sessions"]
+    assert (session["camera"]["size"], session["camera"]["lowest_rung"]) == ("80x60", 1)
+    lengths = [ledger["bytes"] for ledger in ledgers(out)]
+    assert max(lengths[-20:]) < min(lengths[:5])
 
 
 def test_without_leave_the_rate_stays(film: tuple[str, int], tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """The ladder of a camera's modes, and the choice among them: on simulated links of any rate, on simulated time."""
 
 import random
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import pytest
@@ -90,7 +90,7 @@ MODES = ladder(OFFERS, {Way.QUALITY, Way.RATE}, 2.5)
 
 
 def test_quality_gives_way_before_the_rate() -> None:
-    """The ladder goes through the qualities at the full rate, then through the rates down to the least, and asks less at each rung."""
+    """The ladder goes through the qualities at the full rate, then the rates down to the least, then the sizes if they may be lowered; each asks less."""
     periods, qualities = OFFERS.periods_ns, OFFERS.qualities
     assert [(mode.period_ns, mode.quality) for mode in MODES] == [
         (periods[0], qualities[0]),
@@ -105,6 +105,11 @@ def test_quality_gives_way_before_the_rate() -> None:
     assert ladder(OFFERS, {Way.QUALITY, Way.RATE}, 0) == MODES[:3]
     assert ladder(OFFERS, {Way.RATE}, 0) == MODES[:1]
     assert ladder(OFFERS, (), 2.5) == MODES[:1]
+    sized = replace(OFFERS, sizes_px=((640, 480), (320, 240), (160, 120)))
+    whole = ladder(sized, set(Way), 2.5)
+    assert [replace(mode, size_px=(0, 0)) for mode in whole] == [*MODES, MODES[-1], MODES[-1]]
+    assert [mode.size_px for mode in whole] == [(640, 480)] * len(MODES) + [(320, 240), (160, 120)]
+    assert [mode.size_px for mode in ladder(sized, {Way.QUALITY}, 0)] == [(640, 480)] * 3
     assert ladder(Offers((50 * MS, 100 * MS)), {Way.QUALITY, Way.RATE}, 10) == (Mode(50 * MS), Mode(100 * MS))
     assert ladder(Offers(), {Way.QUALITY, Way.RATE}, 10) == ()
 

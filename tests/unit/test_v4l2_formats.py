@@ -4,7 +4,17 @@ from fractions import Fraction
 
 import pytest
 
-from common.camera.v4l2_formats import FormatOffer, Rates, SizeRange, Wanted, choose, choose_rate, slower_rates
+from common.camera.v4l2_formats import (
+    FormatOffer,
+    Rates,
+    SizeRange,
+    Wanted,
+    choose,
+    choose_rate,
+    has_rates,
+    slower_rates,
+    smaller_sizes,
+)
 from common.errors import SettingsError, UnavailableError
 from common.frame import PixelFormat
 
@@ -121,3 +131,22 @@ def test_slower_rates_are_those_below() -> None:
     between = Rates(between_hz=(Fraction(5), Fraction(60)))
     assert slower_rates(between, Fraction(30)) == (Fraction(15), Fraction(10), Fraction(15, 2), Fraction(5))
     assert slower_rates(Rates(), Fraction(30)) == ()
+
+
+def test_smaller_sizes_have_exactly_one_shape() -> None:
+    """Of the sizes below one, those of exactly its shape are offered, the largest first; a scaling camera's are its halves, thirds and quarters."""
+    sizes = ((1280, 960), (640, 480), (640, 360), (352, 288), (320, 240), (160, 120))
+    assert smaller_sizes(FormatOffer("MJPG", "", sizes), (640, 480)) == ((320, 240), (160, 120))
+    assert smaller_sizes(FormatOffer("MJPG", "", sizes), (352, 288)) == ()
+    scaling = FormatOffer("MJPG", "", (), SizeRange((16, 1280, 8), (16, 960, 8)))
+    assert smaller_sizes(scaling, (640, 480)) == ((320, 240), (160, 120))  # 213x160 is no third
+    assert smaller_sizes(scaling, (96, 96)) == ((48, 48), (32, 32), (24, 24))
+
+
+def test_a_size_must_have_the_rates() -> None:
+    """A size is of use if it has each rate of the ladder, to a hundredth."""
+    rates = Rates((Fraction(30), Fraction(15), Fraction(5)))
+    assert has_rates(rates, [Fraction(2997, 100), Fraction(5)])
+    assert not has_rates(rates, [Fraction(30), Fraction(10)])
+    assert has_rates(Rates(between_hz=(Fraction(1), Fraction(30))), [Fraction(30), Fraction(5, 2)])
+    assert not has_rates(Rates(between_hz=(Fraction(1), Fraction(30))), [Fraction(60)])

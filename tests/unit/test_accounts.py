@@ -1,8 +1,7 @@
-"""What a report says in words of what the board told."""
+"""What reports say of what the board told."""
 
 from common.protocol.message import BoardCounts, Rung
-from phone_host.accounts import LinkAccount, SessionAccount
-from phone_host.report import rung_lines
+from phone_host.accounts import LinkAccount, SessionAccount, rung_lines, rung_values
 
 
 def account(rung: Rung) -> LinkAccount:
@@ -18,3 +17,13 @@ def test_a_lowered_camera_is_told_of_in_one_line() -> None:
     assert line == ("board camera: on rung 2 of 3 (7.5 frames/s, quality 45), changed 4 times by what the link carries")
     [line] = rung_lines(account(Rung(0, 3, 4, 50_000_000)))
     assert "as it was asked for (20 frames/s)" in line
+
+
+def test_what_cannot_be_set_is_null() -> None:
+    """The JSON object has every value, and null for a quality or size that the camera does not let itself be told."""
+    assert rung_values(Rung(2, 3, 4, 125_000_000, 45, 320, 240)) == {
+        "rung": 2, "lowest_rung": 3, "changes": 4, "fps": 8.0, "quality": 45, "size": "320x240",
+    }  # fmt: skip
+    assert rung_values(Rung()) == {
+        "rung": 0, "lowest_rung": 0, "changes": 0, "fps": None, "quality": None, "size": None,
+    }  # fmt: skip
