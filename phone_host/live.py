@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from common import now
+from phone_host.accounts import rung_lines
 from phone_host.delays import DELAYS, STAGES, Spread
 from phone_host.host import Host
 from phone_host.regime import judge
@@ -87,12 +88,13 @@ class LiveTable:
         return Text(f"processing, p50 in ms: {', '.join(shares) or 'not yet'}", style="dim")
 
     def _judgement(self) -> list[Text]:
-        """The queueing regime, what has befallen the own camera, and what makes depth wrong."""
+        """The queueing regime, what has befallen the two cameras, and what makes depth wrong."""
         facts = self._host.facts("running")
         warnings = [
             Text(f"warning: {item.sentence}: {item.remedy}", style="bold red") for item in self._host.concerns()
         ]
-        camera = [Text(line, style="yellow") for line in camera_troubles(facts.camera)]
+        lines = (*camera_troubles(facts.camera), *rung_lines(facts.link))
+        camera = [Text(line, style="yellow") for line in lines]
         return [Text(judge(figures(facts)).sentence, style="dim"), *camera, *warnings]
 
     def _state(self) -> Text:

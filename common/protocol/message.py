@@ -94,7 +94,7 @@ class Rung:
         index: 0: as it was asked for.
         last: the index of the lowest rung; 0: nothing can or may be lowered.
         changes: how often it went down or up in this session.
-        period_ns: nominal time between frames now, ns.
+        period_ns: nominal time between frames now, ns; 0 before it is known.
         quality: of the JPEG images now, in the camera's own unit; 0 where it cannot be set.
         width_px: of the images now, px; 0 where it cannot be set.
         height_px: the same.
@@ -125,7 +125,7 @@ class BoardHello:
     boot_id: str
     camera: CameraDescription
     counts: BoardCounts
-    rung: Rung = Rung()
+    rung: Rung
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +192,7 @@ class Status:
 
     session: str
     counts: BoardCounts
-    rung: Rung = Rung()
+    rung: Rung
 
 
 @dataclass(frozen=True, slots=True)

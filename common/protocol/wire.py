@@ -376,7 +376,7 @@ class _Reader:
         )
 
     def rung(self) -> Rung:
-        index, last, changes, period_ns = self.count(), self.count(), self.count(), self._integer(0, _NS)
+        index, last, changes, period_ns = self.count(), self.count(), self.count(), self._integer(1, _NS)
         size = [self.count(), self._integer(0, MAX_SIZE_PX), self._integer(0, MAX_SIZE_PX)]
         return Rung(index, last, changes, period_ns, *size)
 

@@ -30,6 +30,7 @@ from common.protocol.message import (
     Pacing,
     Ping,
     Pong,
+    Rung,
     Status,
 )
 from common.protocol.pairing_code import (
@@ -55,17 +56,18 @@ from common.protocol.zap import KEY_BYTES, deny, read_request
 from phone_host.sync.clock import ClockEstimator
 
 _CAMERA = CameraDescription("webcam", 640, 480, PixelFormat.MJPEG, 33_333_333, Pacing.CLOCK)
+_RUNG = Rung(2, 5, 3, 66_666_666, 50, 320, 240)
 _COUNTS = BoardCounts(9, 5, ((DropReason.REPLACED, 3), (DropReason.NO_HOST, 1)))
 _MARKS = BoardMarks(10**12, 10**12 + 5 * 10**6, 10**12 + 6 * 10**6)
 SOUND_MESSAGES: tuple[Message, ...] = (
     HostHello("0123456789abcdef", Lane.FRAMES),
-    BoardHello("s", "boot", _CAMERA, _COUNTS),
+    BoardHello("s", "boot", _CAMERA, _COUNTS, _RUNG),
     Knock(Lane.CONTROL, "s"),
     Credit(7),
     FrameMessage("s", 5, 7, 640, 480, PixelFormat.MJPEG, 10**7, _MARKS, b""),
     Ping(1, 0),
     Pong(1, 10**12, 10**12, 10**12),
-    Status("s", _COUNTS),
+    Status("s", _COUNTS, _RUNG),
     End("s", _COUNTS),
 )
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from common.frame import PixelFormat
 from common.protocol.host_session import HostSession
-from common.protocol.message import BoardCounts, BoardHello, CameraDescription, Lane, Pacing, Ping, Pong
+from common.protocol.message import BoardCounts, BoardHello, CameraDescription, Lane, Pacing, Ping, Pong, Rung
 from common.protocol.session import Echo, Outgoing, Output, connection_name
 
 US, MS, SECOND_NS = 1_000, 1_000_000, 1_000_000_000
@@ -163,7 +163,7 @@ def waves(
         At the end of each wave: host's time, and the wave's echoes.
     """
     session, now_ns = HostSession("host", [_LANES]), clocks.start_ns
-    hello = BoardHello("board", "boot", _CAMERA, BoardCounts())
+    hello = BoardHello("board", "boot", _CAMERA, BoardCounts(), Rung(period_ns=_CAMERA.period_ns))
     for lane in _LANES.values():
         session.receive(lane, hello, now_ns)
     under_way: list[tuple[int, Pong]] = []

@@ -65,7 +65,7 @@ FRAMES = st.builds(
 )
 LANES = st.sampled_from(Lane)
 RUNGS = st.builds(
-    Rung, NUMBERS, NUMBERS, NUMBERS, st.integers(0, 2**62), NUMBERS, st.integers(0, 16384), st.integers(0, 16384)
+    Rung, NUMBERS, NUMBERS, NUMBERS, st.integers(1, 2**62), NUMBERS, st.integers(0, 16384), st.integers(0, 16384)
 )
 
 MESSAGES: st.SearchStrategy[Message] = st.one_of(

@@ -266,7 +266,7 @@ def test_a_silent_board_is_given_up() -> None:
     world.settle(300 * MS)
     host = world.hosts[0]
     heard_ns = world.now_ns
-    host.session.receive(host.names[0, Lane.CONTROL], Status(world.board.session, BoardCounts()), heard_ns)
+    host.session.receive(host.names[0, Lane.CONTROL], Status(world.board.session, BoardCounts(), Rung()), heard_ns)
     assert Vanished(orderly=False) not in host.session.tick(heard_ns + SILENCE_NS - 1)
     assert host.session.is_open
     assert Vanished(orderly=False) in host.session.tick(heard_ns + SILENCE_NS)
@@ -414,7 +414,7 @@ def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, e
         outputs: list[Output] = []
         while not outputs:
             now_ns += MS
-            host.session.receive(control, Status("", BoardCounts()), now_ns)  # a sign of life
+            host.session.receive(control, Status("", BoardCounts(), Rung()), now_ns)  # a sign of life
             outputs = host.session.tick(now_ns)
         while pings := [o.message for o in outputs if isinstance(o, Outgoing) and isinstance(o.message, Ping)]:
             t0_ns, now_ns, heard = now_ns, now_ns + round_trip_ns, heard + 1

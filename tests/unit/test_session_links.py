@@ -10,7 +10,18 @@ from hypothesis import strategies as st
 from common.frame import PixelFormat
 from common.ledger import BoardMarks
 from common.protocol.host_session import STUCK_NS
-from common.protocol.message import BoardCounts, BoardHello, Bye, Credit, FrameMessage, HostHello, Lane, Message, Ping
+from common.protocol.message import (
+    BoardCounts,
+    BoardHello,
+    Bye,
+    Credit,
+    FrameMessage,
+    HostHello,
+    Lane,
+    Message,
+    Ping,
+    Rung,
+)
 from common.protocol.session import (
     MS,
     SILENCE_NS,
@@ -238,7 +249,7 @@ def test_another_board_on_the_second_link_is_told_and_left_alone() -> None:
         world.break_lane(host, (1, lane))
     world.cut_link(1)
     world.settle(20 * MS)
-    other = BoardHello("other", "another boot", CAMERA, BoardCounts())
+    other = BoardHello("other", "another boot", CAMERA, BoardCounts(), Rung())
     control = host.names[1, Lane.CONTROL]
     begin_ns = world.now_ns
     while OtherBoard(1, other) not in host.others:

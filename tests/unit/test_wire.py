@@ -27,6 +27,7 @@ from common.protocol.message import (
     Pong,
     Refusal,
     RefusalReason,
+    Rung,
 )
 from common.protocol.wire import (
     MAX_HEADER_BYTES,
@@ -231,7 +232,7 @@ def test_kinds_keep_their_numbers() -> None:
 def test_any_folder_name_makes_a_hello(name: str) -> None:
     """A camera's name that is too long or, being a path, no UTF-8 is shortened or mended, never refused."""
     camera = CameraDescription(name, 640, 480, PixelFormat.MJPEG, 1, Pacing.CLOCK)
-    message = decode(encode(BoardHello("s", "b", camera, BoardCounts()))[0])
+    message = decode(encode(BoardHello("s", "b", camera, BoardCounts(), Rung(period_ns=1)))[0])
     assert isinstance(message, BoardHello)
     assert message.camera.name[:3] == name[:3].replace("\udcff", "?")
 
