@@ -15,7 +15,8 @@ from common.camera.base import CameraHealth, CameraState, Grab, Mode, Offers
 from common.camera.v4l2_device import capture_nodes, lasting_name
 from common.camera.v4l2_formats import Wanted
 from common.camera.v4l2_ring import RING_BUFFERS
-from common.camera.v4l2_stream import Stream, Tally, V4l2Settings
+from common.camera.v4l2_stream import Stream, V4l2Settings
+from common.camera.v4l2_tally import Tally
 from common.errors import TandemError, UnavailableError
 from common.frame import Frame
 from common.logs import event
@@ -178,7 +179,7 @@ class V4l2Camera:
             self._wishes = replace(self._wishes, quality=mode.quality)
             try:
                 if self._stream is not None:
-                    self._stream.set_quality(mode.quality)
+                    self._stream.controls.set_quality(mode.quality)
             except OSError as error:
                 self._lose(error, now_ns)
         self.description = replace(self.description, period_ns=mode.period_ns)
@@ -268,13 +269,13 @@ class V4l2Camera:
     def _take(self, stream: Stream, now_ns: int) -> list[Grab]:
         grabs = stream.take()
         if now_ns >= self._exposure_due_ns:
-            stream.read_exposure()
-            still_changes = not stream.tells_exposure or not self._wishes.lock
+            stream.controls.read_exposure()
+            still_changes = not stream.controls.tells_exposure or not self._wishes.lock
             self._exposure_due_ns = now_ns + _AUTO_EXPOSURE_NS if still_changes else _FAR_FUTURE
         elif (
-            not grabs and stream.has_events()
+            not grabs and stream.controls.has_events()
         ):  # woken for something else: asking for events with each frame costs an ioctl
-            stream.read_exposure()
+            stream.controls.read_exposure()
         for grab in grabs:
             if isinstance(grab, Frame):
                 self._exposed_ns = grab.exposed.ns
@@ -301,7 +302,7 @@ class V4l2Camera:
         if self._settle_ns is None:
             self._settle_ns = now_ns + _SETTLE_NS
         elif now_ns >= self._settle_ns:
-            self._wishes = self._wishes.with_found(stream.lock(self._wishes))
+            self._wishes = self._wishes.with_found(stream.controls.lock(self._wishes))
             self._locked, self._settle_ns = True, None
 
     def _watch_rate(self) -> None:

@@ -11,7 +11,7 @@ from typing import Final
 from common import now
 from common.camera import v4l2_abi as abi
 from common.camera.base import Grab, Skipped, Spoiled
-from common.camera.v4l2_controls import Axis, ControlPlan, ControlWishes, Step, lower_qualities
+from common.camera.v4l2_controls import ControlWishes
 from common.camera.v4l2_device import Device, PixelFormatSet, taken
 from common.camera.v4l2_formats import (
     Choice,
@@ -23,11 +23,10 @@ from common.camera.v4l2_formats import (
     slower_rates,
     smaller_sizes,
 )
+from common.camera.v4l2_open_controls import OpenControls
 from common.camera.v4l2_pack import Packing, SendPart
 from common.camera.v4l2_ring import Filled, Ring
 from common.camera.v4l2_stamps import (
-    RateMeter,
-    StampClock,
     StampSource,
     Timing,
     estimated_readout_ns,
@@ -36,6 +35,7 @@ from common.camera.v4l2_stamps import (
     stamp_clock,
     stamp_source,
 )
+from common.camera.v4l2_tally import Tally
 from common.errors import UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat, find_fault
 from common.logs import event
@@ -70,24 +70,6 @@ class V4l2Settings:
     clock: str = "host"
 
 
-@dataclass(slots=True)
-class Tally:
-    """Counts that outlive the device; `stamps` is the clock that the last frame's flags named, None before one."""
-
-    grabs: int = 0
-    missed: int = 0
-    distrusted: int = 0
-    refused: int = 0
-    faults: dict[FrameFault, int] = field(default_factory=dict)
-    stamps: StampClock | None = None
-    rate: RateMeter = field(default_factory=RateMeter)
-
-    def number(self) -> int:
-        """The sequence number of the next grab."""
-        self.grabs += 1
-        return self.grabs - 1
-
-
 class Stream:
     """An open device that is ready to stream.
 
@@ -95,8 +77,7 @@ class Stream:
         choice: encoding and size.
         period_ns: nominal time between frames, ns.
         slower_hz: rates to which it can be slowed, Hz, the highest first.
-        exposure_ns: exposure time as last read, ns; None where the camera does not tell.
-        tells_exposure: whether the driver tells of each change of the exposure time.
+        controls: its controls.
         started_ns: when the stream was last started, CLOCK_MONOTONIC, ns.
 
     Args:
@@ -122,15 +103,7 @@ class Stream:
             self._packing = Packing.of(self._set_format(self.choice), self.choice.pixel_format, settings.part)
             self.slower_hz: tuple[Fraction, ...] = ()
             self.period_ns, self._timing = self._set_rate()
-            self._plan = ControlPlan(self._device.controls())
-            self._warn_missing(wishes)
-            self._apply(self._plan.to_start(wishes))
-            self._exposure_control = self._plan.exposure()
-            self.tells_exposure = self._exposure_control is not None and self._device.watch_control(
-                self._exposure_control.id
-            )
-            self.exposure_ns: int | None = None
-            self.read_exposure()
+            self.controls = OpenControls(self._device, wishes, tally)
             self._ring = Ring(self._device)
         except BaseException:
             self._device.close()
@@ -227,55 +200,13 @@ class Stream:
             self._give_back(newest)
         return grabs
 
-    def has_events(self) -> bool:
-        """Take the events that wait, and tell whether there was one: the exposure time has changed.
-
-        Raises:
-            OSError: the camera is gone.
-        """
-        return self.tells_exposure and self._device.take_events() > 0
-
-    def read_exposure(self) -> None:
-        """Read the exposure time.
-
-        Raises:
-            OSError: the camera is gone.
-        """
-        if self._exposure_control is None:
-            return
-        value = self._read(self._exposure_control.id)
-        self.exposure_ns = None if value is None else value * abi.EXPOSURE_UNIT_NS
-
-    def lock(self, wishes: ControlWishes) -> tuple[tuple[Axis, int], ...]:
-        """Hold exposure, gain, white balance and focus at what the automatisms have found.
-
-        Args:
-            wishes: what is held already.
-
-        Returns:
-            What was found.
-
-        Raises:
-            OSError: the camera is gone.
-        """
-        read = [(axis, self._read(control.id)) for axis, control in self._plan.to_find(wishes)]
-        found = tuple((axis, value) for axis, value in read if value is not None)
-        self._apply(self._plan.to_lock(found, wishes))
-        self.read_exposure()
-        held = {axis.value: value for axis, value in (*found, *wishes.held)}
-        if held:
-            _LOG.info(event("controls_held", camera=self._device.path, **held))
-        return found
-
     def qualities(self) -> tuple[int, ...]:
         """The qualities of JPEG images, the present one first and then those below it; empty where it cannot be set.
 
         Raises:
             OSError: the camera is gone.
         """
-        control = self._plan.quality() if self.choice.pixel_format is PixelFormat.MJPEG else None
-        present = None if control is None else self._read(control.id)
-        return () if control is None or not present else (present, *lower_qualities(control, present))
+        return self.controls.qualities() if self.choice.pixel_format is PixelFormat.MJPEG else ()
 
     def sizes_px(self) -> tuple[tuple[int, int], ...]:
         """The present size, and the smaller ones of the same shape that have the same rates, (width, height), px.
@@ -288,14 +219,6 @@ class Stream:
         wanted_hz = (self._rate_hz, *self.slower_hz)
         smaller = smaller_sizes(offer, present)
         return (present, *(size for size in smaller if has_rates(self._device.rates(letters, size), wanted_hz)))
-
-    def set_quality(self, quality: int) -> None:
-        """Set the quality of JPEG images; drivers take it while they stream, or refuse, which is counted.
-
-        Raises:
-            OSError: the camera is gone.
-        """
-        self._apply(self._plan.to_set_quality(quality))
 
     def _set_format(self, choice: Choice) -> PixelFormatSet:
         try:
@@ -330,30 +253,6 @@ class Stream:
         if readout_ns is None:
             readout_ns = estimated_readout_ns(shortest_ns)
         return period_ns, Timing(self._device.identity.driver, readout_ns, self._settings.latency_ns)
-
-    def _warn_missing(self, wishes: ControlWishes) -> None:
-        for axis in self._plan.missing(wishes):
-            _LOG.warning(event("no_such_control", camera=self._device.path, control=axis.value))
-
-    def _apply(self, steps: list[Step]) -> None:
-        for step in steps:
-            try:
-                self._device.set_control(step.control.id, step.value)
-            except OSError as error:
-                if error.errno == errno.ENODEV:
-                    raise
-                self._tally.refused += 1
-                reason = errno.errorcode.get(error.errno or 0, str(error))
-                _LOG.warning(event("control_refused", control=step.control.name, value=step.value, reason=reason))
-
-    def _read(self, control_id: int) -> int | None:
-        """A control's value; None where the driver does not give it."""
-        try:
-            return self._device.control(control_id)
-        except OSError as error:
-            if error.errno == errno.ENODEV:
-                raise
-            return None
 
     def _give_back(self, filled: Filled) -> None:
         try:
@@ -391,7 +290,7 @@ class Stream:
             width_px,
             height_px,
             self._packing.sent_as,
-            self.exposure_ns,
+            self.controls.exposure_ns,
             payload,
         )
 
@@ -410,7 +309,7 @@ class Stream:
             self._tally.distrusted += 1
             stamp_ns, source = grabbed_ns, StampSource.END_OF_FRAME
         self._tally.rate.add(stamp_ns, filled.sequence)
-        return min(grabbed_ns, exposure_midpoint_ns(stamp_ns, source, self._timing, self.exposure_ns))
+        return min(grabbed_ns, exposure_midpoint_ns(stamp_ns, source, self._timing, self.controls.exposure_ns))
 
 
 def _size(size_px: tuple[int, int]) -> str:

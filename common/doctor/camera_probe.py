@@ -12,7 +12,8 @@ from common.camera.factory import open_camera, parse_camera
 from common.camera.replay import ReplaySettings
 from common.camera.v4l2_device import Device, capture_nodes, lasting_name, video_nodes
 from common.camera.v4l2_formats import Wanted, choose
-from common.camera.v4l2_stream import Stream, Tally, V4l2Settings
+from common.camera.v4l2_stream import Stream, V4l2Settings
+from common.camera.v4l2_tally import Tally
 from common.doctor import machine
 from common.doctor.access import Account, Node, check_access
 from common.doctor.camera_checks import (

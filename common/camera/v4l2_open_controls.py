@@ -1,0 +1,118 @@
+"""The controls of an open V4L2 device: set in the order of their plan, read, watched. A control that the driver refuses is counted, not fatal."""
+
+import errno
+import logging
+
+from common.camera import v4l2_abi as abi
+from common.camera.v4l2_controls import Axis, ControlPlan, ControlWishes, Step, lower_qualities
+from common.camera.v4l2_device import Device
+from common.camera.v4l2_tally import Tally
+from common.logs import event
+
+_LOG = logging.getLogger(__name__)
+
+
+class OpenControls:
+    """The controls of a device, set as they are to be before its stream begins.
+
+    Attributes:
+        exposure_ns: exposure time as last read, ns; None where the camera does not tell.
+        tells_exposure: whether the driver tells of each change of the exposure time.
+
+    Args:
+        device: the device; must outlive this.
+        wishes: after a first life with the values that were found then.
+        tally: where to count.
+
+    Raises:
+        OSError: the camera is gone.
+    """
+
+    def __init__(self, device: Device, wishes: ControlWishes, tally: Tally) -> None:
+        self._device, self._tally = device, tally
+        self._plan = ControlPlan(device.controls())
+        for axis in self._plan.missing(wishes):
+            _LOG.warning(event("no_such_control", camera=device.path, control=axis.value))
+        self._apply(self._plan.to_start(wishes))
+        self._exposure = self._plan.exposure()
+        self.tells_exposure = self._exposure is not None and device.watch_control(self._exposure.id)
+        self.exposure_ns: int | None = None
+        self.read_exposure()
+
+    def has_events(self) -> bool:
+        """Take the events that wait, and tell whether there was one: the exposure time has changed.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        return self.tells_exposure and self._device.take_events() > 0
+
+    def read_exposure(self) -> None:
+        """Read the exposure time.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        if self._exposure is None:
+            return
+        value = self._read(self._exposure.id)
+        self.exposure_ns = None if value is None else value * abi.EXPOSURE_UNIT_NS
+
+    def lock(self, wishes: ControlWishes) -> tuple[tuple[Axis, int], ...]:
+        """Hold exposure, gain, white balance and focus at what the automatisms have found.
+
+        Args:
+            wishes: what is held already.
+
+        Returns:
+            What was found.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        read = [(axis, self._read(control.id)) for axis, control in self._plan.to_find(wishes)]
+        found = tuple((axis, value) for axis, value in read if value is not None)
+        self._apply(self._plan.to_lock(found, wishes))
+        self.read_exposure()
+        held = {axis.value: value for axis, value in (*found, *wishes.held)}
+        if held:
+            _LOG.info(event("controls_held", camera=self._device.path, **held))
+        return found
+
+    def qualities(self) -> tuple[int, ...]:
+        """The qualities of JPEG images, the present one first and then those below it; empty where it cannot be set.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        control = self._plan.quality()
+        present = None if control is None else self._read(control.id)
+        return () if control is None or not present else (present, *lower_qualities(control, present))
+
+    def set_quality(self, quality: int) -> None:
+        """Set the quality of JPEG images; drivers take it while they stream, or refuse, which is counted.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        self._apply(self._plan.to_set_quality(quality))
+
+    def _apply(self, steps: list[Step]) -> None:
+        for step in steps:
+            try:
+                self._device.set_control(step.control.id, step.value)
+            except OSError as error:
+                if error.errno == errno.ENODEV:
+                    raise
+                self._tally.refused += 1
+                reason = errno.errorcode.get(error.errno or 0, str(error))
+                _LOG.warning(event("control_refused", control=step.control.name, value=step.value, reason=reason))
+
+    def _read(self, control_id: int) -> int | None:
+        """A control's value; None where the driver does not give it."""
+        try:
+            return self._device.control(control_id)
+        except OSError as error:
+            if error.errno == errno.ENODEV:
+                raise
+            return None
