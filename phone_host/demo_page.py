@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from common import now
 from common.ledger import PairLedger
 from phone_host.demo import CheckedPair, DepthErrors
-from phone_host.report import RunFacts
+from phone_host.facts import RunFacts
 from phone_host.report_page import Figure, PageData, Verdict, delay_series, page
 from phone_host.run_page import camera_table, drops_table, notes, pictures
 

@@ -16,12 +16,12 @@ from common.link.base import Link
 from common.logs import event
 from common.protocol.message import Pacing, RefusalReason, Steering
 from phone_host.delays import DelayStatistics, Sample
+from phone_host.facts import RunFacts, time_and_motion
 from phone_host.model import FramePair, Side, TimeOffset
 from phone_host.motion import MotionMeter
 from phone_host.pairqueue import PairQueue
 from phone_host.pipeline import Pipeline, Processed
 from phone_host.receiver import Receiver, refusal_text
-from phone_host.report import RunFacts, time_and_motion
 from phone_host.results import Results
 from phone_host.source import Source
 from phone_host.stereo.core import StereoCore

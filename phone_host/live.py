@@ -12,9 +12,10 @@ from rich.text import Text
 from common import now
 from phone_host.accounts import rung_lines
 from phone_host.delays import DELAYS, STAGES, Spread
+from phone_host.facts import board_drops, figures
 from phone_host.host import Host
 from phone_host.regime import judge
-from phone_host.report import board_drops, camera_troubles, figures, phase_lines
+from phone_host.summary import camera_troubles, phase_lines
 
 _REFRESH_S: Final = 0.25
 _RECENT: Final = 300

@@ -9,12 +9,13 @@ from common import now
 from common.camera.base import CameraHealth
 from common.ledger import PairLedger
 from phone_host.accounts import rung_lines
+from phone_host.facts import RunFacts, board_drops, figures, time_and_motion
 from phone_host.formats.preview import colour_disparity, colour_range_px
 from phone_host.model import Image, Side
 from phone_host.pipeline import Processed
 from phone_host.regime import Judgement, Regime, judge
-from phone_host.report import RunFacts, board_drops, figures, phase_lines, time_and_motion
 from phone_host.report_page import Figure, PageData, Picture, Table, Verdict, delay_series, page
+from phone_host.summary import phase_lines
 from phone_host.trust import Concern, concerns
 
 

@@ -44,9 +44,10 @@ def run(options: argparse.Namespace) -> int:
     from phone_host.formats.atomic import write_text  # noqa: PLC0415
     from phone_host.formats.rig_yaml import write_rig  # noqa: PLC0415
     from phone_host.live import LiveTable  # noqa: PLC0415
-    from phone_host.report import build, summary  # noqa: PLC0415
+    from phone_host.report import build  # noqa: PLC0415
     from phone_host.stereo.rectify import rectify_rig  # noqa: PLC0415
     from phone_host.stereo.scene import demo_scene, unlike_rig  # noqa: PLC0415
+    from phone_host.summary import summary  # noqa: PLC0415
 
     if not 1 <= options.seconds <= 3600:
         raise SettingsError(f"--seconds {options.seconds:g}", "give 1 to 3600")

@@ -6,6 +6,7 @@ import math
 import sys
 from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from common import logs, now
 from common.commandline import INTERRUPTED
@@ -16,6 +17,12 @@ from common.signals import StopSignals
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import EXAMPLE, open_camera
 from phone_host.settings import ENVIRONMENT_PREFIX, PhoneHostSettings, check, key_folder
+
+if TYPE_CHECKING:
+    from phone_host.host import HostSettings
+    from phone_host.model import Side
+    from phone_host.stereo.core import StereoCore
+    from phone_host.sync.fifo import FifoSettings
 
 EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --calibration rig.yaml --out scan
   phone-host run --link ipc:///tmp/board --camera 'replay:right?pace=demand' --rectified --disparities 64 --pairs 20 --out scan
@@ -109,14 +116,12 @@ def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]
 def run(options: argparse.Namespace) -> int:
     """Run until stopped, the pairs are reached or a stream ends."""
     from phone_host.discovery import find_aloud, remember  # noqa: PLC0415
-    from phone_host.host import EndReason, Host, HostSettings  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.host import EndReason, Host  # noqa: PLC0415 - OpenCV, only now
     from phone_host.live import LiveTable  # noqa: PLC0415
-    from phone_host.model import Side, TimeOffset  # noqa: PLC0415
-    from phone_host.report import build, summary  # noqa: PLC0415
+    from phone_host.report import build  # noqa: PLC0415
     from phone_host.run_page import run_page  # noqa: PLC0415
+    from phone_host.summary import summary  # noqa: PLC0415
     from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
-    from phone_host.sync.phase import Whose  # noqa: PLC0415
-    from phone_host.verbs.stereo_options import build_core  # noqa: PLC0415
 
     settings = resolve_settings(options).values
     check(settings)
@@ -126,28 +131,7 @@ def run(options: argparse.Namespace) -> int:
     _check_numbers(options)
     fifo = FifoSettings.parse(settings.fifo)
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns())
-    size_px = (camera.description.width_px, camera.description.height_px)
-    core, rig_side = build_core(options, settings.calibration, settings.matcher, size_px)
-    board_side = Side(options.board_side) if options.board_side else rig_side or Side.LEFT
-    if rig_side not in {None, board_side}:
-        raise SettingsError(
-            f"--board-side {board_side.value} contradicts {settings.calibration}",
-            "leave it out, or calibrate with the board there",
-        )
-    if core is None:
-        print("phone-host: no --calibration and not --rectified: pairs and delays only, no depth", file=sys.stderr)
-    host_settings = HostSettings(
-        board_side=board_side,
-        tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
-        fifo=fifo,
-        pairs=options.pairs,
-        wait_ns=None if options.wait is None else round(options.wait * 1e9),
-        out=options.out,
-        save_every=options.save_every,
-        time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
-        interpolate=settings.interpolate,
-        steered=frozenset(whose for whose in Whose if settings.align_phase in {"either", whose.value}),
-    )
+    core, board_side = _core(options, settings, (camera.description.width_px, camera.description.height_px))
     keys = key_folder(settings.keys)
     named = settings.link or (find_aloud(keys.path, options.wait),)
     uris = [parse_link(uri, listens_by_default=False) for uri in named]
@@ -155,7 +139,7 @@ def run(options: argparse.Namespace) -> int:
         tell_insecure(uri)
     links = open_links(uris, keys)
     signals = StopSignals()
-    host = Host(host_settings, camera, links, core)
+    host = Host(_host_settings(options, settings, fifo, board_side, core), camera, links, core)
     live = LiveTable(host) if sys.stderr.isatty() else None
     with live or nullcontext():
         try:
@@ -175,6 +159,50 @@ def run(options: argparse.Namespace) -> int:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     return _CHECK_FAILED if too_few or not host.results.complete else 0
+
+
+def _core(
+    options: argparse.Namespace, settings: PhoneHostSettings, size_px: tuple[int, int]
+) -> "tuple[StereoCore | None, Side]":
+    """The stereo core, if any, and the side of the board's camera: as the option says, else as the rig does, else left."""
+    from phone_host.model import Side  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.verbs.stereo_options import build_core  # noqa: PLC0415
+
+    core, rig_side = build_core(options, settings.calibration, settings.matcher, size_px)
+    board_side = Side(options.board_side) if options.board_side else rig_side or Side.LEFT
+    if rig_side not in {None, board_side}:
+        raise SettingsError(
+            f"--board-side {board_side.value} contradicts {settings.calibration}",
+            "leave it out, or calibrate with the board there",
+        )
+    if core is None:
+        print("phone-host: no --calibration and not --rectified: pairs and delays only, no depth", file=sys.stderr)
+    return core, board_side
+
+
+def _host_settings(
+    options: argparse.Namespace,
+    settings: PhoneHostSettings,
+    fifo: "FifoSettings",
+    board_side: "Side",
+    core: "StereoCore | None",
+) -> "HostSettings":
+    from phone_host.host import HostSettings  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.model import TimeOffset  # noqa: PLC0415
+    from phone_host.sync.phase import Whose  # noqa: PLC0415
+
+    return HostSettings(
+        board_side=board_side,
+        tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
+        fifo=fifo,
+        pairs=options.pairs,
+        wait_ns=None if options.wait is None else round(options.wait * 1e9),
+        out=options.out,
+        save_every=options.save_every,
+        time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
+        interpolate=settings.interpolate,
+        steered=frozenset(whose for whose in Whose if settings.align_phase in {"either", whose.value}),
+    )
 
 
 def _check_numbers(options: argparse.Namespace) -> None:

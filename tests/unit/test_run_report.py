@@ -6,11 +6,12 @@ from common.camera.base import CameraHealth, CameraState
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from phone_host.accounts import LinkAccount
 from phone_host.delays import DelayStatistics
+from phone_host.facts import RunFacts
 from phone_host.model import Side
 from phone_host.pairqueue import PairCounts
-from phone_host.report import RunFacts, phase_lines, summary
 from phone_host.results import Unwritten
 from phone_host.run_page import run_page
+from phone_host.summary import phase_lines, summary
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Phase
 

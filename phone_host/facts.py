@@ -1,0 +1,120 @@
+"""What a run was, in one object, and what others judge it by. Pure."""
+
+from dataclasses import dataclass, field
+
+from common.camera.base import CameraHealth
+from phone_host.accounts import LinkAccount
+from phone_host.delays import DelayStatistics
+from phone_host.model import TimeOffset
+from phone_host.pairqueue import PairCounts
+from phone_host.regime import RunFigures
+from phone_host.results import Unwritten
+from phone_host.sync.clock import ClockEstimate
+from phone_host.sync.fifo import FifoSettings
+from phone_host.sync.phase import Alignment, Phase
+from phone_host.trust import Timing
+
+
+@dataclass(frozen=True, slots=True)
+class RunFacts:
+    """Everything a report is made of.
+
+    Attributes:
+        ended: why the run ended.
+        processed: pairs whose results were written.
+        undecodable: pairs whose bytes were no images.
+        seconds: from the first to the last result, s.
+        delays: of the processed pairs.
+        counts: of frames and pairs on the host.
+        link: the link's account.
+        estimate: the last clock estimate, if there was one.
+        tolerance_ns: greatest time skew of a pair.
+        fifo: depth and policy.
+        unwritten: what the disk did not take.
+        spoiled: own frames that were no whole images.
+        skipped: own frames that a newer one had replaced before they were looked at.
+        time_offset: between the two cameras' stamps, as it was applied.
+        phase: of the two cameras at the end; None: not known, or there is none.
+        alignment: how the steering of a camera came out; None: not asked for.
+        camera: how the own camera has fared.
+        period_ns: of the slower camera, ns; 0 where images come on demand.
+        motion_px_s: how fast the own camera's image moves, px/s; NaN where not measured.
+        width_px: of that image; 0 where not measured.
+        interpolated: whether the board's images were taken to the moment of the host's, so that their time skew did no harm.
+    """
+
+    ended: str
+    processed: int
+    undecodable: int
+    seconds: float
+    delays: DelayStatistics
+    counts: PairCounts
+    link: LinkAccount
+    estimate: ClockEstimate | None
+    tolerance_ns: int
+    fifo: FifoSettings
+    unwritten: Unwritten
+    spoiled: int
+    skipped: int
+    camera: CameraHealth
+    period_ns: int
+    motion_px_s: float
+    width_px: int
+    interpolated: bool = False
+    time_offset: TimeOffset = field(default_factory=TimeOffset)
+    phase: Phase | None = None
+    alignment: Alignment | None = None
+
+    @property
+    def stopped(self) -> int:
+        """Pairs that still waited when the run was ended."""
+        return self.counts.paired - self.processed - self.undecodable - self.counts.dropped
+
+    @property
+    def pairs_per_second(self) -> float:
+        """Rate of results, 1/s; NaN with fewer than two."""
+        return (self.processed - 1) / self.seconds if self.processed > 1 and self.seconds > 0 else float("nan")
+
+
+def figures(facts: RunFacts) -> RunFigures:
+    """What the queueing regime is judged by, over the whole run."""
+    delays, counts, processed = facts.delays, facts.counts, facts.processed
+    return RunFigures(
+        pairs=processed,
+        interval_ns=facts.seconds * 1e9 / (processed - 1) if processed > 1 else float("nan"),
+        processing_ns=delays.spread("processing").mean_ns,
+        match_ns=delays.spread("match").mean_ns,
+        starvation_ns=delays.spread("starvation").mean_ns,
+        period_ns=facts.period_ns,
+        received=counts.received / counts.paired if counts.paired else 1.0,
+        offered=counts.paired / processed if processed else 1.0,
+        frame_bytes=delays.frame_bytes,
+        propagation_ns=delays.spread("propagation").mean_ns,
+        overflow=facts.fifo.overflow,
+    )
+
+
+def time_and_motion(facts: RunFacts, last: int | None = None) -> Timing:
+    """What time and motion are.
+
+    Args:
+        facts: the run.
+        last: over how many of the newest pairs; None for all.
+    """
+    return Timing(
+        time_skew_ns=float("nan") if facts.interpolated else facts.delays.spread("time_skew", last).p95_ns,
+        uncertainty_ns=facts.delays.spread("uncertainty", last).p50_ns,
+        end_to_end_ns=facts.delays.spread("end_to_end", last).p50_ns,
+        motion_px_s=facts.motion_px_s,
+        width_px=facts.width_px,
+    )
+
+
+def board_drops(link: LinkAccount) -> dict[str, int]:
+    """Frames that the board dropped while this host was connected, by reason."""
+    drops: dict[str, int] = {}
+    for account in link.sessions:
+        before = dict(account.first.dropped)
+        for reason, count in account.latest.dropped:
+            drops[reason.value] = drops.get(reason.value, 0) + count - before.get(reason, 0)
+    return drops
