@@ -9,13 +9,12 @@ import numpy as np
 
 from common.ledger import PairLedger, StageTimes
 from phone_host.fits import DelayFit
+from phone_host.plot_parts import BOTTOM_PX, DARK_COLOURS, LEFT_PX, RIGHT_PX, TOP_PX, axes, empty, point, svg, triangle
 from phone_host.plot_scale import Linear, Log, Values, duration_text, duration_unit, number_text, span, ticks
 
-_LEFT_PX, _RIGHT_PX, _TOP_PX, _BOTTOM_PX = 52, 10, 24, 34
 _MOST_DOTS: Final = 700
 _ROW_PX: Final = 26
 _LETTER_PX: Final = 7
-_DARK_COLOURS: Final = (2, 4, 5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,13 +24,13 @@ class Scatter:
     Attributes:
         size_bytes: (N,).
         delay_ns: (N,).
-        colour: (N,) index into the palette, 0..7: which run each frame belongs to.
+        number: (N,) 0 and up, which run each frame belongs to.
         fit: the line through them.
     """
 
     size_bytes: Values
     delay_ns: Values
-    colour: tuple[int, ...]
+    number: tuple[int, ...]
     fit: DelayFit
 
 
@@ -49,28 +48,31 @@ def against_bytes(scatter: Scatter, width_px: int, height_px: int = 240) -> str:
         An <svg> element.
     """
     size, delay, fit = scatter.size_bytes, scatter.delay_ns, scatter.fit
-    x = Linear(0.0, 1.05 * span(size)[1], _LEFT_PX, width_px - _RIGHT_PX)
+    x = Linear(0.0, 1.05 * span(size)[1], LEFT_PX, width_px - RIGHT_PX)
     wanted = max(2.5 * float(np.percentile(delay, 75)), 1.25 * fit.delay_ns(x.high) if fit.ns_per_byte > 0 else 0.0)
     top = min(1.06 * float(delay.max()), wanted)
-    y = Linear(0.0, max(1.0, top), height_px - _BOTTOM_PX, _TOP_PX)
+    y = Linear(0.0, max(1.0, top), height_px - BOTTOM_PX, TOP_PX)
     dots = []
     every = max(1, -(-size.size // _MOST_DOTS))
     late = set(np.flatnonzero(delay > y.high).tolist())
     for index in sorted({*range(0, size.size, every), *late}):
-        title = f"<title>{size[index] / 1e3:.1f} kB: {duration_text(float(delay[index]))}</title>"
-        style = f'style="fill:var(--c{scatter.colour[index]})"'
+        title = f"{size[index] / 1e3:.1f} kB: {duration_text(float(delay[index]))}"
+        number, across = scatter.number[index], x.px(float(size[index]))
         if index in late:
-            middle = x.px(float(size[index]))
-            dots.append(f'<path d="M{middle - 4:.1f} {_TOP_PX - 1}l4 -7l4 7z" {style}>{title}</path>')
-            continue
-        place = f'cx="{x.px(float(size[index])):.1f}" cy="{y.px(float(delay[index])):.1f}"'
-        dots.append(f'<circle {place} r="1.8" fill-opacity=".65" {style}>{title}</circle>')
+            dots.append(triangle(number, across, TOP_PX - 1.0, title))
+        else:
+            dots.append(point(number, (across, y.px(float(delay[index]))), 1.8, title, ".65"))
     line = ""
     if not np.isnan(fit.ns_per_byte):
         ends = ((at, fit.delay_ns(at)) for at in (0.0, x.high))
         (x0, y0), (x1, y1) = ((x.px(at), y.px(max(0.0, value))) for at, value in ends)
         line = f'<path class="mark fit" d="M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}"/>'
-    return _svg(width_px, height_px, "propagation against bytes", [_axes(x, y, width_px, height_px), *dots, line])
+    return svg(
+        width_px,
+        height_px,
+        "propagation against bytes",
+        [axes(x, y, (width_px, height_px), "size of the frame, kB", 1e3), *dots, line],
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,13 +83,13 @@ class Compared:
         name: of the run.
         measured_ns: what was.
         predicted_ns: what the model said.
-        colour: index into the palette, 0..7.
+        number: 0 and up, what it belongs to.
     """
 
     name: str
     measured_ns: float
     predicted_ns: float
-    colour: int
+    number: int
 
 
 def compared(points: Sequence[Compared], width_px: int, height_px: int = 300) -> str:
@@ -101,28 +103,31 @@ def compared(points: Sequence[Compared], width_px: int, height_px: int = 300) ->
     Returns:
         An <svg> element.
     """
-    values = np.array([value for point in points for value in (point.measured_ns, point.predicted_ns)])
+    values = np.array([value for one in points for value in (one.measured_ns, one.predicted_ns)])
     low, high = 0.8 * float(values.min()), 1.25 * float(values.max())
-    x = Log(low, high, _LEFT_PX, width_px - _RIGHT_PX)
-    y = Log(low, high, height_px - _BOTTOM_PX, _TOP_PX)
+    x = Log(low, high, LEFT_PX, width_px - RIGHT_PX)
+    y = Log(low, high, height_px - BOTTOM_PX, TOP_PX)
     parts = ['<text x="0" y="11">predicted</text>']
     for value in _steps(low, high):
         across, up = x.px(value), y.px(value)
         name = duration_text(value).replace(".00", "").replace(".0\u202f", "\u202f")
         parts.append(
-            f'<path class="grid" d="M{_LEFT_PX} {up:.1f}H{width_px - _RIGHT_PX}M{across:.1f} {_TOP_PX}V{height_px - _BOTTOM_PX}"/>'
+            f'<path class="grid" d="M{LEFT_PX} {up:.1f}H{width_px - RIGHT_PX}M{across:.1f} {TOP_PX}V{height_px - BOTTOM_PX}"/>'
         )
-        parts.append(f'<text x="{_LEFT_PX - 6}" y="{up + 4:.1f}" text-anchor="end">{name}</text>')
-        parts.append(f'<text x="{across:.1f}" y="{height_px - _BOTTOM_PX + 16}" text-anchor="middle">{name}</text>')
-    parts.append(f'<text x="{width_px - _RIGHT_PX}" y="{height_px - 3}" text-anchor="end">measured</text>')
+        parts.append(f'<text x="{LEFT_PX - 6}" y="{up + 4:.1f}" text-anchor="end">{name}</text>')
+        parts.append(f'<text x="{across:.1f}" y="{height_px - BOTTOM_PX + 16}" text-anchor="middle">{name}</text>')
+    parts.append(f'<text x="{width_px - RIGHT_PX}" y="{height_px - 3}" text-anchor="end">measured</text>')
     parts.append(f'<path class="axis" d="M{x.px(low):.1f} {y.px(low):.1f}L{x.px(high):.1f} {y.px(high):.1f}"/>')
     parts.extend(
-        f'<circle cx="{x.px(point.measured_ns):.1f}" cy="{y.px(point.predicted_ns):.1f}" r="4" '
-        f'style="fill:var(--c{point.colour})"><title>{escape(point.name)}: measured {duration_text(point.measured_ns)}, '
-        f"predicted {duration_text(point.predicted_ns)}</title></circle>"
-        for point in points
+        point(
+            one.number,
+            (x.px(one.measured_ns), y.px(one.predicted_ns)),
+            4.0,
+            f"{one.name}: measured {duration_text(one.measured_ns)}, predicted {duration_text(one.predicted_ns)}",
+        )
+        for one in points
     )
-    return _svg(width_px, height_px, "predicted against measured", parts)
+    return svg(width_px, height_px, "predicted against measured", parts)
 
 
 def _steps(low: float, high: float) -> list[float]:
@@ -158,8 +163,8 @@ def lives(pairs: Sequence[Life], width_px: int) -> str:
     """
     longest = max((pair.ledger.end_to_end_ns for pair in pairs), default=0)
     if longest <= 0:
-        return _svg(width_px, 60.0, "no pairs", ['<text x="0" y="34">no pairs</text>'])
-    x = Linear(0.0, 1.02 * longest, _LEFT_PX, width_px - _RIGHT_PX)
+        return empty(width_px, "no pairs")
+    x = Linear(0.0, 1.02 * longest, LEFT_PX, width_px - RIGHT_PX)
     height = 4.0
     rows = []
     for pair in pairs:
@@ -177,9 +182,9 @@ def lives(pairs: Sequence[Life], width_px: int) -> str:
         grid.append(f'<path class="grid" d="M{at:.1f} 22V{height - 4:.0f}"/>')
         grid.append(f'<text x="{at:.1f}" y="{height + 10:.0f}" text-anchor="middle">{number_text(value)}</text>')
     grid.append(
-        f'<text x="{width_px - _RIGHT_PX}" y="{height + 26:.0f}" text-anchor="end">since the exposure, {name}</text>'
+        f'<text x="{width_px - RIGHT_PX}" y="{height + 26:.0f}" text-anchor="end">since the exposure, {name}</text>'
     )
-    return _svg(width_px, height + 32.0, "lives of single pairs", [*grid, *rows])
+    return svg(width_px, height + 32.0, "lives of single pairs", [*grid, *rows])
 
 
 def _life(ledger: PairLedger, x: Linear, top: float) -> str:
@@ -195,7 +200,7 @@ def _life(ledger: PairLedger, x: Linear, top: float) -> str:
         (2, "processing", ledger.dequeued_ns, ledger.done_ns, 5),
     )
     parts = [
-        f'<text x="{_LEFT_PX - 8}" y="{top + lane * _ROW_PX + 15:.0f}" text-anchor="end">{name}</text>'
+        f'<text x="{LEFT_PX - 8}" y="{top + lane * _ROW_PX + 15:.0f}" text-anchor="end">{name}</text>'
         for lane, name in enumerate(("board", "link", "host"))
     ]
     for lane, name, start_ns, end_ns, colour in bars:
@@ -228,29 +233,5 @@ def _bar(
     text = f"{name} {length}"
     if not words or wide < _LETTER_PX * len(text):
         return bar
-    pale = " pale" if colour in _DARK_COLOURS else ""
+    pale = " pale" if colour in DARK_COLOURS else ""
     return bar + f'<text class="on{pale}" x="{left + 6:.1f}" y="{top + 14:.1f}">{escape(text)}</text>'
-
-
-def _axes(x: Linear, y: Linear, width_px: int, height_px: int) -> str:
-    unit, name = duration_unit(y.high)
-    parts = [f'<text x="0" y="11">{name}</text>']
-    for value in ticks(0.0, y.high / unit, 4):
-        level = y.px(value * unit)
-        kind = "axis" if value == 0.0 else "grid"
-        parts.append(f'<path class="{kind}" d="M{_LEFT_PX} {level:.1f}H{width_px - _RIGHT_PX}"/>')
-        parts.append(f'<text x="{_LEFT_PX - 6}" y="{level + 4:.1f}" text-anchor="end">{number_text(value)}</text>')
-    bottom = height_px - _BOTTOM_PX
-    for value in ticks(0.0, x.high / 1e3, max(2, width_px // 110)):
-        at = x.px(value * 1e3)
-        parts.append(f'<path class="axis" d="M{at:.1f} {bottom}v4"/>')
-        parts.append(f'<text x="{at:.1f}" y="{bottom + 16}" text-anchor="middle">{number_text(value)}</text>')
-    parts.append(f'<text x="{width_px - _RIGHT_PX}" y="{height_px - 3}" text-anchor="end">size of the frame, kB</text>')
-    return "".join(parts)
-
-
-def _svg(width_px: int, height_px: float, label: str, parts: Sequence[str]) -> str:
-    return (
-        f'<svg class="plot" role="img" aria-label="{escape(label)}" viewBox="0 0 {width_px} {height_px:.0f}">'
-        f"{''.join(parts)}</svg>"
-    )

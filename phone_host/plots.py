@@ -1,7 +1,7 @@
 """Plots as inline SVG: delays over time, their distributions, their shares. Pure: values in, text out.
 
 Every plot is drawn for a given width in CSS pixels and is not meant to be scaled much, so that its text stays legible; colours
-are the CSS variables --c0 to --c7 and a few of the page's own (see `STYLE`), so that one SVG serves light and dark. What a mark
+are the CSS variables --c0 to --c7 and a few of the page's own (see `plot_parts.STYLE`), so that one SVG serves light and dark. What a mark
 means is in its <title>, which browsers show when the pointer rests on it.
 
 All values are durations in ns, float64, NaN = no measurement. The x axis is time in s.
@@ -11,33 +11,16 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Final
 
 import numpy as np
 
-from phone_host.plot_scale import Linear, Values, duration_text, duration_unit, log_scale, number_text, span, ticks
+from phone_host.plot_parts import BOTTOM_PX, DARK_COLOURS, LEFT_PX, RIGHT_PX, TOP_PX, axes, empty, hit, point, svg
+from phone_host.plot_scale import Linear, Values, duration_text, duration_unit, log_scale, number_text, span
 
-# Okabe and Ito's palette, safe for all common kinds of colour blindness ("Color Universal Design", 2008); the last is grey.
-STYLE: Final = """
-:root{--c0:#56b4e9;--c1:#e69f00;--c2:#009e73;--c3:#cc79a7;--c4:#d55e00;--c5:#0072b2;--c6:#e3d332;--c7:#9aa3ad}
-@media (prefers-color-scheme:dark){:root{--c3:#d88cb6;--c5:#3d9be0;--c4:#e8702a;--c2:#1fb98d;--c7:#77818c}}
-svg.plot{display:block;width:100%;height:auto;font:12px/1 system-ui,sans-serif;font-variant-numeric:tabular-nums}
-svg.plot text{fill:var(--ink2)}svg.plot text.strong{fill:var(--ink)}
-svg.plot .grid{stroke:var(--line);fill:none}svg.plot .axis{stroke:var(--ink2);fill:none}
-svg.plot .hit{fill:transparent}svg.plot .hit:hover{fill:var(--ink);fill-opacity:.12}
-svg.plot text.on{fill:#111;pointer-events:none}svg.plot text.on.pale{fill:#fff}
-@media (prefers-color-scheme:dark){svg.plot text.on.pale{fill:#111}}
-svg.plot .mark{stroke:var(--ink);stroke-width:2;fill:none}svg.plot .late{fill:var(--ink)}
-ul.legend{display:flex;flex-wrap:wrap;gap:.25rem 1rem;margin:.5rem 0;padding:0;list-style:none;color:var(--ink2);font-size:.85rem}
-ul.legend i{display:inline-block;width:.8em;height:.8em;border-radius:2px;margin-right:.4em;vertical-align:-.05em}
-"""
-
-_LEFT_PX, _RIGHT_PX, _TOP_PX, _BOTTOM_PX = 52, 10, 24, 34
 _LEAST_COLUMN_PX = 3
 _LETTER_PX = 8
 """Room for a letter of 12 px text, generously."""
 
-_DARK_COLOURS = (2, 4, 5)
 _OUTLIER = 2.5
 """A total this many times above the 98th percentile would flatten all others: it is cut off and marked."""
 
@@ -100,16 +83,6 @@ class Strips:
     quantities: tuple[Quantity, ...]
 
 
-def legend(labels: Sequence[tuple[str, int]]) -> str:
-    """A legend as an HTML list: it wraps where the window is narrow.
-
-    Args:
-        labels: names with their index into the palette.
-    """
-    items = "".join(f'<li><i style="background:var(--c{colour})"></i>{escape(name)}</li>' for name, colour in labels)
-    return f'<ul class="legend">{items}</ul>'
-
-
 def stacked_over_time(time_s: Values, layers: Sequence[Quantity], width_px: int, height_px: int = 260) -> str:
     """Columns over time whose parts stack up to their sum.
 
@@ -125,15 +98,15 @@ def stacked_over_time(time_s: Values, layers: Sequence[Quantity], width_px: int,
     Returns:
         An <svg> element.
     """
-    columns = list(_columns(time_s, layers, width_px - _LEFT_PX - _RIGHT_PX))
+    columns = list(_columns(time_s, layers, width_px - LEFT_PX - RIGHT_PX))
     if not columns:
-        return _empty(width_px, "no pairs")
+        return empty(width_px, "no pairs")
     sums = np.array([column.values_ns.sum() for column in columns])
     usual = float(np.percentile(sums, 98))
     highest = float(sums.max())
     top = max(1.0, highest if highest <= _OUTLIER * usual else 1.25 * usual)
-    x = Linear(columns[0].start_s, columns[-1].end_s, _LEFT_PX, width_px - _RIGHT_PX)
-    y = Linear(0.0, top, height_px - _BOTTOM_PX, _TOP_PX)
+    x = Linear(columns[0].start_s, columns[-1].end_s, LEFT_PX, width_px - RIGHT_PX)
+    y = Linear(0.0, top, height_px - BOTTOM_PX, TOP_PX)
     paths = [""] * len(layers)
     hits, late = [], []
     for column, total in zip(columns, sums, strict=True):
@@ -148,20 +121,20 @@ def stacked_over_time(time_s: Values, layers: Sequence[Quantity], width_px: int,
         lines += [
             f"{layer.label} {duration_text(value)}" for layer, value in zip(layers, column.values_ns, strict=True)
         ]
-        hits.append(_hit(left, _TOP_PX, right - left, height_px - _TOP_PX - _BOTTOM_PX, "\n".join(lines)))
+        hits.append(hit(left, TOP_PX, right - left, height_px - TOP_PX - BOTTOM_PX, "\n".join(lines)))
         if total > top:
             middle = (left + right) / 2.0
             late.append(
-                f'<path class="late" d="M{middle - 4:.1f} {_TOP_PX - 1}l4 -7l4 7z"><title>{duration_text(total)}</title></path>'
+                f'<path class="late" d="M{middle - 4:.1f} {TOP_PX - 1}l4 -7l4 7z"><title>{duration_text(total)}</title></path>'
             )
     body = "".join(
         f'<path d="{path}" style="fill:var(--c{layer.colour})"/>' for path, layer in zip(paths, layers, strict=True)
     )
-    return _svg(
+    return svg(
         width_px,
         height_px,
         "delays of the pairs over time, stacked",
-        [_time_axes(x, y, width_px, height_px), body, *late, *hits],
+        [axes(x, y, (width_px, height_px), "time, s"), body, *late, *hits],
     )
 
 
@@ -183,13 +156,13 @@ def over_time(
     values = quantity.values_ns
     known = np.isfinite(values)
     if not known.any():
-        return _empty(width_px, "no pairs")
+        return empty(width_px, "no pairs")
     both = values if band_ns is None else np.concatenate([values, band_ns, -band_ns])
     low, high = span(np.append(both[np.isfinite(both)], 0.0))
     edge = 0.06 * (high - low)
-    x = Linear(*span(time_s), _LEFT_PX, width_px - _RIGHT_PX)
-    y = Linear(low - edge if low < 0.0 else 0.0, high + edge, height_px - _BOTTOM_PX, _TOP_PX)
-    parts = [_time_axes(x, y, width_px, height_px)]
+    x = Linear(*span(time_s), LEFT_PX, width_px - RIGHT_PX)
+    y = Linear(low - edge if low < 0.0 else 0.0, high + edge, height_px - BOTTOM_PX, TOP_PX)
+    parts = [axes(x, y, (width_px, height_px), "time, s")]
     if band_ns is not None:
         parts.append(_band(time_s, band_ns, x, y, quantity.colour))
     # More dots than three for every pixel add ink, not knowledge; extremes stay.
@@ -199,12 +172,15 @@ def over_time(
         keep = np.unique(np.append(keep[:: math.ceil(keep.size / (3 * width_px))], ends))
     radius = 2.4 if keep.size < 200 else 1.6
     parts.extend(
-        f'<circle cx="{x.px(time_s[index]):.1f}" cy="{y.px(values[index]):.1f}" r="{radius}" '
-        f'style="fill:var(--c{quantity.colour})"><title>{number_text(round(float(time_s[index]), 3))} s: '
-        f"{duration_text(float(values[index]))}</title></circle>"
+        point(
+            quantity.colour,
+            (x.px(time_s[index]), y.px(values[index])),
+            radius,
+            f"{number_text(round(float(time_s[index]), 3))} s: {duration_text(float(values[index]))}",
+        )
         for index in keep
     )
-    return _svg(width_px, height_px, f"{quantity.label} over time", parts)
+    return svg(width_px, height_px, f"{quantity.label} over time", parts)
 
 
 def distributions(groups: Sequence[Strips], width_px: int) -> str:
@@ -241,7 +217,7 @@ def distributions(groups: Sequence[Strips], width_px: int) -> str:
         for index, mark in enumerate(marks)
         if index % every == 0
     )
-    return _svg(width_px, height + 22.0, "distribution of each delay", [axis, *rows])
+    return svg(width_px, height + 22.0, "distribution of each delay", [axis, *rows])
 
 
 def budgets(rows: Sequence[Budget], width_px: int) -> str:
@@ -256,7 +232,7 @@ def budgets(rows: Sequence[Budget], width_px: int) -> str:
     """
     totals = [math.fsum(part.value_ns for part in row.parts) for row in rows]
     if not totals or not max(totals) > 0.0:
-        return _empty(width_px, "nothing measured")
+        return empty(width_px, "nothing measured")
     x = Linear(0.0, max(totals), 0.0, float(width_px))
     parts = []
     for index, (row, total) in enumerate(zip(rows, totals, strict=True)):
@@ -276,9 +252,9 @@ def budgets(rows: Sequence[Budget], width_px: int) -> str:
             )
             words = f"{part.label} {duration_text(part.value_ns)}"
             if right - left > _LETTER_PX * len(words):
-                pale = " pale" if part.colour in _DARK_COLOURS else ""
+                pale = " pale" if part.colour in DARK_COLOURS else ""
                 parts.append(f'<text class="on{pale}" x="{left + 7:.1f}" y="{top + 37}">{escape(words)}</text>')
-    return _svg(width_px, 56.0 * len(rows) - 6.0, "shares of the delays", parts)
+    return svg(width_px, 56.0 * len(rows) - 6.0, "shares of the delays", parts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -332,25 +308,8 @@ def _strip(quantity: Quantity, px: Callable[[float], float], top: float, width_p
         f'<path class="mark p50" d="M{px(p50):.1f} {middle - 7:.1f}v14"/>'
         f'<path class="mark p99" d="M{px(p99):.1f} {middle - 4:.1f}v8" style="stroke:var(--c{quantity.colour})"/>'
         f'<circle cx="{px(greatest):.1f}" cy="{middle:.1f}" r="2.5" style="fill:var(--c{quantity.colour})"/>'
-        f"{_hit(0.0, top, width_px, 34.0, title)}</g>"
+        f"{hit(0.0, top, width_px, 34.0, title)}</g>"
     )
-
-
-def _time_axes(x: Linear, y: Linear, width_px: int, height_px: int) -> str:
-    """Grid, tick labels and axis names of a plot over time."""
-    unit, name = duration_unit(max(abs(y.low), abs(y.high)))
-    parts = [f'<text x="0" y="11">{name}</text>']
-    for value in ticks(y.low / unit, y.high / unit, 4):
-        level = y.px(value * unit)
-        kind = "axis" if value == 0.0 else "grid"
-        parts.append(f'<path class="{kind}" d="M{_LEFT_PX} {level:.1f}H{width_px - _RIGHT_PX}"/>')
-        parts.append(f'<text x="{_LEFT_PX - 6}" y="{level + 4:.1f}" text-anchor="end">{number_text(value)}</text>')
-    bottom = height_px - _BOTTOM_PX
-    for value in ticks(x.low, x.high, max(2, width_px // 110)):
-        parts.append(f'<path class="axis" d="M{x.px(value):.1f} {bottom}v4"/>')
-        parts.append(f'<text x="{x.px(value):.1f}" y="{bottom + 16}" text-anchor="middle">{number_text(value)}</text>')
-    parts.append(f'<text x="{width_px - _RIGHT_PX}" y="{height_px - 3}" text-anchor="end">time, s</text>')
-    return "".join(parts)
 
 
 def _band(time_s: Values, half_ns: Values, x: Linear, y: Linear, colour: int) -> str:
@@ -363,14 +322,6 @@ def _band(time_s: Values, half_ns: Values, x: Linear, y: Linear, colour: int) ->
     return f'<path class="band" d="M{"L".join(upper + lower)}z" style="fill:var(--c{colour});fill-opacity:.25"/>'
 
 
-def _hit(x: float, y: float, width: float, height: float, title: str) -> str:
-    """An invisible area that shows a text when the pointer rests on it."""
-    return (
-        f'<rect class="hit" x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}">'
-        f"<title>{escape(title)}</title></rect>"
-    )
-
-
 def _decade(ns: float) -> str:
     unit, name = duration_unit(ns)
     return f"{ns / unit:.0f}\u202f{name}"
@@ -378,16 +329,3 @@ def _decade(ns: float) -> str:
 
 def _anchor(index: int, count: int) -> str:
     return "start" if index == 0 else "end" if index == count - 1 else "middle"
-
-
-def _empty(width_px: int, reason: str) -> str:
-    return _svg(
-        width_px, 60.0, reason, [f'<text x="{width_px / 2:.0f}" y="34" text-anchor="middle">{escape(reason)}</text>']
-    )
-
-
-def _svg(width_px: int, height_px: float, label: str, parts: Sequence[str]) -> str:
-    return (
-        f'<svg class="plot" role="img" aria-label="{escape(label)}" viewBox="0 0 {width_px} {height_px:.0f}">'
-        f"{''.join(parts)}</svg>"
-    )

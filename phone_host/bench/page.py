@@ -18,14 +18,14 @@ from phone_host.bench.report import (
     what_if_rows,
 )
 from phone_host.bench.runs import WARM_UP_S, CaseResult
+from phone_host.page_frame import HALF_PX, document, section, table, two_widths
 from phone_host.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
+from phone_host.plot_parts import STYLE, legend, point_legend
 from phone_host.plot_scale import duration_text
-from phone_host.plots import STYLE, Budget, Part, Quantity, Strips, budgets, distributions, legend
+from phone_host.plots import Budget, Part, Quantity, Strips, budgets, distributions
 from phone_host.prediction import Figures, values_of
-from phone_host.report_page import DelaySeries, delay_series, document, section, two_widths
+from phone_host.report_page import DelaySeries, delay_series
 
-_PALETTE: Final = 8
-_HALF_PX: Final = 450
 _FIGURE_PX: Final = 760
 _LETTER_PX: Final = 8
 """Room for a letter of 12 px text, generously."""
@@ -119,7 +119,7 @@ def _method(results: Sequence[CaseResult], under: Conditions) -> str:
 
 def _glance(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> str:
     missing = "".join(f"<li>{escape(str(one))} was not run: {escape(reason)}</li>" for one, reason in under.not_run)
-    content = _table(FIT_COLUMNS, fit_rows(analysis)) + (f"<ul>{missing}</ul>" if missing else "")
+    content = table(FIT_COLUMNS, fit_rows(analysis), tight=True) + (f"<ul>{missing}</ul>" if missing else "")
     words = f"{len(results)} runs. Propagation = latency + bytes / rate; the clock's uncertainty and its hard bound are those at the end of the run that knew it worst."
     return section("The interfaces", words, content)
 
@@ -128,12 +128,12 @@ def _fits(analysis: Analysis) -> str:
     if not analysis.fits:
         return ""
     rates = sorted({result.case.rate_hz for one in analysis.fits for result in one.results})
-    colours = {rate_hz: index % _PALETTE for index, rate_hz in enumerate(rates)}
+    numbers = {rate_hz: index for index, rate_hz in enumerate(rates)}
     plots = "".join(
-        f"<div><h3>{escape(str(one.interface))}: {_line(one)}</h3>{_scatter(one, colours)}</div>"
+        f"<div><h3>{escape(str(one.interface))}: {_line(one)}</h3>{_scatter(one, numbers)}</div>"
         for one in analysis.fits
     )
-    names = legend([(f"{rate_hz} frames/s", colour) for rate_hz, colour in colours.items()])
+    names = point_legend([(f"{rate_hz} frames/s", number) for rate_hz, number in numbers.items()])
     return section("Delay against bytes", _FIT_WORDS, f"{names}<div class='pair'>{plots}</div>")
 
 
@@ -143,13 +143,13 @@ def _line(one: InterfaceFit) -> str:
     return f"{duration_text(one.fit.latency_ns)} + bytes / {rate_text(one.fit.bytes_per_s)}"
 
 
-def _scatter(one: InterfaceFit, colours: dict[int, int]) -> str:
+def _scatter(one: InterfaceFit, numbers: dict[int, int]) -> str:
     ledgers = [ledger for result in one.results for ledger in result.ledgers]
     size = values_of(ledgers, lambda ledger: ledger.bytes)
     delay = values_of(ledgers, lambda ledger: ledger.propagation_ns)
-    runs = tuple(colours[result.case.rate_hz] for result in one.results for _ in result.ledgers)
+    runs = tuple(numbers[result.case.rate_hz] for result in one.results for _ in result.ledgers)
     scatter = Scatter(size, delay, runs, one.fit)
-    return two_widths(lambda width: against_bytes(scatter, width), _HALF_PX)
+    return two_widths(lambda width: against_bytes(scatter, width), HALF_PX)
 
 
 def _model(analysis: Analysis) -> str:
@@ -162,26 +162,28 @@ def _model(analysis: Analysis) -> str:
         else ""
     )
     names = list(dict.fromkeys(str(one.interface) for one in analysis.fits))
-    colours = {name: index % _PALETTE for index, name in enumerate(names)}
+    numbers = {name: index for index, name in enumerate(names)}
     points = [
         Compared(
             f"{one.case.interface} {one.case.short}",
             one.measured.end_to_end_p50_ns,
             one.predicted.end_to_end_p50_ns,
-            colours[str(one.case.interface)],
+            numbers[str(one.case.interface)],
         )
         for one in analysis.checked
         if isinstance(one.predicted, Figures)
     ]
-    plot = legend(list(colours.items())) + two_widths(lambda width: compared(points, width)) if points else ""
-    content = f"{plot}<h3>Measured | predicted</h3>{_table(PREDICTION_COLUMNS, checked_rows(analysis))}"
+    plot = point_legend(list(numbers.items())) + two_widths(lambda width: compared(points, width)) if points else ""
+    content = f"{plot}<h3>Measured | predicted</h3>{table(PREDICTION_COLUMNS, checked_rows(analysis), tight=True)}"
     return section("The model beside the measurement", _MODEL_WORDS + share, content)
 
 
 def _what_ifs(analysis: Analysis) -> str:
     if not analysis.what_ifs:
         return ""
-    return section("Settings that were not run", _WHAT_IF_WORDS, _table(PREDICTION_COLUMNS, what_if_rows(analysis)))
+    return section(
+        "Settings that were not run", _WHAT_IF_WORDS, table(PREDICTION_COLUMNS, what_if_rows(analysis), tight=True)
+    )
 
 
 def _card(results: Sequence[CaseResult]) -> str:
@@ -230,13 +232,3 @@ def _quantities(series: DelaySeries) -> tuple[Quantity, ...]:
 
 def _mean(quantity: Quantity) -> Part:
     return Part(quantity.label, float(quantity.values_ns.mean()), quantity.colour)
-
-
-def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table; a row with fewer cells than columns ends in one that takes their room."""
-    head = "".join(f"<th>{escape(name)}</th>" for name in columns)
-    body = ""
-    for row in rows:
-        last = f"<td colspan={len(columns) - len(row) + 1}>{escape(row[-1])}</td>"
-        body += f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row[:-1])}{last}</tr>"
-    return f'<div class="scroll"><table class="tight"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'

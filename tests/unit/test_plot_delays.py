@@ -1,6 +1,7 @@
 """The delay benchmark's own plots: what is drawn stands where the numbers say."""
 
 import math
+import re
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from phone_host.fits import fit_delay
 from phone_host.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
+from phone_host.plot_parts import point_legend
 
 MS = 1_000_000
 
@@ -110,3 +112,18 @@ def test_what_is_foretold_rightly_stands_on_the_line() -> None:
     span = math.log(1.25 * 1e9 / (0.8 * 1e7))
     assert off[1] == pytest.approx(math.log(2.0) / span * (y0 - y1), abs=0.3)
     assert off[2] == pytest.approx(math.log(0.4) / span * (y0 - y1), abs=0.3)
+
+
+def test_things_by_the_dozen_have_marks_of_their_own() -> None:
+    """Of 32 interfaces no two are drawn alike, and the legend shows each one's mark as the plot does."""
+    points = [Compared(f"interface {number}", 1e7 * (number + 1), 1e8, number) for number in range(32)]
+    drawn: dict[str, tuple[str, ...]] = {}
+    for mark in svg(compared(points, 500)).iter():
+        for title in mark.findall("title"):
+            shape = re.sub(r"M[\d.]+ [\d.]+", "", mark.get("d", "")), mark.get("style", ""), mark.tag
+            drawn[(title.text or "").partition(":")[0]] = shape
+    assert len(drawn) == 32
+    assert len(set(drawn.values())) == 32
+    shown = svg(point_legend([(point.name, point.number) for point in points])).findall("li/svg/*")
+    assert [mark.tag for mark in shown] == [shape[-1] for shape in drawn.values()]
+    assert len({(re.sub(r"M[\d.]+ [\d.]+", "", mark.get("d", "")), mark.get("style")) for mark in shown}) == 32

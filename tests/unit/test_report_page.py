@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 
 from common.errors import DataError
 from common.ledger import BoardMarks, PairLedger, StageTimes
+from phone_host.page_frame import document
+from phone_host.plot_parts import legend
 from phone_host.plot_scale import Linear, Log, duration_text, log_scale, span, ticks
 from phone_host.plots import (
     Budget,
@@ -22,7 +24,6 @@ from phone_host.plots import (
     Strips,
     budgets,
     distributions,
-    legend,
     over_time,
     stacked_over_time,
 )
@@ -34,7 +35,6 @@ from phone_host.report_page import (
     Table,
     Verdict,
     delay_series,
-    document,
     page,
 )
 
