@@ -22,8 +22,10 @@ PROOF_NS: Final = 1000 * _MS
 MOST_PROOF_NS: Final = 60_000 * _MS
 """A link that breaks again and again is tried once a minute."""
 
-MEMORY_NS: Final = 300_000 * _MS
-"""What a frame took is forgotten after this time: a link that was slow is tried again every five minutes."""
+MEMORY_NS: Final = 10_000 * _MS
+MOST_MEMORY_NS: Final = 300_000 * _MS
+"""What a frame took is forgotten after 10, 20, 40 … 300 s, as other trials of a link are repeated (flow.py): one stall of a busy machine must not keep
+a good link out for minutes, a slow one must not be tried all the time."""
 
 _AS_GOOD: Final = 1.2
 _AS_GOOD_NS: Final = 8 * _MS
@@ -54,6 +56,7 @@ class _Known:
         least_ns: least round trip since it came up.
         frame_ns: transit of a frame, smoothed; None before it carried.
         measured_ns: when that was.
+        memory_ns: how long that is remembered.
         better_since_ns: since when it is better than the carrier.
     """
 
@@ -64,11 +67,12 @@ class _Known:
     least_ns: int = 0
     frame_ns: float | None = None
     measured_ns: int = 0
+    memory_ns: int = MEMORY_NS
     better_since_ns: int | None = None
 
     def is_forgotten(self, now_ns: int) -> bool:
         """Whether it is too long ago that frames came over this link."""
-        return now_ns - self.measured_ns > MEMORY_NS
+        return now_ns - self.measured_ns > self.memory_ns
 
 
 class LinkChoice:
@@ -101,8 +105,12 @@ class LinkChoice:
         """Take note that frames come over that link from now on."""
         if link == self._carrier:
             return
-        if self._carrier is not None and self._owed_since_ns is not None:
-            self._failed(self._known[self._carrier], now_ns)
+        if self._carrier is not None:
+            before = self._known[self._carrier]
+            if self._owed_since_ns is not None:
+                self._failed(before, now_ns)
+            lasted = now_ns - self._carries_since_ns >= before.memory_ns
+            before.memory_ns = MEMORY_NS if lasted else min(MOST_MEMORY_NS, 2 * before.memory_ns)
         self._owed_since_ns = None
         self._carrier, self._carries_since_ns = link, now_ns
         for known in self._known:
