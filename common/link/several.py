@@ -1,14 +1,14 @@
 """All links of one side as one source of packets.
 
-Rule: a link whose peer turns this side away for good (a key that it does not know) is done without while there is another; the last one's
-refusal is everybody's.
+Rule: a link whose peer turns this side away (a key that it does not know) is done without while there is another, and named once; it dials again by
+itself, and a word that comes over it makes it like the others. While all are turned away the last one's refusal is everybody's.
 """
 
 import logging
 from collections.abc import Iterator, Sequence
 
 from common.errors import UnavailableError
-from common.link.base import Broken, Incoming, Link
+from common.link.base import Broken, Incoming, Link, Packet
 from common.logs import event
 
 _LOG = logging.getLogger(__name__)
@@ -29,11 +29,13 @@ class SeveralLinks:
         """Give all that has come in, without waiting, each with its link's number.
 
         Raises:
-            UnavailableError: the last link that was left has been refused.
+            UnavailableError: every link has been refused.
         """
         for number, link in enumerate(self._links):
             try:
                 for incoming in link.receive():
+                    if self._refused and isinstance(incoming, Packet):
+                        self._refused.discard(number)
                     yield number, incoming
             except UnavailableError as error:
                 is_news = number not in self._refused

@@ -5,30 +5,27 @@ anything is accepted. A high-water mark does not bound the age of frames; credit
 """
 
 import errno
-import logging
 import os
 import socket
 import stat
-import struct
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 import zmq
 
+from common import now
 from common.errors import SettingsError, TakenError, UnavailableError
 from common.frame import Buffer
 from common.keys import KeyFolder, Peer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
+from common.link.dialled import Dialled
 from common.link.wait import is_readable
-from common.logs import event
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
 
 if TYPE_CHECKING:
     from common.link.curve import Guard
     from common.link.pairing_door import Door
-
-_LOG = logging.getLogger(__name__)
 
 _SOCKET_BUFFER_BYTES: Final = 256 * 1024
 """About five 50 KB JPEGs in the kernel at most, so that a frame is not sent long before it can leave."""
@@ -55,22 +52,6 @@ _UNIX_PATH_MAX: Final = 107
 # As plain integers: pyzmq's flags are enums, whose operators cost more than the call that takes them.
 _NOW: Final = int(zmq.DONTWAIT)
 _NOW_AND_MORE: Final = int(zmq.DONTWAIT | zmq.SNDMORE)
-
-_WATCHED: Final = int(
-    zmq.EVENT_DISCONNECTED
-    | zmq.EVENT_HANDSHAKE_SUCCEEDED
-    | zmq.EVENT_HANDSHAKE_FAILED_AUTH
-    | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL
-    | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
-)
-_NEWS: Final = struct.Struct("=HI")
-"""A monitor's event and its value, zmq_socket_monitor(3); pyzmq's own reader would bring asyncio in."""
-
-_MECHANISM_MISMATCH: Final = 0x11000002
-"""ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH in zmq.h: one side wants keys, the other one does not."""
-
-_HANG_UPS: Final = 5
-"""Handshakes that the peer may break off before it is told of: a board that restarts, or a port that is forwarded to nobody yet."""
 
 
 def _most_bytes(*, board: bool) -> int:
@@ -249,96 +230,66 @@ class ZeroMqDialer(_AlwaysReady):
         self, address: str, keys: KeyFolder | None = None, peer: Peer | None = None, *, board: bool = False
     ) -> None:
         own = keys.own() if keys and peer else None
-        self._address, self._peer = address, peer
         self.kind = address.partition(":")[0]
         self.dialled = {lane: lane.name.encode() for lane in Lane}
-        self._hang_ups = dict.fromkeys(self.dialled.values(), 0)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._sockets: dict[bytes, zmq.Socket[bytes]] = {}
-        self._monitors: dict[bytes, zmq.Socket[bytes]] = {}
-        for connection in self.dialled.values():
+        self._connections: dict[bytes, Dialled] = {}
+        for lane in (Lane.FRAMES, Lane.CONTROL):
             sock = self._context.socket(zmq.DEALER)
             _configure(sock, _most_bytes(board=board))
             if own and peer:
                 from common.link.curve import secure_dialler  # noqa: PLC0415 - as in _guard
 
                 secure_dialler(sock, own, peer)
-            self._monitors[connection] = sock.get_monitor_socket(_WATCHED)
-            self._sockets[connection] = sock
             try:
-                sock.connect(address)
+                connection = Dialled(sock, address, peer.name if peer else "", lane.name)
             except zmq.ZMQError as error:
                 self._context.destroy(linger=0)
                 raise _explained(address, error, "give --link tcp://HOST:PORT or ipc://PATH") from None
-        self._lanes = tuple(
-            (self._sockets[self.dialled[lane]], self.dialled[lane]) for lane in (Lane.FRAMES, Lane.CONTROL)
-        )
+            self._connections[self.dialled[lane]] = connection
 
     @property
     def pollables(self) -> Sequence[zmq.Socket[bytes]]:
         """Both sockets and their monitors."""
-        return (*self._sockets.values(), *self._monitors.values())
+        return tuple(item for known in self._connections.values() for item in (known.socket, known.monitor))
+
+    @property
+    def due_ns(self) -> int:
+        """When `receive` wants to be called even if nothing is readable: to dial again."""
+        return min(known.due_ns for known in self._connections.values())
 
     def receive(self) -> Iterator[Incoming]:
         """Give all packets that have come in, frames first, then the news of broken connections: a peer's last words come before its end.
 
         Raises:
-            UnavailableError: the peer does not talk to us, or only with keys; ZeroMQ dials no more.
+            UnavailableError: the peer does not talk to us, or only with keys; it is dialled again later.
         """
+        now_ns = now.monotonic_ns()
         broken = []
+        for known in self._connections.values():
+            known.redial(now_ns)
         going_on = True
         while going_on:
             going_on = False
-            for sock, connection in self._lanes:
-                if is_readable(sock):
+            for connection, known in self._connections.items():
+                if is_readable(known.socket):
                     going_on = True
-                    yield _receive(sock, connection)
-            for connection, monitor in self._monitors.items():
-                if is_readable(monitor):
+                    yield _receive(known.socket, connection)
+            for connection, known in self._connections.items():
+                if is_readable(known.monitor):
                     going_on = True
-                    if self._is_broken(connection, monitor.recv_multipart(_NOW)):
+                    if known.broke(now_ns):
                         broken.append(Broken(connection))
         yield from broken
 
-    def _is_broken(self, connection: bytes, news: list[bytes]) -> bool:
-        """Take a monitor's news; whether a connection broke."""
-        kind, value = _NEWS.unpack(news[0])
-        match kind:
-            case zmq.EVENT_DISCONNECTED:
-                return True
-            case zmq.EVENT_HANDSHAKE_SUCCEEDED:
-                self._hang_ups[connection] = 0
-            case zmq.EVENT_HANDSHAKE_FAILED_AUTH:
-                raise UnavailableError(
-                    f"{self._address} does not know this machine's key",
-                    f"pair them: phone-host pair --link {self._address}",
-                )
-            case zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL if value == _MECHANISM_MISMATCH:
-                raise self._mismatch()
-            case _:
-                self._hang_ups[connection] += 1
-                if self._hang_ups[connection] == _HANG_UPS:
-                    peer = self._peer.name if self._peer else "none"
-                    _LOG.warning(event("peer_hangs_up", address=self._address, expected=peer, lane=connection.decode()))
-        return False
-
-    def _mismatch(self) -> UnavailableError:
-        if self._peer is None:
-            return UnavailableError(
-                f"{self._address} wants a key", f"pair with it: phone-host pair --link {self._address}"
-            )
-        return UnavailableError(
-            f"{self._address} is open to everybody", "secure it there, or say so here too: add ?insecure=1 to --link"
-        )
-
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Hand a packet over; before the peer is there it is FULL (ZMQ_IMMEDIATE)."""
-        return _send(self._sockets[connection], [], header, payload)
+        return _send(self._connections[connection].socket, [], header, payload)
 
     def close(self) -> None:
         """Let what was handed over leave, then close."""
-        for sock in self._sockets.values():
-            sock.disable_monitor()
+        for known in self._connections.values():
+            known.socket.disable_monitor()
         self._context.destroy(linger=_LINGER_MS)
 
 

@@ -1,0 +1,114 @@
+"""One connection that this side dials over ZeroMQ: what becomes of it, and when it is dialled again.
+
+ZeroMQ itself dials again whenever a connection breaks, and no more once the peer has turned it away. Then this does, calmly: keys change, and a
+door that was open or secured by mistake is mended while we run.
+"""
+
+import logging
+import struct
+from contextlib import suppress
+from typing import Final
+
+import zmq
+
+from common.errors import UnavailableError
+from common.logs import event
+
+_LOG = logging.getLogger(__name__)
+
+REDIAL_NS: Final = 15_000_000_000
+"""Each refusal is a line in the board's log (curve.py writes one every ten seconds at most); who has just paired does not wait long."""
+
+_NEVER: Final = 2**63 - 1
+_NOW: Final = int(zmq.DONTWAIT)
+
+_WATCHED: Final = int(
+    zmq.EVENT_DISCONNECTED
+    | zmq.EVENT_HANDSHAKE_SUCCEEDED
+    | zmq.EVENT_HANDSHAKE_FAILED_AUTH
+    | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL
+    | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
+)
+_NEWS: Final = struct.Struct("=HI")
+"""A monitor's event and its value, zmq_socket_monitor(3); pyzmq's own reader would bring asyncio in."""
+
+_MECHANISM_MISMATCH: Final = 0x11000002
+"""ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH in zmq.h: one side wants keys, the other one does not."""
+
+_HANG_UPS: Final = 5
+"""Handshakes that the peer may break off before it is told of: a board that restarts, or a port that is forwarded to nobody yet."""
+
+
+class Dialled:
+    """A socket that connects to one address.
+
+    Args:
+        sock: with its options set, not connected yet.
+        address: `tcp://HOST:PORT` or `ipc://PATH`.
+        peer: name of who must answer; empty on an open link.
+        lane: for the log.
+
+    Raises:
+        zmq.ZMQError: the address makes no sense.
+    """
+
+    def __init__(self, sock: "zmq.Socket[bytes]", address: str, peer: str, lane: str) -> None:
+        self.socket = sock
+        self.monitor = sock.get_monitor_socket(_WATCHED)
+        self.due_ns = _NEVER
+        self._address, self._peer, self._lane = address, peer, lane
+        self._hang_ups = 0
+        sock.connect(address)
+
+    def redial(self, now_ns: int) -> None:
+        """Dial again, if that is due.
+
+        Args:
+            now_ns: CLOCK_MONOTONIC now, ns.
+        """
+        if now_ns < self.due_ns:
+            return
+        self.due_ns = _NEVER
+        with suppress(zmq.ZMQError):  # it may have forgotten the address with the refusal
+            self.socket.disconnect(self._address)
+        self.socket.connect(self._address)
+
+    def broke(self, now_ns: int) -> bool:
+        """Take one piece of news; whether it says that the connection broke.
+
+        Args:
+            now_ns: CLOCK_MONOTONIC now, ns.
+
+        Raises:
+            UnavailableError: the peer has turned us away; it is dialled again later.
+        """
+        kind, value = _NEWS.unpack(self.monitor.recv_multipart(_NOW)[0])
+        match kind:
+            case zmq.EVENT_DISCONNECTED:
+                return True
+            case zmq.EVENT_HANDSHAKE_SUCCEEDED:
+                self._hang_ups = 0
+            case zmq.EVENT_HANDSHAKE_FAILED_AUTH:
+                self.due_ns = now_ns + REDIAL_NS
+                raise UnavailableError(
+                    f"{self._address} does not know this machine's key",
+                    f"pair them: phone-host pair --link {self._address}",
+                )
+            case zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL if value == _MECHANISM_MISMATCH:
+                self.due_ns = now_ns + REDIAL_NS
+                raise self._mismatch()
+            case _:
+                self._hang_ups += 1
+                if self._hang_ups == _HANG_UPS:
+                    expected = self._peer or "none"
+                    _LOG.warning(event("peer_hangs_up", address=self._address, expected=expected, lane=self._lane))
+        return False
+
+    def _mismatch(self) -> UnavailableError:
+        if not self._peer:
+            return UnavailableError(
+                f"{self._address} wants a key", f"pair with it: phone-host pair --link {self._address}"
+            )
+        return UnavailableError(
+            f"{self._address} is open to everybody", "secure it there, or say so here too: add ?insecure=1 to --link"
+        )
