@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from phone_host.emulate import Profile
+from phone_host.relay import relay_process
 from tests.support.keys import acquainted
 from tests.support.numbered import saved_numbers, write_film
 from tests.support.programs import board, free_port, host, ledgers, lines, until
@@ -28,6 +30,18 @@ def cable(tmp_path: Path) -> Iterator[PtyLine]:
     """A cable as fast as gadget serial on the board is thought to be."""
     with PtyLine(tmp_path, bytes_per_s=3e6, delay_ns=300_000) as line:
         yield line
+
+
+FAR_AWAY = Profile("far away", "tcp", 0, 250_000_000)
+"""So much slower than the cable that the choice between the two never hangs on how busy the machine is."""
+
+
+@pytest.fixture
+def network(tmp_path: Path) -> Iterator[tuple[str, str]]:
+    """The board's address on a network that is far away, and where the host reaches it."""
+    board_uri = f"tcp://127.0.0.1:{free_port()}"
+    with relay_process("tcp", board_uri, tmp_path, FAR_AWAY) as relay:
+        yield relay.board, relay.host
 
 
 def with_links(verb: list[str], *links: str) -> list[str]:
@@ -61,15 +75,15 @@ def check(out: Path, report: Any, account: Any) -> None:
     assert account["grabbed"] == account["sent"] + sum(account["dropped"].values())
 
 
-def test_a_pulled_cable_and_back(film: str, cable: PtyLine, tmp_path: Path) -> None:
+def test_a_pulled_cable_and_back(film: str, cable: PtyLine, network: tuple[str, str], tmp_path: Path) -> None:
     """Pairs come over serial, over TCP when the cable is pulled, over serial again when it is back; in one session, each told with its link."""
     out = tmp_path / "out"
     board_uri, host_uri = cable.uris
-    tcp = f"tcp://127.0.0.1:{free_port()}"
+    board_tcp, host_tcp = network
     receiving = ["run", "--camera", film, "--out", str(out), "--save-every", "1", "--json", "--log-level", "info"]
     with (
-        board(with_links(["run", "--camera", film, "--json"], board_uri, tcp), tmp_path) as sender,
-        host(with_links(receiving, host_uri, tcp), tmp_path) as receiver,
+        board(with_links(["run", "--camera", film, "--json"], board_uri, board_tcp), tmp_path) as sender,
+        host(with_links(receiving, host_uri, host_tcp), tmp_path) as receiver,
     ):
         until(lambda: lines(out / "delays.jsonl") >= 10 and carriers(out)[-1] == "serial", "pairs over the cable")
         cable.pull()
@@ -92,15 +106,17 @@ def test_a_pulled_cable_and_back(film: str, cable: PtyLine, tmp_path: Path) -> N
     assert "link_switched source=tcp target=serial" in receiver.stderr
 
 
-def test_a_line_that_falls_silent_gives_way(film: str, cable: PtyLine, tmp_path: Path) -> None:
+def test_a_line_that_falls_silent_gives_way(
+    film: str, cable: PtyLine, network: tuple[str, str], tmp_path: Path
+) -> None:
     """A cable that swallows all bytes without a word gives way to TCP; no frame is paired twice or wrongly."""
     out = tmp_path / "out"
     board_uri, host_uri = cable.uris
-    tcp = f"tcp://127.0.0.1:{free_port()}"
+    board_tcp, host_tcp = network
     receiving = ["run", "--camera", film, "--out", str(out), "--save-every", "1", "--json", "--log-level", "info"]
     with (
-        board(with_links(["run", "--camera", film, "--json"], board_uri, tcp), tmp_path) as sender,
-        host(with_links(receiving, host_uri, tcp), tmp_path) as receiver,
+        board(with_links(["run", "--camera", film, "--json"], board_uri, board_tcp), tmp_path) as sender,
+        host(with_links(receiving, host_uri, host_tcp), tmp_path) as receiver,
     ):
         until(lambda: lines(out / "delays.jsonl") >= 10 and carriers(out)[-1] == "serial", "pairs over the cable")
         for way in cable.ways:
@@ -115,26 +131,29 @@ def test_a_line_that_falls_silent_gives_way(film: str, cable: PtyLine, tmp_path:
     check(out, receiver.json(), sender.json())
 
 
-def test_two_links_of_one_kind_and_one_that_comes_later(film: str, tmp_path: Path) -> None:
+def test_two_links_of_one_kind_and_one_that_comes_later(film: str, network: tuple[str, str], tmp_path: Path) -> None:
     """Two addresses of one board have names of their own; a link whose device appears during the run is taken into use."""
     out = tmp_path / "out"
-    ipc = f"ipc://{tmp_path}/link"
-    ports = [f"tcp://127.0.0.1:{free_port()}" for _ in range(2)]
+    board_tcp, host_tcp = network
     serial = (f"serial:{tmp_path}/ttyBoard", f"serial:{tmp_path}/ttyHost")
     receiving = ["run", "--camera", film, "--out", str(out), "--save-every", "1", "--json", "--log-level", "info"]
+    other = f"tcp://127.0.0.1:{free_port()}"
+    second = tmp_path / "second"
+    second.mkdir()
     with (
-        board(with_links(["run", "--camera", film, "--json"], ipc, *ports, serial[0]), tmp_path) as sender,
-        host(with_links(receiving, serial[1], *ports, ipc), tmp_path) as receiver,
+        relay_process("tcp", other, second, FAR_AWAY) as relay,
+        board(with_links(["run", "--camera", film, "--json"], board_tcp, other, serial[0]), tmp_path) as sender,
+        host(with_links(receiving, serial[1], host_tcp, relay.host), tmp_path) as receiver,
     ):
         until(lambda: lines(out / "delays.jsonl") >= 10, "pairs")
-        assert carriers(out)[-1] in {"tcp", "tcp-2", "ipc"}
+        assert carriers(out)[-1] in {"tcp", "tcp-2"}
         with PtyLine(tmp_path, bytes_per_s=3e6, delay_ns=300_000):
             until(lambda: carriers(out)[-1] == "serial", "pairs over the cable that was plugged in")
             assert receiver.stop() == 0
             assert sender.stop() == 0
     report = receiver.json()
     check(out, report, sender.json())
-    assert [link["link"] for link in report["links"]] == ["serial", "tcp", "tcp-2", "ipc"]
+    assert [link["link"] for link in report["links"]] == ["serial", "tcp", "tcp-2"]
 
 
 def test_two_boards_are_refused(film: str, tmp_path: Path) -> None:
