@@ -19,7 +19,7 @@ class SessionAccount:
         received: frames that came.
         lost: frames that were sent and never came (gaps).
         duplicate: frames that a transport delivered again, dropped.
-        late: frames that came behind a newer one over another link, dropped; they are counted in `lost`.
+        late: how many of the lost came after all, behind a newer one over another link, and were dropped.
         old_session: frames of an older life of the board, dropped.
         rung: how far the board has lowered what its camera gives.
         ended: whether the board said that no frame follows.

@@ -12,7 +12,7 @@ from phone_host.results import Unwritten
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Alignment, Phase
-from phone_host.trust import Timing
+from phone_host.trust import NO_DOUBT, Timing, stamp_doubt
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +41,7 @@ class RunFacts:
         motion_px_s: how fast the own camera's image moves, px/s; NaN where not measured.
         width_px: of that image; 0 where not measured.
         interpolated: whether the board's images were taken to the moment of the host's, so that their time skew did no harm.
+        stamps_exact: whether both cameras' stamps say by definition when their images were exposed.
     """
 
     ended: str
@@ -61,6 +62,7 @@ class RunFacts:
     motion_px_s: float
     width_px: int
     interpolated: bool = False
+    stamps_exact: bool = False
     time_offset: TimeOffset = field(default_factory=TimeOffset)
     phase: Phase | None = None
     alignment: Alignment | None = None
@@ -107,6 +109,7 @@ def time_and_motion(facts: RunFacts, last: int | None = None) -> Timing:
         end_to_end_ns=facts.delays.spread("end_to_end", last).p50_ns,
         motion_px_s=facts.motion_px_s,
         width_px=facts.width_px,
+        stamps=NO_DOUBT if facts.stamps_exact else stamp_doubt(facts.time_offset, facts.camera),
     )
 
 

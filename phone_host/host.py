@@ -196,7 +196,14 @@ class Host:
             motion_px_s=self.motion.px_s,
             width_px=self.motion.width_px,
             interpolated=self.settings.interpolate,
+            stamps_exact=self._stamps_are_exact,
         )
+
+    @property
+    def _stamps_are_exact(self) -> bool:
+        """Whether both cameras' stamps are right by definition; an absent board's are not doubted."""
+        hello = self.receiver.hello
+        return self._own.has_exact_stamps and (hello is None or hello.camera.has_exact_stamps)
 
     @property
     def _period_ns(self) -> int:

@@ -33,6 +33,8 @@ _QUANTUM_BYTES: Final = 16 * 1024
 """Read from one connection at one go; fair enough between the two of a link, whose control messages are small."""
 
 _GOODBYE_S: Final = 5.0
+_DIAL_AGAIN_NS: Final = 100_000_000
+"""While the board is not there, connections of the host wait unaccepted: one that were taken and closed would look to it like a peer that hangs up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +103,7 @@ class Relay:
         self._to_board: Way[_End] = Way(profile, 2)
         self._listener = listener
         self._dial = dial
+        self._dial_due_ns = 0
         self._ends: list[_End] = []
         self._gone_bytes = [0, 0]
 
@@ -132,9 +135,11 @@ class Relay:
             if not end.read_out and not end.peer.pending and end.way is not None and end.way.room_bytes
         ]
         writers = [end for end in self._ends if end.pending]
-        due_ns = min(self._to_host.due_ns, self._to_board.due_ns)
-        wait_s = min(_LONGEST_WAIT_S, max(0.0, (due_ns - now.monotonic_ns()) / 1e9))
-        listening = [self._listener.fileno()] if self._listener is not None else []
+        now_ns = now.monotonic_ns()
+        may_dial = now_ns >= self._dial_due_ns
+        due_ns = min(self._to_host.due_ns, self._to_board.due_ns, *(() if may_dial else (self._dial_due_ns,)))
+        wait_s = min(_LONGEST_WAIT_S, max(0.0, (due_ns - now_ns) / 1e9))
+        listening = [self._listener.fileno()] if self._listener is not None and may_dial else []
         # select, not epoll: its timeout is exact to the microsecond, epoll's to the millisecond.
         ready, writable, _ = select.select(
             [wake.fileno(), *listening, *(end.descriptor for end in readers)],
@@ -159,11 +164,15 @@ class Relay:
         self._bury()
 
     def _accept(self, listener: socket.socket) -> None:
-        theirs, _ = listener.accept()
         try:
             ours = self._dial()
-        except OSError:  # the board is not there yet: the host dials again, as it would then
-            theirs.close()
+        except OSError:  # the board is not there yet
+            self._dial_due_ns = now.monotonic_ns() + _DIAL_AGAIN_NS
+            return
+        try:
+            theirs, _ = listener.accept()
+        except OSError:  # the host has thought better of it
+            ours.close()
             return
         for sock in (theirs, ours):
             sock.setblocking(False)  # noqa: FBT003 - the standard library's own signature

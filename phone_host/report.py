@@ -192,8 +192,9 @@ def _session(facts: RunFacts, index: int) -> dict[str, object]:
         "waiting": grabbed - sent - sum(dropped.values()),
         "received": account.received,
         "lost": account.lost,
+        "lost_late": account.late,
         "camera": rung_values(account.rung),
-        "stale": {"duplicate": account.duplicate, "late": account.late, "old_session": account.old_session},
+        "stale": {"duplicate": account.duplicate, "old_session": account.old_session},
         "ended": account.ended,
         "tail": "unknown" if account.vanished else "known",
     }

@@ -111,11 +111,12 @@ def _links(link: LinkAccount) -> list[str]:
 
 def _losses(facts: RunFacts) -> list[str]:
     lost = sum(account.lost for account in facts.link.sessions)
-    stale = sum(account.duplicate + account.late + account.old_session for account in facts.link.sessions)
+    late = sum(account.late for account in facts.link.sessions)
+    stale = sum(account.duplicate + account.old_session for account in facts.link.sessions)
     board = {reason: n for reason, n in board_drops(facts.link).items() if n}
     parts = [
         *(f"{n} {reason} on the board" for reason, n in board.items()),
-        *([f"{lost} lost on the link"] if lost else []),
+        *([f"{lost} lost on the link{f' ({late} of them came too late)' if late else ''}"] if lost else []),
         *([f"{stale} stale"] if stale else []),
         *(f"{n} board frames {reason}" for reason, n in facts.counts.board_orphans),
         *(f"{n} host frames {reason}" for reason, n in facts.counts.host_orphans),

@@ -1,4 +1,4 @@
-"""Says in words when time makes depth wrong: frames of a pair apart, clocks uncertain, results old, while the image moves. Pure.
+"""Says in words when time makes depth wrong: frames of a pair apart, clocks or stamps uncertain, results old, while the image moves. Pure.
 
 A point that moves v px a second stands t * v px elsewhere in a frame that is t s late, and a matcher takes that for disparity: beyond half a pixel
 depth is wrong by more than a good matcher's own error.
@@ -9,11 +9,17 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
+from common.camera.base import CameraHealth
+from phone_host.model import TimeOffset
+
 MOST_ERROR_PX: Final = 0.5
 """DESIGN's limit of time skew x image motion; the matchers' own median error on real images lies at a third of it."""
 
 _MOST_LAG: Final = 0.05
 """A result that lies this share of the image's width behind the scene no longer shows where things are."""
+
+_LEAST_LATENCY_NS: Final = 50_000_000
+"""What a phone takes from exposure to the first byte at least while nobody has measured it (decision 0016)."""
 
 
 class Doubt(Enum):
@@ -21,7 +27,57 @@ class Doubt(Enum):
 
     TIME_SKEW = "time_skew"
     CLOCK = "clock"
+    STAMPS = "stamps"
     AGE = "age"
+
+
+@dataclass(frozen=True, slots=True)
+class StampDoubt:
+    """How far the two cameras' stamps may differ for one and the same moment.
+
+    Attributes:
+        half_width_ns: so far; 0: they cannot.
+        why: half a sentence with the figure.
+        remedy: what helps.
+    """
+
+    half_width_ns: int
+    why: str
+    remedy: str
+
+
+NO_DOUBT: Final = StampDoubt(0, "", "")
+"""Of cameras whose stamps say by definition when their images were exposed."""
+
+
+def stamp_doubt(offset: TimeOffset, own: CameraHealth) -> StampDoubt:
+    """Say how well the two cameras' stamps are known to agree.
+
+    Args:
+        offset: between them, as it is taken out; the default one was never measured.
+        own: of the own camera; its stamps may be arrivals, less a latency.
+
+    Returns:
+        What is left. A latency's uncertainty counts only where the time offset was not measured: the measurement took the latency along.
+    """
+    late_ns = own.jitter_ns or 0
+    late = "" if own.jitter_ns is None else f", and the own images arrive up to {late_ns / 1e6:.1f} ms late"
+    if offset != TimeOffset():
+        why = f"the cameras' stamps are known to agree to +-{offset.uncertainty_ns / 1e6:.1f} ms only{late}"
+        remedy = "a longer phone-host calibrate-time"
+        return StampDoubt(offset.uncertainty_ns + late_ns, why, remedy if not late else f"{remedy}; a steadier network")
+    unmeasured = f"nobody has measured by how much the cameras' stamps differ, +-{offset.uncertainty_ns / 1e6:.1f} ms"
+    if own.jitter_ns is None:
+        return StampDoubt(offset.uncertainty_ns, unmeasured, "phone-host calibrate-time")
+    remedy = "phone-host calibrate-time, or latency_ms= and latency_uncertainty_ms= in the own camera's address"
+    if own.latency_ns is None:
+        why = f"{unmeasured}, nor the own camera's latency, some {_LEAST_LATENCY_NS / 1e6:.0f} ms or more{late}"
+        return StampDoubt(offset.uncertainty_ns + _LEAST_LATENCY_NS + late_ns, why, remedy)
+    stated_ns = own.latency_uncertainty_ns
+    if stated_ns is None:
+        return StampDoubt(offset.uncertainty_ns + late_ns, f"{unmeasured}, nor how exact latency_ms is{late}", remedy)
+    why = f"{unmeasured}, the own camera's latency is known to +-{stated_ns / 1e6:.1f} ms{late}"
+    return StampDoubt(offset.uncertainty_ns + stated_ns + late_ns, why, "phone-host calibrate-time")
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +90,7 @@ class Timing:
         end_to_end_ns: median age of a result.
         motion_px_s: speed of the fastest tenth of the image, px/s.
         width_px: of the image.
+        stamps: how well the two cameras' stamps agree.
     """
 
     time_skew_ns: float
@@ -41,6 +98,7 @@ class Timing:
     end_to_end_ns: float
     motion_px_s: float
     width_px: int
+    stamps: StampDoubt = NO_DOUBT
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +141,10 @@ def concerns(timing: Timing) -> tuple[Concern, ...]:
                 "wait until the estimate settles; a link with shorter or steadier round trips",
             )
         )
+    stamps_px = timing.stamps.half_width_ns / 1e9 * motion
+    if stamps_px > MOST_ERROR_PX:
+        sentence = f"{timing.stamps.why}, while {moves}: {stamps_px:.1f} px may be wrong"
+        found.append(Concern(Doubt.STAMPS, sentence, timing.stamps.remedy))
     lag_px = timing.end_to_end_ns / 1e9 * motion
     if lag_px > _MOST_LAG * timing.width_px:
         found.append(

@@ -85,6 +85,11 @@ class CameraDescription:
     pacing: Pacing
     steering: Steering = Steering.NONE
 
+    @property
+    def has_exact_stamps(self) -> bool:
+        """Whether its stamps say by definition when its images were exposed: a replay's do, whose images have no other time."""
+        return self.pacing is Pacing.DEMAND or self.steering is Steering.GRID
+
 
 @dataclass(frozen=True, slots=True)
 class Rung:

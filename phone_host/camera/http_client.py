@@ -139,6 +139,12 @@ class Connection:
         shown, status = self._settings.shown, response.status
         kind = (response.getheader("Content-Type") or "").split(";")[0].strip().lower()
         if status == http.client.UNAUTHORIZED:
+            asked = response.headers.get_all("WWW-Authenticate") or []
+            if asked and not any(one.strip().lower().startswith("basic") for one in asked):
+                raise UnavailableError(
+                    f"camera {shown} asks for a password by {asked[0].split()[0][:20]} authentication, only Basic is spoken here",
+                    "switch its password off, or to Basic",
+                )
             if self._settings.user:
                 raise UnavailableError(f"camera {shown} does not take this name and password", "correct them")
             raise UnavailableError(f"camera {shown} asks for a password", "give http://USER:PASSWORD@HOST:PORT/…")

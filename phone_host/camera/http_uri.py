@@ -82,6 +82,11 @@ def http_settings(uri: str, clock: str) -> HttpSettings:
     if not host or port == 0 or re.search(r"[^\x21-\x7e]", host + target + parts.query):
         raise SettingsError(f"camera {_hidden(uri)!r} is no address", f"give {EXAMPLE}")
     ours, theirs = _split(parts.query)
+    if "latency_uncertainty_ms" in ours and "latency_ms" not in ours:
+        raise SettingsError(
+            f"camera {_hidden(uri)!r} has latency_uncertainty_ms without the latency_ms that it is of",
+            "give both, or neither and measure the time offset: phone-host calibrate-time",
+        )
     return HttpSettings(
         secure,
         host,

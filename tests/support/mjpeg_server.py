@@ -62,12 +62,20 @@ class Exchange:
         """One sound part."""
         self.say(f"{boundary}\nContent-Type: image/jpeg\nContent-Length: {len(image)}\n\n", image + b"\r\n")
 
+    def is_sound(self, sent: int) -> bool:
+        """Whether it is not the time to go wrong yet, or not any more.
+
+        Args:
+            sent: images of this connection so far.
+        """
+        return self.number > 1 or sent < _GOOD_IMAGES
+
     def first_parts(self) -> Iterator[bytes]:
         """Sound parts as many as are sent before it goes wrong; then further images. On later connections sound parts for ever."""
         self.answer(f"{_TYPE}; boundary=frame")
         film = self.film()
         for sent, image in enumerate(film):
-            if self.number > 1 or sent < _GOOD_IMAGES:
+            if self.is_sound(sent):
                 self.part(image)
             else:
                 yield image
@@ -116,6 +124,14 @@ def chunked(on: Exchange) -> None:
             on.sock.sendall(b"%x\r\n%s\r\n" % (len(piece), piece))
 
 
+def empty_parts(on: Exchange) -> None:
+    """A part without content before every image, to keep the line alive."""
+    on.answer(f"{_TYPE}; boundary=frame")
+    for image in on.film():
+        on.say("--frame\nContent-Type: image/jpeg\nContent-Length: 0\n\n\n")
+        on.part(image)
+
+
 def early_boundary(on: Exchange) -> None:
     """The next part's header comes together with the image before it."""
     on.answer(f"{_TYPE}; boundary=frame")
@@ -150,6 +166,11 @@ def password(on: Exchange) -> None:
     plain(on)
 
 
+def digest(on: Exchange) -> None:
+    """Another kind of password."""
+    on.say('HTTP/1.1 401 Unauthorized\nWWW-Authenticate: Digest realm="cam", nonce="1"\nContent-Length: 0\n\n')
+
+
 def page(on: Exchange) -> None:
     """A web page."""
     on.answer("text/html; charset=utf-8", "Content-Length: 13\n")
@@ -171,6 +192,11 @@ def missing(on: Exchange) -> None:
 def moved(on: Exchange) -> None:
     """Elsewhere."""
     on.say("HTTP/1.1 302 Found\nLocation: http://elsewhere/video\nContent-Length: 0\n\n")
+
+
+def moved_here(on: Exchange) -> None:
+    """Elsewhere on the same server, for good."""
+    on.say("HTTP/1.1 301 Moved Permanently\nLocation: /other\nContent-Length: 0\n\n")
 
 
 def busy(on: Exchange) -> None:
@@ -224,6 +250,25 @@ def resets(on: Exchange) -> None:
         return
 
 
+def bad_chunks(on: Exchange) -> None:
+    """Chunks whose sizes are no numbers any more."""
+    on.answer(f"{_TYPE}; boundary=frame", "Transfer-Encoding: chunked\n")
+    for sent, image in enumerate(on.film()):
+        part = b"--frame\r\n\r\n" + image
+        size = b"%x" % len(part) if on.is_sound(sent) else b"none"
+        on.sock.sendall(size + b"\r\n" + part + b"\r\n")
+
+
+def last_chunk(on: Exchange) -> None:
+    """A chunked answer that ends in good order, as a server does that restarts its camera."""
+    on.answer(f"{_TYPE}; boundary=frame", "Transfer-Encoding: chunked\n")
+    for sent, image in enumerate(on.film()):
+        if not on.is_sound(sent):
+            on.sock.sendall(b"0\r\n\r\n")
+            return
+        on.sock.sendall(b"%x\r\n%s\r\n" % (len(image), image))
+
+
 def drips(on: Exchange) -> None:
     """Goes on with a byte now and then, each within every timeout."""
     for image in on.first_parts():
@@ -243,8 +288,8 @@ def endless(on: Exchange) -> None:
 MANNERS: Final[dict[str, Callable[[Exchange], None]]] = {
     manner.__name__: manner
     for manner in (
-        plain, dashes, no_dashes, no_line_end, wrong_boundary, chunked, early_boundary, garbage, truncated, password, page, snapshot, missing,
-        moved, busy, another_tongue, no_image, mute, drips_head, hangs, closes, resets, drips, endless,
+        plain, dashes, no_dashes, no_line_end, wrong_boundary, chunked, early_boundary, empty_parts, garbage, truncated, password, digest, page,
+        snapshot, missing, moved, moved_here, busy, another_tongue, no_image, mute, drips_head, hangs, closes, resets, bad_chunks, last_chunk, drips, endless,
     )
 }  # fmt: skip
 

@@ -1,6 +1,7 @@
 """A phone's MJPEG server as the host's own camera, beside servers that misbehave in every way that was heard of; real sockets, a real process."""
 
 import itertools
+import json
 import select
 import shutil
 import subprocess
@@ -9,6 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from common import now
@@ -18,6 +21,7 @@ from common.frame import Frame, FrameFault
 from phone_host.camera.factory import open_camera
 from phone_host.camera.mjpeg_http import HttpCamera
 from tests.support.mjpeg_server import PASSWORD, USER, MjpegServer
+from tests.support.moving import write_moving_film
 from tests.support.numbered import saved_numbers, write_film
 from tests.support.programs import board, free_port, host, ledgers, lines, until
 
@@ -73,7 +77,17 @@ def frames(came: list[Grab]) -> list[Frame]:
 
 @pytest.mark.parametrize(
     "manner",
-    ["plain", "dashes", "no_dashes", "no_line_end", "wrong_boundary", "chunked", "early_boundary", "garbage"],
+    [
+        "plain",
+        "dashes",
+        "no_dashes",
+        "no_line_end",
+        "wrong_boundary",
+        "chunked",
+        "early_boundary",
+        "empty_parts",
+        "garbage",
+    ],
 )
 def test_every_sloppy_manner(film: Path, manner: str) -> None:
     """However a server parts its images, every one comes whole and unaltered, in order, with the measured period."""
@@ -111,9 +125,9 @@ def test_truncated_images_are_told_of(film: Path) -> None:
     assert len(frames(came)) >= 8
 
 
-@pytest.mark.parametrize("manner", ["closes", "resets", "hangs", "drips", "endless"])
+@pytest.mark.parametrize("manner", ["closes", "resets", "bad_chunks", "last_chunk", "hangs", "drips", "endless"])
 def test_a_server_that_goes_wrong_is_met_again(film: Path, manner: str) -> None:
-    """A server that hangs up, resets, hangs, drips or never ends an image is left, counted, and frames come again over a new connection."""
+    """A server that hangs up, resets, ends its answer, garbles its chunks, hangs, drips or never ends an image is left, counted, and frames come again over a new connection."""
     with serving(film, manner) as server, camera_of(server.uri) as camera:
         grabs(camera, lambda _: camera.health.returned > 0)
         came = grabs(camera, lambda came: len(frames(came)) >= 5)
@@ -159,7 +173,9 @@ REFUSALS = {
     "snapshot": ("single images", "IP Webcam has /video"),
     "missing": ("404", "check the path"),
     "moved": ("http://elsewhere/video", "give that address"),
+    "moved_here": ("has moved to /other", "give that address"),
     "busy": ("503", "busy"),
+    "digest": ("by Digest authentication", "Basic"),
     "password": ("asks for a password", "USER:PASSWORD"),
     "another_tongue": ("does not speak HTTP", "port"),
 }
@@ -174,6 +190,22 @@ def test_what_is_no_stream_is_told_with_its_remedy(film: Path, manner: str) -> N
     assert problem in caught.value.problem
     assert remedy in caught.value.remedy
     assert str(server.port) in caught.value.problem
+
+
+def test_a_phone_that_is_turned(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Images of another size in the middle of the stream come as they are, with their own size, and the change is told."""
+    mixed = write_film(tmp_path / "mixed", 20)
+    upright = cv2.rotate(np.asarray(cv2.imread(str(mixed / "0.jpg"))), cv2.ROTATE_90_CLOCKWISE)
+    for number in range(10, 20):
+        assert cv2.imwrite(str(mixed / f"{number}.jpg"), upright)
+    with serving(mixed, "plain") as server, camera_of(server.uri) as camera:
+        sizes = {(160, 120), (120, 160)}
+        came = grabs(camera, lambda came: {(f.width_px, f.height_px) for f in frames(came)} == sizes)
+        assert camera.health.faults == ()
+    for frame in frames(came):
+        image = np.asarray(cv2.imdecode(np.frombuffer(frame.payload, np.uint8), cv2.IMREAD_COLOR))
+        assert (frame.height_px, frame.width_px) == image.shape[:2]
+    assert "camera_size_changed" in caplog.text
 
 
 def test_nobody_there_is_told(film: Path) -> None:
@@ -260,6 +292,24 @@ def test_a_board_and_a_phone_are_paired(tmp_path: Path) -> None:
     agree = [left == right for left, right in saved_numbers(out)]
     assert sum(agree) > len(agree) / 2
     assert all(abs(ledger["time_skew_ns"]) <= 125_000_000 for ledger in ledgers(out))
+
+
+def test_a_phone_whose_latency_nobody_measured_makes_a_warning(tmp_path: Path) -> None:
+    """Before a moving scene the log, the report and the summary say that stamps of an uncalibrated phone make depth wrong, and name calibrate-time."""
+    fps, link = 20, f"ipc://{tmp_path}/board"
+    film = write_moving_film(tmp_path / "moving", 100, 6)
+    with (
+        serving(film, "plain", fps=fps) as server,
+        board(["run", "--camera", f"replay:{film}?fps={fps}&loop=1", "--link", link], tmp_path),
+        host(["run", "--camera", server.uri, "--link", link, "--out", str(tmp_path / "out")], tmp_path) as receiver,
+    ):
+        until(lambda: "doubt=stamps" in receiver.stderr, "the warning")
+        assert receiver.stop() == 0
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    told = {warning["doubt"]: warning for warning in report["warnings"]}
+    assert "nor the own camera's latency" in told["stamps"]["sentence"]
+    assert "calibrate-time" in told["stamps"]["remedy"]
+    assert "warning: nobody has measured" in receiver.stderr + receiver.out.read_text()
 
 
 def test_the_doctor_looks_at_a_phone(film: Path, tmp_path: Path) -> None:

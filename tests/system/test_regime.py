@@ -6,26 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import cv2
-import numpy as np
-
+from tests.support.moving import write_moving_film
 from tests.support.numbered import write_film
 from tests.support.programs import board, host
 from tests.support.pty_line import PtyLine
-
-
-def write_moving_film(folder: Path, frames: int, step_px: int) -> Path:
-    """A texture that moves by so many pixels from image to image, back and forth."""
-    folder.mkdir(parents=True)
-    noise = np.random.default_rng(3).integers(0, 255, (240, 320 + frames * step_px), dtype=np.uint8)
-    texture = np.asarray(cv2.GaussianBlur(noise, (0, 0), 2.5))
-    texture = np.clip((texture.astype(float) - 127) * 5 + 127, 0, 255).astype(np.uint8)
-    for number in range(frames):
-        x_px = step_px * min(number, frames - number)
-        done, jpeg = cv2.imencode(".jpg", texture[:, x_px : x_px + 320])
-        assert done
-        (folder / f"{number}.jpg").write_bytes(jpeg.tobytes())
-    return folder
 
 
 def test_a_slow_line_starves_the_processor(tmp_path: Path) -> None:

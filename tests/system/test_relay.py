@@ -162,10 +162,24 @@ def test_the_end_of_one_side_is_told_to_the_other_behind_the_last_byte(tmp_path:
         assert data == b"goodbye" * 1000
 
 
-def test_a_line_without_a_board_refuses_as_the_board_would(tmp_path: Path) -> None:
-    """While nobody listens at the board's address the host's connection is closed at once, and the line stays up for the next try."""
-    with relay_process("ipc", f"ipc://{tmp_path / 'board'}", tmp_path, NOTHING) as relay:
-        for _ in range(2):
-            with socket.socket(socket.AF_UNIX) as host:
-                host.connect(relay.host.removeprefix("ipc://"))
-                assert host.recv(1) == b""
+@pytest.mark.parametrize("kind", ["tcp", "ipc"])
+def test_a_host_that_comes_before_the_board_is_kept_waiting(kind: str, tmp_path: Path) -> None:
+    """While nobody listens at the board's end a connection is not closed, so that the host sees no peer that hangs up; it serves once the board is there."""
+    family = socket.AF_INET if kind == "tcp" else socket.AF_UNIX
+    with socket.socket(family) as board, socket.socket(family) as host:
+        board.bind(("127.0.0.1", 0) if kind == "tcp" else str(tmp_path / "board"))
+        name = f"tcp://127.0.0.1:{board.getsockname()[1]}" if kind == "tcp" else f"ipc://{tmp_path / 'board'}"
+        with relay_process(kind, name, tmp_path, NOTHING) as relay:
+            address = relay.host.partition("://")[2]
+            place, _, port = address.rpartition(":")
+            host.connect((place, int(port)) if kind == "tcp" else address)
+            host.settimeout(1.0)
+            with pytest.raises(TimeoutError):  # bound, but nobody listens yet: ten attempts fail
+                host.recv(1)
+            board.listen()
+            board.settimeout(PATIENCE_S)
+            board_end, _ = board.accept()
+            host.settimeout(PATIENCE_S)
+            with board_end:
+                board_end.sendall(b"x")
+                assert host.recv(1) == b"x"

@@ -59,6 +59,7 @@ def test_addresses(uri: str, settings: HttpSettings) -> None:
         ("http://phone/v?latency_ms=-1", "latency_ms=-1"),
         ("http://phone/v?latency_ms=1e999999999", "latency_ms=1e999999999"),
         ("http://phone/v?verify=maybe", "verify=maybe"),
+        ("http://phone/v?latency_uncertainty_ms=5", "latency_uncertainty_ms without the latency_ms"),
     ],
 )
 def test_what_is_no_address_is_refused(uri: str, named: str) -> None:

@@ -6,7 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phone_host.trust import Doubt, Timing, concerns
+from common.camera.base import CameraHealth, CameraState
+from phone_host.model import UNMEASURED_NS, TimeOffset
+from phone_host.trust import Doubt, Timing, concerns, stamp_doubt
 
 MS = 1_000_000
 STILL = Timing(time_skew_ns=16 * MS, uncertainty_ns=0.1 * MS, end_to_end_ns=80 * MS, motion_px_s=0.0, width_px=640)
@@ -48,3 +50,53 @@ def test_more_skew_or_motion_never_silences_the_warning(skew_ns: float, motion_p
     ]
     assert bool(warned) is (skew_ns / 1e9 * motion_px_s > 0.5)
     assert all(concern.remedy for concern in warned)
+
+
+RUNNING = CameraHealth(CameraState.RUNNING)
+ARRIVALS = replace(RUNNING, jitter_ns=4 * MS)
+MEASURED = TimeOffset(3 * MS, 2 * MS)
+
+
+@pytest.mark.parametrize(
+    ("offset", "own", "half_width_ns", "said", "remedy"),
+    [
+        (TimeOffset(), RUNNING, UNMEASURED_NS, "nobody has measured", "phone-host calibrate-time"),
+        (MEASURED, RUNNING, 2 * MS, "agree to +-2.0 ms only", "a longer phone-host calibrate-time"),
+        (MEASURED, ARRIVALS, 6 * MS, "up to 4.0 ms late", "a steadier network"),
+        (TimeOffset(), ARRIVALS, UNMEASURED_NS + 54 * MS, "nor the own camera's latency", "latency_ms= and"),
+        (
+            TimeOffset(),
+            replace(ARRIVALS, latency_ns=90 * MS),
+            UNMEASURED_NS + 4 * MS,
+            "nor how exact latency_ms is",
+            "latency_uncertainty_ms=",
+        ),
+        (
+            TimeOffset(),
+            replace(ARRIVALS, latency_ns=90 * MS, latency_uncertainty_ns=20 * MS),
+            UNMEASURED_NS + 24 * MS,
+            "latency is known to +-20.0 ms",
+            "phone-host calibrate-time",
+        ),
+        (
+            MEASURED,
+            replace(ARRIVALS, latency_ns=90 * MS, latency_uncertainty_ns=20 * MS),
+            6 * MS,
+            "agree to +-2.0 ms only",
+            "calibrate-time",
+        ),
+    ],
+)
+def test_what_is_not_known_of_the_stamps_adds_up(
+    offset: TimeOffset, own: CameraHealth, half_width_ns: int, said: str, remedy: str
+) -> None:
+    """An unmeasured time offset, an own camera's latency and its jitter add up, and a warning names figure and remedy where that is half a pixel."""
+    doubt = stamp_doubt(offset, own)
+    assert doubt.half_width_ns == half_width_ns
+    limit_px_s = 0.5e9 / half_width_ns
+    calm = replace(STILL, time_skew_ns=0, uncertainty_ns=0, end_to_end_ns=0, stamps=doubt)
+    assert concerns(replace(calm, motion_px_s=0.99 * limit_px_s)) == ()
+    (concern,) = concerns(replace(calm, motion_px_s=1.01 * limit_px_s))
+    assert concern.doubt is Doubt.STAMPS
+    assert said in concern.sentence
+    assert remedy in concern.remedy
