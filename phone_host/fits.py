@@ -3,7 +3,8 @@
 The line is the one of least absolute deviations, the median of the delay for each size (Koenker and Bassett, "Regression Quantiles", Econometrica 46,
 1978): a frame that the machine held up for a hundred times the usual weighs no more than one held up a little. Intervals come from the moving-block
 bootstrap (Künsch, "The jackknife and the bootstrap for general stationary observations", Annals of Statistics 17, 1989): neighbours in
-time share their luck, and drawing frames one by one would claim too much.
+time share their luck, and drawing frames one by one would claim too much. Neither latency nor time for a byte is below zero: where noise tilts the line
+beyond that, it is the best one that begins at zero, or the level one.
 """
 
 from dataclasses import dataclass
@@ -37,10 +38,10 @@ class DelayFit:
     """delay = latency + ns_per_byte * bytes, with intervals that hold the true line in 95 % of like measurements.
 
     Attributes:
-        latency_ns: delay of no bytes at all; NaN where all frames were of about one size.
+        latency_ns: delay of no bytes at all, 0 at least; NaN where all frames were of about one size.
         latency_low_ns: lower end of its interval; NaN where too few frames were of another size.
         latency_high_ns: upper end.
-        ns_per_byte: slope; NaN where all frames were of about one size.
+        ns_per_byte: slope, 0 at least; NaN where all frames were of about one size.
         slope_low: lower end of its interval, ns a byte.
         slope_high: upper end, ns a byte.
         points: frames that were looked at.
@@ -105,6 +106,23 @@ def fit_delay(size_bytes: Values, delay_ns: Values, draws: int = _DRAWS) -> Dela
 
 
 def _line(x: Values, y: Values) -> tuple[float, float]:
+    """Intercept and slope of least absolute deviations, neither below zero."""
+    latency, slope = _free_line(x, y)
+    # The sum of deviations is convex: where its least lies outside, the least inside lies on the border that is crossed.
+    if slope < 0.0:
+        return max(0.0, float(np.median(y))), 0.0
+    if latency < 0.0:
+        return 0.0, max(0.0, _weighted_median(y / x, x))
+    return latency, slope
+
+
+def _weighted_median(values: Values, weights: Values) -> float:
+    order = np.argsort(values)
+    reached = np.cumsum(weights[order])
+    return float(values[order[np.searchsorted(reached, 0.5 * reached[-1])]])
+
+
+def _free_line(x: Values, y: Values) -> tuple[float, float]:
     """Intercept and slope of least absolute deviations, by reweighted least squares."""
     middle, width = float(x.mean()), float(x.std()) or 1.0
     design = np.stack([np.ones_like(x), (x - middle) / width])

@@ -205,11 +205,6 @@ def learn_link(interface: str, images: Images, cells: Sequence[Cell]) -> LinkMod
     else:
         fit = fit_of(ledgers, intervals=False)
         latency_ns, ns_per_byte = fit.latency_ns, fit.ns_per_byte
-        # Noise may tilt a fast link's line until it means nothing: then all of the delay is latency, or all of it bytes.
-        if ns_per_byte < 0.0:
-            latency_ns, ns_per_byte = float(np.median(delay)), 0.0
-        elif latency_ns < 0.0:
-            latency_ns, ns_per_byte = 0.0, float(np.median(delay / size))
     return LinkModel(latency_ns, ns_per_byte, delay - latency_ns - ns_per_byte * size, mine[0].self_paced)
 
 

@@ -3,23 +3,21 @@
 import argparse
 import json
 import sys
-import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING
 
-from common import logs, now
+from common import logs
 from common.commandline import INTERRUPTED, ExamplesFirstParser, run_command
-from common.errors import SettingsError, TandemError, UnavailableError
+from common.errors import SettingsError, UnavailableError
 from common.signals import StopSignals
 
 if TYPE_CHECKING:
     from phone_host.bench.analysis import Analysis
-    from phone_host.bench.cases import Case, Interface, Size
+    from phone_host.bench.cases import Interface
     from phone_host.bench.report import Conditions
     from phone_host.bench.runs import CaseResult, RunSettings
-    from phone_host.film import Film
 
 _EXAMPLES = """examples:
   delay-bench
@@ -36,11 +34,6 @@ delay-bench.json, delay-bench.html (plots, the queueing model beside the measure
 """
 
 _NOTHING_MEASURED = 4
-_RENDER_S: Final = 0.06
-"""An image takes about this long to render, for the progress bar's idea of the time that remains."""
-
-_SET_UP_S: Final = 2.0
-"""A run takes so much longer than its seconds: processes begin and end."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -53,18 +46,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0 done, 2 wrong usage, 3 a link, a process or stdout cannot be had, 4 nothing was measured, 130 interrupted.
     """
     return run_command(_parser(), arguments, _run)
-
-
-class _StoppedError(Exception):
-    """Raised inside the rendering when the user wants to stop."""
-
-
-@dataclass(slots=True)
-class _Outcome:
-    """What a matrix of cases has given so far, and what ended it before its time."""
-
-    results: "list[CaseResult]" = field(default_factory=list)
-    failure: TandemError | None = None
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -113,55 +94,29 @@ def _run(options: argparse.Namespace) -> int:
         _print_profiles(as_json=options.json)
         return 0
     from phone_host.bench.analysis import analyse  # noqa: PLC0415 - OpenCV, only now
-    from phone_host.bench.cases import (  # noqa: PLC0415 - only what this run needs is loaded
-        cases,
-        interfaces,
-        parse_links,
-        parse_qualities,
-        parse_rates,
-        parse_sizes,
-    )
+    from phone_host.bench.cases import cases, parse_qualities, parse_rates, parse_sizes  # noqa: PLC0415
     from phone_host.bench.changes import parse_changes  # noqa: PLC0415
-    from phone_host.bench.links import obstacle  # noqa: PLC0415
-    from phone_host.bench.page import figure, page  # noqa: PLC0415
-    from phone_host.bench.report import as_json, conditions  # noqa: PLC0415
-    from phone_host.emulate import parse_profiles  # noqa: PLC0415
-    from phone_host.trace import TracedRun, trace_json  # noqa: PLC0415
+    from phone_host.bench.matrix import measure, remote_cases  # noqa: PLC0415
+    from phone_host.bench.report import conditions  # noqa: PLC0415
 
     settings, changes = _settings(options), parse_changes(options.predict)
-    asked = interfaces(
-        parse_links(options.links) if options.links else (), parse_profiles(options.emulate) if options.emulate else ()
-    )
+    asked = _interfaces(options)
     matrix = parse_sizes(options.size), parse_qualities(options.quality), parse_rates(options.fps)
-    not_run = [(interface, reason) for interface in asked if (reason := obstacle(interface))]
-    for interface, reason in not_run:
-        print(f"delay-bench: {interface} is not run: {reason}", file=sys.stderr)
-    here = [interface for interface in asked if not obstacle(interface)]
-    if not here:
-        raise UnavailableError("none of the links can be had here", "name others with --links")
+    here, not_run = _available(asked)
     if options.out is not None:
         _make_folder(options.out)
     logs.set_up(30)
     signals = StopSignals()
-    boards = _remote_cases([interface for interface in here if interface.is_remote], signals)
+    boards = remote_cases([interface for interface in here if interface.is_remote], signals)
+    for case in boards:
+        print(
+            f"delay-bench: {case.interface} shows {case.images}; its camera is not set from here: "
+            "--size, --quality and --fps do not count there",
+            file=sys.stderr,
+        )
     planned = (*cases([interface for interface in here if not interface.is_remote], *matrix), *boards)
-    outcome = _measure(planned, settings, signals)
-    under = conditions(settings, not_run)
-    analysis = analyse(outcome.results, settings.fifo, changes)
-    report = as_json(outcome.results, under, analysis)
-    if options.json:
-        print(json.dumps(report))
-    else:
-        _print(outcome.results, under, analysis)
-    if options.out is not None:
-        files = {
-            "delay-bench.json": json.dumps(report, indent=1) + "\n",
-            "delay-bench.html": page(outcome.results, under, analysis),
-            "trace.json": trace_json([TracedRun(str(result.case), result.ledgers) for result in outcome.results]),
-        }
-        if any(result.ledgers for result in outcome.results):
-            files["delay-bench.svg"] = figure(outcome.results, under)
-        _write(options.out, files)
+    outcome = measure(planned, settings, signals)
+    _tell(options, outcome.results, conditions(settings, not_run), analyse(outcome.results, settings.fifo, changes))
     if outcome.failure is not None:
         raise outcome.failure
     if signals.stop:
@@ -169,6 +124,57 @@ def _run(options: argparse.Namespace) -> int:
         print(f"delay-bench: {how} after {len(outcome.results)} of {len(planned)} runs", file=sys.stderr)
         return INTERRUPTED if signals.interrupted else 0
     return 0 if all(result.ledgers for result in outcome.results) else _NOTHING_MEASURED
+
+
+def _interfaces(options: argparse.Namespace) -> "tuple[Interface, ...]":
+    """What the options ask for."""
+    from phone_host.bench.cases import interfaces, parse_links  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.emulate import parse_profiles  # noqa: PLC0415
+
+    links = parse_links(options.links) if options.links else ()
+    return interfaces(links, parse_profiles(options.emulate) if options.emulate else ())
+
+
+def _available(asked: "Sequence[Interface]") -> "tuple[list[Interface], list[tuple[Interface, str]]]":
+    """Those that can be had here, and the others with the reason, which is said at once."""
+    from phone_host.bench.links import obstacle  # noqa: PLC0415 - OpenCV, only now
+
+    here, not_run = [], []
+    for interface in asked:
+        reason = obstacle(interface)
+        if reason:
+            print(f"delay-bench: {interface} is not run: {reason}", file=sys.stderr)
+            not_run.append((interface, reason))
+        else:
+            here.append(interface)
+    if not here:
+        raise UnavailableError("none of the links can be had here", "name others with --links")
+    return here, not_run
+
+
+def _tell(
+    options: argparse.Namespace, results: "Sequence[CaseResult]", under: "Conditions", analysis: "Analysis"
+) -> None:
+    """Print the table or the object, and write the files."""
+    from phone_host.bench.page import figure, page  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.bench.report import as_json  # noqa: PLC0415
+    from phone_host.trace import TracedRun, trace_json  # noqa: PLC0415
+
+    report = as_json(results, under, analysis)
+    if options.json:
+        print(json.dumps(report))
+    else:
+        _print(results, under, analysis)
+    if options.out is None:
+        return
+    files = {
+        "delay-bench.json": json.dumps(report, indent=1) + "\n",
+        "delay-bench.html": page(results, under, analysis),
+        "trace.json": trace_json([TracedRun(str(result.case), result.ledgers) for result in results]),
+    }
+    if any(result.ledgers for result in results):
+        files["delay-bench.svg"] = figure(results, under)
+    _write(options.out, files)
 
 
 def _settings(options: argparse.Namespace) -> "RunSettings":
@@ -183,136 +189,6 @@ def _settings(options: argparse.Namespace) -> "RunSettings":
             f"--matcher {options.matcher!r} is unknown", f"give {' or '.join(name.value for name in MatcherName)}"
         )
     return RunSettings(MatcherName(options.matcher), FifoSettings.parse(options.fifo), options.seconds)
-
-
-def _remote_cases(remote: "Sequence[Interface]", signals: StopSignals) -> "list[Case]":
-    """What the boards elsewhere show; an absent one is an error before anything is measured."""
-    from phone_host.bench.links import ask_board  # noqa: PLC0415
-    from phone_host.bench.runs import PATIENCE_NS  # noqa: PLC0415
-
-    found = []
-    for interface in remote:
-        case = ask_board(interface.link, PATIENCE_NS, lambda: signals.stop)
-        if case is None:
-            break
-        print(
-            f"delay-bench: {interface.link} shows {case.images}; its camera is not set from here: "
-            "--size, --quality and --fps do not count there",
-            file=sys.stderr,
-        )
-        found.append(case)
-    return found
-
-
-def _measure(planned: "Sequence[Case]", settings: "RunSettings", signals: StopSignals) -> _Outcome:
-    """Run all cases, until a signal comes or one fails; what was measured before stays."""
-    from phone_host.bench.runs import WARM_UP_S, film_images, run_case  # noqa: PLC0415
-
-    outcome = _Outcome()
-    run_s = _SET_UP_S + WARM_UP_S + settings.seconds
-    render_s = film_images() * _RENDER_S
-    sizes = dict.fromkeys(case.size for case in planned)
-    with (
-        tempfile.TemporaryDirectory(prefix="delay-bench-") as name,
-        _Bar(len(sizes) * render_s + len(planned) * run_s, signals) as bar,
-    ):
-        folder = Path(name)
-        films: dict[tuple[Size, int], Film] = {}
-        for number, case in enumerate(planned):
-            try:
-                if (case.size, case.quality_percent) not in films:
-                    bar.begin(f"rendering {case.size}", render_s)
-                    films |= _films(planned, case.size, folder, bar.rendered)
-                bar.begin(f"{number + 1}/{len(planned)} {case}", run_s)
-                result = run_case(
-                    case,
-                    films[case.size, case.quality_percent],
-                    _fresh(folder / f"run{number}"),
-                    settings,
-                    stop=bar.stopped,
-                )
-            except _StoppedError:
-                break
-            except TandemError as error:
-                outcome.failure = error
-                break
-            if result is not None:
-                outcome.results.append(result)
-            if signals.stop:
-                break
-    return outcome
-
-
-class _Bar:
-    """The progress bar over the whole matrix, in seconds of expected time; nothing where stderr is no terminal.
-
-    Args:
-        total_s: all work.
-        signals: asked while work goes on.
-    """
-
-    def __init__(self, total_s: float, signals: StopSignals) -> None:
-        from rich.console import Console  # noqa: PLC0415
-        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn  # noqa: PLC0415
-
-        console = Console(stderr=True)
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("left"), TimeRemainingColumn())
-        self._progress = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-        self._task = self._progress.add_task("", total=total_s)
-        self._signals = signals
-        self._done_s = self._length_s = 0.0
-        self._begun_ns = now.monotonic_ns()
-
-    def __enter__(self) -> Self:
-        self._progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._progress.stop()
-
-    def begin(self, what: str, length_s: float) -> None:
-        """A piece of work begins, so the one before is done."""
-        self._done_s += self._length_s
-        self._length_s, self._begun_ns = length_s, now.monotonic_ns()
-        self._progress.update(self._task, description=what, completed=self._done_s)
-
-    def stopped(self) -> bool:
-        """Show how far it is; gives whether the user wants to stop."""
-        elapsed_s = (now.monotonic_ns() - self._begun_ns) / 1e9
-        self._progress.update(self._task, completed=self._done_s + min(elapsed_s, self._length_s))
-        return self._signals.stop
-
-    def rendered(self) -> None:
-        """An image was rendered."""
-        if self.stopped():
-            raise _StoppedError
-
-
-def _films(
-    planned: "Sequence[Case]", size: "Size", folder: Path, advance: Callable[[], None]
-) -> "dict[tuple[Size, int], Film]":
-    """The films of one size, in all its qualities."""
-    from phone_host.bench.runs import render  # noqa: PLC0415
-
-    qualities = tuple(dict.fromkeys(case.quality_percent for case in planned if case.size == size))
-    try:
-        films = render(size, qualities, folder / str(size), advance)
-    except OSError as error:
-        raise _no_room(folder, error) from None
-    return {(size, quality): film for quality, film in films.items()}
-
-
-def _fresh(folder: Path) -> Path:
-    """A new folder for one run's sockets."""
-    try:
-        folder.mkdir()
-    except OSError as error:
-        raise _no_room(folder, error) from None
-    return folder
-
-
-def _no_room(folder: Path, error: OSError) -> UnavailableError:
-    return UnavailableError(f"temporary folder {folder} cannot be used ({error.strerror})", "make room, or set TMPDIR")
 
 
 def _make_folder(folder: Path) -> None:
@@ -341,14 +217,8 @@ def _print(results: "Sequence[CaseResult]", under: "Conditions", analysis: "Anal
     from rich.console import Console  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
 
-    from phone_host.bench.report import (  # noqa: PLC0415
-        PERCENTILES,
-        fit_lines,
-        grouped,
-        prediction_lines,
-        rows,
-        summary_line,
-    )
+    from phone_host.bench.report import PERCENTILES, grouped  # noqa: PLC0415
+    from phone_host.bench.tables import fit_lines, prediction_lines, rows, summary_line  # noqa: PLC0415
 
     console = Console(highlight=False)
     console.print(f"{under.machine}, {under.date}, matcher {under.matcher}", soft_wrap=True)

@@ -6,18 +6,17 @@ from html import escape
 from typing import Final
 
 from phone_host.bench.analysis import Analysis, InterfaceFit, typical_and_slow
-from phone_host.bench.report import (
+from phone_host.bench.report import Conditions, grouped
+from phone_host.bench.runs import WARM_UP_S, CaseResult
+from phone_host.bench.tables import (
     FIT_COLUMNS,
     PREDICTION_COLUMNS,
-    Conditions,
     checked_rows,
     fit_rows,
-    grouped,
     rate_text,
     summary_line,
     what_if_rows,
 )
-from phone_host.bench.runs import WARM_UP_S, CaseResult
 from phone_host.page_frame import HALF_PX, document, section, table, two_widths
 from phone_host.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
 from phone_host.plot_parts import STYLE, legend, point_legend

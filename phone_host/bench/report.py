@@ -1,10 +1,9 @@
-"""What the delay benchmark measured, as a JSON object and as rows of tables. Pure. Every number's unit stands in its key."""
+"""What the delay benchmark measured, as a JSON object. Pure. Every number's unit stands in its key."""
 
-import math
 import os
 import platform
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Final
 
 import zmq
@@ -15,7 +14,6 @@ from phone_host.bench.cases import BOARD_SETS, Interface
 from phone_host.bench.runs import WARM_UP_S, CaseResult, RunSettings
 from phone_host.delays import DELAYS, STAGES, DelayStatistics, Spread
 from phone_host.fits import DelayFit
-from phone_host.plot_scale import duration_text
 from phone_host.prediction import Figures, Unknown
 from phone_host.sync.fifo import FifoSettings
 
@@ -111,26 +109,6 @@ def grouped(results: Sequence[CaseResult]) -> list[list[CaseResult]]:
     return list(groups.values())
 
 
-def rows(results: Sequence[CaseResult]) -> list[tuple[str, ...]]:
-    """The terminal's table: stage, link, percentiles in ms; the stages of processing are indented below it.
-
-    Args:
-        results: the runs to stand below each other, stage by stage.
-    """
-    spreads = [(str(result.case.interface), statistics_of(result)) for result in results]
-    table = []
-    for name in (*DELAYS[:6], *STAGES, *DELAYS[6:], "time_skew"):
-        for index, (link, statistics) in enumerate(spreads):
-            values = _percentiles(statistics.spread(name))
-            label = "" if index else f"  {name}" if name in STAGES else name.replace("_", "-")
-            table.append((label, link, *(_cell(values[key]) for key in PERCENTILES)))
-    return table
-
-
-def _cell(value_ns: float) -> str:
-    return "-" if value_ns != value_ns else f"{value_ns / 1e6:.3f}"  # noqa: PLR0124 - NaN is the only value unlike itself
-
-
 def _run(result: CaseResult) -> dict[str, object]:
     case, statistics = result.case, statistics_of(result)
     uncertainty = statistics.spread("uncertainty")
@@ -149,7 +127,7 @@ def _run(result: CaseResult) -> dict[str, object]:
         "delays": {name: _spread(statistics.spread(name)) for name in DELAYS},
         "stages": {name: _spread(statistics.spread(name)) for name in STAGES},
         "time_skew": _spread(statistics.spread("time_skew")),
-        "clock_uncertainty": {f"{key}_us": _number(value / 1e3) for key, value in _percentiles(uncertainty).items()},
+        "clock_uncertainty": {f"{key}_us": _number(value / 1e3) for key, value in percentiles(uncertainty).items()},
         "clock_uncertainty_at_end_us": _number(result.uncertainty_ns / 1e3),
         "clock_bound_at_end_us": _number(result.bound_ns / 1e3),
         "whole_run": _counts(result),
@@ -180,10 +158,11 @@ def _counts(result: CaseResult) -> dict[str, object]:
 
 
 def _spread(spread: Spread) -> dict[str, float | None]:
-    return {f"{key}_ms": _number(value / 1e6) for key, value in _percentiles(spread).items()}
+    return {f"{key}_ms": _number(value / 1e6) for key, value in percentiles(spread).items()}
 
 
-def _percentiles(spread: Spread) -> dict[str, float]:
+def percentiles(spread: Spread) -> dict[str, float]:
+    """The percentiles that are told, by their names, and the mean, ns."""
     return {
         "p50": spread.p50_ns,
         "p95": spread.p95_ns,
@@ -195,154 +174,6 @@ def _percentiles(spread: Spread) -> dict[str, float]:
 
 def _number(value: float) -> float | None:
     return None if value != value else round(value, 6)  # noqa: PLR0124 - NaN is the only value unlike itself; JSON has none
-
-
-def summary_line(result: CaseResult) -> str:
-    """Pairs, rate, losses and clock of one run in a line; uncertainty and bound of the clock are of one moment, so the bound is the wider."""
-    lost = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in losses(result).items()) or "nothing"
-    if result.ledgers:
-        worst_us = statistics_of(result).spread("uncertainty").p95_ns / 1e3
-        pairs = f"{len(result.ledgers)} pairs, {result.pairs_per_second:.1f}/s, clock of the pairs +-{worst_us:.0f} us (p95)"
-    else:
-        pairs = "no pairs"
-    at_end = (
-        "clock not known at the end"
-        if math.isnan(result.bound_ns)
-        else f"at the end +-{result.uncertainty_ns / 1e3:.0f} us (+-{result.bound_ns / 1e3:.0f} us whatever the link does)"
-    )
-    return f"{pairs}, {at_end}, whole run lost: {lost}"
-
-
-def rate_text(bytes_per_s: float) -> str:
-    """A rate in words: MB/s or kB/s with three digits."""
-    if bytes_per_s != bytes_per_s or bytes_per_s == float("inf"):  # noqa: PLR0124 - NaN is the only value unlike itself
-        return "any" if bytes_per_s == float("inf") else "\u2013"
-    return f"{bytes_per_s / 1e6:.3g} MB/s" if bytes_per_s >= 1e6 else f"{bytes_per_s / 1e3:.3g} kB/s"
-
-
-def fit_rows(analysis: Analysis) -> list[tuple[str, ...]]:
-    """Each interface's latency and rate with their 95 % intervals, and how well the clocks were known there."""
-    rows: list[tuple[str, ...]] = []
-    for one in analysis.fits:
-        fit = one.fit
-        worst = max(one.results, key=lambda result: result.uncertainty_ns)
-        lost = sum(account.lost for result in one.results for account in result.link.sessions)
-        sent = sum(result.board.sent for result in one.results)
-        rows.append(
-            (
-                str(one.interface),
-                duration_text(fit.latency_ns),
-                f"{duration_text(fit.latency_low_ns)} to {duration_text(fit.latency_high_ns)}",
-                rate_text(fit.bytes_per_s),
-                f"{rate_text(fit.least_bytes_per_s)} to {rate_text(fit.most_bytes_per_s)}",
-                duration_text(fit.typical_error_ns),
-                f"{fit.points}",
-                f"\u00b1{duration_text(worst.uncertainty_ns)}",
-                f"\u00b1{duration_text(worst.bound_ns)}",
-                f"{lost} of {sent}",
-            )
-        )
-    return rows
-
-
-FIT_COLUMNS: Final = (
-    "interface",
-    "latency",
-    "95 %",
-    "rate",
-    "95 %",
-    "left over",
-    "frames",
-    "clock",
-    "hard bound",
-    "lost there",
-)
-
-PREDICTION_COLUMNS: Final = (
-    "interface",
-    "setting",
-    "pairs/s",
-    "lost",
-    "propagation p50",
-    "queuing p95",
-    "starvation p50",
-    "end-to-end p50",
-    "p95",
-)
-
-
-def fit_lines(analysis: Analysis) -> list[str]:
-    """Each interface's latency and rate for the terminal, with their 95 % intervals."""
-    lines = []
-    for one in analysis.fits:
-        if math.isnan(one.fit.ns_per_byte):
-            lines.append(f"{one.interface}: frames of one size only, so latency and rate cannot be told apart")
-            continue
-        name, latency, latency_reach, rate, rate_reach, *_ = fit_rows(replace(analysis, fits=(one,)))[0]
-        lines.append(f"{name}: propagation = {latency} ({latency_reach}) + bytes / {rate} ({rate_reach})")
-    return lines
-
-
-def prediction_lines(analysis: Analysis) -> list[str]:
-    """Each run beside its prediction from the other runs, and what the user wanted to be predicted, for the terminal."""
-    lines = []
-    if len(analysis.checked) > 1:
-        lines = ["", "end-to-end p50 and pairs/s, measured and predicted from the other runs:"]
-    for one in analysis.checked if lines else ():
-        seen, said = one.measured, one.predicted
-        found = f"{one.case.interface} {one.case.short}: {duration_text(seen.end_to_end_p50_ns)}, {seen.pairs_per_s:.1f}/s; "
-        if isinstance(said, Unknown):
-            lines.append(f"{found}no prediction: {said.reason}")
-        else:
-            lines.append(f"{found}{duration_text(said.end_to_end_p50_ns)}, {said.pairs_per_s:.1f}/s")
-    asked = [one for one in analysis.what_ifs if one.asked_for]
-    if asked:
-        lines += ["", "predicted, not run:"]
-    for what_if in asked:
-        if isinstance(what_if.figures, Unknown):
-            lines.append(f"{what_if.interface} {what_if.setting}: no prediction: {what_if.figures.reason}")
-            continue
-        texts = zip(PREDICTION_COLUMNS[2:-1], _figure_texts(what_if.figures), strict=False)
-        lines.append(f"{what_if.interface} {what_if.setting}: {', '.join(f'{name} {text}' for name, text in texts)}")
-    return lines
-
-
-def checked_rows(analysis: Analysis) -> list[tuple[str, ...]]:
-    """Each run: measured, and predicted from the others; `12.1 | 11.9`."""
-    rows: list[tuple[str, ...]] = []
-    for one in analysis.checked:
-        name, images = str(one.case.interface), one.case.short
-        if isinstance(one.predicted, Unknown):
-            rows.append((name, images, f"no prediction: {one.predicted.reason}"))
-            continue
-        pairs = zip(_figure_texts(one.measured), _figure_texts(one.predicted), strict=True)
-        rows.append((name, images, *(f"{seen} | {said}" for seen, said in pairs)))
-    return rows
-
-
-def what_if_rows(analysis: Analysis) -> list[tuple[str, ...]]:
-    """Each setting that was not run, predicted."""
-    return [
-        (one.interface, one.setting, *_figure_texts(one.figures))
-        if isinstance(one.figures, Figures)
-        else (one.interface, one.setting, f"no prediction: {one.figures.reason}")
-        for one in analysis.what_ifs
-    ]
-
-
-def _figure_texts(figures: Figures) -> tuple[str, ...]:
-    delays = (
-        figures.propagation_p50_ns,
-        figures.queuing_p95_ns,
-        figures.starvation_p50_ns,
-        figures.end_to_end_p50_ns,
-        figures.end_to_end_p95_ns,
-    )
-    return (
-        f"{figures.pairs_per_s:.1f}",
-        f"{100.0 * figures.lost_share:.0f} %",
-        *(duration_text(value) for value in delays),
-    )
 
 
 def _interface(one: InterfaceFit) -> dict[str, object]:

@@ -31,8 +31,9 @@ from phone_host.bench.cases import (
 )
 from phone_host.bench.changes import parse_changes
 from phone_host.bench.page import figure, page
-from phone_host.bench.report import Conditions, as_json, fit_rows, losses, rows, summary_line
+from phone_host.bench.report import Conditions, as_json, losses
 from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up, rig_of
+from phone_host.bench.tables import fit_rows, rows, summary_line
 from phone_host.boardprocess import BoardAccount
 from phone_host.delays import DELAYS, STAGES
 from phone_host.emulate import PROFILES

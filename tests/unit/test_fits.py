@@ -91,3 +91,26 @@ def test_a_single_frame_of_another_size_gives_no_interval() -> None:
     size[500] = 1e4
     fit = fit_delay(size, 1e6 + 100.0 * size)
     assert math.isnan(fit.slope_low) or fit.slope_low <= fit.slope_high
+
+
+@given(st.lists(st.tuples(st.floats(1e3, 1e5), st.floats(0.0, 1e9)), min_size=3, max_size=60))
+@settings(deadline=None, max_examples=100)
+def test_no_line_promises_a_frame_before_it_was_sent(frames: list[tuple[float, float]]) -> None:
+    """Whatever was measured, latency, slope and all ends of their intervals are at least zero."""
+    size, delay = (np.array(column) for column in zip(*frames, strict=True))
+    fit = fit_delay(size, delay, draws=5)
+    if not math.isnan(fit.ns_per_byte):
+        assert min(fit.latency_ns, fit.ns_per_byte) >= 0.0
+        assert not min(fit.latency_low_ns, fit.slope_low) < 0.0
+
+
+def test_a_line_that_would_begin_below_zero_is_the_best_one_through_zero() -> None:
+    """Of all lines through zero and a point none is nearer, in the sum of deviations; and where larger frames came sooner, the level line stands at the median."""
+    random = np.random.default_rng(5)
+    size = random.uniform(5_000, 60_000, 101)
+    delay = np.maximum(0.0, 1000.0 * size - 4e6 + random.normal(0, 2e6, size.size))
+    fit = fit_delay(size, delay, draws=0)
+    nearest = min(delay / size, key=lambda slope: float(np.abs(delay - slope * size).sum()))
+    assert (fit.latency_ns, fit.ns_per_byte) == (0.0, nearest)
+    falling = fit_delay(size, 9e7 - 1000.0 * size, draws=0)
+    assert (falling.latency_ns, falling.bytes_per_s) == (float(np.median(9e7 - 1000.0 * size)), math.inf)

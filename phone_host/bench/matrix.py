@@ -1,0 +1,173 @@
+"""A matrix of cases run one after the other, with a progress bar, until a signal comes or one fails. Shell."""
+
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final, Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from common import now
+from common.errors import TandemError, UnavailableError
+from common.signals import StopSignals
+from phone_host.bench.cases import Case, Interface, Size
+from phone_host.bench.links import ask_board
+from phone_host.bench.runs import PATIENCE_NS, WARM_UP_S, CaseResult, RunSettings, film_images, render, run_case
+from phone_host.film import Film
+
+_RENDER_S: Final = 0.06
+"""An image takes about this long to render, for the progress bar's idea of the time that remains."""
+
+_SET_UP_S: Final = 2.0
+"""A run takes so much longer than its seconds: processes begin and end."""
+
+
+class _StoppedError(Exception):
+    """Raised inside the rendering when the user wants to stop."""
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What a matrix of cases has given.
+
+    Attributes:
+        results: of the cases that were run, in order.
+        failure: what ended it before its time; None where nothing did.
+    """
+
+    results: list[CaseResult] = field(default_factory=list)
+    failure: TandemError | None = None
+
+
+def remote_cases(remote: Sequence[Interface], signals: StopSignals) -> list[Case]:
+    """What the boards elsewhere show; fewer when a signal comes meanwhile.
+
+    Args:
+        remote: interfaces that are boards' URIs.
+        signals: asked while a board is waited for.
+
+    Returns:
+        A case for each board.
+
+    Raises:
+        UnavailableError: a board is not there.
+    """
+    found = []
+    for interface in remote:
+        case = ask_board(interface.link, PATIENCE_NS, lambda: signals.stop)
+        if case is None:
+            break
+        found.append(case)
+    return found
+
+
+def measure(planned: Sequence[Case], settings: RunSettings, signals: StopSignals) -> Outcome:
+    """Run all cases, until a signal comes or one fails; what was measured before stays.
+
+    Args:
+        planned: in the order in which they are run.
+        settings: of all cases.
+        signals: asked several times a second.
+    """
+    outcome = Outcome()
+    run_s = _SET_UP_S + WARM_UP_S + settings.seconds
+    render_s = film_images() * _RENDER_S
+    sizes = dict.fromkeys(case.size for case in planned)
+    with (
+        tempfile.TemporaryDirectory(prefix="delay-bench-") as name,
+        _Bar(len(sizes) * render_s + len(planned) * run_s, signals) as bar,
+    ):
+        folder = Path(name)
+        films: dict[tuple[Size, int], Film] = {}
+        for number, case in enumerate(planned):
+            try:
+                if (case.size, case.quality_percent) not in films:
+                    bar.begin(f"rendering {case.size}", render_s)
+                    films |= _films(planned, case.size, folder, bar.rendered)
+                bar.begin(f"{number + 1}/{len(planned)} {case}", run_s)
+                result = run_case(
+                    case,
+                    films[case.size, case.quality_percent],
+                    _fresh(folder / f"run{number}"),
+                    settings,
+                    stop=bar.stopped,
+                )
+            except _StoppedError:
+                break
+            except TandemError as error:
+                outcome.failure = error
+                break
+            if result is not None:
+                outcome.results.append(result)
+            if signals.stop:
+                break
+    return outcome
+
+
+class _Bar:
+    """The progress bar over the whole matrix, in seconds of expected time; nothing where stderr is no terminal.
+
+    Args:
+        total_s: all work.
+        signals: asked while work goes on.
+    """
+
+    def __init__(self, total_s: float, signals: StopSignals) -> None:
+        console = Console(stderr=True)
+        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("left"), TimeRemainingColumn())
+        self._progress = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+        self._task = self._progress.add_task("", total=total_s)
+        self._signals = signals
+        self._done_s = self._length_s = 0.0
+        self._begun_ns = now.monotonic_ns()
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.stop()
+
+    def begin(self, what: str, length_s: float) -> None:
+        """A piece of work begins, so the one before is done."""
+        self._done_s += self._length_s
+        self._length_s, self._begun_ns = length_s, now.monotonic_ns()
+        self._progress.update(self._task, description=what, completed=self._done_s)
+
+    def stopped(self) -> bool:
+        """Show how far it is; gives whether the user wants to stop."""
+        elapsed_s = (now.monotonic_ns() - self._begun_ns) / 1e9
+        self._progress.update(self._task, completed=self._done_s + min(elapsed_s, self._length_s))
+        return self._signals.stop
+
+    def rendered(self) -> None:
+        """An image was rendered."""
+        if self.stopped():
+            raise _StoppedError
+
+
+def _films(
+    planned: Sequence[Case], size: Size, folder: Path, advance: Callable[[], None]
+) -> dict[tuple[Size, int], Film]:
+    """The films of one size, in all its qualities."""
+    qualities = tuple(dict.fromkeys(case.quality_percent for case in planned if case.size == size))
+    try:
+        films = render(size, qualities, folder / str(size), advance)
+    except OSError as error:
+        raise _no_room(folder, error) from None
+    return {(size, quality): film for quality, film in films.items()}
+
+
+def _fresh(folder: Path) -> Path:
+    """A new folder for one run's sockets."""
+    try:
+        folder.mkdir()
+    except OSError as error:
+        raise _no_room(folder, error) from None
+    return folder
+
+
+def _no_room(folder: Path, error: OSError) -> UnavailableError:
+    return UnavailableError(f"temporary folder {folder} cannot be used ({error.strerror})", "make room, or set TMPDIR")
