@@ -10,7 +10,7 @@ from phone_host.pairqueue import PairCounts
 from phone_host.regime import RunFigures
 from phone_host.results import Unwritten
 from phone_host.sync.clock import ClockEstimate
-from phone_host.sync.fifo import FifoSettings
+from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.phase import Alignment, Phase
 from phone_host.trust import NO_DOUBT, Timing, stamp_doubt
 
@@ -80,19 +80,49 @@ class RunFacts:
 
 def figures(facts: RunFacts) -> RunFigures:
     """What the queueing regime is judged by, over the whole run."""
-    delays, counts, processed = facts.delays, facts.counts, facts.processed
+    processed = facts.processed
+    interval_ns = facts.seconds * 1e9 / (processed - 1) if processed > 1 else float("nan")
+    return figures_of(
+        facts.delays,
+        facts.counts,
+        processed,
+        interval_ns=interval_ns,
+        period_ns=facts.period_ns,
+        overflow=facts.fifo.overflow,
+    )
+
+
+def figures_of(
+    delays: DelayStatistics,
+    counts: PairCounts,
+    processed: int,
+    *,
+    interval_ns: float,
+    period_ns: int,
+    overflow: Overflow,
+) -> RunFigures:
+    """What the queueing regime is judged by.
+
+    Args:
+        delays: of the pairs that are looked at.
+        counts: of frames and pairs over the whole run.
+        processed: pairs over the whole run.
+        interval_ns: between two results; NaN where there are not two.
+        period_ns: of the slower camera; 0 where images come on demand.
+        overflow: of the FIFO.
+    """
     return RunFigures(
-        pairs=processed,
-        interval_ns=facts.seconds * 1e9 / (processed - 1) if processed > 1 else float("nan"),
+        pairs=delays.spread("processing").count,
+        interval_ns=interval_ns,
         processing_ns=delays.spread("processing").mean_ns,
         match_ns=delays.spread("match").mean_ns,
         starvation_ns=delays.spread("starvation").mean_ns,
-        period_ns=facts.period_ns,
+        period_ns=period_ns,
         received=counts.received / counts.paired if counts.paired else 1.0,
         offered=counts.paired / processed if processed else 1.0,
         frame_bytes=delays.frame_bytes,
         propagation_ns=delays.spread("propagation").mean_ns,
-        overflow=facts.fifo.overflow,
+        overflow=overflow,
     )
 
 

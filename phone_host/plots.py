@@ -18,6 +18,7 @@ from phone_host.plot_parts import BOTTOM_PX, DARK_COLOURS, LEFT_PX, RIGHT_PX, TO
 from phone_host.plot_scale import Linear, Values, duration_text, duration_unit, log_scale, number_text, span
 
 _LEAST_COLUMN_PX = 3
+_ROOM_FOR_MAX_PX = 440
 _LETTER_PX = 8
 """Room for a letter of 12 px text, generously."""
 
@@ -298,6 +299,8 @@ def _strip(quantity: Quantity, px: Callable[[float], float], top: float, width_p
     greatest = float(values.max())
     numbers = f"p50 {duration_text(p50)} · p95 {duration_text(p95)} · p99 {duration_text(p99)}"
     title = f"{quantity.label}: p5 {duration_text(p5)}, {numbers.replace(' · ', ', ')}, max {duration_text(greatest)}"
+    if width_px >= _ROOM_FOR_MAX_PX:
+        numbers += f" · max {duration_text(greatest)}"
     middle = top + 24.0
     left, right = px(p5), px(p95)
     return (

@@ -5,7 +5,7 @@ large, how often. What a cell cannot know from the others it says so instead of 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -157,6 +157,22 @@ def held_out(cell: Cell, cells: Sequence[Cell]) -> Figures | Unknown:
     if isinstance(link, Unknown):
         return link
     return foretell(Target(cell.interface, link, cell.images, cell.fifo), others)
+
+
+def replayed(cell: Cell, cells: Sequence[Cell]) -> Figures | Unknown:
+    """Let a cell's frames go through the queues once more, its own delays drawn anew: what differs from the run is the queues' error alone.
+
+    Args:
+        cell: which.
+        cells: all of them: the line through all frames of its interface says how much of the link's delay is bytes.
+    """
+    link = learn_link(cell.interface, cell.images, cells)
+    if isinstance(link, Unknown):
+        return link
+    size = values_of(cell.ledgers, lambda ledger: ledger.bytes)
+    delay = values_of(cell.ledgers, lambda ledger: ledger.propagation_ns)
+    own = replace(link, spread_ns=delay - link.latency_ns - link.ns_per_byte * size)
+    return foretell(Target(cell.interface, own, cell.images, cell.fifo), [cell])
 
 
 def foretell(target: Target, cells: Sequence[Cell]) -> Figures | Unknown:

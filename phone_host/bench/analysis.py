@@ -10,7 +10,9 @@ from common.ledger import PairLedger
 from phone_host.bench.cases import Case, Interface
 from phone_host.bench.changes import Change
 from phone_host.bench.runs import CaseResult
+from phone_host.delays import DelayStatistics
 from phone_host.emulate import PROFILES, Profile
+from phone_host.facts import figures_of
 from phone_host.fits import DelayFit
 from phone_host.prediction import (
     Cell,
@@ -24,9 +26,11 @@ from phone_host.prediction import (
     learn_link,
     measured,
     nominal_link,
+    replayed,
     values_of,
 )
 from phone_host.queue_model import LinkModel
+from phone_host.regime import Judgement, judge
 from phone_host.sync.fifo import FifoSettings, Overflow
 
 _SELF_PACED: Final = ("serial", "rfcomm")
@@ -55,11 +59,32 @@ class Checked:
         case: which.
         measured: the run.
         predicted: from the others; or why not.
+        queues: what the queues make of the run's own link, capture and processing: what differs from the run is the model's own error.
     """
 
     case: Case
     measured: Figures
     predicted: Figures | Unknown
+    queues: Figures | Unknown
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """How far predictions were from measurements, relative, 0 = not at all; NaN without predictions.
+
+    Attributes:
+        runs: how many were predicted.
+        rate: median error of the pairs per second.
+        worst_rate: the greatest.
+        end_to_end: median error of the median end-to-end delay.
+        worst_end_to_end: the greatest.
+    """
+
+    runs: int
+    rate: float
+    worst_rate: float
+    end_to_end: float
+    worst_end_to_end: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,19 +119,14 @@ class Analysis:
     what_ifs: tuple[WhatIf, ...]
 
     @property
-    def predicted_runs(self) -> int:
-        """How many runs could be predicted from the others."""
-        return sum(isinstance(one.predicted, Figures) for one in self.checked)
+    def held_out(self) -> Errors:
+        """Of each run predicted from the others."""
+        return _errors([(one.measured, one.predicted) for one in self.checked if isinstance(one.predicted, Figures)])
 
     @property
-    def typical_error(self) -> float:
-        """Median relative error of the predicted median end-to-end delay, 0 = none; NaN without predictions."""
-        errors = [
-            abs(one.predicted.end_to_end_p50_ns / one.measured.end_to_end_p50_ns - 1.0)
-            for one in self.checked
-            if isinstance(one.predicted, Figures)
-        ]
-        return float(np.median(errors)) if errors else float("nan")
+    def queues(self) -> Errors:
+        """Of the queues alone, with each run's own link and processing."""
+        return _errors([(one.measured, one.queues) for one in self.checked if isinstance(one.queues, Figures)])
 
 
 def analyse(results: Sequence[CaseResult], fifo: FifoSettings, changes: Sequence[Change] = ()) -> Analysis:
@@ -120,7 +140,8 @@ def analyse(results: Sequence[CaseResult], fifo: FifoSettings, changes: Sequence
     useful = [result for result in results if result.ledgers]
     cells = [_cell(result, fifo) for result in useful]
     checked = [
-        Checked(result.case, measured(cell), held_out(cell, cells)) for result, cell in zip(useful, cells, strict=True)
+        Checked(result.case, measured(cell), held_out(cell, cells), replayed(cell, cells))
+        for result, cell in zip(useful, cells, strict=True)
     ]
     by_interface: dict[str, list[CaseResult]] = {}
     for result in useful:
@@ -132,11 +153,42 @@ def analyse(results: Sequence[CaseResult], fifo: FifoSettings, changes: Sequence
     return Analysis(tuple(fits), tuple(checked), tuple(_what_ifs(cells, fifo, changes)))
 
 
+def regime_of(result: CaseResult, fifo: FifoSettings) -> Judgement:
+    """Which queueing regime held in a run, and what would help."""
+    pairs = len(result.ledgers)
+    return judge(
+        figures_of(
+            statistics_of(result),
+            result.counts,
+            result.processed,
+            interval_ns=result.measured_s * 1e9 / pairs if pairs else float("nan"),
+            period_ns=round(1e9 / result.case.rate_hz),
+            overflow=fifo.overflow,
+        )
+    )
+
+
+def statistics_of(result: CaseResult) -> DelayStatistics:
+    """The spreads of one run's pairs after the warm-up."""
+    statistics = DelayStatistics()
+    for ledger in result.ledgers:
+        statistics.add(ledger)
+    return statistics
+
+
 def typical_and_slow(result: CaseResult) -> tuple[int, int]:
     """Which of a run's pairs stand for it: the one at the median of end-to-end, and the one at its 99th percentile."""
     order = np.argsort(values_of(result.ledgers, lambda ledger: ledger.end_to_end_ns), kind="stable")
     last = order.size - 1
     return int(order[last // 2]), int(order[round(0.99 * last)])
+
+
+def _errors(pairs: Sequence[tuple[Figures, Figures]]) -> Errors:
+    if not pairs:
+        return Errors(0, *[float("nan")] * 4)
+    rate = np.abs([said.pairs_per_s / seen.pairs_per_s - 1.0 for seen, said in pairs])
+    delay = np.abs([said.end_to_end_p50_ns / seen.end_to_end_p50_ns - 1.0 for seen, said in pairs])
+    return Errors(len(pairs), float(np.median(rate)), float(rate.max()), float(np.median(delay)), float(delay.max()))
 
 
 def _cell(result: CaseResult, fifo: FifoSettings) -> Cell:

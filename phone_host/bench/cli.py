@@ -218,7 +218,7 @@ def _print(results: "Sequence[CaseResult]", under: "Conditions", analysis: "Anal
     from rich.table import Table  # noqa: PLC0415
 
     from phone_host.bench.report import PERCENTILES, grouped  # noqa: PLC0415
-    from phone_host.bench.tables import fit_lines, prediction_lines, rows, summary_line  # noqa: PLC0415
+    from phone_host.bench.tables import fit_lines, prediction_lines, regime_lines, rows, summary_line  # noqa: PLC0415
 
     console = Console(highlight=False)
     console.print(f"{under.machine}, {under.date}, matcher {under.matcher}", soft_wrap=True)
@@ -233,6 +233,8 @@ def _print(results: "Sequence[CaseResult]", under: "Conditions", analysis: "Anal
         console.print(table)
         for result in group:
             console.print(f"{result.case.interface}: {summary_line(result)}", soft_wrap=True)
+            for line in regime_lines(result, under.fifo):
+                console.print(f"  {line}", soft_wrap=True)
         console.print()
     for line in (*fit_lines(analysis), *prediction_lines(analysis)):
         console.print(line, soft_wrap=True)

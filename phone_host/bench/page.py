@@ -12,8 +12,10 @@ from phone_host.bench.tables import (
     FIT_COLUMNS,
     PREDICTION_COLUMNS,
     checked_rows,
+    error_lines,
     fit_rows,
     rate_text,
+    regime_lines,
     summary_line,
     what_if_rows,
 )
@@ -58,7 +60,7 @@ def page(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -
         f"matcher {escape(under.matcher)}, FIFO {under.fifo.depth}:{under.fifo.overflow.value}</p></header>"
     )
     cards = [_glance(results, under, analysis), _fits(analysis), _model(analysis), _what_ifs(analysis)]
-    cards += [_card(group) for group in grouped(results)]
+    cards += [_card(group, under) for group in grouped(results)]
     cards.append(section("How this was measured", _method(results, under), ""))
     return document("delay-bench", head + "".join(cards))
 
@@ -154,12 +156,6 @@ def _scatter(one: InterfaceFit, numbers: dict[int, int]) -> str:
 def _model(analysis: Analysis) -> str:
     if len(analysis.checked) < 2:
         return section("The model beside the measurement", "One run alone predicts nothing: measure two or more.", "")
-    error = analysis.typical_error
-    share = (
-        f" {analysis.predicted_runs} of {len(analysis.checked)} runs could be predicted; the median error of the end-to-end medians is {100.0 * error:.0f} %."
-        if not math.isnan(error)
-        else ""
-    )
     names = list(dict.fromkeys(str(one.interface) for one in analysis.fits))
     numbers = {name: index for index, name in enumerate(names)}
     points = [
@@ -173,8 +169,9 @@ def _model(analysis: Analysis) -> str:
         if isinstance(one.predicted, Figures)
     ]
     plot = point_legend(list(numbers.items())) + two_widths(lambda width: compared(points, width)) if points else ""
-    content = f"{plot}<h3>Measured | predicted</h3>{table(PREDICTION_COLUMNS, checked_rows(analysis), tight=True)}"
-    return section("The model beside the measurement", _MODEL_WORDS + share, content)
+    errors = "".join(f"<li>{escape(line[0].upper() + line[1:])}.</li>" for line in error_lines(analysis))
+    content = f"<ul>{errors}</ul>{plot}<h3>Measured | predicted</h3>{table(PREDICTION_COLUMNS, checked_rows(analysis), tight=True)}"
+    return section("The model beside the measurement", _MODEL_WORDS, content)
 
 
 def _what_ifs(analysis: Analysis) -> str:
@@ -185,7 +182,7 @@ def _what_ifs(analysis: Analysis) -> str:
     )
 
 
-def _card(results: Sequence[CaseResult]) -> str:
+def _card(results: Sequence[CaseResult], under: Conditions) -> str:
     """The card of one kind of images: a bar for each interface, each delay and stage by itself, the lives of single pairs."""
     title = results[0].case.images
     useful = [result for result in results if result.ledgers]
@@ -197,9 +194,7 @@ def _card(results: Sequence[CaseResult]) -> str:
     work = [Budget(name, tuple(_mean(quantity) for quantity in series.stages)) for name, series in measured]
     strips = [Strips(name, _quantities(series)) for name, series in measured]
     chosen = [life for result in useful for life in _lives(result)]
-    summaries = "".join(
-        f"<li>{escape(str(result.case.interface))}: {escape(summary_line(result))}</li>" for result in results
-    )
+    summaries = "".join(_summary(result, under) for result in results)
     content = (
         f'<ul style="font-size:.85rem;color:var(--ink2)">{summaries}</ul>'
         + legend([(quantity.label, quantity.colour) for quantity in delays])
@@ -214,6 +209,13 @@ def _card(results: Sequence[CaseResult]) -> str:
         + "</details>"
     )
     return section(title, "Means of all pairs, from the middle of the exposure to the written result.", content)
+
+
+def _summary(result: CaseResult, under: Conditions) -> str:
+    """One run's counts, which regime held, and what would help."""
+    sentence, *remedies = regime_lines(result, under.fifo)
+    help_ = f"<ul>{''.join(f'<li>{escape(remedy)}</li>' for remedy in remedies)}</ul>" if remedies else ""
+    return f"<li>{escape(str(result.case.interface))}: {escape(summary_line(result))}<br>{escape(sentence)}{help_}</li>"
 
 
 def _lives(result: CaseResult) -> list[Life]:

@@ -9,10 +9,10 @@ from typing import Final
 import zmq
 
 from common import now
-from phone_host.bench.analysis import Analysis, Checked, InterfaceFit, WhatIf
+from phone_host.bench.analysis import Analysis, Checked, Errors, InterfaceFit, WhatIf, regime_of, statistics_of
 from phone_host.bench.cases import BOARD_SETS, Interface
 from phone_host.bench.runs import WARM_UP_S, CaseResult, RunSettings
-from phone_host.delays import DELAYS, STAGES, DelayStatistics, Spread
+from phone_host.delays import DELAYS, STAGES, Spread
 from phone_host.fits import DelayFit
 from phone_host.prediction import Figures, Unknown
 from phone_host.sync.fifo import FifoSettings
@@ -70,22 +70,13 @@ def as_json(results: Sequence[CaseResult], under: Conditions, analysis: Analysis
         "measured_per_run_s": under.seconds,
         "left_out_warm_up_s": WARM_UP_S,
         "fifo": f"{under.fifo.depth}:{under.fifo.overflow.value}",
-        "runs": [_run(result) for result in results],
+        "runs": [_run(result, under.fifo) for result in results],
         "interfaces": [_interface(one) for one in analysis.fits],
         "predictions": [_checked(one) for one in analysis.checked],
-        "predicted_runs": analysis.predicted_runs,
-        "typical_prediction_error_percent": _number(100.0 * analysis.typical_error),
+        "prediction_errors": {"held_out": _errors(analysis.held_out), "queues_alone": _errors(analysis.queues)},
         "not_run_settings": [_what_if(one) for one in analysis.what_ifs],
         "not_run": [{"link": str(interface), "reason": reason} for interface, reason in under.not_run],
     }
-
-
-def statistics_of(result: CaseResult) -> DelayStatistics:
-    """The spreads of one run's pairs after the warm-up."""
-    statistics = DelayStatistics()
-    for ledger in result.ledgers:
-        statistics.add(ledger)
-    return statistics
 
 
 def losses(result: CaseResult) -> dict[str, int]:
@@ -109,8 +100,8 @@ def grouped(results: Sequence[CaseResult]) -> list[list[CaseResult]]:
     return list(groups.values())
 
 
-def _run(result: CaseResult) -> dict[str, object]:
-    case, statistics = result.case, statistics_of(result)
+def _run(result: CaseResult, fifo: FifoSettings) -> dict[str, object]:
+    case, statistics, regime = result.case, statistics_of(result), regime_of(result, fifo)
     uncertainty = statistics.spread("uncertainty")
     return {
         "link": case.interface.link,
@@ -130,6 +121,7 @@ def _run(result: CaseResult) -> dict[str, object]:
         "clock_uncertainty": {f"{key}_us": _number(value / 1e3) for key, value in percentiles(uncertainty).items()},
         "clock_uncertainty_at_end_us": _number(result.uncertainty_ns / 1e3),
         "clock_bound_at_end_us": _number(result.bound_ns / 1e3),
+        "regime": {"regime": regime.regime.value, "sentence": regime.sentence, "remedies": list(regime.remedies)},
         "whole_run": _counts(result),
         "line": None if result.relay is None else asdict(result.relay),
     }
@@ -197,9 +189,20 @@ def _interface(one: InterfaceFit) -> dict[str, object]:
     return {"link": str(one.interface), "fitted_frames": fit.points, **numbers}
 
 
+def _errors(errors: Errors) -> dict[str, object]:
+    return {
+        "predicted_runs": errors.runs,
+        "pair_rate_median_percent": _number(100.0 * errors.rate),
+        "pair_rate_worst_percent": _number(100.0 * errors.worst_rate),
+        "end_to_end_p50_median_percent": _number(100.0 * errors.end_to_end),
+        "end_to_end_p50_worst_percent": _number(100.0 * errors.worst_end_to_end),
+    }
+
+
 def _checked(one: Checked) -> dict[str, object]:
     head: dict[str, object] = {"link": str(one.case.interface), "images": one.case.images}
     head["measured"] = _figures(one.measured)
+    head["queues_alone"] = _said(one.queues)["predicted"]
     return head | _said(one.predicted)
 
 

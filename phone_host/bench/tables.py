@@ -5,12 +5,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from phone_host.bench.analysis import Analysis
-from phone_host.bench.report import PERCENTILES, losses, percentiles, statistics_of
+from phone_host.bench.analysis import Analysis, regime_of, statistics_of
+from phone_host.bench.report import PERCENTILES, losses, percentiles
 from phone_host.bench.runs import CaseResult
 from phone_host.delays import DELAYS, STAGES
 from phone_host.plot_scale import duration_text
 from phone_host.prediction import Figures, Unknown
+from phone_host.sync.fifo import FifoSettings
+
+_RATES: Final = ((1e9, "GB/s"), (1e6, "MB/s"), (1e3, "kB/s"))
 
 FIT_COLUMNS: Final = (
     "interface",
@@ -74,11 +77,31 @@ def summary_line(result: CaseResult) -> str:
     return f"{pairs}, {at_end}, whole run lost: {lost}"
 
 
+def regime_lines(result: CaseResult, fifo: FifoSettings) -> tuple[str, ...]:
+    """Which queueing regime held in a run, then what would help."""
+    judgement = regime_of(result, fifo)
+    return (judgement.sentence, *judgement.remedies)
+
+
+def error_lines(analysis: Analysis) -> list[str]:
+    """How far predictions were from measurements, in words; nothing where nothing was predicted."""
+    return [
+        f"{what}, {errors.runs} runs: pairs/s off by {100 * errors.rate:.0f} % (median; {100 * errors.worst_rate:.0f} % at worst), "
+        f"end-to-end p50 by {100 * errors.end_to_end:.0f} % ({100 * errors.worst_end_to_end:.0f} %)"
+        for what, errors in (
+            ("predicted from the other runs", analysis.held_out),
+            ("the queues alone, each run's own link and processing given", analysis.queues),
+        )
+        if errors.runs
+    ]
+
+
 def rate_text(bytes_per_s: float) -> str:
-    """A rate in words: MB/s or kB/s with three digits."""
+    """A rate in words, with three digits."""
     if bytes_per_s != bytes_per_s or bytes_per_s == float("inf"):  # noqa: PLR0124 - NaN is the only value unlike itself
         return "any" if bytes_per_s == float("inf") else "\u2013"
-    return f"{bytes_per_s / 1e6:.3g} MB/s" if bytes_per_s >= 1e6 else f"{bytes_per_s / 1e3:.3g} kB/s"
+    unit, name = next(((unit, name) for unit, name in _RATES if bytes_per_s >= 0.9995 * unit), _RATES[-1])
+    return f"{bytes_per_s / unit:.3g} {name}"
 
 
 def fit_rows(analysis: Analysis) -> list[tuple[str, ...]]:
@@ -130,6 +153,7 @@ def prediction_lines(analysis: Analysis) -> list[str]:
             lines.append(f"{found}no prediction: {said.reason}")
         else:
             lines.append(f"{found}{duration_text(said.end_to_end_p50_ns)}, {said.pairs_per_s:.1f}/s")
+    lines += error_lines(analysis) if lines else []
     asked = [one for one in analysis.what_ifs if one.asked_for]
     if asked:
         lines += ["", "predicted, not run:"]

@@ -1,6 +1,7 @@
 """The delay benchmark's pure parts: what is asked for, what is left out, what is said."""
 
 import dataclasses
+import html
 import json
 import math
 import xml.etree.ElementTree as ET
@@ -33,7 +34,7 @@ from phone_host.bench.changes import parse_changes
 from phone_host.bench.page import figure, page
 from phone_host.bench.report import Conditions, as_json, losses
 from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up, rig_of
-from phone_host.bench.tables import fit_rows, rows, summary_line
+from phone_host.bench.tables import fit_rows, rate_text, regime_lines, rows, summary_line
 from phone_host.boardprocess import BoardAccount
 from phone_host.delays import DELAYS, STAGES
 from phone_host.emulate import PROFILES
@@ -236,6 +237,27 @@ def test_counts_of_the_report_are_conserved() -> None:
     assert whole["paired_pairs"] == whole["processed_pairs"] + whole["dropped_in_fifo_pairs"]
 
 
+def test_each_run_says_which_regime_held_and_what_would_help() -> None:
+    """Work of 15 ms after a wait of 1 ms is a backlog, after one of 85 ms at a tenth of the cameras' rate a slow link: object, terminal and page say so."""
+    busy, waiting = result(pairs=100), result(link="serial")
+    far = [
+        dataclasses.replace(ledger(number, 330_000_000), previous_done_ns=number * 330_000_000 - 75_000_000)
+        for number in range(100)
+    ]
+    kept, measured_s = after_warm_up(far)
+    waiting = dataclasses.replace(
+        waiting, ledgers=kept, measured_s=measured_s, counts=PairCounts(received=101, paired=101, taken=100)
+    )
+    runs: Any = as_json([busy, waiting], UNDER, analysed(busy, waiting))["runs"]
+    assert [run["regime"]["regime"] for run in runs] == ["backlog", "starved by the link"]
+    assert "94 %" in runs[0]["regime"]["sentence"]
+    assert any("smaller frames" in remedy for remedy in runs[1]["regime"]["remedies"])
+    text = html.unescape(page([busy, waiting], UNDER, analysed(busy, waiting)))
+    for one, run in zip((busy, waiting), runs, strict=True):
+        assert list(regime_lines(one, UNDER.fifo)) == [run["regime"]["sentence"], *run["regime"]["remedies"]]
+        assert all(line in text for line in regime_lines(one, UNDER.fifo))
+
+
 def test_losses_name_what_became_of_each_frame() -> None:
     """Only reasons that happened are named."""
     assert losses(result()) == {
@@ -318,6 +340,15 @@ def test_page_is_whole_html_and_refers_to_nothing_outside() -> None:
     assert "rfcomm was not run: no radio" in text
     assert "640x480 JPEG 80 at 30" in text
     assert "320x240 JPEG 80 at 15" in text
+
+
+@pytest.mark.parametrize(
+    ("bytes_per_s", "text"),
+    [(1.044e9, "1.04 GB/s"), (999.6e6, "1 GB/s"), (4.45e6, "4.45 MB/s"), (669e3, "669 kB/s"), (20.0, "0.02 kB/s")],
+)
+def test_a_rate_has_the_unit_that_keeps_it_short(bytes_per_s: float, text: str) -> None:
+    """Rates are told with three digits in kB/s, MB/s or GB/s."""
+    assert rate_text(bytes_per_s) == text
 
 
 def test_figure_is_an_svg_file_of_its_own() -> None:

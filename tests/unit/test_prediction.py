@@ -19,6 +19,7 @@ from phone_host.prediction import (
     learn_link,
     measured,
     nominal_link,
+    replayed,
 )
 from phone_host.sync.fifo import FifoSettings, Overflow
 
@@ -75,6 +76,22 @@ def test_a_cell_gives_nothing_to_its_own_prediction() -> None:
     nonsense = replace(target, ledgers=tuple(replace(one, done_ns=one.done_ns + 10**9) for one in target.ledgers))
     others = [cell(), cell(size_bytes=30_000)]
     assert held_out(target, [*others, target]) == held_out(nonsense, [*others, nonsense])
+
+
+def test_a_machine_that_was_slower_in_other_runs_is_no_error_of_the_queues() -> None:
+    """A cell replayed with its own delays gives its own figures, however slow processing was in the others, from which the prediction suffers."""
+    target = cell(size_bytes=20_000, period_ms=50)
+    others = [cell(), cell(size_bytes=40_000, period_ms=100)]
+    slow = [
+        replace(other, ledgers=tuple(replace(one, done_ns=one.done_ns + 30 * MS) for one in other.ledgers))
+        for other in others
+    ]
+    cells = [target, *slow]
+    again, true = figures(replayed(target, cells)), measured(target)
+    for name in ("propagation_p50_ns", "end_to_end_p50_ns", "end_to_end_p95_ns", "starvation_p50_ns", "pairs_per_s"):
+        assert getattr(again, name) == pytest.approx(getattr(true, name), rel=0.01)
+    from_others = figures(held_out(target, cells))
+    assert from_others.end_to_end_p50_ns > true.end_to_end_p50_ns + 25 * MS
 
 
 def test_what_others_cannot_tell_is_not_guessed() -> None:
