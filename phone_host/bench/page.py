@@ -14,6 +14,7 @@ from phone_host.bench.tables import (
     checked_rows,
     error_lines,
     fit_rows,
+    latency_text,
     rate_text,
     regime_lines,
     summary_line,
@@ -22,7 +23,6 @@ from phone_host.bench.tables import (
 from phone_host.page_frame import HALF_PX, document, section, table, two_widths
 from phone_host.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
 from phone_host.plot_parts import STYLE, legend, point_legend
-from phone_host.plot_scale import duration_text
 from phone_host.plots import Budget, Part, Quantity, Strips, budgets, distributions
 from phone_host.prediction import Figures, values_of
 from phone_host.report_page import DelaySeries, delay_series
@@ -141,7 +141,7 @@ def _fits(analysis: Analysis) -> str:
 def _line(one: InterfaceFit) -> str:
     if math.isnan(one.fit.ns_per_byte):
         return "frames of one size only, no rate to be told"
-    return f"{duration_text(one.fit.latency_ns)} + bytes / {rate_text(one.fit.bytes_per_s)}"
+    return f"{latency_text(one.fit)} + bytes / {rate_text(one.fit.bytes_per_s)}"
 
 
 def _scatter(one: InterfaceFit, numbers: dict[int, int]) -> str:

@@ -9,6 +9,7 @@ from phone_host.bench.analysis import Analysis, regime_of, statistics_of
 from phone_host.bench.report import PERCENTILES, losses, percentiles
 from phone_host.bench.runs import CaseResult
 from phone_host.delays import DELAYS, STAGES
+from phone_host.fits import DelayFit
 from phone_host.plot_scale import duration_text
 from phone_host.prediction import Figures, Unknown
 from phone_host.sync.fifo import FifoSettings
@@ -104,6 +105,13 @@ def rate_text(bytes_per_s: float) -> str:
     return f"{bytes_per_s / unit:.3g} {name}"
 
 
+def latency_text(fit: DelayFit) -> str:
+    """A fitted latency in words: no byte arrives before it was sent, so a negative one only tells that it is less than clocks and scatter let be told."""
+    if fit.latency_ns < 0:
+        return f"too small to tell (the line gives {duration_text(fit.latency_ns)})"
+    return duration_text(fit.latency_ns)
+
+
 def fit_rows(analysis: Analysis) -> list[tuple[str, ...]]:
     """Each interface's latency and rate with their 95 % intervals, and how well the clocks were known there."""
     rows: list[tuple[str, ...]] = []
@@ -115,7 +123,7 @@ def fit_rows(analysis: Analysis) -> list[tuple[str, ...]]:
         rows.append(
             (
                 str(one.interface),
-                duration_text(fit.latency_ns),
+                latency_text(fit),
                 f"{duration_text(fit.latency_low_ns)} to {duration_text(fit.latency_high_ns)}",
                 rate_text(fit.bytes_per_s),
                 f"{rate_text(fit.least_bytes_per_s)} to {rate_text(fit.most_bytes_per_s)}",

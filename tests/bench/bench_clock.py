@@ -286,8 +286,10 @@ def _print_real(rows: Sequence[RealRow]) -> None:
         "bound",
         "least RTT",
         "load average",
+        "cores busy",
+        "missed",
     ):
-        table.add_column(title, justify="left" if title in {"load", "scheduling"} else "right")
+        table.add_column(title, justify="left" if title in {"load", "scheduling", "missed"} else "right")
     for row in rows:
         table.add_row(
             row.load,
@@ -299,8 +301,16 @@ def _print_real(rows: Sequence[RealRow]) -> None:
             f"{row.bound_us:.0f}",
             f"{row.round_trip_us:.0f}",
             f"{row.load_average:.1f}",
+            ", ".join(f"{percent} %" for percent in row.busy_percents),
+            ", ".join(_real_failures(row)),
         )
-    Console(width=150).print(table)
+    Console(width=190).print(table)
+
+
+def _real_failures(row: RealRow) -> list[str]:
+    """The figures that were missed."""
+    early, late = row.early_p99_us > _REAL_US[0], row.late_p99_us > _REAL_US[1]
+    return [*(["after 1 s"] if early else []), *(["after 10 s"] if late else [])]
 
 
 def _percentile(values: Sequence[float], percent: float) -> float:

@@ -17,7 +17,7 @@ from phone_host.pairqueue import PairQueue
 from phone_host.receiver import Receiver
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings
-from tests.bench.machine import be_quiet, may_use_fifo
+from tests.bench.machine import Busyness, be_quiet, may_use_fifo
 from tests.bench.payloads import write_raw
 from tests.support.unheard import Unheard
 
@@ -28,7 +28,7 @@ _STEP_S = 0.02
 
 @dataclass(frozen=True, slots=True)
 class RealRow:
-    """One load's figures, us."""
+    """One load's figures, us; how busy each core was, by anybody, %."""
 
     load: str
     scheduling: str
@@ -41,6 +41,7 @@ class RealRow:
     bound_us: float
     round_trip_us: float
     load_average: float
+    busy_percents: tuple[int, ...]
 
 
 def measure(runs: int) -> list[RealRow]:
@@ -78,6 +79,7 @@ def _scheduling(*, fifo: bool) -> Iterator[list[int]]:
 def _measured(load: str, folder: Path, fps: int, runs: int, *, fifo: bool) -> RealRow:
     address = f"tcp://127.0.0.1:{free_port()}"
     seen: list[tuple[float, int, ClockEstimate]] = []
+    busyness = Busyness()
     with (
         _scheduling(fifo=fifo) as cores,
         board_process(f"replay:{folder}?fps={fps}&loop=1", address),  # inherits the first core
@@ -102,6 +104,7 @@ def _measured(load: str, folder: Path, fps: int, runs: int, *, fifo: bool) -> Re
         float(np.median([estimate.bound_at(at_ns) / 1e3 for age, at_ns, estimate in seen if age >= 10])),
         float(np.median([estimate.round_trip_ns / 1e3 for age, _, estimate in seen if age >= 10])),
         os.getloadavg()[0],
+        busyness.percents,
     )
 
 

@@ -34,7 +34,7 @@ from phone_host.bench.changes import parse_changes
 from phone_host.bench.page import figure, page
 from phone_host.bench.report import Conditions, as_json, losses
 from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up, rig_of
-from phone_host.bench.tables import fit_rows, rate_text, regime_lines, rows, summary_line
+from phone_host.bench.tables import fit_lines, fit_rows, latency_text, rate_text, regime_lines, rows, summary_line
 from phone_host.boardprocess import BoardAccount
 from phone_host.delays import DELAYS, STAGES
 from phone_host.emulate import PROFILES
@@ -277,6 +277,19 @@ def test_the_line_of_a_run_never_sets_an_uncertainty_above_its_bound() -> None:
     assert fit_rows(analysed(result()))[0][7:9] == ("\u00b145.0\u202f\u00b5s", "\u00b170.0\u202f\u00b5s")
     nothing = dataclasses.replace(result(pairs=0), uncertainty_ns=math.nan, bound_ns=math.nan)
     assert summary_line(nothing).startswith("no pairs, clock not known at the end")
+
+
+def test_a_negative_latency_is_told_as_what_it_is() -> None:
+    """Nothing arrives before it was sent: a line that begins below 0 says in table, terminal and page that the latency is too small to tell, and its figure."""
+    analysis = analysed(result())
+    fitted = dataclasses.replace(analysis.fits[0].fit, latency_ns=-120e3, ns_per_byte=10.0)
+    below = dataclasses.replace(analysis, fits=(dataclasses.replace(analysis.fits[0], fit=fitted),))
+    words = "too small to tell (the line gives -120\u202f\u00b5s)"
+    assert fit_rows(below)[0][1] == words
+    assert words in fit_lines(below)[0]
+    assert f"{words} + bytes" in page([result()], UNDER, below)
+    above = dataclasses.replace(fitted, latency_ns=120e3)
+    assert latency_text(above) == "120\u202f\u00b5s"
 
 
 def test_a_run_without_pairs_is_reported_without_numbers() -> None:
