@@ -126,12 +126,14 @@ def _keys(options: argparse.Namespace) -> int:
 
 
 def _pair(options: argparse.Namespace) -> int:
-    from board_agent.pair import follow  # noqa: PLC0415 - needed by this verb alone
+    from board_agent.pair import NOBODY, absence, follow  # noqa: PLC0415 - needed by this verb alone
 
     if not 0 < options.seconds < _LONGEST_IDLE_S:
         raise SettingsError(f"--seconds {options.seconds:g}", "give seconds, more than 0")
-    name = ""
-    for state in follow(_key_folder(options), options.seconds):
+    name, keys = "", _key_folder(options)
+    for state in follow(keys, options.seconds):
+        if state == NOBODY:
+            print(f"board-agent: waiting: {absence(keys)}", file=sys.stderr)
         name = state.paired
         if state.code and not name:
             asks = f"{state.asking} asks; " if state.asking else ""

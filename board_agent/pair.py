@@ -1,6 +1,7 @@
 """What `board-agent pair` does: asks the running agent to take in a new host, and follows what becomes of it."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Final
 
 import zmq
@@ -14,57 +15,99 @@ _ASK_NS: Final = 500_000_000
 _SILENCE_NS: Final = 5_000_000_000
 """An agent on the smallest board answers within one round of its loop, a second at most."""
 
+NOBODY: Final = DoorState("", "", "", "", 0)
+"""No agent answers: none is running, or it waits for its camera and has opened no link yet."""
+
 
 def follow(keys: KeyFolder, seconds: float) -> Iterator[DoorState]:
-    """Keep the door open and give its state whenever that has changed, until a host was taken in.
+    """Keep the door open and give its state whenever that has changed, until a host was taken in. An agent that is not there yet is waited for.
 
     Args:
         keys: the running agent's folder.
         seconds: for so long; then it ends without a host.
 
+    Returns:
+        States; NOBODY whenever no agent answers any more.
+
     Raises:
         UnavailableError: no agent with a secured link uses this folder, or nobody came.
     """
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    state = NOBODY
     try:
-        yield from _follow(context, keys, seconds)
+        for state in _follow(_Agents(context, keys), now.monotonic_ns() + round(seconds * 1e9)):
+            yield state
+            if state.paired:
+                return
     finally:
         context.destroy(linger=0)
-
-
-def _follow(context: "zmq.Context[zmq.Socket[bytes]]", keys: KeyFolder, seconds: float) -> Iterator[DoorState]:
-    poller, doors = zmq.Poller(), []
-    for path in keys.path.glob(f"{CONTROL_PREFIX}*"):
-        door = context.socket(zmq.DEALER)
-        door.setsockopt(zmq.LINGER, 0)
-        door.setsockopt(zmq.IMMEDIATE, 1)  # nothing is kept for an agent that has gone
-        door.connect(f"ipc://{path}")
-        doors.append(door)
-        poller.register(door, zmq.POLLIN)
-    began_ns = heard_ns = now.monotonic_ns()
-    deadline_ns = began_ns + round(seconds * 1e9)
-    shown = {id(door): DoorState("", "", "", "", 0) for door in doors}
-    while (now_ns := now.monotonic_ns()) < deadline_ns:
-        if not doors or now_ns - heard_ns > _SILENCE_NS:
-            raise UnavailableError(
-                f"no running board-agent with a secured link uses the keys in {keys.path}",
-                "start it with a link such as tcp://*:5555 and a camera plugged in; for the service use sudo",
-            )
-        for door in doors:
-            if door.poll(0, zmq.POLLOUT):
-                door.send(b"", zmq.DONTWAIT)
-        until_ns = now_ns + _ASK_NS
-        while (left_ns := until_ns - now.monotonic_ns()) > 0:
-            ready = dict(poller.poll(left_ns // 1_000_000 + 1))
-            for door in (door for door in doors if door in ready):
-                heard_ns = now.monotonic_ns()
-                state = DoorState.decode(door.recv(zmq.DONTWAIT))
-                if state != shown[id(door)]:
-                    shown[id(door)] = state
-                    yield state
-                if state.paired:
-                    return
+    if state == NOBODY:
+        raise absence(keys)
     raise UnavailableError(
         f"no host has paired within {seconds:g} s",
         "run `phone-host pair --link tcp://BOARD:5555` on the host meanwhile",
     )
+
+
+def absence(keys: KeyFolder) -> UnavailableError:
+    """What is wrong while nobody answers."""
+    return UnavailableError(
+        f"no running board-agent with a secured link uses the keys in {keys.path}",
+        "start it with a link such as tcp://*:5555 and a camera plugged in; for the service use sudo",
+    )
+
+
+class _Agents:
+    """The running agents that use a folder of keys: one, as a rule.
+
+    Args:
+        context: of the sockets.
+        keys: the folder.
+    """
+
+    def __init__(self, context: "zmq.Context[zmq.Socket[bytes]]", keys: KeyFolder) -> None:
+        self._context, self._keys = context, keys
+        self._poller = zmq.Poller()
+        self._sockets: dict[Path, zmq.Socket[bytes]] = {}
+
+    @property
+    def are_none(self) -> bool:
+        """Whether none has left a sign of itself."""
+        return not self._sockets
+
+    def ask(self) -> None:
+        """Ask all that there are now to keep their doors open."""
+        for path in self._keys.path.glob(f"{CONTROL_PREFIX}*"):
+            if path not in self._sockets:
+                sock = self._sockets[path] = self._context.socket(zmq.DEALER)
+                sock.setsockopt(zmq.LINGER, 0)
+                sock.setsockopt(zmq.IMMEDIATE, 1)  # nothing is kept for an agent that has gone
+                sock.connect(f"ipc://{path}")
+                self._poller.register(sock, zmq.POLLIN)
+        for sock in self._sockets.values():
+            if sock.poll(0, zmq.POLLOUT):
+                sock.send(b"", zmq.DONTWAIT)
+
+    def answers(self, until_ns: int) -> Iterator[DoorState]:
+        """Give what they say until then."""
+        while (left_ns := until_ns - now.monotonic_ns()) > 0:
+            ready = dict(self._poller.poll(left_ns // 1_000_000 + 1))
+            for sock in ready:
+                yield DoorState.decode(sock.recv(zmq.DONTWAIT))
+
+
+def _follow(agents: _Agents, deadline_ns: int) -> Iterator[DoorState]:
+    shown: dict[str, DoorState] = {}
+    silent_since_ns = now.monotonic_ns()
+    is_told = False
+    while (now_ns := now.monotonic_ns()) < deadline_ns:
+        agents.ask()
+        for state in agents.answers(now_ns + _ASK_NS):
+            silent_since_ns, is_told = now.monotonic_ns(), False
+            if shown.get(state.address) != state:
+                shown[state.address] = state
+                yield state
+        if not is_told and (agents.are_none or now.monotonic_ns() - silent_since_ns > _SILENCE_NS):
+            is_told = True
+            shown.clear()
+            yield NOBODY

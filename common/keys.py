@@ -27,6 +27,9 @@ MAX_NAME: Final = 64
 
 _KEY_FILE: Final = "key"
 _PEERS_FILE: Final = "peers.json"
+_CODES_FILE: Final = "spent-codes"
+_CODES_KEPT: Final = 64
+"""Codes that were typed last; a board shows one for minutes."""
 _Z85_CHARACTERS: Final = 40
 _Z85_ALPHABET: Final = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.-:+=^!/*?&<>()[]{}@%$#"
 """RFC 32. A text of 40 of them may still be no 256 bits (each five stand for less than 2^32): see is_key."""
@@ -170,6 +173,27 @@ class KeyFolder:
         raise SettingsError(
             f"{name!r} is not known", f"the names are {', '.join(peer.name for peer in peers) or '(none)'}"
         )
+
+    def spent_codes(self) -> tuple[str, ...]:
+        """Give the codes that were typed here last. None is to be proved twice: each time tells somebody in the middle some of its bits.
+
+        Raises:
+            DataError: others may read the file.
+            UnavailableError: it cannot be read.
+        """
+        path = self.path / _CODES_FILE
+        return tuple(_read(path, "pair").split()) if _exists(path) else ()
+
+    def spend(self, code: str) -> None:
+        """Take note that a code is being proved.
+
+        Raises:
+            DataError: others may read the file.
+            UnavailableError: it cannot be written.
+        """
+        with self._locked():
+            codes = (*self.spent_codes(), code)[-_CODES_KEPT:]
+            _write(self.path / _CODES_FILE, "\n".join(codes).encode() + b"\n")
 
     def _write_peers(self, peers: tuple[Peer, ...]) -> None:
         text = json.dumps([asdict(peer) for peer in peers], indent=1)

@@ -1,41 +1,41 @@
-"""The host's call at a board's door: connect, exchange the words of pairing, keep the board's key. A core of its own decides (pairing_code)."""
+"""The host's calls at a board's door: exchange the words of pairing, keep the board's key. A core of its own decides (pairing_code).
+
+A call ends before the code is typed, and another one proves it: nobody holds a connection while a person walks.
+"""
 
 import os
 import socket
-from collections.abc import Callable
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Final, assert_never
 
-import zmq
 from zmq.utils import z85
 
 from common import now
-from common.errors import DataError, ProtocolError, TandemError, UnavailableError
+from common.errors import DataError, ProtocolError, SettingsError, TandemError, UnavailableError
 from common.keys import KeyFolder, Peer, clean_name
-from common.protocol.pairing_code import Asking, Identity, Refuse, Refused, Word
-from common.protocol.pairing_wire import MAX_WORD_BYTES, decode_word, encode_word
+from common.protocol.pairing_code import Asking, Identity, Open, Refuse, Refused, Word, code_text
+from common.protocol.pairing_wire import MAX_WORD_BYTES, WordReader, frame_word
 
-_ANSWER_MS: Final = 10_000
-"""A word takes a round trip and one round of the board's loop; a board that is busy elsewhere gets this long."""
+_ANSWER_S: Final = 10.0
+"""A word takes a round trip and one round of the board's loop; a board that is busy elsewhere, or opens its door only now, gets this long."""
+
+_AGAIN_S: Final = 0.2
 
 
 class PairingCall:
     """One attempt to be trusted.
 
     Args:
-        address: of the board's door, `tcp://HOST:PORT`.
+        door: the board's, host and port.
         keys: this host's key; the board's is added when it has proved the code.
     """
 
-    def __init__(self, address: str, keys: KeyFolder) -> None:
-        self._address, self._keys = address, keys
+    def __init__(self, door: tuple[str, int], keys: KeyFolder) -> None:
+        self._door, self._keys = door, keys
         me = Identity(z85.decode(keys.own().public.encode()), clean_name(socket.gethostname()))
         self._asking = Asking(me, os.urandom)
-        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._socket = self._context.socket(zmq.DEALER)
-        for option, value in ((zmq.MAXMSGSIZE, MAX_WORD_BYTES), (zmq.LINGER, 500), (zmq.IMMEDIATE, 1), (zmq.IPV6, 1)):
-            self._socket.setsockopt(option, value)
-        self._socket.connect(address)
 
     def ask(self) -> str:
         """Ask the board to show a code; gives the board's name.
@@ -44,13 +44,18 @@ class PairingCall:
             UnavailableError: the board takes in nobody, or not now.
             DataError: what answers is no board.
         """
-        if not self._socket.poll(_ANSWER_MS, zmq.POLLOUT):
-            raise UnavailableError(
-                f"{self._address} takes in no new host",
-                "start board-agent there; if it knows a host already: sudo board-agent pair",
-            )
-        self._say(self._asking.ask())
-        self._asking.receive(self._hear())
+        deadline_ns = now.monotonic_ns() + round(_ANSWER_S * 1e9)
+        while True:
+            try:
+                with self._line() as line:
+                    line.say(self._asking.ask())
+                    self._asking.receive(line.hear())
+            except _HungUpError:
+                if now.monotonic_ns() >= deadline_ns:
+                    raise
+                threading.Event().wait(_AGAIN_S)
+            else:
+                break
         assert self._asking.board is not None
         return clean_name(self._asking.board.name)
 
@@ -66,41 +71,78 @@ class PairingCall:
             The board as it is known from now on.
 
         Raises:
+            SettingsError: this code was typed before.
             DataError: one of the two does not know the code.
             UnavailableError: the board has fallen silent.
         """
+        if code_text(code) in self._keys.spent_codes():
+            raise SettingsError(
+                "this code was typed before", "type a new one: `sudo board-agent pair` on the board shows it"
+            )
+        is_spent = False
         word: Word | None = self._asking.begin(code)
-        while word is not None:
-            self._say(word)
-            word = self._asking.receive(self._hear())
-            progress()
+        with self._line() as line:
+            while word is not None:
+                if isinstance(word, Open) and not is_spent:  # from now on somebody may learn of it
+                    self._keys.spend(code_text(code))
+                    is_spent = True
+                line.say(word)
+                word = self._asking.receive(line.hear())
+                progress()
         board = self._asking.board
         assert board is not None
         assert self._asking.proved
         return self._keys.add(Peer(board.name, z85.encode(board.key).decode(), now.wall_time(), link))
 
-    def close(self) -> None:
-        """Hang up; the board need not wait for us."""
-        if not self._asking.proved:
-            with suppress(zmq.ZMQError):
-                self._socket.send(encode_word(Refuse(Refused.CLOSED)), zmq.DONTWAIT)
-        self._context.destroy(linger=500)
-
-    def _say(self, word: Word) -> None:
-        with suppress(zmq.Again):  # the answer that does not come tells it
-            self._socket.send(encode_word(word), zmq.DONTWAIT)
-
-    def _hear(self) -> Word:
-        if not self._socket.poll(_ANSWER_MS):
-            raise UnavailableError(f"{self._address} has fallen silent", "try again")
+    @contextmanager
+    def _line(self) -> "Iterator[_Line]":
+        where = f"tcp://{self._door[0]}:{self._door[1]}"
         try:
-            parts = self._socket.recv_multipart(zmq.DONTWAIT)
-            word = decode_word(parts[0])
-        except ProtocolError as error:
-            raise DataError(f"{self._address} is no board's door ({error.problem})", "check --link") from None
-        if isinstance(word, Refuse):
-            raise _refusal(word)
-        return word
+            connected = socket.create_connection(self._door, _ANSWER_S)
+        except OSError as error:
+            raise _HungUpError(
+                f"{where} takes in no new host ({error.strerror or error})",
+                "start board-agent there; if it knows a host already: sudo board-agent pair",
+            ) from None
+        with connected:
+            yield _Line(connected, where)
+
+
+class _HungUpError(UnavailableError):
+    """Nobody answers at the door; it may open in a moment."""
+
+
+class _Line:
+    """A connection to the door."""
+
+    def __init__(self, connected: socket.socket, where: str) -> None:
+        self._socket, self._where = connected, where
+        self._reader = WordReader()
+
+    def say(self, word: Word) -> None:
+        with suppress(OSError):  # the answer that does not come tells it
+            self._socket.sendall(frame_word(word))
+
+    def hear(self) -> Word:
+        while True:
+            try:
+                received = self._socket.recv(1 + MAX_WORD_BYTES)
+                words = self._reader.feed(received)
+            except TimeoutError:
+                raise UnavailableError(f"{self._where} has fallen silent", "try again") from None
+            except OSError:
+                received, words = b"", []
+            except ProtocolError as error:
+                raise DataError(f"{self._where} is no board's door ({error.problem})", "check --link") from None
+            if words:
+                if isinstance(words[0], Refuse):
+                    raise _refusal(words[0])
+                return words[0]
+            if not received:
+                raise _HungUpError(
+                    f"{self._where} hangs up",
+                    "start board-agent there; if it knows a host already: sudo board-agent pair",
+                )
 
 
 def _refusal(word: Refuse) -> TandemError:

@@ -88,7 +88,7 @@ def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = Fals
     Args:
         uri: what to open.
         keys: this machine's key and those that it trusts; None where only open links can be had.
-        board: whether this side is the board, which over tcp and ipc takes no images and, where there are keys, new hosts that prove a code.
+        board: whether this side is the board, which over tcp and ipc takes no images.
 
     Returns:
         The open link; a dialled peer may still be absent.
@@ -158,15 +158,18 @@ def open_links(uris: Sequence[LinkUri], keys: KeyFolder | None = None, *, board:
     Args:
         uris: what to open.
         keys: as for `open_link`.
-        board: as for `open_link`.
+        board: as for `open_link`; a board whose tcp links need keys also takes in new hosts that prove a code.
 
     Returns:
         The open links, in that order.
 
     Raises:
-        SettingsError: an address makes no sense.
+        SettingsError: an address makes no sense, or a link lies on the port on which another one's new hosts are taken in.
         UnavailableError: a port or path is taken, or every device is missing.
+        DataError: the files of keys are bad.
     """
+    if board:
+        _check_doors(uris)
     links: list[Link] = []
     missing: list[UnavailableError] = []
     try:
@@ -178,11 +181,43 @@ def open_links(uris: Sequence[LinkUri], keys: KeyFolder | None = None, *, board:
                 links.append(_open_serial(uri, waits=True))
         if len(missing) == len(uris):
             raise missing[0]
+        if board and keys is not None:
+            _open_door(uris, links, keys)
     except TandemError:
         for link in links:
             link.close()
         raise
     return links
+
+
+def _has_door(uri: LinkUri) -> bool:
+    return uri.listens and needs_keys(uri)
+
+
+def _check_doors(uris: Sequence[LinkUri]) -> None:
+    """Refuse a tcp link on the port behind a secured one's own."""
+    places = {
+        uri.address: uri.address.removeprefix("tcp://").rpartition(":") for uri in uris if "tcp://" in uri.address
+    }
+    for secured in (uri.address for uri in uris if _has_door(uri)):
+        for other in (uri.address for uri in uris if uri.listens and uri.address in places):
+            (host, _, port), (other_host, _, other_port) = places[secured], places[other]
+            if int(other_port) == int(port) + 1 and (host == other_host or "*" in {host, other_host}):
+                raise SettingsError(
+                    f"{other} lies on the port on which {secured} takes in new hosts",
+                    f"choose another than the one behind it, for example {int(port) + 2}",
+                )
+
+
+def _open_door(uris: Sequence[LinkUri], links: Sequence[Link], keys: KeyFolder) -> None:
+    """Have the first secured link take in new hosts for all of them."""
+    if not any(_has_door(uri) for uri in uris):
+        return
+    from common.link.zeromq import ZeroMqListener  # noqa: PLC0415 - only where it is used already
+
+    pairs = zip(uris, links, strict=True)
+    secured = [link for uri, link in pairs if _has_door(uri) and isinstance(link, ZeroMqListener)]
+    secured[0].open_door([link.endpoint for link in secured], keys)
 
 
 def _check_port(uri: str, address: str) -> None:

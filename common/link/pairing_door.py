@@ -1,13 +1,14 @@
-"""Where a board takes in hosts that it does not know yet: the port behind a secured link's own, open only while that is wanted.
+"""Where a board takes in hosts that it does not know yet: the ports behind its secured links' own, open only while that is wanted.
 
 It is wanted while no host is known at all, and while the owner's `board-agent pair` asks for it over a socket in the folder of keys, which
-only the owner can reach. The port speaks ZeroMQ without keys and understands nothing but the words of pairing; a stranger there gets one
-guess at a code, and costs a line in the log.
+only the owner can reach. There is one door, one code and one account of tries for all links of a board. It understands nothing but the
+words of pairing; a stranger there gets one guess at a code, and costs a line in the log.
 """
 
 import logging
 import os
 import socket
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,8 +19,9 @@ import zmq
 from zmq.utils import z85
 
 from common import now
-from common.errors import ProtocolError, SettingsError, TandemError
+from common.errors import SettingsError, TandemError
 from common.keys import KeyFolder, Peer, clean_name
+from common.link.callers import Call, Callers, Left, Nonsense, Said
 from common.link.curve import Guard, Seldom
 from common.link.wait import is_readable
 from common.logs import event
@@ -29,12 +31,12 @@ from common.protocol.pairing_code import (
     Identity,
     Output,
     Paired,
+    Refuse,
+    Refused,
     Say,
     ShowCode,
     code_text,
 )
-from common.protocol.pairing_wire import MAX_WORD_BYTES, decode_word, encode_word
-from common.protocol.zap import plain_address
 
 _LOG = logging.getLogger(__name__)
 
@@ -44,12 +46,6 @@ _LOOK_NS: Final = 1_000_000_000
 
 _OWNER_NS: Final = 3_000_000_000
 """`board-agent pair` says that it is still there every half second; a moment after it has gone the door closes."""
-
-_AT_ONCE: Final = 32
-"""Words taken in one round of the poll loop: a flood of them must not hold up frames."""
-
-_HANDSHAKE_MS: Final = 3000
-_LINGER_MS: Final = 500
 
 _LAST_PORT: Final = 65535
 
@@ -61,9 +57,9 @@ class DoorState:
     """What `board-agent pair` is told.
 
     Attributes:
-        address: the link that this is the door of; a board may have several, each with a code of its own.
+        address: the links that this is the door of.
         code: what to type on the host now.
-        asking: name of the host that has asked and must now prove the code; empty if none.
+        asking: name of the host that has asked last; empty if none.
         paired: name of the host that was taken in last since the command began; empty if none.
         failed: attempts that came to nothing since then.
     """
@@ -90,48 +86,57 @@ class Door:
     """Takes in hosts.
 
     Args:
-        context: of the link's sockets.
-        address: the link's own, `tcp://HOST:PORT`.
+        context: of a link's sockets.
+        links: the secured links' addresses as they are bound, `tcp://ADDRESS:PORT`.
         keys: the board's key; a host that has proved the code is added there.
         guard: knows whether any host is known; it lets in the one that is added.
 
     Raises:
-        SettingsError: there is no port behind the link's own.
+        SettingsError: there is no port behind a link's own.
         DataError: the files of keys are bad.
         UnavailableError: they cannot be used.
     """
 
-    def __init__(self, context: "zmq.Context[zmq.Socket[bytes]]", address: str, keys: KeyFolder, guard: Guard) -> None:
+    def __init__(
+        self, context: "zmq.Context[zmq.Socket[bytes]]", links: Sequence[str], keys: KeyFolder, guard: Guard
+    ) -> None:
         self._keys, self._guard = keys, guard
-        self._address = pairing_address(address)
+        self._addresses = [pairing_address(link) for link in links]
         name = clean_name(socket.gethostname())
         self._desk = Desk(Identity(z85.decode(keys.own().public.encode()), name), os.urandom)
-        self._socket = _socket(context, MAX_WORD_BYTES)
-        self._control = _socket(context, MAX_WORD_BYTES)
-        self._bind_control(keys.path / f"{CONTROL_PREFIX}{clean_name(address.removeprefix('tcp://'))}")
+        self._callers = Callers(self._desk.is_proving)
+        self._control = context.socket(zmq.ROUTER)
+        self._control.setsockopt(zmq.LINGER, 0)
+        self._bind_control(keys.path / f"{CONTROL_PREFIX}{clean_name(_as_given(links[0]))}")
         self._is_open = False
-        self._bound = ""
         self._owner_until_ns = 0
-        self._state = self._before = DoorState(address, "", "", "", 0)
-        self._strangers, self._troubles = Seldom(), Seldom()
+        self._state = self._before = DoorState(", ".join(map(_as_given, links)), "", "", "", 0)
+        self._told_code = -1
+        self._askers, self._strangers, self._troubles = Seldom(), Seldom(), Seldom()
         self.due_ns = 0
 
     @property
-    def pollables(self) -> "tuple[zmq.Socket[bytes], zmq.Socket[bytes]]":
-        """The sockets to wait on."""
-        return self._socket, self._control
+    def pollables(self) -> "tuple[Callers, zmq.Socket[bytes]]":
+        """What to wait on."""
+        return self._callers, self._control
 
     def answer(self) -> None:
         """Do all that is to be done now."""
         now_ns = now.monotonic_ns()
         if is_readable(self._control):
             self._hear_owner(now_ns)
-        if is_readable(self._socket):
-            self._hear_hosts(now_ns)
+        for call in self._callers.receive(now_ns):
+            self._hear(call, now_ns)
         if now_ns >= self.due_ns:
             self.due_ns = now_ns + _LOOK_NS
-            self._do(self._desk.tick(now_ns), "")
+            for call in self._callers.tick(now_ns):
+                self._hear(call, now_ns)
+            self._do(self._desk.tick(now_ns), "", now_ns)
             self._open_or_close(now_ns)
+
+    def close(self) -> None:
+        """Hang up on everybody."""
+        self._callers.close()
 
     def _hear_owner(self, now_ns: int) -> None:
         """Answer `board-agent pair`; it opens the door, and ends a pause when it comes."""
@@ -143,51 +148,48 @@ class Door:
         self._state = replace(self._state, code=code_text(self._desk.code(now_ns)))
         while self._control.poll(0):
             connection = self._control.recv_multipart(_NOW)[0]
-            self._control.send_multipart([connection, self._state.encode()], _NOW)
+            with suppress(zmq.ZMQError):  # gone already
+                self._control.send_multipart([connection, self._state.encode()], _NOW)
 
     def _open_or_close(self, now_ns: int) -> None:
         wanted = now_ns < self._owner_until_ns or self._guard.knows_nobody()
         if wanted == self._is_open:
             return
+        addresses = ", ".join(
+            _as_given(f"tcp://{f'[{host}]' if ':' in host else host}:{port}") for host, port in self._addresses
+        )
         try:
             if wanted:
-                self._socket.bind(self._address)
-                self._bound = self._socket.getsockopt_string(zmq.LAST_ENDPOINT)  # `*` is unbound by what it became
+                self._callers.listen(self._addresses)
             else:
-                self._socket.unbind(self._bound)
-        except zmq.ZMQError as error:
+                self._callers.shut()
+        except OSError as error:
             if self._troubles.now(now_ns):
-                _LOG.warning(event("pairing_impossible", address=self._address, problem=error.strerror))
+                _LOG.warning(event("pairing_impossible", address=addresses, problem=error.strerror))
             return
         self._is_open = wanted
-        _LOG.info(event("pairing_open" if wanted else "pairing_closed", address=self._address))
+        _LOG.info(event("pairing_open" if wanted else "pairing_closed", address=addresses))
 
-    def _hear_hosts(self, now_ns: int) -> None:
-        for _ in range(_AT_ONCE):
-            if not self._socket.poll(0):
-                return
-            connection, *parts = self._socket.recv_multipart(_NOW, copy=False)
-            address = _peer_address(connection)
-            try:
-                if len(parts) != 1:
-                    raise ProtocolError(f"{len(parts)} parts", "")
-                word = decode_word(parts[0].bytes)
-            except ProtocolError as error:
+    def _hear(self, call: Call, now_ns: int) -> None:
+        match call:
+            case Said(connection, address, word):
+                self._do(self._desk.receive(connection, word, now_ns), address, now_ns)
+            case Left(connection):
+                self._do(self._desk.receive(connection, Refuse(Refused.CLOSED), now_ns), "", now_ns)
+            case Nonsense(_, address, problem):
                 if self._strangers.now(now_ns):
                     count = self._strangers.count
-                    _LOG.warning(event("pairing_garbage", address=address, count=count, problem=error.problem))
-            else:
-                self._do(self._desk.receive(connection.bytes, word, now_ns), address)
+                    _LOG.warning(event("pairing_garbage", address=address, count=count, problem=problem))
+            case _:
+                assert_never(call)
 
-    def _do(self, outputs: list[Output], address: str) -> None:
+    def _do(self, outputs: list[Output], address: str, now_ns: int) -> None:
         for output in outputs:
             match output:
                 case Say(connection, word):
-                    with suppress(zmq.ZMQError):  # gone, or does not read
-                        self._socket.send_multipart([connection, encode_word(word)], _NOW)
+                    self._callers.say(connection, word)
                 case ShowCode(code, name):
-                    self._state = replace(self._state, code=code_text(code), asking=clean_name(name))
-                    _LOG.warning(event("pairing_code", code=code_text(code), host=clean_name(name), address=address))
+                    self._show(code, clean_name(name), address, now_ns)
                 case Failed(name, pause_ns):
                     self._state = replace(self._state, code="", asking="", failed=self._state.failed + 1)
                     pause_s = pause_ns // 1_000_000_000
@@ -197,6 +199,13 @@ class Door:
                         return
                 case _:
                     assert_never(output)
+
+    def _show(self, code: int, name: str, address: str, now_ns: int) -> None:
+        """Tell the code: at once when it is new, and seldom for who else asks."""
+        if self._askers.now(now_ns) or code != self._told_code:
+            self._told_code = code
+            self._state = replace(self._state, code=code_text(code), asking=name)
+            _LOG.warning(event("pairing_code", code=code_text(code), host=name, address=address))
 
     def _take_in(self, host: Identity, address: str) -> bool:
         try:
@@ -219,43 +228,24 @@ class Door:
             os.umask(before)
 
 
-def pairing_address(address: str) -> str:
+def pairing_address(link: str) -> tuple[str, int]:
     """Where a secured link's board takes in new hosts: the port behind the link's own.
 
     Args:
-        address: the link's, `tcp://HOST:PORT`.
+        link: its address, `tcp://HOST:PORT`.
+
+    Returns:
+        Host and port.
 
     Raises:
         SettingsError: there is no such port.
     """
-    port = _port(address)
-    if port >= _LAST_PORT:
-        raise SettingsError(f"{address} leaves no port for pairing", f"choose one below {_LAST_PORT}")
-    return f"{address.rpartition(':')[0]}:{port + 1}"
+    host, _, port = link.removeprefix("tcp://").rpartition(":")
+    if int(port) >= _LAST_PORT:
+        raise SettingsError(f"{link} leaves no port for pairing", f"choose one below {_LAST_PORT}")
+    return host.strip("[]"), int(port) + 1
 
 
-def _port(address: str) -> int:
-    return int(address.rpartition(":")[2])
-
-
-def _socket(context: "zmq.Context[zmq.Socket[bytes]]", most_bytes: int) -> "zmq.Socket[bytes]":
-    sock = context.socket(zmq.ROUTER)
-    for option, value in (
-        (zmq.MAXMSGSIZE, most_bytes),
-        (zmq.SNDHWM, 4),
-        (zmq.RCVHWM, 4),
-        (zmq.LINGER, _LINGER_MS),
-        (zmq.HANDSHAKE_IVL, _HANDSHAKE_MS),
-        (zmq.HEARTBEAT_IVL, _HANDSHAKE_MS),
-        (zmq.HEARTBEAT_TIMEOUT, _HANDSHAKE_MS),
-        (zmq.IPV6, 1),
-    ):
-        sock.setsockopt(option, value)
-    return sock
-
-
-def _peer_address(part: zmq.Frame) -> str:
-    try:
-        return plain_address(str(part.get("Peer-Address")))
-    except zmq.ZMQError:
-        return "unknown"
+def _as_given(link: str) -> str:
+    """A bound link as people write it: every interface is a star."""
+    return link.replace("[::]", "*").replace("0.0.0.0", "*")  # noqa: S104 - only to show it

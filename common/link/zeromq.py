@@ -4,22 +4,20 @@ Frames and control thus travel on TCP connections of their own and a clock echo 
 anything is accepted. A high-water mark does not bound the age of frames; credit does (session), so the marks here are only a fence.
 """
 
-import errno
 import os
-import socket
-import stat
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import zmq
 
 from common import now
-from common.errors import SettingsError, TakenError, UnavailableError
+from common.errors import UnavailableError
 from common.frame import Buffer
 from common.keys import KeyFolder, Peer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.dialled import Dialled
 from common.link.wait import is_readable
+from common.link.zeromq_address import explained, free_path
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
 
@@ -46,8 +44,6 @@ _RECONNECT_MAX_MS: Final = 400
 
 _COPY_BELOW_BYTES: Final = 256 * 1024
 """Below this one memcpy into ZeroMQ's message is cheaper than pyzmq's bookkeeping for a borrowed buffer (bench_link shows it)."""
-
-_UNIX_PATH_MAX: Final = 107
 
 # As plain integers: pyzmq's flags are enums, whose operators cost more than the call that takes them.
 _NOW: Final = int(zmq.DONTWAIT)
@@ -145,7 +141,7 @@ class ZeroMqListener(_AlwaysReady):
     Args:
         address: `tcp://HOST:PORT` (`*` for every interface) or `ipc://PATH`.
         keys: holds this side's key and those that may connect; None: anybody may.
-        board: whether this side is the board: it hears short messages only, and takes in new hosts by a code at the port behind this one.
+        board: whether this side is the board: it hears short messages only.
 
     Raises:
         SettingsError: the address makes no sense.
@@ -158,7 +154,7 @@ class ZeroMqListener(_AlwaysReady):
         self.kind = address.partition(":")[0]
         self.dialled: dict[Lane, bytes] = {}
         if self.kind == "ipc":
-            _free_path(address.removeprefix("ipc://"))
+            free_path(address.removeprefix("ipc://"))
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._guard = _guard(self._context, keys) if keys else None
         self._socket = self._context.socket(zmq.ROUTER)
@@ -173,13 +169,31 @@ class ZeroMqListener(_AlwaysReady):
             self._socket.bind(address)
         except zmq.ZMQError as error:
             self._context.destroy(linger=0)
-            raise _explained(address, error, "stop what listens there, or choose another with --link") from None
+            raise explained(address, error, "stop what listens there, or choose another with --link") from None
         finally:
             os.umask(before)
-        self._door = _door(self._context, address, keys, self._guard) if board and keys and self._guard else None
+        self.endpoint = self._socket.getsockopt_string(zmq.LAST_ENDPOINT)
+        self._door: Door | None = None
+
+    def open_door(self, links: Sequence[str], keys: KeyFolder) -> None:
+        """Take in new hosts by a code, for all secured links of this board.
+
+        Args:
+            links: the secured links' `endpoint`s.
+            keys: the board's.
+
+        Raises:
+            SettingsError: there is no port behind a link's own.
+            DataError: the files of keys are bad.
+            UnavailableError: they cannot be used.
+        """
+        from common.link.pairing_door import Door  # noqa: PLC0415 - as in _guard
+
+        assert self._guard is not None, "an open link has no door"
+        self._door = Door(self._context, links, keys, self._guard)
 
     @property
-    def pollables(self) -> Sequence[zmq.Socket[bytes]]:
+    def pollables(self) -> Sequence[Any]:
         """The one socket, the guard's and the door's."""
         guard = (self._guard.socket,) if self._guard else ()
         return (self._socket, *guard, *(self._door.pollables if self._door else ()))
@@ -208,6 +222,8 @@ class ZeroMqListener(_AlwaysReady):
 
     def close(self) -> None:
         """Let what was handed over leave, then close."""
+        if self._door:
+            self._door.close()
         self._context.destroy(linger=_LINGER_MS)
 
 
@@ -245,7 +261,7 @@ class ZeroMqDialer(_AlwaysReady):
                 connection = Dialled(sock, address, peer.name if peer else "", lane.name)
             except zmq.ZMQError as error:
                 self._context.destroy(linger=0)
-                raise _explained(address, error, "give --link tcp://HOST:PORT or ipc://PATH") from None
+                raise explained(address, error, "give --link tcp://HOST:PORT or ipc://PATH") from None
             self._connections[self.dialled[lane]] = connection
 
     @property
@@ -297,61 +313,3 @@ def _guard(context: "zmq.Context[zmq.Socket[bytes]]", keys: KeyFolder) -> "Guard
     from common.link.curve import Guard  # noqa: PLC0415 - an open link does not pay for keys: half a second of a board's start
 
     return Guard(context, keys)
-
-
-def _door(context: "zmq.Context[zmq.Socket[bytes]]", address: str, keys: KeyFolder, guard: "Guard") -> "Door":
-    from common.link.pairing_door import Door  # noqa: PLC0415 - as above
-
-    return Door(context, address, keys, guard)
-
-
-def _explained(address: str, error: zmq.ZMQError, remedy: str) -> SettingsError | UnavailableError:
-    """Sort ZeroMQ's refusal of an address by whose fault it is."""
-    why = zmq.strerror(error.errno or 0)  # the exception's own text repeats the address
-    if error.errno == zmq.EADDRINUSE:
-        return TakenError(f"{address} cannot be had ({why})", remedy)
-    if error.errno in {zmq.EADDRNOTAVAIL, errno.ENODEV}:
-        return UnavailableError(f"{address} cannot be had ({why})", "give an address of this machine, or * for all")
-    if error.errno in {errno.EPERM, errno.ENOENT, errno.EACCES}:  # the folder of an ipc path, or a port below 1024
-        return UnavailableError(f"{address} cannot be opened ({why})", "check the folder and its permissions")
-    return SettingsError(f"link {address!r} makes no sense ({why})", remedy)
-
-
-def _check_replaceable(path: str) -> None:
-    """Refuse a path that holds something else than a socket: ZeroMQ unlinks whatever is there.
-
-    Raises:
-        UnavailableError: it does.
-    """
-    try:
-        mode = os.lstat(path).st_mode
-    except OSError:
-        return
-    if not stat.S_ISSOCK(mode):
-        raise UnavailableError(f"ipc://{path} is a file that is no socket", "choose another path with --link")
-
-
-def _free_path(path: str) -> None:
-    """Remove the socket of a listener that died; ZeroMQ would silently take the path even of one that lives.
-
-    Raises:
-        SettingsError: the path is too long for a Unix socket.
-        TakenError: somebody listens there.
-        UnavailableError: it is no socket, or may not be touched.
-    """
-    if len(os.fsencode(path)) > _UNIX_PATH_MAX:
-        raise SettingsError(
-            f"ipc path of {len(os.fsencode(path))} bytes",
-            f"use one of at most {_UNIX_PATH_MAX} bytes, for example ipc:///tmp/board",
-        )
-    with socket.socket(socket.AF_UNIX) as probe:
-        try:
-            probe.connect(path)
-        except (FileNotFoundError, ConnectionRefusedError):
-            _check_replaceable(path)
-            return  # ZeroMQ itself unlinks a dead socket
-        except OSError as error:
-            raise UnavailableError(
-                f"ipc://{path} cannot be opened ({error.strerror})", "choose another path with --link"
-            ) from None
-    raise TakenError(f"ipc://{path} is taken", "stop what listens there, or choose another path with --link")

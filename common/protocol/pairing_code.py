@@ -6,7 +6,8 @@ code. Whoever stands between has keys of its own in its commitments; it hears th
 there, and must guess the rest at the board: 21 x 2^-20. A recording gives nothing to try codes against: it holds only a spent code. Source: Bluetooth Core Specification 5.4, Vol 2 Part H, 7.2.3 (authentication stage 1, passkey entry)
 and 7.7.1 (f1 = HMAC-SHA-256), here over the keys' and names' digest, with the round and the side in each commitment.
 
-Rules: a code serves one attempt; after three failed ones there is a pause, which grows (`Desk`). `now_ns` and chance are passed in.
+Rules: a code serves one attempt; after three failed ones there is a pause, which grows (`Desk`). Who only asks reserves nothing: the desk is taken
+from a proof's first word to its last, for seconds at most. `now_ns` and chance are passed in.
 """
 
 import hashlib
@@ -17,7 +18,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, assert_never
 
-from common.errors import ProtocolError
+from common.errors import ProtocolError, SettingsError
 
 ROUNDS: Final = 20
 """Bits of a code: 10^6 < 2^20."""
@@ -30,7 +31,10 @@ COMMITMENT_BYTES: Final = 32
 _S: Final = 1_000_000_000
 
 CODE_LIFE_NS: Final = 300 * _S
-"""A code that nobody has used by then is spent: time to walk from the board to the host, not to guess."""
+"""A code that nobody has used so long after it was last asked for is spent: time to walk from the board to the host, not to guess."""
+
+PROOF_NS: Final = 10 * _S
+"""A proof may take this long: 20 rounds of two round trips, 4 s where each takes 100 ms. Nobody has to type meanwhile."""
 
 TRIES: Final = 3
 """Failed attempts before a pause."""
@@ -71,6 +75,14 @@ class Shown:
 
 
 @dataclass(frozen=True, slots=True)
+class Begin:
+    """Host: the code was typed; this is who I am, and my commitment to its first bit."""
+
+    host: Identity
+    commitment: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class Commit:
     """Either side: my commitment to this round's bit."""
 
@@ -103,7 +115,7 @@ class Refuse:
     seconds: int = 0
 
 
-Word = Ask | Shown | Commit | Open | Refuse
+Word = Ask | Shown | Begin | Commit | Open | Refuse
 
 
 class Side(Enum):
@@ -118,10 +130,16 @@ def code_text(code: int) -> str:
     return f"{code:0{CODE_DIGITS}d}"
 
 
-def read_code(text: str) -> int | None:
-    """Read a code as people type it, blanks and hyphens aside; None if it is none."""
+def read_code(text: str) -> int:
+    """Read a code as people type it, blanks and hyphens aside.
+
+    Raises:
+        SettingsError: it is none.
+    """
     digits = text.replace(" ", "").replace("-", "").strip()
-    return int(digits) if len(digits) == CODE_DIGITS and digits.isascii() and digits.isdigit() else None
+    if len(digits) == CODE_DIGITS and digits.isascii() and digits.isdigit():
+        return int(digits)
+    raise SettingsError(f"{text.strip()!r:.40} is no code", f"type the {CODE_DIGITS} digits that the board shows")
 
 
 def new_code(chance: Callable[[int], bytes]) -> int:
@@ -201,12 +219,12 @@ class Asking:
         """The first word."""
         return Ask(self._host)
 
-    def begin(self, code: int) -> Commit:
-        """Begin the proof, with what was typed; only after `Shown` has come."""
+    def begin(self, code: int) -> Begin:
+        """Begin the proof, with what was typed; only after `Shown` has come, be it over another connection."""
         assert self.board is not None
         self._proof = _Proof(Side.HOST, self._host, self.board, code, self._chance)
         self._expects = Commit
-        return self._proof.commit()
+        return Begin(self._host, self._proof.commit().commitment)
 
     def receive(self, word: Word) -> Word | None:
         """Take a word of the board's.
@@ -275,11 +293,11 @@ class _Attempt:
     host: Identity
     proof: _Proof
     until_ns: int
-    expects: type = Commit
+    expects: type = Open
 
 
 class Desk:
-    """The board's side: shows codes, one attempt at a time, and makes whoever guesses wait.
+    """The board's side: shows a code, takes one proof at a time, and makes whoever guesses wait.
 
     Args:
         board: who the board is.
@@ -302,10 +320,16 @@ class Desk:
             self._code_until_ns = now_ns + CODE_LIFE_NS
         return self._code
 
+    def is_proving(self, connection: bytes) -> bool:
+        """Whether the attempt of the moment is this connection's."""
+        return self._attempt is not None and self._attempt.connection == connection
+
     def pardon(self) -> None:
-        """Forget failed attempts: the owner stands at the board and says so."""
+        """Forget failed attempts, and the code shown so far: the owner stands at the board and says so."""
         self._failures = 0
         self._closed_until_ns = 0
+        if self._attempt is None:
+            self._code = None
 
     def receive(self, connection: bytes, word: Word, now_ns: int) -> list[Output]:
         """Take a word.
@@ -315,42 +339,43 @@ class Desk:
             word: what was said.
             now_ns: CLOCK_MONOTONIC, ns.
         """
-        outputs: list[Output] = list(self.tick(now_ns))
+        outputs = self.tick(now_ns)
         attempt = self._attempt
+        is_theirs = attempt is not None and attempt.connection == connection
         match word:
-            case Ask(host):
-                return outputs + self._begin(connection, host, now_ns)
-            case Refuse() if attempt is not None and attempt.connection == connection:
-                return outputs + self._fail(now_ns)
-            case Refuse() | Shown():
-                return outputs
-            case Commit() | Open():
-                if attempt is None or attempt.connection != connection:
-                    return [*outputs, Say(connection, Refuse(Refused.WRONG))]
+            case Begin() | Ask() if attempt is None or not is_theirs:
+                return outputs + (self._refusal(connection, now_ns) or self._take(connection, word, now_ns))
+            case Commit() | Open() if attempt is not None and is_theirs:
                 return outputs + self._prove(attempt, word, now_ns)
+            case Commit() | Open():
+                return [*outputs, Say(connection, Refuse(Refused.WRONG))]
+            case Ask() | Begin() | Shown() | Refuse():
+                return outputs + (self._fail(now_ns) if is_theirs else [])
             case _:
                 assert_never(word)
 
     def tick(self, now_ns: int) -> list[Output]:
-        """Give up an attempt whose code has run out."""
+        """Give up a proof that takes too long."""
         if self._attempt is not None and now_ns >= self._attempt.until_ns:
             return self._fail(now_ns)
         return []
 
-    def _begin(self, connection: bytes, host: Identity, now_ns: int) -> list[Output]:
-        outputs: list[Output] = []
+    def _refusal(self, connection: bytes, now_ns: int) -> list[Output]:
+        """Send a host away while a proof or a pause lasts; else nothing."""
+        reason, until_ns = Refused.PAUSE, self._closed_until_ns
         if self._attempt is not None:
-            if self._attempt.host != host:
-                left_s = -((now_ns - self._attempt.until_ns) // _S)
-                return [Say(connection, Refuse(Refused.BUSY, left_s))]
-            outputs += self._fail(now_ns)  # its owner has begun anew
-        if now_ns < self._closed_until_ns:
-            left_s = -((now_ns - self._closed_until_ns) // _S)
-            return [*outputs, Say(connection, Refuse(Refused.PAUSE, left_s))]
+            reason, until_ns = Refused.BUSY, self._attempt.until_ns
+        return [Say(connection, Refuse(reason, -((now_ns - until_ns) // _S)))] if now_ns < until_ns else []
+
+    def _take(self, connection: bytes, word: Ask | Begin, now_ns: int) -> list[Output]:
         code = self.code(now_ns)
-        proof = _Proof(Side.BOARD, host, self._board, code, self._chance)
-        self._attempt = _Attempt(connection, host, proof, self._code_until_ns)
-        return [*outputs, ShowCode(code, host.name), Say(connection, Shown(self._board))]
+        if isinstance(word, Ask):
+            self._code_until_ns = now_ns + CODE_LIFE_NS
+            return [ShowCode(code, word.host.name), Say(connection, Shown(self._board))]
+        proof = _Proof(Side.BOARD, word.host, self._board, code, self._chance)
+        proof.keep(Commit(0, word.commitment))
+        self._attempt = _Attempt(connection, word.host, proof, now_ns + PROOF_NS)
+        return [Say(connection, proof.commit())]
 
     def _prove(self, attempt: _Attempt, word: Commit | Open, now_ns: int) -> list[Output]:
         proof, connection = attempt.proof, attempt.connection
@@ -366,7 +391,7 @@ class Desk:
         attempt.expects = Commit
         if proof.round < ROUNDS:
             return [Say(connection, answer)]
-        self._attempt = self._code = None
+        self._attempt = None
         self.pardon()
         return [Paired(attempt.host), Say(connection, answer)]
 

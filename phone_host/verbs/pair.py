@@ -3,10 +3,10 @@
 import argparse
 import json
 import sys
-from contextlib import closing
 from pathlib import Path
 
 from common.errors import DataError, SettingsError, UnavailableError
+from common.keys import KeyFolder, Peer
 from common.link.factory import needs_keys, parse_link
 from common.protocol.pairing_code import CODE_DIGITS, read_code
 
@@ -36,7 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Pair; asks for the code on the terminal."""
     from phone_host.discovery import find_aloud  # noqa: PLC0415
-    from phone_host.pairing_call import PairingCall  # noqa: PLC0415 - ZeroMQ, only now
     from phone_host.settings import chosen_keys  # noqa: PLC0415
 
     keys = chosen_keys(options.config, options.keys)
@@ -44,46 +43,45 @@ def run(options: argparse.Namespace) -> int:
     if not link.address.startswith("tcp://") or link.listens:
         raise SettingsError(f"link {options.link!r} needs no keys", "pair over tcp://HOST:PORT")
     door = _door(link.address, options.pairing_port)
-    used: set[int] = set()
-    while True:
-        with closing(PairingCall(door, keys)) as call:
-            name = call.ask()
-            code = _code(options.code, name, used)
-            try:
-                board = call.prove(code, link.address, lambda: None)
-            except DataError as error:
-                if options.code is not None or not sys.stdin.isatty() or len(used) >= _TRIES:
-                    raise
-                print(f"phone-host: {error}", file=sys.stderr)
-                continue
-        break
+    board = _paired(keys, door, link.address, options.code)
     known = {"name": board.name, "key": board.key, "link": link.address}
     run_with = f"phone-host run --link {link.address}" if needs_keys(link) else "phone-host run"
     print(json.dumps(known) if options.json else f"paired with {board.name}; now: {run_with} --camera ...")
     return 0
 
 
-def _door(address: str, port: int | None) -> str:
+def _paired(keys: KeyFolder, door: tuple[str, int], link: str, given: str | None) -> Peer:
+    """Pair; who mistypes on a terminal is asked again."""
+    from phone_host.pairing_call import PairingCall  # noqa: PLC0415 - slow to load
+
+    tries = 1
+    while True:
+        call = PairingCall(door, keys)
+        code = _code(given, call.ask())
+        try:
+            return call.prove(code, link, lambda: None)
+        except DataError as error:
+            if given is not None or not sys.stdin.isatty() or tries >= _TRIES:
+                raise
+            tries += 1
+            print(f"phone-host: {error}", file=sys.stderr)
+
+
+def _door(address: str, port: int | None) -> tuple[str, int]:
     from common.link.pairing_door import pairing_address  # noqa: PLC0415 - ZeroMQ, only now
 
     if port is None:
         return pairing_address(address)
     if not 1 <= port <= 65535:
         raise SettingsError(f"--pairing-port {port}", "give 1 to 65535")
-    return f"{address.rpartition(':')[0]}:{port}"
+    return pairing_address(address)[0], port
 
 
-def _code(given: str | None, name: str, used: set[int]) -> int:
-    """Take the code from the option, or from whoever types it. A code that was typed before is refused: who meddles could learn it bit by bit."""
+def _code(given: str | None, name: str) -> int:
+    """Take the code from the option, or from whoever types it."""
     if given is None:
         print(f"{name} shows a code of {CODE_DIGITS} digits now; type it: ", end="", file=sys.stderr, flush=True)
         given = sys.stdin.readline()
         if not given:
             raise UnavailableError("no code was typed", "type what the board shows, or give --code")
-    code = read_code(given)
-    if code is None:
-        raise SettingsError(f"{given.strip()!r} is no code", f"type the {CODE_DIGITS} digits that the board shows")
-    if code in used:
-        raise SettingsError("this code has failed already", "start again and type the new one that the board shows")
-    used.add(code)
-    return code
+    return read_code(given)

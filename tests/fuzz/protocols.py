@@ -38,6 +38,7 @@ from common.protocol.pairing_code import (
     NONCE_BYTES,
     Ask,
     Asking,
+    Begin,
     Commit,
     Desk,
     Identity,
@@ -253,6 +254,7 @@ def pairing_seeds() -> list[bytes]:
         Commit(1, b"c" * COMMITMENT_BYTES),
         Open(1, b"n" * NONCE_BYTES),
         Refuse(Refused.PAUSE, 30),
+        Begin(Identity(b"k" * KEY_BYTES, "phone"), b"c" * COMMITMENT_BYTES),
     ]
     packed = [b"x" + encode_word(word) for word in words]
     return [_as_parts([word]) for word in packed] + [_as_parts(packed)]

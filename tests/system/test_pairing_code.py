@@ -9,15 +9,17 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 
 import pytest
 import zmq
 
 from common.keys import KeyFolder
-from common.protocol.pairing_code import CODE_DIGITS
+from common.protocol.pairing_code import CODE_DIGITS, Ask, Identity, code_text
+from common.protocol.pairing_wire import frame_word
 from tests.support.numbered import write_film
 from tests.support.programs import Program, board, host, program, until
 
@@ -79,6 +81,16 @@ class Rig:
         until(lambda: len(self.codes()) > known or pairing.poll() is not None, "the board shows a code")
         said = pairing.communicate(f"{self.codes()[-1]}\n", timeout=60)
         return pairing.returncode, *said
+
+    def pair_wrongly(self, *options: str) -> int:
+        """Type a code that is not the board's; the exit code."""
+        known = len(self.codes())
+        pairing = self.pair(*options)
+        until(lambda: len(self.codes()) > known or pairing.poll() is not None, "a code is shown")
+        wrong = code_text((int(self.codes()[-1]) + 1) % 10**CODE_DIGITS)
+        _, err = pairing.communicate(f"{wrong}\n", timeout=60)
+        assert "the code was" in err
+        return pairing.returncode
 
     def streams(self, name: str) -> None:
         """A host gets frames over this link."""
@@ -171,8 +183,8 @@ def test_the_owner_takes_in_a_second_host(rig: Rig) -> None:
     assert json.loads(out)["key"] == KeyFolder(Path(rig.board_keys)).own().public
 
 
-def test_each_link_has_a_code_of_its_own_and_is_named_beside_it(tmp_path: Path) -> None:
-    """Of a board with two links `board-agent pair` tells which code is for which; with that a host pairs at that link."""
+def test_one_code_and_one_account_of_tries_for_all_links(tmp_path: Path) -> None:
+    """A board with two links shows one code, good at either; wrong codes at one and at the other count together, whatever host they come from."""
     first = ports()
     second = next(port for port in iter(ports, None) if abs(port - first) > 1)
     write_film(tmp_path / "film", 10)
@@ -180,29 +192,96 @@ def test_each_link_has_a_code_of_its_own_and_is_named_beside_it(tmp_path: Path) 
     serving = ["run", "--camera", f"replay:{tmp_path / 'film'}?pace=demand", "--keys", str(tmp_path / "b"), *listening]
     with ExitStack() as stack:
         agent = stack.enter_context(board(serving, tmp_path))
-        until(lambda: " serving " in agent.stderr, "the board serves")
-        rig = Rig(agent, f"tcp://127.0.0.1:{second}", tmp_path)
-        owner = stack.enter_context(program("board_agent.cli", ["pair", "--keys", rig.board_keys], tmp_path, "pair"))
-        shown = re.compile(r"^tcp://\*:(\d+): type this code on the host: (\d{6})$", re.MULTILINE)
-        until(lambda: len(shown.findall(owner.out.read_text())) == 2, "both codes are shown")
-        codes = {int(port): code for port, code in shown.findall(owner.out.read_text())}
-        assert codes.keys() == {first, second}
-        pairing = rig.pair("--code", codes[second])
+        until(lambda: "pairing_open" in agent.stderr, "the board takes in hosts")
+        rigs = [Rig(agent, f"tcp://127.0.0.1:{port}", tmp_path) for port in (first, second)]
+        for number, rig in enumerate((rigs[0], rigs[1], rigs[0])):
+            assert rig.pair_wrongly("--keys", str(tmp_path / f"h{number}")) == 4
+        assert "pause_s=60" in agent.stderr
+        refused = rigs[1].pair()
+        assert "pause" in refused.communicate("", timeout=60)[1]
+        assert refused.returncode == 3
+        owner = stack.enter_context(
+            program("board_agent.cli", ["pair", "--keys", rigs[0].board_keys], tmp_path, "pair")
+        )
+        shown = re.compile(
+            rf"^tcp://\*:{first}, tcp://\*:{second}: type this code on the host: (\d{{6}})$", re.MULTILINE
+        )
+        until(lambda: bool(shown.search(owner.out.read_text())), "the code is shown")
+        (code,) = shown.findall(owner.out.read_text())
+        pairing = rigs[1].pair("--code", code)
         _, err = pairing.communicate(timeout=60)
         assert pairing.returncode == 0, err
         assert owner.wait() == 0, owner.stderr
 
 
+def test_strangers_that_say_nothing_keep_nobody_from_pairing(rig: Rig) -> None:
+    """Strangers ask and fall silent, or never end a word, or connect and say nothing at all: a host is paired meanwhile, and they are hung up on."""
+    door = ("127.0.0.1", int(rig.link.rpartition(":")[2]) + 1)
+    ask = frame_word(Ask(Identity(bytes(32), "stranger")))
+    until(lambda: "pairing_open" in rig.agent.stderr, "the door is open")
+    with ExitStack() as stack:
+        strangers = [stack.enter_context(socket.create_connection(door, timeout=60)) for _ in range(40)]
+        for stranger, said in zip(strangers, cycle((ask, ask[:20], b"")), strict=False):
+            with suppress(ConnectionError):  # made room for another one
+                stranger.sendall(said)
+        code, _, err = rig.pair_by_log()
+        assert code == 0, err
+        for stranger in strangers:
+            with suppress(ConnectionError):
+                while stranger.recv(1000):
+                    pass
+    assert "pairing_failed" not in rig.agent.stderr
+    assert rig.agent.stderr.count("pairing_code") <= 2
+
+
+def test_who_is_connected_when_the_door_closes_is_hung_up_on(rig: Rig) -> None:
+    """A stranger that connected while the door was open, and goes on asking, is cut off when it closes: nobody guesses behind it."""
+    until(lambda: "pairing_open" in rig.agent.stderr, "the door is open")
+    door = ("127.0.0.1", int(rig.link.rpartition(":")[2]) + 1)
+    assert rig.pair_by_log()[0] == 0
+    ask = frame_word(Ask(Identity(bytes(32), "stranger")))
+    with suppress(ConnectionError), socket.create_connection(door, timeout=60) as stranger:
+        stranger.sendall(ask)
+        while stranger.recv(1000):
+            pass
+    until(lambda: "pairing_closed" in rig.agent.stderr, "the door closes")
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(door)
+
+
+def test_a_code_typed_before_is_refused_by_every_later_process(rig: Rig) -> None:
+    """Somebody in the middle learns some bits each time a code is proved to him: a host proves one once, however often it is started."""
+    assert rig.pair_wrongly() == 4
+    (typed,) = KeyFolder(Path(rig.host_keys)).spent_codes()
+    assert typed not in rig.codes()
+    for _ in range(2):
+        again = rig.pair("--code", typed)
+        _, err = again.communicate(timeout=60)
+        assert again.returncode == 2, err
+        assert "typed before" in err
+        assert err.count("\n") == 1
+    assert rig.agent.stderr.count("pairing_failed") == 1, "the board has heard nothing of it"
+    assert (Path(rig.host_keys) / "spent-codes").stat().st_mode & 0o077 == 0
+
+
+def test_two_links_side_by_side_are_refused(tmp_path: Path) -> None:
+    """A link on the port where another one's new hosts are taken in ends the start with exit 2 and one line that names both and the remedy."""
+    write_film(tmp_path / "film", 3)
+    port = ports()
+    for other in (f"tcp://*:{port + 1}", f"tcp://127.0.0.1:{port + 1}"):
+        links = ["--link", f"tcp://*:{port}", "--link", other, "--keys", str(tmp_path / "b")]
+        with board(["run", "--camera", f"replay:{tmp_path / 'film'}", *links], tmp_path) as agent:
+            assert agent.wait() == 2
+        assert f"tcp://*:{port} " in agent.stderr
+        assert other in agent.stderr
+        assert str(port + 2) in agent.stderr
+        assert agent.stderr.count("\n") == 1
+
+
 def test_three_wrong_codes_are_followed_by_a_pause(rig: Rig) -> None:
     """A wrong code ends with exit 4 and spends the code shown; after the third one nobody may try for a minute, until the owner says so."""
     for _ in range(3):
-        known = len(rig.codes())
-        pairing = rig.pair()
-        until(lambda known=known: len(rig.codes()) > known, "a code is shown")  # type: ignore[misc]
-        wrong = f"{(int(rig.codes()[-1]) + 1) % 10**CODE_DIGITS:0{CODE_DIGITS}d}"
-        _, err = pairing.communicate(f"{wrong}\n", timeout=60)
-        assert pairing.returncode == 4, err
-        assert "the code was" in err
+        assert rig.pair_wrongly() == 4
     assert len(set(rig.codes())) == 3
     pairing = rig.pair()
     _, err = pairing.communicate("", timeout=60)
@@ -240,12 +319,34 @@ def test_on_a_terminal_a_wrong_code_is_asked_again(rig: Rig) -> None:
     assert "the code was wrong" in err.read_text() or "not proved" in err.read_text()
 
 
-def test_without_an_agent_pair_says_so(tmp_path: Path) -> None:
-    """`board-agent pair` with nobody to talk to, and `phone-host pair` with nobody there, end with exit 3 and the remedy in one line."""
-    with program("board_agent.cli", ["pair", "--keys", str(tmp_path)], tmp_path, "pair") as alone:
+def test_without_an_agent_pair_waits_and_says_so(tmp_path: Path) -> None:
+    """`board-agent pair` with nobody to talk to says what it waits for, and after its time ends with exit 3 and the remedy; so does the host's."""
+    with program("board_agent.cli", ["pair", "--seconds", "2", "--keys", str(tmp_path)], tmp_path, "pair") as alone:
         assert alone.wait() == 3
-    assert "no running board-agent" in alone.stderr
-    assert alone.stderr.count("\n") == 1
+    waiting, last = alone.stderr.splitlines()
+    for line in (waiting, last):
+        assert "no running board-agent" in line
+    assert "waiting" in waiting
+
+
+def test_the_owner_may_come_before_the_agent(tmp_path: Path) -> None:
+    """`board-agent pair` waits for an agent that has opened no link yet, because its camera is missing, and goes on when it is there."""
+    camera = tmp_path / "film"
+    config = tmp_path / "board.toml"
+    port = ports()
+    config.write_text(
+        f'camera = "replay:{camera}?pace=demand"\nlink = ["tcp://*:{port}"]\nkeys = "{tmp_path}/b"\nwait_for_camera = true\n'
+    )
+    with ExitStack() as stack:
+        owner = stack.enter_context(program("board_agent.cli", ["pair", "--config", str(config)], tmp_path, "pair"))
+        until(lambda: "waiting" in owner.stderr, "the owner is told what is missing")
+        write_film(camera, 10)
+        agent = stack.enter_context(board(["run", "--config", str(config)], tmp_path))
+        until(lambda: "type this code" in owner.out.read_text(), "the code is shown")
+        pairing = Rig(agent, f"tcp://127.0.0.1:{port}", tmp_path).pair("--code", owner.out.read_text().split()[-1])
+        _, err = pairing.communicate(timeout=60)
+        assert pairing.returncode == 0, err
+        assert owner.wait() == 0, owner.stderr
 
 
 @pytest.mark.parametrize(

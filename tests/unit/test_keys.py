@@ -170,3 +170,14 @@ def test_every_256_bits_are_a_key(raw: bytes) -> None:
     assert not is_key(text[:-1])
     assert not is_key(text[:-1] + " ")
     assert not is_key("#####" + text[5:])
+
+
+def test_the_codes_typed_last_are_kept(tmp_path: Path) -> None:
+    """Codes that were proved stay known to every later process, the newest 64 of them, for the owner only; a file that others may read is refused."""
+    assert KeyFolder(tmp_path / "k").spent_codes() == ()
+    for number in range(70):
+        KeyFolder(tmp_path / "k").spend(f"{number:06d}")
+    assert KeyFolder(tmp_path / "k").spent_codes() == tuple(f"{number:06d}" for number in range(6, 70))
+    (tmp_path / "k" / "spent-codes").chmod(0o644)
+    with pytest.raises(DataError, match="chmod"):
+        KeyFolder(tmp_path / "k").spent_codes()

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from common.errors import SettingsError, UnavailableError
 from common.keys import KeyFolder, Peer
-from common.link.factory import LinkUri, needs_keys, open_link, parse_link
+from common.link.factory import LinkUri, needs_keys, open_link, open_links, parse_link
 
 
 @given(
@@ -135,6 +135,24 @@ def test_addresses_that_cannot_be_dialled_are_refused(address: str) -> None:
 def test_what_other_machines_can_reach_asks_for_keys(uri: str, *, asks: bool) -> None:
     """Tcp beyond loopback is for known keys unless it is said to be insecure; what only this machine reaches is open."""
     assert needs_keys(parse_link(uri, listens_by_default=True)) is asks
+
+
+@pytest.mark.parametrize(
+    "links",
+    [
+        ("tcp://*:5555", "tcp://*:5556"),
+        ("tcp://192.0.2.1:5555", "tcp://*:5556"),
+        ("tcp://*:5555", "tcp://127.0.0.1:5556"),
+        ("tcp://*:5555", "tcp://*:5556?insecure=1"),
+        ("tcp://*:5556", "ipc:///tmp/x", "tcp://*:5555"),
+    ],
+)
+def test_a_link_on_anothers_door_is_refused(links: tuple[str, ...], tmp_path: Path) -> None:
+    """A board's link on the port behind a secured one's own, at the same address, is the user's mistake: nothing is opened."""
+    with pytest.raises(SettingsError) as caught:
+        open_links([parse_link(uri, listens_by_default=True) for uri in links], KeyFolder(tmp_path / "k"), board=True)
+    assert "takes in new hosts" in str(caught.value)
+    assert not (tmp_path / "k").exists()
 
 
 @pytest.mark.parametrize("listens", [True, False])

@@ -1,0 +1,72 @@
+"""What ZeroMQ is asked to listen at, checked before, and its refusals in plain words."""
+
+import errno
+import os
+import socket
+import stat
+from typing import Final
+
+import zmq
+
+from common.errors import SettingsError, TakenError, UnavailableError
+
+_UNIX_PATH_MAX: Final = 107
+"""Bytes of a Unix socket's path, without its end (unix(7))."""
+
+
+def explained(address: str, error: zmq.ZMQError, remedy: str) -> SettingsError | UnavailableError:
+    """Sort ZeroMQ's refusal of an address by whose fault it is.
+
+    Args:
+        address: what was refused.
+        error: how.
+        remedy: what to do about an address that is taken or makes no sense.
+    """
+    why = zmq.strerror(error.errno or 0)  # the exception's own text repeats the address
+    if error.errno == zmq.EADDRINUSE:
+        return TakenError(f"{address} cannot be had ({why})", remedy)
+    if error.errno in {zmq.EADDRNOTAVAIL, errno.ENODEV}:
+        return UnavailableError(f"{address} cannot be had ({why})", "give an address of this machine, or * for all")
+    if error.errno in {errno.EPERM, errno.ENOENT, errno.EACCES}:  # the folder of an ipc path, or a port below 1024
+        return UnavailableError(f"{address} cannot be opened ({why})", "check the folder and its permissions")
+    return SettingsError(f"link {address!r} makes no sense ({why})", remedy)
+
+
+def _check_replaceable(path: str) -> None:
+    """Refuse a path that holds something else than a socket: ZeroMQ unlinks whatever is there.
+
+    Raises:
+        UnavailableError: it does.
+    """
+    try:
+        mode = os.lstat(path).st_mode
+    except OSError:
+        return
+    if not stat.S_ISSOCK(mode):
+        raise UnavailableError(f"ipc://{path} is a file that is no socket", "choose another path with --link")
+
+
+def free_path(path: str) -> None:
+    """Remove the socket of a listener that died; ZeroMQ would silently take the path even of one that lives.
+
+    Raises:
+        SettingsError: the path is too long for a Unix socket.
+        TakenError: somebody listens there.
+        UnavailableError: it is no socket, or may not be touched.
+    """
+    if len(os.fsencode(path)) > _UNIX_PATH_MAX:
+        raise SettingsError(
+            f"ipc path of {len(os.fsencode(path))} bytes",
+            f"use one of at most {_UNIX_PATH_MAX} bytes, for example ipc:///tmp/board",
+        )
+    with socket.socket(socket.AF_UNIX) as probe:
+        try:
+            probe.connect(path)
+        except (FileNotFoundError, ConnectionRefusedError):
+            _check_replaceable(path)
+            return  # ZeroMQ itself unlinks a dead socket
+        except OSError as error:
+            raise UnavailableError(
+                f"ipc://{path} cannot be opened ({error.strerror})", "choose another path with --link"
+            ) from None
+    raise TakenError(f"ipc://{path} is taken", "stop what listens there, or choose another path with --link")
