@@ -107,7 +107,7 @@ class Door:
         self._callers = Callers(self._desk.is_proving)
         self._control = context.socket(zmq.ROUTER)
         self._control.setsockopt(zmq.LINGER, 0)
-        self._bind_control(keys.path / f"{CONTROL_PREFIX}{clean_name(_as_given(links[0]))}")
+        self._bind_control(keys.path / f"{CONTROL_PREFIX}{clean_name(_as_given(links[0]).removeprefix('tcp://'))}")
         self._is_open = False
         self._owner_until_ns = 0
         self._state = self._before = DoorState(", ".join(map(_as_given, links)), "", "", "", 0)

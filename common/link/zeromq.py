@@ -17,7 +17,7 @@ from common.keys import KeyFolder, Peer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.dialled import Dialled
 from common.link.wait import is_readable
-from common.link.zeromq_address import explained, free_path
+from common.link.zeromq_address import explained, free_path, plain_endpoint
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
 
@@ -172,7 +172,7 @@ class ZeroMqListener(_AlwaysReady):
             raise explained(address, error, "stop what listens there, or choose another with --link") from None
         finally:
             os.umask(before)
-        self.endpoint = self._socket.getsockopt_string(zmq.LAST_ENDPOINT)
+        self.endpoint = plain_endpoint(self._socket.getsockopt_string(zmq.LAST_ENDPOINT))
         self._door: Door | None = None
 
     def open_door(self, links: Sequence[str], keys: KeyFolder) -> None:

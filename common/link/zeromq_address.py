@@ -70,3 +70,10 @@ def free_path(path: str) -> None:
                 f"ipc://{path} cannot be opened ({error.strerror})", "choose another path with --link"
             ) from None
     raise TakenError(f"ipc://{path} is taken", "stop what listens there, or choose another path with --link")
+
+
+def plain_endpoint(endpoint: str) -> str:
+    """Give what ZeroMQ has bound as people know it: IPv4 without the brackets and prefix that it has on a socket of both versions."""
+    scheme, _, rest = endpoint.partition("://")
+    host, _, port = rest.rpartition(":")
+    return f"{scheme}://{host[8:-1]}:{port}" if host.startswith("[::ffff:") else endpoint

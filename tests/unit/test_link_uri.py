@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from common.errors import SettingsError, UnavailableError
 from common.keys import KeyFolder, Peer
 from common.link.factory import LinkUri, needs_keys, open_link, open_links, parse_link
+from common.link.zeromq_address import plain_endpoint
 
 
 @given(
@@ -179,3 +180,17 @@ def test_an_address_of_another_machine_cannot_be_listened_on(host: str) -> None:
     uri = parse_link(f"tcp://{host}:5555?insecure=1", listens_by_default=True)
     with pytest.raises(UnavailableError, match=r" \([A-Za-z ]+\): give an address of this machine, or \* for all$"):
         open_link(uri)
+
+
+@pytest.mark.parametrize(
+    ("bound", "plain"),
+    [
+        ("tcp://[::ffff:192.168.7.2]:5555", "tcp://192.168.7.2:5555"),
+        ("tcp://[::]:5555", "tcp://[::]:5555"),
+        ("tcp://0.0.0.0:5555", "tcp://0.0.0.0:5555"),
+        ("tcp://[fe80::1]:5555", "tcp://[fe80::1]:5555"),
+    ],
+)
+def test_what_zeromq_has_bound_can_be_bound_by_others(bound: str, plain: str) -> None:
+    """An IPv4 address on a socket of both versions is given as IPv4: the door behind it is a socket of one."""
+    assert plain_endpoint(bound) == plain
