@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Final
 import zmq
 
 from common import now
-from common.errors import UnavailableError
 from common.frame import Buffer
 from common.keys import KeyFolder, Peer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult

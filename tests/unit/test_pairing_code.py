@@ -217,9 +217,9 @@ def test_one_proof_at_a_time_and_for_seconds() -> None:
     assert said(desk.receive(b"b", Commit(0, bytes(32)), S)) == [Refuse(Refused.WRONG)]
     assert desk.receive(b"b", Refuse(Refused.CLOSED), S) == []
     assert desk.is_proving(b"a")
-    word: Word | None = first.receive(commit)
-    while word is not None:
-        word = first.receive(said(desk.receive(b"a", word, S))[0])
+    answer = first.receive(commit)
+    while answer is not None:
+        answer = first.receive(said(desk.receive(b"a", answer, S))[0])
     assert first.proved
     for number in range(TRIES):
         asking = Asking(HOST, chance(8 + number))
