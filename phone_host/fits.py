@@ -141,16 +141,30 @@ def _free_line(x: Values, y: Values) -> tuple[float, float]:
     return float(solution[0]) - slope * middle, slope
 
 
+def neighbours(size: int, count: int, generator: np.random.Generator) -> NDArray[np.int64]:
+    """Draw from a series with its neighbours together (moving blocks), so that what comes in spells still does.
+
+    Args:
+        size: of the series, 1 at least.
+        count: how many are wanted.
+        generator: for the draws.
+
+    Returns:
+        (count,) indices into the series.
+    """
+    block = max(1, min(_BLOCK, size // _LEAST_BLOCKS))
+    starts = generator.integers(0, size - block + 1, -(-count // block))
+    indices: NDArray[np.int64] = (starts[:, np.newaxis] + np.arange(block)).ravel()[:count]
+    return indices
+
+
 def _blocks(x: Values, draws: int, generator: np.random.Generator) -> list[NDArray[np.int64]]:
     """Indices of resampled series that have more than one size."""
-    block = max(1, min(_BLOCK, x.size // _LEAST_BLOCKS))
-    count = -(-x.size // block)
     chosen: list[NDArray[np.int64]] = []
     for _ in range(_TRIES * draws):
         if len(chosen) == draws:
             break
-        starts = generator.integers(0, x.size - block + 1, count)
-        indices = (starts[:, np.newaxis] + np.arange(block)).ravel()[: x.size]
+        indices = neighbours(x.size, x.size, generator)
         if x[indices].min() < x[indices].max():
             chosen.append(indices)
     return chosen

@@ -1,9 +1,10 @@
 """A pair's way as a chain of queues, run forward in time: what rate, delays and losses follow from a setting. Pure.
 
 No distribution is assumed. Cameras are clocks, so arrivals are periodic (D), not Poisson; what a frame costs on the link follows from its bytes; what it
-costs in processing is drawn from what was measured (G). There is one link, one worker, and a bounded queue before each: D/G/1 queues with
-loss, in tandem. Their exact recursion, event after event, is Lindley's (D. V. Lindley, "The theory of queues with a single server",
-Mathematical Proceedings of the Cambridge Philosophical Society 48, 1952), with the outbox's and the FIFO's rules for what gives way.
+costs in processing is drawn from what was measured (G), neighbours together, because a busy machine is slow in spells. There is one link, one worker,
+and a bounded queue before each: D/G/1 queues with loss, in tandem. Their exact recursion, event after event, is Lindley's (D. V. Lindley, "The theory
+of queues with a single server", Mathematical Proceedings of the Cambridge Philosophical Society 48, 1952), with the outbox's and the FIFO's rules
+for what gives way.
 All times in ns; draws come from a generator that is passed in.
 """
 
@@ -14,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from phone_host.fits import neighbours
 from phone_host.sync.fifo import FifoSettings, Overflow
 
 Values = NDArray[np.float64]
@@ -169,7 +171,8 @@ def predict(setting: Setting, frames: int, random: np.random.Generator) -> Predi
     """
 
     def drawn(values: Values) -> Values:
-        return random.choice(values, frames)
+        chosen: Values = values[neighbours(values.size, frames, random)]
+        return chosen
 
     exposed_ns = np.arange(frames) * setting.period_ns
     # A driver gives frames in their order: none overtakes the one before.

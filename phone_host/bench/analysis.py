@@ -26,14 +26,17 @@ from phone_host.prediction import (
     learn_link,
     measured,
     nominal_link,
-    replayed,
     values_of,
+    with_own_delays,
 )
 from phone_host.queue_model import LinkModel
 from phone_host.regime import Judgement, judge
 from phone_host.sync.fifo import FifoSettings, Overflow
 
 _SELF_PACED: Final = ("serial", "rfcomm")
+
+_ENOUGH_PAIRS: Final = 10
+"""A rate told by fewer is itself off by more than a tenth."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,12 +60,14 @@ class Checked:
 
     Attributes:
         case: which.
+        pairs: that it gave.
         measured: the run.
         predicted: from the others; or why not.
         queues: what the queues make of the run's own link, capture and processing: what differs from the run is the model's own error.
     """
 
     case: Case
+    pairs: int
     measured: Figures
     predicted: Figures | Unknown
     queues: Figures | Unknown
@@ -70,7 +75,7 @@ class Checked:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """How far predictions were from measurements, relative, 0 = not at all; NaN without predictions.
+    """How far predictions were from measurements, relative, 0 = not at all; NaN without predictions. Runs of a few pairs are left out.
 
     Attributes:
         runs: how many were predicted.
@@ -121,12 +126,12 @@ class Analysis:
     @property
     def held_out(self) -> Errors:
         """Of each run predicted from the others."""
-        return _errors([(one.measured, one.predicted) for one in self.checked if isinstance(one.predicted, Figures)])
+        return _errors([(one, one.predicted) for one in self.checked])
 
     @property
     def queues(self) -> Errors:
         """Of the queues alone, with each run's own link and processing."""
-        return _errors([(one.measured, one.queues) for one in self.checked if isinstance(one.queues, Figures)])
+        return _errors([(one, one.queues) for one in self.checked])
 
 
 def analyse(results: Sequence[CaseResult], fifo: FifoSettings, changes: Sequence[Change] = ()) -> Analysis:
@@ -140,7 +145,7 @@ def analyse(results: Sequence[CaseResult], fifo: FifoSettings, changes: Sequence
     useful = [result for result in results if result.ledgers]
     cells = [_cell(result, fifo) for result in useful]
     checked = [
-        Checked(result.case, measured(cell), held_out(cell, cells), replayed(cell, cells))
+        Checked(result.case, len(result.ledgers), measured(cell), held_out(cell, cells), with_own_delays(cell, cells))
         for result, cell in zip(useful, cells, strict=True)
     ]
     by_interface: dict[str, list[CaseResult]] = {}
@@ -183,7 +188,8 @@ def typical_and_slow(result: CaseResult) -> tuple[int, int]:
     return int(order[last // 2]), int(order[round(0.99 * last)])
 
 
-def _errors(pairs: Sequence[tuple[Figures, Figures]]) -> Errors:
+def _errors(runs: Sequence[tuple[Checked, Figures | Unknown]]) -> Errors:
+    pairs = [(one.measured, said) for one, said in runs if isinstance(said, Figures) and one.pairs >= _ENOUGH_PAIRS]
     if not pairs:
         return Errors(0, *[float("nan")] * 4)
     rate = np.abs([said.pairs_per_s / seen.pairs_per_s - 1.0 for seen, said in pairs])

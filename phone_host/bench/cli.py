@@ -224,8 +224,8 @@ def _print(results: "Sequence[CaseResult]", under: "Conditions", analysis: "Anal
     console.print(f"{under.machine}, {under.date}, matcher {under.matcher}", soft_wrap=True)
     for group in grouped(results):
         table = Table(title=f"{group[0].case.images}, delays in ms", title_justify="left")
-        for name in ("stage", "link"):
-            table.add_column(name)
+        table.add_column("stage")
+        table.add_column("link", overflow="fold")  # a board's URI is long, and its end is what tells it from another
         for name in PERCENTILES:
             table.add_column(name, justify="right")
         for row in rows(group):

@@ -32,9 +32,21 @@ def checked(text: str) -> list[dict[str, Any]]:
                 assert isinstance(event["cat"], str)
             case other:
                 raise AssertionError(f"a phase that we do not write: {other}")
+    check_order(events)
     check_nesting(events)
     check_flows(events)
     return events
+
+
+def check_order(events: list[dict[str, Any]]) -> None:
+    """Names come first and once for each process and thread, and every process that shows anything has one; then all events by their time."""
+    names = [event for event in events if event["ph"] == "M"]
+    shown = events[len(names) :]
+    assert all(event["ph"] != "M" for event in shown)
+    said = [(event["name"], event["pid"], event["tid"]) for event in names]
+    assert len(said) == len(set(said))
+    assert {event["pid"] for event in shown} <= {pid for name, pid, _ in said if name == "process_name"}
+    assert all(before["ts"] <= after["ts"] for before, after in pairwise(shown))
 
 
 def check_nesting(events: list[dict[str, Any]]) -> None:

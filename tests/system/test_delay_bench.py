@@ -199,7 +199,8 @@ def test_a_matrix_foretells_each_run_from_the_others(tmp_path: Path) -> None:
     assert slower["pair_rate_hz"] <= 1.01 * as_run["pair_rate_hz"]
     assert slower["end_to_end_p50_ms"] > 2 * as_run["end_to_end_p50_ms"]
     errors = report["prediction_errors"]
-    assert errors["held_out"]["predicted_runs"] == errors["queues_alone"]["predicted_runs"] == 4
+    enough = sum(run["measured_pairs"] >= 10 for run in report["runs"])
+    assert errors["held_out"]["predicted_runs"] == errors["queues_alone"]["predicted_runs"] == enough
     assert {one["link"] for one in report["not_run_settings"]} > {"bluetooth (serial)", "wifi (tcp)"}
     # A frame of the greatest runs over 115200 baud: 11 520 bytes a second, and no result comes faster than a frame.
     asked = settings["fps=5,link=uart"]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phone_host.fits import fit_delay
+from phone_host.fits import fit_delay, neighbours
 
 
 @given(st.floats(1e4, 1e8), st.floats(0.1, 1e5), st.integers(2, 200))
@@ -114,3 +114,13 @@ def test_a_line_that_would_begin_below_zero_is_the_best_one_through_zero() -> No
     assert (fit.latency_ns, fit.ns_per_byte) == (0.0, nearest)
     falling = fit_delay(size, 9e7 - 1000.0 * size, draws=0)
     assert (falling.latency_ns, falling.bytes_per_s) == (float(np.median(9e7 - 1000.0 * size)), math.inf)
+
+
+@given(st.integers(1, 500), st.integers(1, 500), st.integers(0, 99))
+def test_neighbours_are_drawn_together(size: int, count: int, seed: int) -> None:
+    """As many as wanted, all out of the series, and of a long one at most every fifteenth begins elsewhere than behind the one before."""
+    drawn = neighbours(size, count, np.random.default_rng(seed))
+    assert drawn.size == count
+    assert 0 <= drawn.min() <= drawn.max() < size
+    jumps = int((np.diff(drawn) != 1).sum())
+    assert jumps <= count // max(1, min(15, size // 8))

@@ -19,7 +19,7 @@ from phone_host.prediction import (
     learn_link,
     measured,
     nominal_link,
-    replayed,
+    with_own_delays,
 )
 from phone_host.sync.fifo import FifoSettings, Overflow
 
@@ -79,7 +79,7 @@ def test_a_cell_gives_nothing_to_its_own_prediction() -> None:
 
 
 def test_a_machine_that_was_slower_in_other_runs_is_no_error_of_the_queues() -> None:
-    """A cell replayed with its own delays gives its own figures, however slow processing was in the others, from which the prediction suffers."""
+    """A cell with_own_delays with its own delays gives its own figures, however slow processing was in the others, from which the prediction suffers."""
     target = cell(size_bytes=20_000, period_ms=50)
     others = [cell(), cell(size_bytes=40_000, period_ms=100)]
     slow = [
@@ -87,7 +87,7 @@ def test_a_machine_that_was_slower_in_other_runs_is_no_error_of_the_queues() -> 
         for other in others
     ]
     cells = [target, *slow]
-    again, true = figures(replayed(target, cells)), measured(target)
+    again, true = figures(with_own_delays(target, cells)), measured(target)
     for name in ("propagation_p50_ns", "end_to_end_p50_ns", "end_to_end_p95_ns", "starvation_p50_ns", "pairs_per_s"):
         assert getattr(again, name) == pytest.approx(getattr(true, name), rel=0.01)
     from_others = figures(held_out(target, cells))
@@ -169,3 +169,26 @@ def test_a_line_that_noise_has_tilted_gives_no_negative_delay(latency_ns: int, n
     assert link.ns_per_byte >= 0.0
     middle = link.latency_ns + link.ns_per_byte * 20_000 + float(np.median(link.spread_ns))
     assert middle == pytest.approx(latency_ns + ns_per_byte * 20_000, rel=0.3)
+
+
+def test_a_line_is_as_fast_as_it_takes_frames() -> None:
+    """Where a self-paced link begins a frame every 9 ms, its line takes 9 ms for one, though propagation grows by 12 ms with the bytes of one."""
+    hurried = replace(cell(period_ms=9), self_paced=True)
+    small = replace(cell(size_bytes=5_000), self_paced=True)
+
+    def held_up(one: Cell, more_ns: int) -> Cell:
+        return replace(
+            one, ledgers=tuple(replace(each, received_ns=each.received_ns + more_ns) for each in one.ledgers)
+        )
+
+    cells = [held_up(hurried, 2 * MS), held_up(small, 1 * MS)]
+    link = learn_link("tcp", hurried.images, cells)
+    assert not isinstance(link, Unknown)
+    assert link.ns_per_byte == pytest.approx(9 * MS / 10_000)
+    # The delays are what they were: 14 ms for the larger, 8 ms for the smaller.
+    typical = {size: link.latency_ns + link.ns_per_byte * size for size in (10_000, 5_000)}
+    left = sorted({round(typical[10_000] + spread) for spread in link.spread_ns[:50]})
+    assert left == [pytest.approx(14 * MS, rel=1e-3)]
+    free = learn_link("tcp", hurried.images, [replace(one, self_paced=False) for one in cells])
+    assert not isinstance(free, Unknown)
+    assert free.ns_per_byte == pytest.approx(12 * MS / 10_000, rel=1e-3)
