@@ -36,6 +36,9 @@ _FAREWELL_NS: Final = 300_000_000
 _FULL_RETRY_NS: Final = 2_000_000
 """A frame that may not be dropped is offered again after this time to a link that was full; ZeroMQ does not say when it has room."""
 
+_LEAST_SLEEP_NS: Final = 5_000_000
+"""A shorter sleep would spoil no pair; a process that is held up between two readings of clocks makes less than nothing of it."""
+
 _LONGEST_WAIT_MS: Final = 1000
 
 _CAMERA_RETRY_MS: Final = 500
@@ -141,6 +144,7 @@ class Agent:
         self._service = service
         self._idle_ns = idle_ns
         self._alone_since_ns = now.monotonic_ns()
+        self._asleep_ns = max(now.asleep_ns() for _ in range(3))  # held up between its readings, one says less
         self._camera = camera
         self._links = links
         self._several = SeveralLinks(links)
@@ -177,6 +181,7 @@ class Agent:
                 self._grab(now_ns)
             if later_ns := self._session.take_steering():
                 self._camera.steer(later_ns, now_ns)
+            self._watch_clock()
             self._flush()
             if self._control is not None and self._control.is_due(now_ns):
                 self._adapt(self._control, now_ns)
@@ -276,6 +281,16 @@ class Agent:
                     self._outbox.skipped(frames)
                 case Ended():
                     self._camera_ended = True
+
+    def _watch_clock(self) -> None:
+        """Notice that the machine has slept. A frame from before is dropped: between its exposure and its sending the clock stood still."""
+        slept_ns = now.asleep_ns() - self._asleep_ns
+        if slept_ns < _LEAST_SLEEP_NS:
+            return
+        self._asleep_ns += slept_ns
+        self._outbox.discard(DropReason.NO_HOST)
+        self._session.begin_clock(now.random_id())
+        _LOG.info(event("slept", session=self._session.session, seconds=round(slept_ns / 1e9, 1)))
 
     def _flush(self) -> None:
         """Send the waiting frame if there is credit for it."""

@@ -10,6 +10,14 @@ def monotonic_ns() -> int:
     return time.monotonic_ns()
 
 
+def asleep_ns() -> int:
+    """How long this machine has slept since it booted, ns: CLOCK_MONOTONIC stands still in a suspend, CLOCK_BOOTTIME goes on.
+
+    At most that: what passes between the two readings makes it less, never more. 0 where the kernel has no clock that runs on.
+    """
+    return time.clock_gettime_ns(time.CLOCK_BOOTTIME) - time.monotonic_ns() if hasattr(time, "CLOCK_BOOTTIME") else 0
+
+
 def wall_time() -> str:
     """Local wall time as ISO 8601 to the second, for reports only; nothing is ever computed from it."""
     return time.strftime("%Y-%m-%dT%H:%M:%S%z")

@@ -95,7 +95,7 @@ class BoardSession:
 
     Args:
         session: random id of this process's life.
-        boot_id: id of the machine's boot.
+        boot_id: names the life of the machine's clock.
         camera: what the host must know of the camera.
         dialled: the connections that this side opened itself (`?connect=1`), of all links; empty when the host dials.
     """
@@ -131,6 +131,15 @@ class BoardSession:
         """Number of the link that frames go to; None while they go nowhere."""
         host = self._host
         return None if host is None or host.frames is None else host.frames[0]
+
+    def begin_clock(self, boot_id: str) -> None:
+        """Take note that this machine has slept and its clock stood still: the host is to greet anew, and to learn the clock from the start.
+
+        Args:
+            boot_id: names the new life of the clock.
+        """
+        self._boot_id = boot_id
+        self._host = None
 
     def describe(self, camera: CameraDescription, rung: Rung) -> None:
         """Take note that the camera gives something else from now on; the host is told with the next account, which is due now.

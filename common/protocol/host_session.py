@@ -81,6 +81,7 @@ class HostSession:
         self._streams = False
         self._leaving = False
         self._hello: BoardHello | None = None
+        self._boot_id = ""
         self._changes = 0
         self._next_index = 0
         self._below_index = 0
@@ -217,7 +218,9 @@ class HostSession:
     def _open(self, path: HostPath, hello: BoardHello, now_ns: int) -> list[Output]:
         """Take a board's hello on a control lane."""
         if path.hello is not None:
-            return []  # the answer to a hello that was said twice
+            if path.hello.boot_id == hello.boot_id:
+                return []  # the answer to a hello that was said twice
+            return self._lose(path, now_ns) + self._open(path, hello, now_ns)  # the board has slept
         others = [other for other in self._paths if other.hello is not None and other.hello.session != hello.session]
         path.session = hello.session
         alive = [other for other in others if other.is_alive_beside(hello, now_ns)]
@@ -225,6 +228,7 @@ class HostSession:
             return self._doubt(path, hello, max(other.heard_ns for other in alive), now_ns)
         outputs = [output for other in others for output in self._lose(other, now_ns)]
         path.open(hello, now_ns)
+        self._boot_id = hello.boot_id
         outputs.append(LinkUp(path.link, hello))
         return outputs if self._wanted is not None else outputs + self._want(path, now_ns)
 
@@ -286,8 +290,8 @@ class HostSession:
         """Take a board's hello on a frames' lane."""
         if path.hello is None:
             return []
-        if path.hello.session != hello.session:
-            return self._lose(path, now_ns)  # the board began a new life between the two lanes
+        if (path.hello.session, path.hello.boot_id) != (hello.session, hello.boot_id):
+            return self._lose(path, now_ns)  # the board began a new life between the two lanes, or slept
         if path is not self._wanted:
             # The answer to a hello of a while ago: the board may send its frames there now.
             return [] if self._wanted is None else self._want(self._wanted, now_ns)
@@ -308,6 +312,8 @@ class HostSession:
     def _take_frame(self, path: HostPath, frame: FrameMessage, now_ns: int) -> list[Output]:
         if self._hello is None or frame.session != self._hello.session:
             return [Stale(frame, StaleReason.OLD_SESSION)]
+        if self._hello.boot_id != self._boot_id:
+            return [Stale(frame, StaleReason.OLD_SESSION)]  # sent before a sleep; its marks are of the clock before
         index = frame.sent_index
         if index < self._next_index:
             if index not in self._missing:

@@ -67,6 +67,7 @@ class HostNode:
     wires: dict[Place, Wire] = field(default_factory=dict)
     names: dict[Place, bytes] = field(default_factory=dict)
     board_session: str = ""
+    boot_id: str = ""
     base_sent: int = 0
     received: int = 0
     lost: int = 0
@@ -93,6 +94,8 @@ class World:
         self.lives = 0
         self.sent: dict[str, int] = {}
         self.credit: dict[str, int] = {}
+        self.boot_id = "boot"
+        self.clocks: dict[tuple[str, int], str] = {}
         self.camera_runs = True
         self.wires: dict[bytes, tuple[HostNode, Place, Wire]] = {}
         self.hosts: list[HostNode] = []
@@ -112,6 +115,12 @@ class World:
         for host in self.hosts:
             for place in self.places:
                 self.break_lane(host, place)
+
+    def sleep_board(self) -> None:
+        """The board's machine is suspended and wakes: its clock stood still."""
+        self.lives += 1
+        self.boot_id = f"boot-{self.lives}"
+        self.board.begin_clock(self.boot_id)
 
     def restart_host(self, host: HostNode) -> HostNode:
         """A host's process dies without a word and a new one begins."""
@@ -201,6 +210,7 @@ class World:
             frame = Frame(index, stamp, stamp, 640, 480, PixelFormat.MJPEG, None, b"")
             if self._board_sends(self.board.send(frame)):
                 self.board.sent()
+                self.clocks[self.board.session, index] = self.boot_id
                 self.sent[self.board.session] += 1
 
     def settle(self, duration_ns: int = 2000 * MS) -> None:
@@ -235,7 +245,7 @@ class World:
         session = f"board-{self.lives}"
         self.sent[session] = 0
         dialled = tuple((place[1], _dialled(place)) for place in self.places) if self.board_dials else ()
-        return BoardSession(session, "boot", CAMERA, dialled)
+        return BoardSession(session, self.boot_id, CAMERA, dialled)
 
     def _board_name(self, host: HostNode, place: Place) -> bytes:
         if self.board_dials:
@@ -289,6 +299,8 @@ class World:
                 case Arrived(frame, lost, _):
                     assert lost >= 0
                     assert frame.session == host.board_session, "a frame of an old session was taken"
+                    known = self.clocks.get((frame.session, frame.sent_index), host.boot_id)
+                    assert known == host.boot_id, "a frame was taken by a clock that is not its own"
                     newest = host.arrived[-1] if host.arrived else ("", -1)
                     assert newest[0] != frame.session or newest[1] < frame.sent_index, "a frame was taken twice or late"
                     host.arrived.append((frame.session, frame.sent_index))
@@ -299,7 +311,10 @@ class World:
                 case Counted(_, _, lost):
                     assert lost >= 0
                     host.lost += lost
-                case Echo() | Refused() | Vanished() | LinkUp() | LinkDown() | OtherBoard() | Stepped():
+                case LinkUp(_, hello):
+                    host.boot_id = hello.boot_id
+                    host.others.append(output)
+                case Echo() | Refused() | Vanished() | LinkDown() | OtherBoard() | Stepped():
                     host.others.append(output)
 
     def _host_sends(self, host: HostNode, connection: bytes, message: Message) -> None:

@@ -58,6 +58,7 @@ class What(Enum):
     BREAK = auto()
     RESTART_BOARD = auto()
     RESTART_HOST = auto()
+    SLEEP_BOARD = auto()
     RETURN_FRAME = auto()
     WAIT = auto()
 
@@ -102,6 +103,8 @@ def happen(world: World, event: Event, seen: list[FrameMessage]) -> None:
             world.restart_board()
         case What.RESTART_HOST:
             world.restart_host(host)
+        case What.SLEEP_BOARD:
+            world.sleep_board()
         case What.RETURN_FRAME:
             if seen:
                 world.inject(host, seen[event.amount % len(seen)])
@@ -136,10 +139,34 @@ def test_frames_flow_again_and_every_one_is_accounted_for(
     before = len(host.arrived)
     world.settle(200 * MS)
     assert len(host.arrived) >= before + 4
-    assert host.board_session == world.board.session
+    assert (host.board_session, host.boot_id) == (world.board.session, world.boot_id)
     world.camera_runs = False
     world.settle(2 * STATUS_NS)
     assert world.sent[host.board_session] == host.base_sent + host.received + host.lost
+
+
+@pytest.mark.parametrize("board_dials", [False, True])
+def test_a_board_that_has_slept_is_greeted_anew(*, board_dials: bool) -> None:
+    """After a sleep the host learns the clock anew in the same session, and a frame that was under way then is none of the new clock's."""
+    world = World(board_dials=board_dials)
+    host = world.hosts[0]
+    host.slots = 2
+    world.settle(500 * MS)
+    session, before = host.board_session, len(host.arrived)
+    world.pass_time(20 * MS)  # a frame leaves
+    assert world.sent[session] == host.base_sent + before + 1
+    world.sleep_board()
+    while host.boot_id != world.boot_id:  # the frames' lane is slow
+        world.pass_time(20 * MS)
+        for to_board in (True, False):
+            world.deliver(host, (0, Lane.CONTROL), to_board=to_board)
+    world.settle()
+    assert host.board_session == session
+    assert len(host.arrived) > before
+    assert [stale.reason for stale in host.stale] == [StaleReason.OLD_SESSION]
+    world.camera_runs = False
+    world.settle(2 * STATUS_NS)
+    assert world.sent[session] == host.base_sent + host.received + host.lost
 
 
 @given(events=EVENTS, board_dials=st.booleans(), slots=st.integers(1, 4))

@@ -1,0 +1,76 @@
+"""A board that sleeps: its CLOCK_MONOTONIC, which all stamps are of, stands still while the host's goes on."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.vm.conftest import booted
+from tests.vm.guest import Architecture, Guest
+from tests.vm.stream import Film, Skew, check_journal, streaming
+from tests.vm.webcam import Webcam
+
+pytestmark = pytest.mark.timeout(600)  # the first test boots the board
+
+SLEEP_S = 1
+"""Shorter than the silence after which a host gives its board up: then nothing but the board itself tells of it."""
+
+
+@pytest.fixture(scope="module")
+def bare_guest() -> Iterator[Guest]:
+    """A board of this file's own: QEMU 7.2 wakes a guest well once."""
+    with booted(Architecture.AMD64) as guest:
+        yield guest
+
+
+@pytest.fixture(autouse=True)
+def _sound_afterwards(guest: Guest, webcam: Webcam) -> Iterator[None]:
+    """After each test the service is up, its books balance and it has never shown a traceback."""
+    assert webcam.plugged
+    yield
+    check_journal(guest)
+
+
+def offset_ns(guest: Guest) -> int:
+    """Guest's clock minus this machine's."""
+    clock = guest.clock()
+    found_ns, _ = clock.offset_ns()
+    clock.close()
+    return found_ns
+
+
+def test_a_board_that_was_suspended_streams_on(
+    guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
+) -> None:
+    """Suspended to memory and woken, the board goes on in the same session; its clock is learnt anew, no pair is wrong."""
+    with streaming(guest, film.right, tmp_path / "out") as stream:
+        stream.more(10, "before the sleep")
+        before_ns = offset_ns(guest)
+        webcam.unplug()  # a USB port without power has no camera
+        guest.suspend()
+        time.sleep(SLEEP_S)  # the length of the sleep, no wait for anything
+        guest.wake()
+        webcam.plug(guest)
+        stream.more(20, "after the sleep")
+        assert before_ns - offset_ns(guest) > SLEEP_S * 900_000_000, "the board's clock stood still"
+        report = stream.finish(skew)
+    assert len(report["sessions"]) == 1
+    assert "slept" in guest.journal()
+
+
+@pytest.mark.parametrize("pause_s", [1, 6], ids=["briefly", "long"])
+def test_a_board_whose_machine_stood_still_streams_on(
+    guest: Guest, film: Film, skew: Skew, tmp_path: Path, *, pause_s: int
+) -> None:
+    """Stopped with its camera streaming, and unaware of it as a virtual machine is, the board goes on in the same session; no pair is wrong."""
+    with streaming(guest, film.right, tmp_path / "out") as stream:
+        stream.more(10, "before the stop")
+        before_ns = offset_ns(guest)
+        guest.tell_emulator("stop")
+        time.sleep(pause_s)  # the length of the stop, no wait for anything
+        guest.tell_emulator("cont")
+        stream.more(20, "after the stop")
+        assert before_ns - offset_ns(guest) > pause_s * 900_000_000, "the board's clock stood still"
+        report = stream.finish(skew)
+    assert len(report["sessions"]) == 1
