@@ -56,6 +56,7 @@ class OurHost:
 
     Attributes:
         ages_ns: of each frame when it came, since its exposure.
+        first_ns: when the first frame came; 0 before it.
 
     Args:
         address: of the board's link.
@@ -63,7 +64,7 @@ class OurHost:
     """
 
     def __init__(self, address: str, period_ns: int) -> None:
-        self.frames = self.bytes = 0
+        self.frames = self.bytes = self.first_ns = 0
         self.ages_ns = array("q")
         counter = self
 
@@ -71,6 +72,7 @@ class OurHost:
             """Ends the frames' way."""
 
             def add_board(self, frame: BoardFrame) -> int:
+                counter.first_ns = counter.first_ns or frame.received_ns
                 counter.frames += 1
                 counter.bytes += len(frame.message.payload)
                 counter.ages_ns.append(frame.received_ns - frame.marks.exposed_ns)
