@@ -2,6 +2,10 @@
 
 A link has named byte paths (connections). The side that dials opens one for each lane; the side that listens learns of a connection when
 its first packet arrives. A link never blocks, never decides what a packet means, and is used by one thread only, save `Link.close`.
+
+A packet that was taken may be lost: with its connection, with bytes that a wire loses without a word, or when nobody acknowledges it for a second on a
+link that paces itself. Then all of it is lost and the next one comes whole; a frame's loss shows as a gap in `sent_index`, and what else must be
+heard is said until it is answered.
 """
 
 from collections.abc import Iterator, Sequence

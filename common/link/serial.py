@@ -62,9 +62,15 @@ class SerialLine:
             termios.tcflush(self._fd, termios.TCOFLUSH)
 
     def close(self) -> None:
-        """Close; what has not left is thrown away, because a UART's close may wait for it for half a minute."""
+        """Close; what has not left is thrown away, because a UART's close may wait for it for half a minute.
+
+        So is what has come and was not read: a gadget's port that is closed while it holds the host back never hears it again (Linux 6.1,
+        drivers/usb/gadget/function/u_serial.c: only reading lets it take more, and there is nothing left to be read).
+        """
         if not self.is_drained():
             self.discard_output()
+        with suppress(termios.error):
+            termios.tcflush(self._fd, termios.TCIFLUSH)
         with suppress(OSError, termios.error):
             self._port.close()
 

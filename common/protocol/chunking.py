@@ -29,6 +29,9 @@ _QUEUE_PACKETS: Final = 32
 _ABANDON_NS: Final = 1000 * MS
 """A frame of which nothing was acknowledged for this long is given up: who comes back shall have a fresh one."""
 
+_ATTENTION_NS: Final = 100 * MS
+"""At most so much of the time between two looks counts as silence: who was not awake has not listened (an emulated board slept for seconds)."""
+
 _KIND_OF: Final = {Lane.FRAMES: UnitKind.FRAMES, Lane.CONTROL: UnitKind.CONTROL}
 _LANE_OF: Final = {kind: lane for lane, kind in _KIND_OF.items()}
 
@@ -49,7 +52,6 @@ class _Parcel:
     head: bytes
     payload: memoryview
     at: int = 0
-    begun_ns: int = 0
 
     @property
     def size_bytes(self) -> int:
@@ -81,6 +83,8 @@ class Cutter:
         self._acknowledge: int | None = None
         self._window = Window(frame_bytes)
         self._abandoned = 0
+        self._looked_ns = 0
+        self._silent_ns = 0
 
     @property
     def bytes_per_s(self) -> float:
@@ -101,7 +105,9 @@ class Cutter:
     def due_ns(self) -> int:
         """When `take` wants to be called next even if nothing has happened; 2^63 - 1: never."""
         queue = self._queues[Lane.FRAMES]
-        return min(self._window.due_ns, self._abandon_ns(queue[0])) if queue else self._window.due_ns
+        if not queue or not queue[0].at:
+            return self._window.due_ns
+        return min(self._window.due_ns, self._looked_ns + min(_ATTENTION_NS, _ABANDON_NS - self._silent_ns))
 
     def ready(self, lane: Lane) -> bool:
         """Whether a packet with a payload would be taken now: none is on its way on that lane, and its first chunk may leave at once."""
@@ -134,7 +140,8 @@ class Cutter:
 
     def acknowledged(self, number: int, now_ns: int) -> None:
         """Take the peer's word of the newest FRAMES unit that came to it."""
-        self._window.acknowledged(number, now_ns)
+        if self._window.acknowledged(number, now_ns):
+            self._silent_ns = 0
 
     def take(self, now_ns: int) -> bytes:
         """Give the next bytes to write; they are to be written before any others are taken.
@@ -147,9 +154,7 @@ class Cutter:
         """
         self._window.tick(now_ns)
         frames = self._queues[Lane.FRAMES]
-        if frames and now_ns >= self._abandon_ns(frames[0]):
-            frames.popleft()
-            self._abandoned += 1
+        self._listen(now_ns)
         parts: list[Buffer] = []
         size = 0
         if self._acknowledge is not None:
@@ -163,7 +168,6 @@ class Cutter:
             chunk = self._window.chunk_bytes
             if not self._window.has_room(chunk + UNIT_OVERHEAD_BYTES):
                 return b"".join(parts)
-            frames[0].begun_ns = frames[0].begun_ns or now_ns
             number = self._numbers[Lane.FRAMES]
             written = self._cut(Lane.FRAMES, chunk, parts)
             self._window.sent(number, written, now_ns)
@@ -182,9 +186,18 @@ class Cutter:
         self._numbers[lane] = (self._numbers[lane] + 1) % _NUMBERS
         return len(body) + UNIT_OVERHEAD_BYTES
 
-    def _abandon_ns(self, parcel: _Parcel) -> int:
-        """When a packet is to be given up; never before its first chunk was written."""
-        return max(parcel.begun_ns, self._window.acknowledged_ns) + _ABANDON_NS if parcel.at else _NEVER
+    def _listen(self, now_ns: int) -> None:
+        """Give a frame up that has begun to leave and of which nothing was heard for too long."""
+        passed_ns = min(now_ns - self._looked_ns, _ATTENTION_NS)
+        self._looked_ns = now_ns
+        frames = self._queues[Lane.FRAMES]
+        if not frames or not frames[0].at:
+            self._silent_ns = 0
+            return
+        self._silent_ns += passed_ns
+        if self._silent_ns >= _ABANDON_NS:
+            frames.popleft()
+            self._abandoned += 1
 
 
 @dataclass(slots=True)

@@ -6,7 +6,8 @@ keep a slow line busy.
 The rate is the largest delivery rate of late, a sample being what arrived between a unit's writing and its acknowledgement over that time
 (Cheng et al., "Delivery Rate Estimation", draft-cheng-iccrg-delivery-rate-estimation-02). As a busy line always holds a queue, the least
 round trip is measured anew every ten seconds with the line let run empty (BBR's ProbeRTT, draft-cardwell-iccrg-bbr-congestion-control-02,
-4.3.4). Lengths of a tty's output queue are not asked for: drivers and adapters tell less than they hold.
+4.3.4). Where acknowledgements again and again leave nothing under way although more waited to be written, the line is not full: one of the
+two programs is seldom awake, or an adapter hands bytes on in heaps. Then the 10 ms become more, until the line no longer runs empty. Lengths of a tty's output queue are not asked for: drivers and adapters tell less than they hold.
 """
 
 from collections import deque
@@ -24,6 +25,12 @@ _CHUNK_NS: Final = 2_500_000
 """A chunk takes this long on the line: a quarter of the slack, so that the line does not run empty between two acknowledgements."""
 
 _SLACK_NS: Final = 10 * MS
+
+_MOST_SLACK_NS: Final = 500 * MS
+"""Round trips of 200 ms were seen between two programs on a board with six busy others; least ones of 7 ms beside them."""
+
+_MOST_AHEAD_BYTES: Final = 256 * 1024
+"""What such a slack may come to: less than the 640 KB that Linux holds for a tty (drivers/tty/tty_buffer.c) and drops what is more."""
 
 _RATE_SPAN_NS: Final = 1000 * MS
 """The rate is the largest of this span and the one before: a line that has become slower is believed after two seconds."""
@@ -78,8 +85,9 @@ class Window:
         self._round_trip_at_ns = 0
         self._smooth_ns = 0
         self._probing = False
+        self._slack_ns = _SLACK_NS
+        self._ran_empty = False
         self._progress_ns = 0
-        self._acknowledged_ns = 0
         self._backoff = 1
 
     @property
@@ -102,14 +110,11 @@ class Window:
         if self._backoff > 1 or not rate:
             return 2 * least_bytes
         own_bytes = min(self._round_trip_bytes, rate * _SLACK_NS / 2)
-        limit = max(2 * least_bytes, int(rate * (self._round_trip_ns + _SLACK_NS) - own_bytes))
+        limit = int(rate * (self._round_trip_ns + _SLACK_NS) - own_bytes)
+        more = int(rate * (self._slack_ns - _SLACK_NS))
+        limit = max(2 * least_bytes, limit, min(limit + more, _MOST_AHEAD_BYTES))
         # On a slow line the slack is less than a chunk: without a whole one more than is known to fit, no higher rate would ever be seen.
         return limit if self.chunk_bytes + UNIT_OVERHEAD_BYTES > least_bytes else -(-limit // least_bytes) * least_bytes
-
-    @property
-    def acknowledged_ns(self) -> int:
-        """When word of a unit came last; 0: never."""
-        return self._acknowledged_ns
 
     def has_room(self, size_bytes: int) -> bool:
         """Whether a unit of that size may be written now."""
@@ -137,25 +142,30 @@ class Window:
         if len(self._under_way) > _MOST_REMEMBERED:
             self._forget(self._under_way.popleft())
 
-    def acknowledged(self, number: int, now_ns: int) -> None:
+    def acknowledged(self, number: int, now_ns: int) -> bool:
         """Take note that a unit has come, and with it the fate of all before it is known.
 
         Args:
             number: of the unit; one that is not under way teaches nothing.
             now_ns: any steady clock, ns.
+
+        Returns:
+            Whether it was under way.
         """
         if not self._under_way or (number - self._under_way[0].number) % _NUMBERS >= len(self._under_way):
-            return
+            return False
         while True:
             unit = self._under_way.popleft()
             self._forget(unit)
             self._delivered_bytes += unit.size_bytes
             if unit.number == number:
                 break
-        self._delivered_ns = self._progress_ns = self._acknowledged_ns = now_ns
+        self._delivered_ns = self._progress_ns = now_ns
         self._backoff = 1
         self._first_sent_ns = unit.sent_ns
         self._learn(unit, now_ns)
+        self._adapt_slack()
+        return True
 
     def tick(self, now_ns: int) -> None:
         """Do what time demands: write off what nobody acknowledges, let the line run empty to measure its round trip."""
@@ -179,6 +189,16 @@ class Window:
     def _forget(self, unit: _UnderWay) -> None:
         if unit.counts:
             self._under_way_bytes -= unit.size_bytes
+
+    def _adapt_slack(self) -> None:
+        """Allow for more under way after the second acknowledgement in a row that left the line empty for want of leave."""
+        if self._under_way_bytes:
+            self._ran_empty = False
+            self._slack_ns -= (self._slack_ns - _SLACK_NS) // 8
+        elif not self._probing and self._delivered_bytes > self._starved_until_bytes:
+            if self._ran_empty:
+                self._slack_ns = min(self._slack_ns * 5 // 4, _MOST_SLACK_NS)
+            self._ran_empty = True
 
     def _learn(self, unit: _UnderWay, now_ns: int) -> None:
         round_trip_ns = max(1, now_ns - unit.sent_ns)

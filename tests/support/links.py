@@ -3,12 +3,13 @@
 import os
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import zmq
 
 from common.link.base import Broken, Garbage, Link, Packet, SendResult
+from common.link.stream import StreamLink
 from common.protocol.message import Lane
 
 PATIENCE_S = float(os.environ.get("TEST_PATIENCE_S", "60"))
@@ -49,10 +50,19 @@ def wait_until(condition: Callable[[], bool], *ends: End) -> None:
             poller.register(pollable, zmq.POLLIN)
     deadline = time.monotonic() + PATIENCE_S
     while not condition():
-        assert time.monotonic() < deadline, "the condition was not met in a minute"
+        assert time.monotonic() < deadline, f"the condition was not met in {PATIENCE_S:.0f} s: {_told(ends)}"
         poller.poll(20)
         for end in ends:
             end.take()
+
+
+def _told(ends: Sequence[End]) -> str:
+    """What each end has seen, for whoever must find out why nothing more came."""
+    seen = []
+    for end in ends:
+        lost = f", {end.link.counts}" if isinstance(end.link, StreamLink) else ""
+        seen.append(f"{len(end.packets)} packets, {len(end.broken)} breaks, garbage {end.garbage} times{lost}")
+    return "; ".join(seen)
 
 
 def send_until_sent(end: End, connection: bytes, header: bytes, payload: bytes, *others: End) -> None:

@@ -23,11 +23,13 @@ class Way:
         bytes_per_s: how fast bytes leave; what has not left waits in a queue without end.
         delay_ns: from leaving to arriving.
         spoil: what becomes of the bytes on the way.
+        nap_ns: whoever reads is awake only so often.
     """
 
     bytes_per_s: float
     delay_ns: int
     spoil: Spoil = bytes
+    nap_ns: int = 1
     free_ns: int = 0
 
 
@@ -66,7 +68,8 @@ class VirtualLine:
                     grain = data[at : at + step]
                     way.free_ns += round(len(grain) / way.bytes_per_s * 1e9)
                     self._count += 1
-                    arrival = (way.free_ns + way.delay_ns, self._count, side.peer, way.spoil(grain))
+                    at_ns = -(-(way.free_ns + way.delay_ns) // way.nap_ns) * way.nap_ns
+                    arrival = (at_ns, self._count, side.peer, way.spoil(grain))
                     heapq.heappush(self._arrivals, arrival)
 
     def run(self, until_ns: int, act: Callable[["VirtualLine"], None] = lambda _: None) -> None:

@@ -169,6 +169,25 @@ def test_the_rate_is_learnt() -> None:
     assert made.ends[BOARD].bytes_per_s == pytest.approx(50_000, rel=0.1)
 
 
+@pytest.mark.parametrize(("rate", "frame_bytes"), [(187_500, 25_000), (1_000_000, 250_000)])
+def test_a_reader_that_is_seldom_awake_gets_what_the_line_carries(rate: float, frame_bytes: int) -> None:
+    """When the host comes to read only every 100 ms, the line is still filled, and once it is awake again echoes wait no longer than ever."""
+    made = line(rate)
+    film = Film(frame_bytes)
+    made.run(made.now_ns + 2 * S, film)
+    made.ways[BOARD].nap_ns = 100 * MS
+    made.run(made.now_ns + 8 * S, film)
+    before = len(made.packets(HOST))
+    made.run(made.now_ns + 4 * S, film)
+    frames = [whole for whole in made.packets(HOST)[before:] if whole.lane is Lane.FRAMES]
+    assert frame_bytes * len(frames) / 4 >= 0.8 * rate
+    made.ways[BOARD].nap_ns = 1
+    made.run(made.now_ns + 11 * S, film)  # the least round trip is measured anew every ten seconds
+    settled_ns = made.now_ns
+    made.run(made.now_ns + 2 * S, film)
+    assert max(film.round_trips_ns(made, settled_ns)) < 14 * MS
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_bad_line_loses_frames_and_alters_none(seed: int) -> None:
     """On a line that flips, loses, inserts and swallows, frames come in order, unaltered, and the stream never stops."""
@@ -220,6 +239,30 @@ def test_acknowledgements_that_all_get_lost_do_not_stop_the_stream() -> None:
     made.run(made.now_ns + 5 * S, film)
     later = [at - back_ns for at, event in made.came[HOST] if isinstance(event, Whole) and at > back_ns]
     assert len([at for at in later if at < 4 * S]) > 100
+
+
+def test_only_a_silence_that_was_listened_to_gives_a_frame_up() -> None:
+    """A frame half sent outlives ten seconds in which its own sender slept; after one second of listening in vain it is given up, and counted."""
+    made = line(500_000, MS)
+    board, host = made.ends[BOARD], made.ends[HOST]
+    for sleep_ns, step_ns in ((10 * S, 10 * S), (0, 50 * MS)):
+        assert board.put(Lane.FRAMES, b"header", bytes(8000))
+        first = board.take(made.now_ns)
+        made.now_ns += sleep_ns
+        second = board.take(made.now_ns)
+        assert board.counts.abandoned == 0
+        if sleep_ns:
+            host.feed(first + second, made.now_ns)
+            board.feed(host.take(made.now_ns), made.now_ns)
+            made.run(made.now_ns + S)
+            assert [bytes(whole.payload) for whole in made.packets(HOST)] == [bytes(8000)]
+            continue
+        listened_ns = 0
+        while not board.counts.abandoned:
+            made.now_ns += step_ns
+            listened_ns += step_ns
+            board.take(made.now_ns)
+        assert listened_ns == S
 
 
 @pytest.mark.parametrize("restarts", [BOARD, HOST])
