@@ -82,14 +82,15 @@ class Delays:
 Profile = Callable[[random.Random], Delays]
 
 
-def _least(chance: random.Random, low_ns: float, high_ns: float) -> tuple[float, float]:
+def least_delays(chance: random.Random, low_ns: float, high_ns: float) -> tuple[float, float]:
+    """Draw the least delays there and back, ns: around one base in a range, unequal by up to the near-symmetry."""
     base, unequal = chance.uniform(low_ns, high_ns), chance.uniform(-_ASYMMETRY, _ASYMMETRY)
     return base * (1 + unequal), base * (1 - unequal)
 
 
 def loopback(chance: random.Random) -> Delays:
     """Two processes of one machine: wake-ups, a cold first one, rare spells on the run queue; frames of a MB in front of a third of the answers."""
-    (there, back), scatter = _least(chance, 30 * US, 60 * US), chance.uniform(10 * US, 60 * US)
+    (there, back), scatter = least_delays(chance, 30 * US, 60 * US), chance.uniform(10 * US, 60 * US)
 
     def wake(*, first: bool) -> float:
         late = chance.expovariate(1 / MS) if chance.random() < 0.05 else 0.0
@@ -103,7 +104,7 @@ def loopback(chance: random.Random) -> Delays:
 
 def wifi(chance: random.Random) -> Delays:
     """Least round trip about 2 ms, jitter of 2 to 10 ms on the average both ways, exponential."""
-    (there, back), jitter = _least(chance, 0.6 * MS, 1.2 * MS), chance.uniform(2 * MS, 10 * MS)
+    (there, back), jitter = least_delays(chance, 0.6 * MS, 1.2 * MS), chance.uniform(2 * MS, 10 * MS)
     return Delays(
         lambda _first, _age_ns: there + chance.expovariate(1 / jitter),
         lambda _first, _age_ns: back + chance.expovariate(1 / jitter),
@@ -115,7 +116,7 @@ def loaded_line(bits_per_s: float, least_ns: float, slot_ns: float, wait_ns: flo
     wait = 2 * _UNIT_BYTES * _BITS_PER_BYTE / bits_per_s * 1e9 if wait_ns is None else wait_ns
 
     def draw(chance: random.Random) -> Delays:
-        there, back = _least(chance, 0.8 * least_ns, 1.2 * least_ns)
+        there, back = least_delays(chance, 0.8 * least_ns, 1.2 * least_ns)
 
         def slot() -> float:
             return chance.uniform(0, slot_ns) + chance.expovariate(1 / (30 * US))
