@@ -1,14 +1,19 @@
 """A run's summary and page: what was not measured is said so, never as a number that is none."""
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 
 from common.camera.base import CameraHealth, CameraState
 from common.ledger import BoardMarks, PairLedger, StageTimes
-from phone_host.accounts import LinkAccount
+from common.protocol.message import BoardCounts
+from phone_host.accounts import LinkAccount, SessionAccount
 from phone_host.delays import DelayStatistics
 from phone_host.facts import RunFacts
 from phone_host.model import Side
 from phone_host.pairqueue import PairCounts
+from phone_host.report import build
 from phone_host.results import Unwritten
 from phone_host.run_page import run_page
 from phone_host.summary import phase_lines, summary
@@ -55,3 +60,14 @@ def test_the_phase_is_told_with_its_side() -> None:
         "5.0 of 50.0 ms after the host, drifts by +100.0 ppm, comes round in 500 s"
         in phase_lines(Phase(5.0 * MS, 50 * MS, 1e-4, 0), None)[0]
     )
+
+
+def test_a_late_frame_has_one_reason() -> None:
+    """A lost frame that came after all stays lost and is no stale one, so that what was sent is what was received and lost, to the frame."""
+    sent = BoardCounts(grabbed=10, sent=10)
+    account = SessionAccount("s", BoardCounts(), sent, received=7, lost=3, late=2, duplicate=1)
+    seen = replace(facts(7), link=LinkAccount([account]))
+    told: Any = build(seen)["sessions"]
+    assert told[0]["sent"] == told[0]["received"] + told[0]["lost"]
+    assert (told[0]["lost_late"], told[0]["stale"]) == (2, {"duplicate": 1, "old_session": 0})
+    assert "3 lost on the link (2 of them came too late), 1 stale" in summary(seen)
