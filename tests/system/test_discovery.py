@@ -112,6 +112,20 @@ def test_the_board_announces_what_the_host_looks_for() -> None:
     assert (name.text, name.get("replace-wildcards")) == ("%h", "yes")
 
 
+def test_the_package_brings_the_announcement(tmp_path: Path) -> None:
+    """The board's package puts the static service where avahi-daemon reads it, as a file that its owner may change, and recommends the daemon."""
+    if not shutil.which("dpkg-deb"):
+        pytest.skip("dpkg-deb is missing")
+    built = subprocess.run([ROOT / "deploy/board/build-deb", tmp_path], capture_output=True, text=True, check=True)
+    package = built.stdout.strip()
+    fields = subprocess.run(["dpkg-deb", "--field", package], capture_output=True, text=True, check=True).stdout
+    assert "Recommends: avahi-daemon" in fields
+    subprocess.run(["dpkg-deb", "--raw-extract", package, tmp_path / "tree"], check=True)
+    announced = tmp_path / "tree" / "etc" / "avahi" / "services" / "tandemscan.service"
+    assert announced.read_bytes() == (ROOT / "deploy" / "board" / "tandemscan.service.xml").read_bytes()
+    assert "/etc/avahi/services/tandemscan.service" in (tmp_path / "tree/DEBIAN/conffiles").read_text().splitlines()
+
+
 @pytest.mark.parametrize("text", ["", "tcp://", "tcp://x:y", "ipc:///x", "\ud800", "tcp://127.0.0.1:5555 rm"])
 def test_a_spoiled_memory_is_no_board(text: str, tmp_path: Path) -> None:
     """Whatever stands in the file of the last board is a tcp link or nothing."""
