@@ -3,17 +3,13 @@
 import json
 import socket
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Final
 
 from common.commandline import INTERRUPTED
 from common.errors import UnavailableError
-
-_GOODBYE_S: Final = 10.0
-"""A board that was asked to end gets this long; it needs 0.3 s at most."""
+from phone_host.childprocess import GOODBYE_S, child_process
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +48,7 @@ class BoardProcess:
             self.check()
         self._process.terminate()
         try:
-            said = json.loads(self._process.communicate(timeout=_GOODBYE_S)[0])
+            said = json.loads(self._process.communicate(timeout=GOODBYE_S)[0])
         except (subprocess.TimeoutExpired, ValueError):
             raise UnavailableError("board-agent did not end with its account", "run it by hand with --json") from None
         return BoardAccount(said["grabbed"], said["sent"], tuple(sorted(said["dropped"].items())))
@@ -61,24 +57,9 @@ class BoardProcess:
 @contextmanager
 def board_process(camera: str, address: str) -> Iterator[BoardProcess]:
     """A board-agent process for the length of a block; whatever happens, it is gone afterwards."""
-    # -P: a folder named `common` where the user happens to stand must not be taken for ours.
-    command = [sys.executable, "-P", "-m", "board_agent.cli", "run", "--camera", camera, "--link", address]
-    process = subprocess.Popen(
-        [*command, "--log-level", "warning", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
-    try:
+    arguments = ["run", "--camera", camera, "--link", address, "--log-level", "warning", "--json"]
+    with child_process("board_agent.cli", arguments, errors=True) as process:
         yield BoardProcess(process)
-    finally:
-        if process.poll() is None:
-            process.terminate()
-            try:
-                process.wait(_GOODBYE_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-        for pipe in (process.stdout, process.stderr):
-            if pipe is not None:
-                pipe.close()
 
 
 def free_port() -> int:

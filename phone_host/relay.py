@@ -23,6 +23,7 @@ from typing import Final
 from common import now
 from common.errors import UnavailableError
 from common.signals import StopSignals
+from phone_host.childprocess import GOODBYE_S, child_process
 from phone_host.emulate import SEGMENT_BYTES, Profile, Way
 
 _SOCKET_BUFFER_BYTES: Final = 16 * 1024
@@ -32,7 +33,6 @@ _LONGEST_WAIT_S: Final = 0.5
 _QUANTUM_BYTES: Final = 16 * 1024
 """Read from one connection at one go; fair enough between the two of a link, whose control messages are small."""
 
-_GOODBYE_S: Final = 5.0
 _DIAL_AGAIN_NS: Final = 100_000_000
 """While the board is not there, connections of the host wait unaccepted: one that were taken and closed would look to it like a peer that hangs up."""
 
@@ -313,7 +313,7 @@ class RelayProcess:
         """Ask it to end; gives its account."""
         self._process.terminate()
         try:
-            return RelayAccount(**json.loads(self._process.communicate(timeout=_GOODBYE_S)[0]))
+            return RelayAccount(**json.loads(self._process.communicate(timeout=GOODBYE_S)[0]))
         except (subprocess.TimeoutExpired, ValueError):
             raise UnavailableError("the line between the two programs broke", "run it again") from None
 
@@ -328,29 +328,9 @@ def relay_process(kind: str, board: str, folder: Path, profile: Profile) -> Iter
         folder: for sockets and names of terminals.
         profile: how the line behaves.
     """
-    command = [
-        sys.executable,
-        "-P",
-        "-m",
-        "phone_host.relay",
-        kind,
-        board,
-        str(folder),
-        json.dumps(asdict(profile)),
-    ]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL)
-    try:
+    arguments = [kind, board, str(folder), json.dumps(asdict(profile))]
+    with child_process("phone_host.relay", arguments) as process:
         yield RelayProcess(process)
-    finally:
-        if process.poll() is None:
-            process.terminate()
-            try:
-                process.wait(_GOODBYE_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-        if process.stdout is not None:
-            process.stdout.close()
 
 
 if __name__ == "__main__":
