@@ -141,6 +141,8 @@ def _fits(analysis: Analysis) -> str:
 def _line(one: InterfaceFit) -> str:
     if math.isnan(one.fit.ns_per_byte):
         return "frames of one size only, no rate to be told"
+    if one.fit.ns_per_byte == 0.0:
+        return f"{latency_text(one.fit)}, larger frames are no slower"
     return f"{latency_text(one.fit)} + bytes / {rate_text(one.fit.bytes_per_s)}"
 
 

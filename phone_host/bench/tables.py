@@ -106,10 +106,8 @@ def rate_text(bytes_per_s: float) -> str:
 
 
 def latency_text(fit: DelayFit) -> str:
-    """A fitted latency in words: no byte arrives before it was sent, so a negative one only tells that it is less than clocks and scatter let be told."""
-    if fit.latency_ns < 0:
-        return f"too small to tell (the line gives {duration_text(fit.latency_ns)})"
-    return duration_text(fit.latency_ns)
+    """A fitted latency in words; 0 only tells that it is less than clocks and scatter let be told."""
+    return "too small to tell" if fit.latency_ns == 0.0 else duration_text(fit.latency_ns)
 
 
 def fit_rows(analysis: Analysis) -> list[tuple[str, ...]]:
@@ -145,6 +143,11 @@ def fit_lines(analysis: Analysis) -> list[str]:
             lines.append(f"{one.interface}: frames of one size only, so latency and rate cannot be told apart")
             continue
         name, latency, latency_reach, rate, rate_reach, *_ = fit_rows(replace(analysis, fits=(one,)))[0]
+        if one.fit.ns_per_byte == 0.0:
+            lines.append(
+                f"{name}: propagation = {latency} ({latency_reach}), larger frames are no slower ({rate_reach})"
+            )
+            continue
         lines.append(f"{name}: propagation = {latency} ({latency_reach}) + bytes / {rate} ({rate_reach})")
     return lines
 

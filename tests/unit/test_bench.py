@@ -34,7 +34,7 @@ from phone_host.bench.changes import parse_changes
 from phone_host.bench.page import figure, page
 from phone_host.bench.report import Conditions, as_json, losses
 from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up, rig_of
-from phone_host.bench.tables import fit_lines, fit_rows, latency_text, rate_text, regime_lines, rows, summary_line
+from phone_host.bench.tables import fit_lines, fit_rows, rate_text, regime_lines, rows, summary_line
 from phone_host.boardprocess import BoardAccount
 from phone_host.delays import DELAYS, STAGES
 from phone_host.emulate import PROFILES
@@ -279,17 +279,23 @@ def test_the_line_of_a_run_never_sets_an_uncertainty_above_its_bound() -> None:
     assert summary_line(nothing).startswith("no pairs, clock not known at the end")
 
 
-def test_a_negative_latency_is_told_as_what_it_is() -> None:
-    """Nothing arrives before it was sent: a line that begins below 0 says in table, terminal and page that the latency is too small to tell, and its figure."""
+def test_what_a_line_cannot_tell_is_said_in_words() -> None:
+    """A latency of 0 is too small to tell, and a level line has no rate: table, terminal and page say so."""
     analysis = analysed(result())
-    fitted = dataclasses.replace(analysis.fits[0].fit, latency_ns=-120e3, ns_per_byte=10.0)
-    below = dataclasses.replace(analysis, fits=(dataclasses.replace(analysis.fits[0], fit=fitted),))
-    words = "too small to tell (the line gives -120\u202f\u00b5s)"
-    assert fit_rows(below)[0][1] == words
-    assert words in fit_lines(below)[0]
-    assert f"{words} + bytes" in page([result()], UNDER, below)
-    above = dataclasses.replace(fitted, latency_ns=120e3)
-    assert latency_text(above) == "120\u202f\u00b5s"
+
+    def fitted(latency_ns: float, ns_per_byte: float) -> Analysis:
+        fit = dataclasses.replace(analysis.fits[0].fit, latency_ns=latency_ns, ns_per_byte=ns_per_byte)
+        return dataclasses.replace(analysis, fits=(dataclasses.replace(analysis.fits[0], fit=fit),))
+
+    for known, words in (
+        (fitted(0.0, 10.0), "too small to tell + bytes / 100 MB/s"),
+        (fitted(120e3, 10.0), "120\u202f\u00b5s + bytes / 100 MB/s"),
+        (fitted(120e3, 0.0), "120\u202f\u00b5s, larger frames are no slower"),
+    ):
+        assert words in page([result()], UNDER, known)
+        assert words.split(" + ")[0].split(",")[0] in fit_lines(known)[0]
+        assert fit_rows(known)[0][1] == words.split(" + ")[0].split(",")[0]
+    assert "no slower" in fit_lines(fitted(120e3, 0.0))[0]
 
 
 def test_a_run_without_pairs_is_reported_without_numbers() -> None:
