@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.programs import until
+from tests.support.numbered import saved_numbers
+from tests.support.programs import ledgers, until
 from tests.vm import uvc
 from tests.vm.conftest import CAMERA
 from tests.vm.guest import Guest
-from tests.vm.stream import Film, Skew, check_journal, streaming
+from tests.vm.stream import FPS, FRAMES, Film, Skew, check_journal, streaming
 from tests.vm.webcam import Webcam
 
 pytestmark = pytest.mark.timeout(600)  # the first test boots the board
@@ -20,6 +21,14 @@ AUTOMATISMS = {
     uvc.FOCUS: (uvc.FOCUS_AUTO, 0),
 }
 """By value: its automatism, and the value that switches it off."""
+
+
+EXPOSURE_ABSOLUTE, FOCUS_ABSOLUTE = 0x009A0902, 0x009A090A
+SET = (
+    'cd /usr/lib/tandemscan && python3 -c "from common.camera.v4l2_device import Device, capture_nodes; '
+    'Device(capture_nodes()[0]).set_control({control}, {value})"'
+)
+"""Another program of the board sets a control."""
 
 
 @pytest.fixture(autouse=True)
@@ -48,14 +57,24 @@ def check_order(requests: list[tuple[tuple[int, int], int]]) -> None:
         assert requests.index((automatism, off)) < order.index(value), requests
 
 
+def check_stamps(out: Path, webcam: Webcam, first: int) -> None:
+    """From that pair on the stamps lie where the webcam's own account puts them; checked on the frames that its driver took within 8 ms."""
+    told = list(zip(saved_numbers(out), ledgers(out), strict=True))[first:]
+    sharp = [(left, right, ledger) for (left, right), ledger in told if webcam.late_ns[left][1] < 8_000_000]
+    assert sharp
+    lap_ns = FRAMES * 10**9 // FPS
+    for left, right, ledger in sharp:
+        due_ns = ((left - right) * 10**9 // FPS + lap_ns // 2) % lap_ns - lap_ns // 2
+        late_ns = ledger["time_skew_ns"] - due_ns
+        least_ns, most_ns = webcam.late_ns[left]
+        slack_ns = ledger["uncertainty_ns"] + 1_000_000  # the kernel's stamp and the period are rounded
+        assert least_ns - slack_ns <= late_ns <= most_ns + slack_ns, (left, right, ledger)
+
+
 def test_the_driver_refuses_what_an_automatism_rules(guest: Guest, webcam: Webcam) -> None:
     """The driver refuses to set the focus while it is automatic (EACCES): the order that is tested here is demanded."""
     as_new(webcam, guest)
-    refuse = (
-        "from common.camera.v4l2_device import Device, capture_nodes; "
-        "Device(capture_nodes()[0]).set_control(0x009A090A, 30)"
-    )
-    said = guest.sh(f'cd /usr/lib/tandemscan && python3 -c "{refuse}" 2>&1; true')
+    said = guest.sh(f"{SET.format(control=FOCUS_ABSOLUTE, value=30)} 2>&1; true")
     assert "PermissionError" in said
     assert "in set_control" in said
     assert uvc.FOCUS not in [where for where, _ in webcam.set_requests]
@@ -107,3 +126,27 @@ def test_without_lock_the_automatisms_stay_on(
         stream.finish(skew)
     assert webcam.settings[uvc.FOCUS_AUTO] == webcam.settings[uvc.WHITE_BALANCE_AUTO] == 1
     assert webcam.settings[uvc.EXPOSURE_MODE] == 8
+
+
+@pytest.mark.parametrize("by_itself", [False, True], ids=["by-another-program", "by-the-camera"])
+def test_stamps_follow_the_exposure_time(
+    guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path, *, by_itself: bool
+) -> None:
+    """Exposure goes from 10 to 40 ms while frames come, told by the driver or not: it is read anew, or the stamps would be 15 ms late."""
+    as_new(webcam, guest)
+    guest.configure(f"{CAMERA}&lock=0" if by_itself else CAMERA)
+    with streaming(guest, film.right, tmp_path / "out") as stream:
+        if by_itself:
+            stream.more(10, "with a short exposure")
+            webcam.find(uvc.EXPOSURE, 400)
+        else:
+            until(lambda: webcam.settings[uvc.EXPOSURE_MODE] == 1, "the exposure is held")
+            stream.more(10, "with a short exposure")
+            guest.sh(SET.format(control=EXPOSURE_ABSOLUTE, value=400))
+        assert webcam.settings[uvc.EXPOSURE] == 400
+        stream.more(2 * FPS, "in which the exposure is read: once a second where nothing tells of it")
+        before = stream.pairs
+        stream.more(3 * FPS, "with a long exposure")
+        stream.finish(skew)
+    webcam.found.clear()
+    check_stamps(tmp_path / "out", webcam, before)

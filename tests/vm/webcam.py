@@ -69,6 +69,8 @@ class Webcam:
         """How much later than k / fps it exposes since the newest start."""
         self.settings: dict[tuple[int, int], int] = {}
         """Its controls as they stand, by (unit, selector)."""
+        self.found: dict[tuple[int, int], int] = {}
+        """What automatisms find, where it is not what they found when it was made."""
         self.set_requests: list[tuple[tuple[int, int], int]] = []
         """Every control that a driver has set, with the value, in order."""
         self._frames, self._fps, self._readout_ns = frames, fps, readout_ns
@@ -85,6 +87,10 @@ class Webcam:
     def start_with_phase(self, phase_ns: int) -> None:
         """Let the next start give exposures so much later than k / fps; every later start is as late after its own command as that one was."""
         self.start_phase_ns = phase_ns
+
+    def find(self, where: tuple[int, int], value: int) -> None:
+        """Let the light change: an automatism that is on finds another value, and the camera goes by it at once."""
+        self.found[where] = self.settings[where] = value
 
     def plug(self, guest: Guest, usb_port: int = 0) -> None:
         """Plug it into a guest's USB port, and wait until the port took it."""
@@ -196,7 +202,7 @@ class _Device:
         if control is None:
             return None
         if control.automatism is not None and self._controls[control.automatism] in control.automatic:
-            self._controls[unit, selector] = control.found
+            self._controls[unit, selector] = self._camera.found.get((unit, selector), control.found)
         if request == uvc.SET_CUR:
             self._controls[unit, selector] = int.from_bytes(out, "little")
             self._camera.set_requests.append(((unit, selector), self._controls[unit, selector]))
