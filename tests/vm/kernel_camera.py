@@ -1,4 +1,4 @@
-"""Runs in the guest with the installed package's code: opens the kernel's test camera (vivid), follows orders, prints as JSON what came.
+"""Runs in the guest with the installed package's code: opens a camera that is no hardware (vivid, v4l2loopback), follows orders, prints as JSON what came.
 
 kernel_camera.py OPTIONS ORDER...
     OPTIONS       of the camera's URI
@@ -35,7 +35,7 @@ def main() -> None:
     """Follow the orders."""
     deadline = time.monotonic() + _PATIENCE_S
     with Device(capture_nodes()[0]) as driver:
-        assert driver.identity.driver == "vivid", driver.identity
+        assert driver.identity.driver in {"vivid", "v4l2 loopback"}, driver.identity
         controls = {control.name: control.id for control in driver.controls()}
         camera = open_camera(f"v4l2:{driver.path}?{sys.argv[1]}", "board", time.monotonic_ns())
         frames: list[Frame] = []
@@ -50,9 +50,8 @@ def main() -> None:
         health = health_values(camera.health)
         camera.close()
     last = frames[-1]
-    step = len(last.payload) // (
-        last.width_px * last.height_px
-    )  # YUYV has two bytes a pixel; a luma is the first of them
+    # YUYV has two bytes a pixel, a luma is the first of them; a JPEG has no rows.
+    step = max(1, len(last.payload) // (last.width_px * last.height_px))
     row = last.payload[400 * last.width_px * step : 401 * last.width_px * step : step]
     account = {"format": last.pixel_format.value, "bytes": len(last.payload), "row": list(row), "health": health}
     print(json.dumps({**account, "sequences": [frame.sequence for frame in frames]}))
