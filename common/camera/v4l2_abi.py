@@ -201,6 +201,25 @@ class Layout:
     dqevent: int
 
 
+def _event(time: type[c_int32] | type[c_int64]) -> type[ctypes.Structure]:
+    """Struct v4l2_event, with this time_t."""
+
+    class Event(ctypes.Structure):
+        # The union's longest member is data[64]; v4l2_event_ctrl holds a 64-bit value, which sets the alignment.
+        _fields_ = [
+            ("type", c_uint32),
+            ("u", c_int64 * 8),
+            ("pending", c_uint32),
+            ("sequence", c_uint32),
+            ("seconds", time),
+            ("nanoseconds", time),
+            ("id", c_uint32),
+            ("reserved", c_uint32 * 8),
+        ]
+
+    return Event
+
+
 def layout(pointer_bits: int, time_bits: int) -> Layout:
     """Make the structures of a machine.
 
@@ -240,31 +259,18 @@ def layout(pointer_bits: int, time_bits: int) -> Layout:
             ("request_fd", c_int32),
         ]
 
-    class Event(ctypes.Structure):
-        # The union's longest member is data[64]; v4l2_event_ctrl holds a 64-bit value, which sets the alignment.
-        _fields_ = [
-            ("type", c_uint32),
-            ("u", c_int64 * 8),
-            ("pending", c_uint32),
-            ("sequence", c_uint32),
-            ("seconds", time),
-            ("nanoseconds", time),
-            ("id", c_uint32),
-            ("reserved", c_uint32 * 8),
-        ]
-
-    both = _READ | _WRITE
+    both, event = _READ | _WRITE, _event(time)
     format_bytes, buffer_bytes = ctypes.sizeof(Format), ctypes.sizeof(Buffer)
     return Layout(
         Format,
         Buffer,
-        Event,
+        event,
         g_fmt=_request(both, 4, format_bytes),
         s_fmt=_request(both, 5, format_bytes),
         querybuf=_request(both, 9, buffer_bytes),
         qbuf=_request(both, 15, buffer_bytes),
         dqbuf=_request(both, 17, buffer_bytes),
-        dqevent=_request(_READ, 89, ctypes.sizeof(Event)),
+        dqevent=_request(_READ, 89, ctypes.sizeof(event)),
     )
 
 
