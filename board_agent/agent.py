@@ -21,7 +21,7 @@ from common.link.several import SeveralLinks
 from common.link.wait import Waiter
 from common.logs import event
 from common.protocol.board_session import BoardSession
-from common.protocol.message import PROTOCOL_VERSION, BoardCounts, DropReason, Pacing, Refusal, RefusalReason
+from common.protocol.message import PROTOCOL_VERSION, BoardCounts, DropReason, Pacing, Refusal, RefusalReason, Rung
 from common.protocol.session import Outgoing
 from common.protocol.wire import VersionError, decode, encode_for_any_version, encode_stamped
 
@@ -108,9 +108,9 @@ class Service:
     notifier: Notifier
     status: StatusLine
 
-    def alive(self, now_ns: int, counts: BoardCounts, session: BoardSession) -> None:
+    def alive(self, now_ns: int, counts: BoardCounts, session: BoardSession, rung: Rung | None) -> None:
         """Tell it, when the notifier is due."""
-        text = self.status.text(now_ns, counts, has_host=session.has_host, carrier=session.carrier)
+        text = self.status.text(now_ns, counts, has_host=session.has_host, carrier=session.carrier, rung=rung)
         self.notifier.alive(now_ns, text)
 
 
@@ -190,7 +190,8 @@ class Agent:
                 self._send_all(self._session.tick(now_ns, self._outbox.counts))
             self._watch_host(now_ns)
             if self._service is not None and self._service.notifier.due(now_ns):
-                self._service.alive(now_ns, self._outbox.counts, self._session)
+                rung = None if self._control is None else self._control.rung
+                self._service.alive(now_ns, self._outbox.counts, self._session, rung)
         if self._camera_ended and not self._stopping:
             self._drain()
         self._outbox.discard(DropReason.STOPPED)
@@ -315,7 +316,7 @@ class Agent:
 
     def _adapt(self, control: RateControl, now_ns: int) -> None:
         """Let the camera give what the link carries."""
-        if not control.update(self._outbox.counts, self._session.link, now_ns):
+        if not control.update(self._outbox.counts, self._session.carrier, now_ns):
             return
         self._camera.adapt(control.mode, now_ns)
         rung = control.rung

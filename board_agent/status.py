@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from common.protocol.message import BoardCounts, Pacing
+from common.protocol.message import BoardCounts, Pacing, Rung
 
 _SILENT_NS: Final = 3_000_000_000
 """Without a frame for this long a camera that goes by the clock counts as silent: above the slowest useful rate of 1 fps."""
@@ -25,7 +25,15 @@ class StatusLine:
         self._measured_ns = self._moved_ns = now_ns
         self._grabbed = 0
 
-    def text(self, now_ns: int, counts: BoardCounts, *, has_host: bool, carrier: int | None = None) -> str:
+    def text(
+        self,
+        now_ns: int,
+        counts: BoardCounts,
+        *,
+        has_host: bool,
+        carrier: int | None = None,
+        rung: Rung | None = None,
+    ) -> str:
         """Give the line; the rate is the mean since it was asked for last.
 
         Args:
@@ -33,6 +41,7 @@ class StatusLine:
             counts: what became of all frames so far.
             has_host: whether a host is served.
             carrier: index of the link that its frames go to; None while there is none.
+            rung: how far the camera is lowered; None where it cannot be.
         """
         fresh = counts.grabbed - self._grabbed
         rate_hz = fresh * 1e9 / max(1, now_ns - self._measured_ns)
@@ -47,4 +56,14 @@ class StatusLine:
             return f"no frame from {self._camera} for {silent_ns // 1_000_000_000} s: is it plugged in?"
         dropped = sum(count for _, count in counts.dropped)
         over = "" if carrier is None else f" over {self._links[carrier]}"
-        return f"{rate_hz:.1f} fps{over}, {counts.sent} sent to the host, {dropped} dropped"
+        return f"{rate_hz:.1f} fps{over}, {counts.sent} sent to the host, {dropped} dropped{_lowered(rung)}"
+
+
+def _lowered(rung: Rung | None) -> str:
+    """What the camera gives where that is less than was asked for."""
+    if rung is None or not rung.index:
+        return ""
+    quality = f" at quality {rung.quality}" if rung.quality else ""
+    size = f" of {rung.width_px}x{rung.height_px}" if rung.width_px else ""
+    fps = f"{1e9 / rung.period_ns:.3g}"
+    return f"; lowered to {fps} fps{size}{quality} for the link (rung {rung.index} of {rung.last})"

@@ -82,13 +82,14 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
     return LinkUri(address, listens_by_default if not options else "bind" in options, baud, unpaired, insecure)
 
 
-def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = False) -> Link:
+def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = False, waits: bool = False) -> Link:
     """Open the link: with keys where tcp leaves this machine, or where the peer at an address is known.
 
     Args:
         uri: what to open.
         keys: this machine's key and those that it trusts; None where only open links can be had.
         board: whether this side is the board, which over tcp and ipc takes no images.
+        waits: whether a device that is missing is waited for.
 
     Returns:
         The open link; a dialled peer may still be absent.
@@ -99,9 +100,9 @@ def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = Fals
         DataError: the files of keys are bad.
     """
     if uri.address.startswith("serial:"):
-        return _open_serial(uri)
+        return _open_serial(uri, waits=waits)
     if uri.address.startswith("rfcomm:"):
-        return _open_rfcomm(uri)
+        return _open_rfcomm(uri, waits=waits)
     from common.link.zeromq import ZeroMqDialer, ZeroMqListener  # noqa: PLC0415 - only the transport that is used is loaded
 
     if not uri.listens and "//*:" in uri.address:
@@ -178,11 +179,13 @@ def open_links(uris: Sequence[LinkUri], keys: KeyFolder | None = None, *, board:
                 links.append(open_link(uri, keys, board=board))
             except MissingDeviceError as error:
                 missing.append(error)
-                links.append(_open_serial(uri, waits=True))
+                links.append(open_link(uri, keys, board=board, waits=True))
         if len(missing) == len(uris):
             raise missing[0]
         if board and keys is not None:
             _open_door(uris, links, keys)
+        for one in missing:
+            _LOG.warning(event("link_missing", problem=one.problem, remedy=one.remedy))
     except TandemError:
         for link in links:
             link.close()
@@ -247,7 +250,7 @@ def _baud(uri: str, text: str) -> int:
     return int(text)
 
 
-def _open_serial(uri: LinkUri, *, waits: bool = False) -> Link:
+def _open_serial(uri: LinkUri, *, waits: bool) -> Link:
     try:
         from common.link.serial import DEFAULT_BAUD, SerialLink  # noqa: PLC0415 - only the transport that is used is loaded
     except ImportError as error:
@@ -257,7 +260,7 @@ def _open_serial(uri: LinkUri, *, waits: bool = False) -> Link:
     return SerialLink(uri.address.removeprefix("serial:"), uri.baud or DEFAULT_BAUD, listens=uri.listens, waits=waits)
 
 
-def _open_rfcomm(uri: LinkUri) -> Link:
+def _open_rfcomm(uri: LinkUri, *, waits: bool) -> Link:
     from common.link.rfcomm import ANYONE, RfcommDialler, RfcommListener, is_address  # noqa: PLC0415 - as above
 
     device, _, number = uri.address.removeprefix("rfcomm://").partition("/")
@@ -265,7 +268,7 @@ def _open_rfcomm(uri: LinkUri) -> Link:
     if not uri.listens:
         if device == ANYONE:
             raise SettingsError(f"link {uri.address!r} names no device to connect to", "give its name or address")
-        return RfcommDialler(uri.address, device, channel, unpaired=uri.unpaired)
+        return RfcommDialler(uri.address, device, channel, unpaired=uri.unpaired, waits=waits)
     if device != ANYONE and not is_address(device):
         raise SettingsError(f"link {uri.address!r} cannot be listened on", "give rfcomm://* or an adapter's address")
-    return RfcommListener(uri.address, device, channel, unpaired=uri.unpaired)
+    return RfcommListener(uri.address, device, channel, unpaired=uri.unpaired, waits=waits)

@@ -18,7 +18,7 @@ from itertools import count
 from pathlib import Path
 from typing import Final
 
-from common.errors import UnavailableError
+from common.errors import MissingDeviceError, UnavailableError
 from common.frame import Buffer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.bluez import PublishedRecord, address_of
@@ -180,16 +180,18 @@ class RfcommDialler(StreamLink):
         device: address or name of the peer.
         channel: 0: to be asked for.
         unpaired: whether a peer will do that was never paired with.
+        waits: whether an adapter that is missing is waited for.
 
     Raises:
-        UnavailableError: this machine has no working Bluetooth, or nobody is known by that name.
+        UnavailableError: this machine has no working Bluetooth (MissingDeviceError where it lacks only the adapter), or nobody is known by that name.
     """
 
-    def __init__(self, uri: str, device: str, channel: int, *, unpaired: bool) -> None:
-        _check_adapter(uri)
+    def __init__(self, uri: str, device: str, channel: int, *, unpaired: bool, waits: bool = False) -> None:
+        if not waits:
+            _check_adapter(uri)
         address = device if is_address(device) else address_of(device)
         self._dialling = _Dialling(uri, address, channel, unpaired=unpaired)
-        super().__init__("rfcomm", Side.DIALLER, self._dialling, FRAME_BYTES)
+        super().__init__("rfcomm", Side.DIALLER, self._dialling, FRAME_BYTES, waits=waits)
 
     def close(self) -> None:
         """Give what was handed over half a second to leave, say goodbye, hang up."""
@@ -205,21 +207,23 @@ class RfcommListener:
         adapter: address of one of this machine's adapters, or ANYONE.
         channel: 0: the default.
         unpaired: whether devices may dial that were never paired with.
+        waits: whether an adapter that is missing is waited for: who listens everywhere hears it when it comes.
 
     Raises:
-        UnavailableError: this machine has no Bluetooth, or the channel is taken.
+        UnavailableError: this machine has no Bluetooth (MissingDeviceError where it lacks only the adapter), or the channel is taken.
     """
 
     kind: Final = "rfcomm"
     self_paced: Final = True
 
-    def __init__(self, uri: str, adapter: str, channel: int, *, unpaired: bool) -> None:
+    def __init__(self, uri: str, adapter: str, channel: int, *, unpaired: bool, waits: bool = False) -> None:
         self.dialled: dict[Lane, bytes] = {}
         self._streams: dict[bytes, StreamLink] = {}
         self._numbers = count()
         self._listening = _new_socket(_Protocol.RFCOMM)
         try:
-            _check_adapter(uri)
+            if not waits:
+                _check_adapter(uri)
             _secure(self._listening, unpaired=unpaired)
             self._listening.bind((_ANY_ADAPTER if adapter == ANYONE else adapter, channel or DEFAULT_CHANNEL))
             self._listening.listen(_BACKLOG)
@@ -350,7 +354,9 @@ def _check_adapter(uri: str) -> None:
     """See that this machine has an adapter at all; one that is switched off is found out by dialling."""
     _new_socket(_Protocol.RFCOMM).close()  # Python and kernel first
     if not any(_ADAPTERS.glob("hci*")):
-        raise UnavailableError(f"{uri} needs a Bluetooth adapter", "plug one in; bluetoothctl list shows what is there")
+        raise MissingDeviceError(
+            f"{uri} needs a Bluetooth adapter", "plug one in; bluetoothctl list shows what is there"
+        )
 
 
 def _undialled(uri: str, error: OSError) -> UnavailableError:

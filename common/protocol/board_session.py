@@ -126,12 +126,6 @@ class BoardSession:
         host = self._host
         return host is not None and (host.frames is not None or bool(host.controls))
 
-    @property
-    def link(self) -> int | None:
-        """Number of the link that frames go to; None while they go nowhere."""
-        host = self._host
-        return None if host is None or host.frames is None else host.frames[0]
-
     def begin_clock(self, boot_id: str) -> None:
         """Take note that this machine has slept and its clock stood still: the host is to greet anew, and to learn the clock from the start.
 

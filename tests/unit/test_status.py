@@ -1,7 +1,7 @@
 """The line that says how the board is doing."""
 
 from board_agent.status import StatusLine
-from common.protocol.message import BoardCounts, DropReason, Pacing
+from common.protocol.message import BoardCounts, DropReason, Pacing, Rung
 
 SECOND_NS = 1_000_000_000
 
@@ -32,6 +32,15 @@ def test_the_link_in_use_is_named() -> None:
     text = status.text(SECOND_NS, BoardCounts(30, 30), has_host=True, carrier=1)
     assert text == "30.0 fps over ipc:///run/x, 30 sent to the host, 0 dropped"
     assert " over " not in status.text(2 * SECOND_NS, BoardCounts(60, 60), has_host=True, carrier=None)
+
+
+def test_a_lowered_camera_is_told() -> None:
+    """What the camera gives instead of what was asked for stands at the end; nothing does while it gives all."""
+    lowered = Rung(1, 2, 1, 200_000_000, 50, 320, 240)
+    text = line().text(SECOND_NS, BoardCounts(5, 5), has_host=True, rung=lowered)
+    assert text.endswith("0 dropped; lowered to 5 fps of 320x240 at quality 50 for the link (rung 1 of 2)")
+    asked = Rung(0, 2, 2, 100_000_000, 80, 640, 480)
+    assert line().text(SECOND_NS, BoardCounts(5, 5), has_host=True, rung=asked).endswith("0 dropped")
 
 
 def test_a_silent_camera_is_named_with_its_silence() -> None:

@@ -49,9 +49,17 @@ class Webcam:
         fps: of its own accord; a driver that asks for less gets less.
         readout_ns: of its sensor.
         model: what it is.
+        smaller: the same JPEGs for a driver that asks for the model's second size; empty: the same for both.
     """
 
-    def __init__(self, frames: Sequence[bytes], fps: int, readout_ns: int, model: uvc.Model | None = None) -> None:
+    def __init__(
+        self,
+        frames: Sequence[bytes],
+        fps: int,
+        readout_ns: int,
+        model: uvc.Model | None = None,
+        smaller: Sequence[bytes] = (),
+    ) -> None:
         self.late_ns: dict[int, tuple[int, int]] = {}
         """By number of the image in `frames`, the last time: how much later than due its first bytes left, and how much later the guest's
         driver had taken them. It stamped them in between; on a busy machine that may be long."""
@@ -74,6 +82,7 @@ class Webcam:
         self.set_requests: list[tuple[tuple[int, int], int]] = []
         """Every control that a driver has set, with the value, in order."""
         self._frames, self._fps, self._readout_ns = frames, fps, readout_ns
+        self._smaller = smaller or frames
         self._model = model or uvc.Model()
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._connection: socket.socket | None = None
@@ -299,10 +308,11 @@ class _Device:
         self._number = number + 1
         due_ns += round(skipped * 1e9 / self._rate_hz())
         due_ns -= self._phase_ns  # image k belongs to k / fps: what its exposure was later is told as lateness
-        image = number % len(camera._frames)
+        image = number * camera._fps // self._rate_hz() % len(camera._frames)  # at half of the rate every other one
         camera.late_ns[image] = (now_ns - due_ns, now_ns - due_ns)
         self._first = (image, due_ns)
-        frame = with_comment(camera._frames[image], f"number={number}")
+        frames = camera._smaller if self._commit[3] == 2 else camera._frames  # bFrameIndex
+        frame = with_comment(frames[image], f"number={number}")
         if camera.truncate_every and number % camera.truncate_every == 0:
             camera.truncated += 1
             frame = frame[: len(frame) // 2]
