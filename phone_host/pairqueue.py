@@ -22,8 +22,9 @@ _SIDE_BYTES: Final = 64 * 1024 * 1024
 _NEWEST: Final = 4
 """Board frames kept beside those that wait: a pair is nearly always formed before its frame has three successors."""
 
-_FIRST_WAIT_NS: Final = 2_000_000_000
-"""Before a delay has been measured a host frame waits this long for its partner."""
+_LEAST_WAIT_NS: Final = 2_000_000_000
+"""A host frame waits at least this long for its partner, also on a swift link: that may become slow from one frame to the next, whose partner then would
+have gone and a worse one be taken. Two seconds of 50 KB JPEGs at 30 fps are 3 MB."""
 
 _SLOWEST_NS: Final = 60_000_000_000
 """No link is waited for longer than this."""
@@ -96,7 +97,7 @@ class PairQueue:
         self._board_orphans: dict[str, int] = {}
         self._host_orphans: dict[str, int] = {}
         self._host_bytes = self._board_bytes = 0
-        self._host_wait_ns = _FIRST_WAIT_NS
+        self._delay_ns = _LEAST_WAIT_NS
 
     @property
     def tolerance_ns(self) -> int:
@@ -185,7 +186,7 @@ class PairQueue:
                 return exposed_ns
             delay_ns = frame.received_ns - frame.marks.exposed_ns
             # Where bytes take the time a frame that is a fifth larger comes as much later; the slow decay follows a link that gets faster.
-            self._host_wait_ns = min(_SLOWEST_NS, max(delay_ns * 5 // 4, self._host_wait_ns * 63 // 64))
+            self._delay_ns = min(_SLOWEST_NS, max(delay_ns * 5 // 4, self._delay_ns * 63 // 64))
             self._board_bytes += len(frame.message.payload)
             self._newest.append(frame)
             if self._meter is not None:
@@ -255,10 +256,9 @@ class PairQueue:
         if self._timeless:
             return  # stamps of images shown on demand are labels; the wall clock says nothing about them
         longer_ns = max(self._board_period_ns, self._host_period_ns)
-        patience_ns = self._host_wait_ns + 2 * longer_ns
-        self._settle(self._pairing.evict_host(now_ns - patience_ns))
+        self._settle(self._pairing.evict_host(now_ns - max(_LEAST_WAIT_NS, self._delay_ns) - 2 * longer_ns))
         # A host frame is here as soon as its camera gave it; a board frame without one after this time never gets one.
-        self._settle(self._pairing.evict_board(now_ns - patience_ns - self.tolerance_ns))
+        self._settle(self._pairing.evict_board(now_ns - self._delay_ns - 2 * longer_ns - self.tolerance_ns))
 
     def _settle(self, outcomes: Iterable[Outcome[BoardFrame, Frame]]) -> None:
         for outcome in outcomes:

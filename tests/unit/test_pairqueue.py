@@ -170,6 +170,25 @@ def test_host_frames_wait_as_long_as_the_link_delays() -> None:
     assert queue.counts.held_host == 1
 
 
+def test_a_link_that_becomes_slow_finds_the_partners_still_there() -> None:
+    """After 300 frames that came at once one that takes 1.5 s is paired with the host frame of its own moment, not with a worse one that came later."""
+    queue = queue_of()
+    start_ns = now.monotonic_ns() - 300 * PERIOD_NS - 1500 * MS
+    for i in range(300):
+        exposed_ns = start_ns + i * PERIOD_NS
+        queue.add_board(board_frame(i, exposed_ns, exposed_ns + MS))
+        queue.add_host(host_frame(i, exposed_ns))
+    slow_ns = now.monotonic_ns() - 1500 * MS
+    queue.add_host(host_frame(300, slow_ns))
+    queue.tick()
+    queue.add_host(host_frame(301, slow_ns + PERIOD_NS // 2))
+    queue.add_board(board_frame(300, slow_ns, now.monotonic_ns()))
+    queue.finish()
+    last = queue.take()
+    assert last is not None
+    assert (last.host.sequence, last.time_skew_ns) == (300, 0)
+
+
 def test_a_new_session_orphans_what_the_old_one_left() -> None:
     """Board frames held from an earlier session end as orphans with that reason; own frames stay for the new one."""
     queue = queue_of()
