@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from common.protocol.message import BoardCounts, Rung
+from common.protocol.session import StaleReason
 from phone_host.delays import Series
 
 
@@ -37,6 +38,16 @@ class SessionAccount:
     rung: Rung = field(default_factory=Rung)
     ended: bool = False
     vanished: bool = False
+
+    def count_stale(self, reason: StaleReason) -> None:
+        """Count a frame that must not be used."""
+        match reason:
+            case StaleReason.OLD_SESSION:
+                self.old_session += 1
+            case StaleReason.DUPLICATE:
+                self.duplicate += 1
+            case StaleReason.LATE:
+                self.late += 1
 
 
 @dataclass(slots=True)

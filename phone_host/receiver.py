@@ -1,7 +1,6 @@
 """The host's end of all links in a thread of its own: session, choice of the link, clock estimate, credit. Frames go to the pair queue with all marks set."""
 
 import logging
-import math
 import os
 import threading
 from collections.abc import Sequence
@@ -29,7 +28,6 @@ from common.protocol.session import (
     Output,
     Refused,
     Stale,
-    StaleReason,
     Stepped,
     Vanished,
     connection_name,
@@ -41,19 +39,12 @@ from phone_host.pairqueue import PairQueue
 from phone_host.sync.choice import LinkChoice
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.clocks import LinkClocks
-from phone_host.sync.flow import MOST, Flow
+from phone_host.sync.flow import Flow
 
 _LOG = logging.getLogger(__name__)
 
 _LONGEST_WAIT_MS: Final = 50
 """The pair queue's patience is checked at least this often."""
-
-_UNKNOWN_NS: Final = 2**62
-"""Transit time of a frame before the first one has come: no link is taken for swift before it was measured."""
-
-_SWIFT: Final = 4
-"""A link is swift while a frame takes less than this part of a period: then it has come before the next one is grabbed."""
-
 
 _FAREWELL_NS: Final = 300_000_000
 """How long a leaving host waits for the board's last account: a few round trips of any usable link."""
@@ -98,7 +89,6 @@ class Receiver:
         self._hello: BoardHello | None = None
         self._flow = Flow()
         self._streamed_over: int | None = None
-        self._transit_ns = _UNKNOWN_NS
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._waiter = Waiter([*(item for link in links for item in link.pollables), self._wake_read])
         self._stopping = False
@@ -108,6 +98,7 @@ class Receiver:
         self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
         self.failure: Exception | None = None
         self._refused: tuple[RefusalReason, int] | None = None
+        self._turned_away: set[int] = set()
 
     @property
     def refused(self) -> RefusalReason | None:
@@ -240,17 +231,10 @@ class Receiver:
         if hello.camera.pacing is Pacing.DEMAND or self._queue.held_back_by_credit:
             self._handle(self._session.grant(self._queue.free_slots()), now_ns)
             return
-        needed = self._flow.window
-        if self._links[carrier].self_paced:
-            # It holds the next frame back itself, so that a newer one may take its place: it always has credit for that one too, and for
-            # as many more as its round trip is periods long, which echoes tell truly there, for they pass by the frames.
-            periods = math.floor((self._clock.round_trip_ns(carrier) or 0) / hello.camera.period_ns)
-            needed = min(MOST, 1 + max(1, periods))
-        if self._session.outstanding < needed:
-            # A swift link never has two frames under way, whatever the credit: then several are granted at once, which spares the
-            # board most wake-ups (a fifth of its CPU time a frame, bench_link).
-            swift = self._transit_ns * _SWIFT < hello.camera.period_ns
-            self._handle(self._session.grant(MOST if swift else needed), now_ns)
+        round_trip_ns = (self._clock.round_trip_ns(carrier) or 0) if self._links[carrier].self_paced else None
+        frames = self._flow.credit(self._session.outstanding, hello.camera.period_ns, round_trip_ns)
+        if frames:
+            self._handle(self._session.grant(frames), now_ns)
 
     def _handle(self, outputs: list[Output], now_ns: int) -> None:
         for output in outputs:
@@ -264,7 +248,7 @@ class Receiver:
                     self._clock.add(output)
                     self._choice.echo(link, (t3_ns - t0_ns) - (t2_ns - t1_ns), now_ns)
                 case Stale(_, reason):
-                    self._count_stale(reason)
+                    self._current.count_stale(reason)
                 case Accepted():
                     self._begin(output, now_ns)
                 case LinkUp() | LinkDown() | OtherBoard():
@@ -277,10 +261,18 @@ class Receiver:
                     self._choice.account(counts.grabbed, now_ns, has_credit=self._session.outstanding > 0)
                 case Stepped(rung):
                     self._note_rung(rung)
-                case Refused(reason):
-                    self._refused = (reason, now_ns)
+                case Refused(reason, link):
+                    self._note_refusal(reason, link, now_ns)
                 case Vanished(orderly):
                     self._note_gone(orderly=orderly, now_ns=now_ns)
+
+    def _note_refusal(self, reason: RefusalReason, link: int, now_ns: int) -> None:
+        """A board does not talk to us; told once where another link is up, because then the run goes on."""
+        self._refused = (reason, now_ns)
+        if self._session.is_open and link not in self._turned_away:
+            self._turned_away.add(link)
+            problem, remedy = refusal_text(reason)
+            _LOG.warning(event("link_refused", link=self.account.links[link].name, problem=problem, remedy=remedy))
 
     def _note_gone(self, *, orderly: bool, now_ns: int) -> None:
         """The board is not there any more, on no link."""
@@ -290,22 +282,13 @@ class Receiver:
             tally.is_up = False
         _LOG.info(event("board_gone", session=self._current.session, orderly=orderly))
 
-    def _count_stale(self, reason: StaleReason) -> None:
-        account = self._current
-        match reason:
-            case StaleReason.OLD_SESSION:
-                account.old_session += 1
-            case StaleReason.DUPLICATE:
-                account.duplicate += 1
-            case StaleReason.LATE:
-                account.late += 1
-
     def _note_link(self, news: LinkUp | LinkDown | OtherBoard, now_ns: int) -> None:
         """Take note of a link that came up, went down, or leads astray."""
         tally = self.account.links[news.link]
         match news:
             case LinkUp(link, hello):
                 tally.is_up = True
+                self._turned_away.discard(link)
                 if hello.boot_id != self._boot_id:
                     self._boot_id = hello.boot_id
                     self._clock = LinkClocks(len(self._links))  # another boot is another clock
@@ -339,7 +322,6 @@ class Receiver:
         hello, link = accepted.hello, accepted.link
         self._refused = None
         self._hello = hello
-        self._transit_ns = _UNKNOWN_NS
         self._flow = Flow()
         self._choice.carries(link, now_ns)
         tally, before = self.account.links[link], self._streamed_over
@@ -390,11 +372,11 @@ class Receiver:
         offset_ns = estimate.offset_at(sent_ns)
         marks = frame.marks.moved_to(sent_ns + offset_ns)
         uncertainty_ns = estimate.uncertainty_at(sent_ns)
-        self._transit_ns = now_ns - marks.sent_ns
-        self._choice.frame(link, self._transit_ns, now_ns)
+        transit_ns = now_ns - marks.sent_ns
+        self._choice.frame(link, transit_ns, now_ns)
         assert self._hello is not None
         camera = self._hello.camera
-        self._flow.arrived(self._transit_ns, marks.sent_ns - marks.grabbed_ns, camera.period_ns, now_ns)
+        self._flow.arrived(transit_ns, marks.sent_ns - marks.grabbed_ns, camera.period_ns, now_ns)
         tally.age.add(now_ns - marks.exposed_ns)
         asked_px = (camera.width_px, camera.height_px)
         stamp_ns = self._queue.add_board(

@@ -56,7 +56,7 @@ SILENCE_BESIDE_NS: Final = 1500 * MS
 """The carrier is lost when unheard for this long while another link was heard: three accounts of the board and three waves have not come."""
 
 _FOREIGN_RETRY_NS: Final = 5000 * MS
-"""A link that leads to another board is asked again after this time: the cable may be moved."""
+"""A link that leads to another board, or is refused beside one that is not, is asked again after this time: the cable may be moved."""
 
 _MOST_MISSING: Final = 64
 """Lost frames that are remembered, so that one which comes late is not taken for a repetition: more than any link holds."""
@@ -126,7 +126,9 @@ class HostSession:
             case Knock():
                 return self._answer_knock(path, connection, message, now_ns)
             case Refusal(reason):
-                return [Refused(reason)]
+                if not path.is_open and any(other.is_open for other in self._paths):
+                    path.shut(now_ns + _FOREIGN_RETRY_NS)  # our board talks to us elsewhere: this is another one
+                return [Refused(reason, path.link)]
             case BoardHello():
                 if connection == path.lanes.get(Lane.CONTROL):
                     return self._open(path, message, now_ns)

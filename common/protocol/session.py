@@ -136,9 +136,10 @@ class Stepped:
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """Host: the board does not talk to us."""
+    """Host: the board at the end of a link does not talk to us."""
 
     reason: RefusalReason
+    link: int = 0
 
 
 @dataclass(frozen=True, slots=True)

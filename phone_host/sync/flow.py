@@ -16,6 +16,9 @@ MOST: Final = 4
 _QUEUED: Final = 0.6
 """So much of a frame in the queue is too much: 1 where the rate is the limit and a second frame was tried, 0 where it is not; sizes differ by a fifth."""
 
+_SWIFT: Final = 4
+"""A link is swift while a frame takes less than this part of a period: then it has come before the next one is grabbed."""
+
 _WAITED: Final = 8
 """A frame waited for leave if it stood in the outbox for more than this part of a period."""
 
@@ -34,6 +37,7 @@ class Flow:
     def __init__(self) -> None:
         self._window = 1
         self._arrivals = 0
+        self._newest_ns: int | None = None
         self._base_ns = self._base_before_ns = 0
         self._base_since_ns = 0
         self._transit_ns = 0.0
@@ -45,6 +49,29 @@ class Flow:
         """How many frames may be under way."""
         return self._window
 
+    def credit(self, outstanding: int, period_ns: int, paced_round_trip_ns: int | None = None) -> int:
+        """How many frames beyond the last one that came the board may send now.
+
+        Args:
+            outstanding: frames that it may still send.
+            period_ns: between two frames of the camera.
+            paced_round_trip_ns: of a link that holds the next frame back itself, so that a newer one may take its place: it always has credit for
+                that one too, and for as many more as its round trip is periods long, which echoes tell truly there, for they pass by the
+                frames. None for other links.
+
+        Returns:
+            The number; 0: what was granted before is enough.
+        """
+        needed = self._window
+        if paced_round_trip_ns is not None:
+            needed = min(MOST, 1 + max(1, paced_round_trip_ns // period_ns))
+        if outstanding >= needed:
+            return 0
+        # A swift link never has two frames under way, whatever the credit: then several are granted at once, which spares the
+        # board most wake-ups (a fifth of its CPU time a frame, bench_link).
+        is_swift = self._newest_ns is not None and self._newest_ns * _SWIFT < period_ns
+        return MOST if is_swift else needed
+
     def arrived(self, transit_ns: int, waited_ns: int, period_ns: int, now_ns: int) -> None:
         """Take note of a frame.
 
@@ -54,6 +81,7 @@ class Flow:
             period_ns: between two frames of the camera.
             now_ns: host's clock, ns.
         """
+        self._newest_ns = transit_ns
         transit_ns = max(1, transit_ns)
         self._keep_least(transit_ns, now_ns)
         self._arrivals += 1

@@ -71,3 +71,22 @@ def test_the_window_is_bounded() -> None:
     for number in range(1000):
         flow.arrived(200 * MS, 30 * MS, PERIOD_NS, number * PERIOD_NS)
     assert flow.window == MOST
+
+
+def test_a_swift_link_gets_leave_for_several_frames_at_once() -> None:
+    """Where a frame takes a tenth of a period four are granted as soon as there is none outstanding; before any has come, or where it is slow, one."""
+    flow = Flow()
+    assert flow.credit(0, PERIOD_NS) == 1
+    flow.arrived(PERIOD_NS // 10, 0, PERIOD_NS, SECOND_NS)
+    assert [flow.credit(outstanding, PERIOD_NS) for outstanding in range(3)] == [MOST, 0, 0]
+    flow.arrived(PERIOD_NS, 0, PERIOD_NS, 2 * SECOND_NS)
+    assert flow.credit(0, PERIOD_NS) == 1
+
+
+@pytest.mark.parametrize(("round_trip_ns", "frames"), [(0, 2), (PERIOD_NS, 2), (2 * PERIOD_NS, 3), (SECOND_NS, MOST)])
+def test_a_link_that_paces_itself_always_has_leave_for_the_next_frame(round_trip_ns: int, frames: int) -> None:
+    """One frame more than is under way, and one for each period of the round trip, four at most."""
+    flow = Flow()
+    flow.arrived(PERIOD_NS, 0, PERIOD_NS, SECOND_NS)
+    assert flow.credit(frames - 1, PERIOD_NS, round_trip_ns) == frames
+    assert flow.credit(frames, PERIOD_NS, round_trip_ns) == 0

@@ -20,7 +20,10 @@ from common.protocol.message import (
     Lane,
     Message,
     Ping,
+    Refusal,
+    RefusalReason,
     Rung,
+    Status,
 )
 from common.protocol.session import (
     MS,
@@ -30,6 +33,7 @@ from common.protocol.session import (
     LinkDown,
     OtherBoard,
     Outgoing,
+    Refused,
     StaleReason,
 )
 from tests.support.session_world import CAMERA, HostNode, World
@@ -264,6 +268,29 @@ def test_another_board_on_the_second_link_is_told_and_left_alone() -> None:
     world.settle(200 * MS)
     assert len(host.arrived) >= before + 4
     assert host.board_session == world.board.session
+
+
+def test_a_busy_board_on_the_second_link_is_asked_calmly() -> None:
+    """A link whose board is busy with somebody else is told with its number and asked again every five seconds, while the first one carries."""
+    world = settled()
+    host = world.hosts[0]
+    for lane in Lane:
+        world.break_lane(host, (1, lane))
+    world.cut_link(1)
+    world.settle(20 * MS)
+    ours, other = host.names[0, Lane.CONTROL], host.names[1, Lane.CONTROL]
+    account = Status(world.board.session, world.counts, Rung())
+    told: list[Refused] = []
+    hellos = 0
+    for now_ns in range(world.now_ns, world.now_ns + 60_000 * MS, 100 * MS):
+        host.session.receive(ours, account, now_ns)
+        for output in host.session.tick(now_ns):
+            if isinstance(output, Outgoing) and output.connection == other and isinstance(output.message, HostHello):
+                hellos += 1
+                answer = host.session.receive(other, Refusal(RefusalReason.BUSY), now_ns)
+                told += [item for item in answer if isinstance(item, Refused)]
+    assert set(told) == {Refused(RefusalReason.BUSY, 1)}
+    assert 11 <= hellos <= 14
 
 
 def test_a_goodbye_is_said_on_every_link() -> None:

@@ -92,6 +92,7 @@ def test_rate_and_size_give_way_and_come_back(
             guest.until("StatusText", f"lowered to {SLOW_FPS} fps of 160x120 for the link (rung 2 of 2)", "still less")
             until(lambda: steps(out) == 10 * [2], "every other image, small, without a gap")
             assert ledgers(out)[-1]["bytes"] < min(map(len, film.frames)) / 2
+        until(lambda: rungs(guest.journal())[-1] == 1, "the camera's images are whole again")
         until(lambda: rungs(guest.journal())[-1] == 0, "the camera gives all again")
         until(lambda: steps(out) == 10 * [1], "every image again")
         status = guest.show("StatusText")
