@@ -1,12 +1,20 @@
 """Both programs over two links at once: one is taken away and given back; numbered images are paired right all the while, and all is counted."""
 
 import signal
+import socket
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from board_agent.agent import Agent
+from common import now
+from common.camera.factory import open_camera
+from common.frame import Buffer
+from common.link.base import SendResult
+from common.link.zeromq import ZeroMqListener
 from phone_host.emulate import Profile
 from phone_host.relay import relay_process
 from tests.support.keys import acquainted
@@ -202,6 +210,45 @@ def test_a_board_that_has_forgotten_the_host_is_still_heard_over_other_links(fil
         assert len(refusals) == 1
         assert f"phone-host pair --link {tcp}" in refusals[0]
         assert sender.stop() == 0
+
+
+class RepeatingLink(ZeroMqListener):
+    """A transport that delivers every frame twice."""
+
+    def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
+        """Hand it over, and once more."""
+        if len(payload):
+            super().send(connection, header, payload)
+        return super().send(connection, header, payload)
+
+
+def test_a_frame_that_comes_twice_is_paired_once(film: str, tmp_path: Path) -> None:
+    """What a transport delivers again never reaches pairing: each frame makes one pair, the repetitions are counted, and the account holds."""
+    out = tmp_path / "out"
+    ipc = f"ipc://{tmp_path}/link"
+    camera = open_camera(film, "board", now.monotonic_ns())
+    link = RepeatingLink(ipc, board=True)
+    reader, writer = socket.socketpair()
+    with reader, writer:
+        agent = Agent(camera, [link], now.random_id(), now.boot_id(), reader)
+        sender = threading.Thread(target=agent.run)
+        sender.start()
+        try:
+            receiving = ["run", "--camera", film, "--out", str(out), "--save-every", "1", "--pairs", "30", "--json"]
+            with host(with_links(receiving, ipc), tmp_path) as receiver:
+                assert receiver.wait() == 0
+        finally:
+            writer.send(b"\0")
+            sender.join()
+            link.close()
+    report = receiver.json()
+    sequences = [ledger["sequence"] for ledger in ledgers(out)]
+    assert sequences == sorted(set(sequences))
+    assert len(sequences) == 30
+    assert all(left == right for left, right in saved_numbers(out))
+    (session,) = report["sessions"]
+    assert session["sent"] == session["received"] + session["lost"]
+    assert session["received"] - 1 <= session["stale"]["duplicate"] <= session["received"]  # the last may be under way
 
 
 @pytest.mark.parametrize("killed", ["board", "host"])
