@@ -120,6 +120,8 @@ def test_a_pulled_cable_gives_way_to_the_network_and_takes_over_again(
     assert report["switches"] >= 2
     sequences = [ledger["sequence"] for ledger in ledgers(out)]
     assert sequences == sorted(set(sequences)), "a frame was paired twice or out of order"
+    for source, target in (("serial", "tcp"), ("tcp", "serial")):
+        assert f"link_switched source={source} target={target}" in stream.receiver.stderr
     check_journal(cabled)
 
 
