@@ -1,5 +1,7 @@
 """What befalls a camera: pulled and plugged in again, spoiled frames, a plane whose depth is known."""
 
+import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +18,8 @@ from tests.vm.webcam import Webcam
 pytestmark = pytest.mark.timeout(600)  # the first test boots the board
 
 DISPARITIES = 64
+DEAD_S = 64
+"""More than a minute, and not the film's length, at which every wrong pair would look right."""
 
 
 @pytest.fixture(autouse=True)
@@ -123,16 +127,26 @@ def test_truncated_frames_are_dropped_and_counted(
     assert 1 <= spoiled <= webcam.truncated
 
 
-def test_a_resting_camera_starts_for_a_host(
+def test_a_host_dead_for_a_minute_is_served_again(
     guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
 ) -> None:
-    """Without a host the stream is switched off after a while, and a host that comes then gets frames all the same."""
-    before = webcam.starts
-    until(lambda: not webcam.streaming, "the stream is switched off")
+    """A host that is stopped for more than a minute is given up and the camera rests; when it goes on, it gets fresh frames of the same session."""
     with streaming(guest, film.right, tmp_path / "out") as stream:
-        stream.more(10, "after the rest")
-        stream.finish(skew)
+        stream.more(10, "before the stop")
+        before = webcam.starts
+        stream.receiver.send(signal.SIGSTOP)
+        dead_until = time.monotonic() + DEAD_S
+        try:
+            guest.until("StatusText", "waiting for a host", "the board gives the host up")
+            until(lambda: not webcam.streaming, "the stream is switched off")
+            assert webcam.starts == before
+            time.sleep(max(0.0, dead_until - time.monotonic()))  # the length of the fault, no wait for anything
+        finally:
+            stream.receiver.send(signal.SIGCONT)
+        stream.more(10, "after the minute")
+        report = stream.finish(skew)
     assert webcam.starts > before
+    assert len(report["sessions"]) == 1
 
 
 def test_a_camera_out_of_step_is_steered_by_restarting_it(
