@@ -57,18 +57,3 @@ def test_a_board_that_was_suspended_streams_on(
         report = stream.finish(skew)
     assert len(report["sessions"]) == 1
     assert "slept" in guest.journal()
-
-
-def test_a_board_whose_machine_stood_still_streams_on(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
-    """Stopped with its camera streaming, and unaware of it as a virtual machine is, for less and for more than silence is borne: no pair is wrong."""
-    with streaming(guest, film.right, tmp_path / "out") as stream:
-        for pause_s in (2, 6):
-            stream.more(10, "before the stop")
-            before_ns = offset_ns(guest)
-            guest.tell_emulator("stop")
-            time.sleep(pause_s)  # the length of the stop, no wait for anything
-            guest.tell_emulator("cont")
-            stream.more(20, "after the stop")
-            assert before_ns - offset_ns(guest) > pause_s * 900_000_000, "the board's clock stood still"
-        report = stream.finish(skew)
-    assert len(report["sessions"]) == 1
