@@ -305,7 +305,7 @@ class Agent:
             return
         match self._send(outgoing):
             case SendResult.SENT:
-                self._session.sent()
+                self._session.sent(now.monotonic_ns())
                 self._outbox.sent()
             case SendResult.FULL if not self._on_demand:
                 self._outbox.discard(DropReason.LINK_FULL)

@@ -30,7 +30,7 @@ from common.protocol.message import (
     Status,
     Steer,
 )
-from common.protocol.session import HELLO_RETRY_NS, SILENCE_NS, STATUS_NS, TAKEOVER_NS, Outgoing
+from common.protocol.session import HELLO_RETRY_NS, SILENCE_NS, STATUS_NS, STATUS_SLOW_NS, TAKEOVER_NS, Outgoing
 
 _NEVER = 2**63 - 1
 
@@ -111,6 +111,8 @@ class BoardSession:
         self._knock_due_ns = 0
         self._host: _Host | None = None
         self._sent = 0
+        self._sent_ns = 0
+        self._status_ns = STATUS_NS
         self._ended = False
         self._later_ns = 0
 
@@ -206,7 +208,7 @@ class BoardSession:
             if not host.heard_by:
                 self._host = host = None
         if host is not None and now_ns >= host.status_due_ns:
-            host.status_due_ns = now_ns + STATUS_NS
+            host.status_due_ns = now_ns + self._status_ns
             outgoing += self._account(host, counts)
         if self._dialled and now_ns >= self._knock_due_ns:
             outgoing += [
@@ -238,9 +240,11 @@ class BoardSession:
         message = FrameMessage(self.session, self._sent, frame.sequence, *size, frame.exposure_ns, marks, frame.payload)
         return Outgoing(self._host.frames, message)
 
-    def sent(self) -> None:
-        """Take note that the link took the frame."""
-        self._sent += 1
+    def sent(self, now_ns: int) -> None:
+        """Take note that the link took the frame; where frames are far apart, accounts are rarer."""
+        apart_ns = now_ns - self._sent_ns if self._sent else 0
+        self._status_ns = STATUS_NS if apart_ns < STATUS_SLOW_NS else STATUS_SLOW_NS
+        self._sent, self._sent_ns = self._sent + 1, now_ns
 
     def unreachable(self, connection: bytes) -> list[Outgoing]:
         """Take note that a connection is gone; a host that is still heard on others and has no lane for frames is asked to say hello anew."""

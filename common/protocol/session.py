@@ -26,6 +26,9 @@ SILENCE_NS: Final = 3000 * MS
 STATUS_NS: Final = 500 * MS
 """Between two accounts of the board's frames."""
 
+STATUS_SLOW_NS: Final = 1000 * MS
+"""The same where frames are further apart than this: half a percent of a line of 115200 baud is one account a second."""
+
 
 @dataclass(frozen=True, slots=True)
 class Outgoing:

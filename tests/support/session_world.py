@@ -209,7 +209,7 @@ class World:
             index = self.sent[self.board.session]
             frame = Frame(index, stamp, stamp, 640, 480, PixelFormat.MJPEG, None, b"")
             if self._board_sends(self.board.send(frame)):
-                self.board.sent()
+                self.board.sent(self.now_ns)
                 self.clocks[self.board.session, index] = self.boot_id
                 self.sent[self.board.session] += 1
 

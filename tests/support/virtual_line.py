@@ -23,12 +23,14 @@ class Way:
         bytes_per_s: how fast bytes leave; what has not left waits in a queue without end.
         delay_ns: from leaving to arriving.
         spoil: what becomes of the bytes on the way.
+        chop: gives how many bytes come at one go; by default what leaves in 100 us, 16 at least.
         nap_ns: whoever reads is awake only so often.
     """
 
     bytes_per_s: float
     delay_ns: int
     spoil: Spoil = bytes
+    chop: Callable[[], int] | None = None
     nap_ns: int = 1
     free_ns: int = 0
 
@@ -52,9 +54,9 @@ class VirtualLine:
     _count: int = 0
 
     @classmethod
-    def of(cls, bytes_per_s: float, delay_ns: int, spoil: Spoil = bytes) -> "VirtualLine":
+    def of(cls, bytes_per_s: float, delay_ns: int, spoil: Spoil = bytes, frame_bytes: int = 1) -> "VirtualLine":
         """A line with two like directions."""
-        ends = {side: Duplex(side, 17) for side in Side}
+        ends = {side: Duplex(side, 17, frame_bytes) for side in Side}
         return cls(ends, {side: Way(bytes_per_s, delay_ns, spoil) for side in Side})
 
     def write(self) -> None:
@@ -64,8 +66,9 @@ class VirtualLine:
             while data := end.take(self.now_ns):
                 way.free_ns = max(way.free_ns, self.now_ns)
                 step = max(_GRAIN_BYTES, int(way.bytes_per_s * _GRAIN_NS / 1e9))
-                for at in range(0, len(data), step):
-                    grain = data[at : at + step]
+                while data:
+                    size = way.chop() if way.chop is not None else step
+                    grain, data = data[:size], data[size:]
                     way.free_ns += round(len(grain) / way.bytes_per_s * 1e9)
                     self._count += 1
                     at_ns = -(-(way.free_ns + way.delay_ns) // way.nap_ns) * way.nap_ns

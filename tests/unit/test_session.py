@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from common.frame import PixelFormat
 from common.ledger import BoardMarks
+from common.protocol.board_session import BoardSession
 from common.protocol.message import (
     BoardCounts,
     BoardHello,
@@ -43,6 +44,7 @@ from common.protocol.session import (
     StaleReason,
     Stepped,
     Vanished,
+    connection_name,
 )
 from common.protocol.waves import YOUNG_NS
 from common.protocol.wire import decode, encode_stamped
@@ -461,6 +463,23 @@ def test_a_wish_to_steer_is_given_once() -> None:
         world.board.receive(connection, message, world.now_ns, BoardCounts())
         assert world.board.take_steering() == given_ns
         assert world.board.take_steering() == 0
+
+
+@pytest.mark.parametrize(("apart_ns", "accounts"), [(33 * MS, 20), (900 * MS, 20), (1500 * MS, 10)])
+def test_accounts_are_rarer_where_frames_are_far_apart(apart_ns: int, accounts: int) -> None:
+    """In ten seconds the host is told twenty accounts, and ten where frames are more than a second apart, as on a line of 115200 baud."""
+    board, control, now_ns = BoardSession("board", "boot", CAMERA), connection_name(0, b"control"), 10**12
+    board.receive(control, HostHello("host", Lane.CONTROL), now_ns, BoardCounts())
+    told, sent_ns = 0, now_ns
+    for step in range(1400):
+        now_ns += 10 * MS
+        if now_ns - sent_ns >= apart_ns:
+            sent_ns = now_ns
+            board.sent(now_ns)
+        board.receive(control, Ping(0, 0), now_ns, BoardCounts())  # a sign of life
+        accounted = any(isinstance(said.message, Status) for said in board.tick(now_ns, BoardCounts()))
+        told += accounted and step >= 400  # before that the first two frames leave
+    assert told == pytest.approx(accounts, abs=2)
 
 
 def test_the_host_is_told_once_of_each_rung() -> None:

@@ -1,0 +1,127 @@
+"""Serial and RFCOMM over a byte pipe that chops, delays, corrupts and drops: packets come whole, unaltered and in order, or not at all."""
+
+import random
+from collections import deque
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.link.rfcomm import FRAME_BYTES
+from common.protocol.chunking import Whole
+from common.protocol.framing import Side
+from common.protocol.message import Lane
+from tests.support.virtual_line import VirtualLine
+
+S = 1_000_000_000
+MS = 1_000_000
+BYTES_PER_S = 200_000
+
+FRAMES_OF = {"serial": 1, "rfcomm": FRAME_BYTES}
+"""What a transport carries bytes in."""
+
+Sent = tuple[Lane, bytes, bytes]
+
+PACKETS = st.lists(
+    st.one_of(
+        st.tuples(st.just(Lane.FRAMES), st.integers(0, 6000)), st.tuples(st.just(Lane.CONTROL), st.integers(0, 100))
+    ),
+    min_size=1,
+    max_size=10,
+)
+
+
+class Pipe:
+    """What spoils one direction of the pipe.
+
+    Args:
+        seed: of all that happens in it.
+        badness: how often, of the pieces that pass, one is spoiled.
+    """
+
+    def __init__(self, seed: int, badness: float) -> None:
+        self.badness = badness
+        self._chance = random.Random(seed)
+
+    def __call__(self, data: bytes) -> bytes:
+        """What comes out for a piece that goes in."""
+        return self._spoiled(data) if self._chance.random() < self.badness else data
+
+    def chop(self) -> int:
+        """How many bytes the next piece has: often few, seldom many."""
+        return self._chance.choice((1, 2, 7, 16, 61, 300, 5000))
+
+    def _spoiled(self, data: bytes) -> bytes:
+        chance, at = self._chance, self._chance.randrange(len(data))
+        match chance.randrange(4):
+            case 0:
+                return data[:at] + bytes((data[at] ^ 1 << chance.randrange(8),)) + data[at + 1 :]
+            case 1:
+                return data[:at] + data[at + chance.randrange(1, 16) :]
+            case 2:
+                return data[:at] + chance.randbytes(chance.randrange(1, 40)) + data[at:]
+            case _:
+                return b""
+
+
+def _exchange(line: VirtualLine, packets: dict[Side, list[Sent]], until_ns: int) -> None:
+    """Send what each end has, as the link takes it; what it does not take until then stays unsent."""
+    waiting = {side: deque(own) for side, own in packets.items()}
+
+    def act(on: VirtualLine) -> None:
+        for side, queue in waiting.items():
+            while queue and on.ends[side].put(*queue[0]):
+                queue.popleft()
+
+    line.run(until_ns, act)
+
+
+def _packets(kinds: list[tuple[Lane, int]], seed: int, word: str) -> dict[Side, list[Sent]]:
+    """Packets of these sizes for both ends, no two of them alike."""
+    chance = random.Random(seed)
+    return {
+        side: [(lane, f"{word} {number}".encode(), chance.randbytes(size)) for number, (lane, size) in enumerate(kinds)]
+        for side in Side
+    }
+
+
+def _came(line: VirtualLine, side: Side, lane: Lane) -> list[Sent]:
+    """What came to an end on a lane."""
+    came = [event for _, event in line.came[side] if isinstance(event, Whole) and event.lane is lane]
+    return [(lane, bytes(whole.header), bytes(whole.payload)) for whole in came]
+
+
+@pytest.mark.parametrize("transport", FRAMES_OF)
+@given(
+    kinds=PACKETS,
+    delay_ms=st.integers(0, 40),
+    badness=st.sampled_from([0.0, 0.002, 0.02, 0.2]),
+    seed=st.integers(0, 2**32),
+)
+@settings(deadline=None, max_examples=150)
+def test_whole_unaltered_and_in_order_or_not_at_all(
+    transport: str, kinds: list[tuple[Lane, int]], delay_ms: int, badness: float, seed: int
+) -> None:
+    """Whatever the pipe does, what comes was sent, once, in order and unaltered, all of it if the pipe only chops; once it is sound all comes again."""
+    line = VirtualLine.of(BYTES_PER_S, delay_ms * MS, frame_bytes=FRAMES_OF[transport])
+    line.meet()
+    pipes = {side: Pipe(seed + side.value, badness) for side in Side}
+    for side, way in line.ways.items():
+        way.spoil = pipes[side]
+        way.chop = pipes[side].chop
+    early = _packets(kinds, seed, "early")
+    _exchange(line, early, line.now_ns + 3 * S)
+    for pipe in pipes.values():
+        pipe.badness = 0.0
+    line.run(line.now_ns + 3 * S)  # so long what was under way when bytes were lost may count as such
+    late = _packets([(Lane.FRAMES, 3000), (Lane.CONTROL, 30), (Lane.FRAMES, 0)], seed + 1, "late")
+    _exchange(line, late, line.now_ns + 3 * S)
+    for side in Side:
+        for lane in Lane:
+            came = _came(line, side.peer, lane)
+            sent_early, sent_late = ([one for one in own[side] if one[0] is lane] for own in (early, late))
+            first, last = came[: len(came) - len(sent_late)], came[len(came) - len(sent_late) :]
+            assert last == sent_late
+            left = iter(sent_early)
+            assert all(one in left for one in first), "not in order, twice, or altered"
+            assert badness or first == sent_early
