@@ -22,6 +22,9 @@ _FRAMES: Final = 3000
 
 _SEED: Final = 1
 
+_SLOWER: Final = 1.15
+"""Frames that begin this much more seldom than the camera shows them, while the processor waits, wait for the line."""
+
 _LEAST_GAPS: Final = 10
 """Fewer tell no median that a single hitch would not move."""
 
@@ -226,22 +229,33 @@ def learn_link(interface: str, images: Images, cells: Sequence[Cell]) -> LinkMod
         fit = fit_of(ledgers, intervals=False)
         latency_ns, ns_per_byte = fit.latency_ns, fit.ns_per_byte
     if mine[0].self_paced:
-        ns_per_byte = min(ns_per_byte, *(_occupied(cell) for cell in mine))
+        taken = [_occupied(cell) for cell in mine]
+        full = [one.ns_per_byte for one in taken if one.is_full]
+        # Lines that were full tell how long a byte takes them, others only that it takes no longer.
+        ns_per_byte = float(np.median(full)) if full else min(ns_per_byte, *(one.ns_per_byte for one in taken))
     return LinkModel(latency_ns, ns_per_byte, delay - latency_ns - ns_per_byte * size, mine[0].self_paced)
 
 
-def _occupied(cell: Cell) -> float:
-    """What a byte can take of the line at most, ns, on a link that begins a frame when the one before has left: the median time to the next beginning.
+@dataclass(frozen=True, slots=True)
+class _Occupied:
+    """How long a self-paced line was taken, a byte, ns, from one frame's beginning to the next's; `is_full`: because of the line, not of the camera."""
 
-    What the machine adds to propagation does not hold up the next frame, but tilts the fitted line. Where a frame between the two gave no pair, the time
-    is too long, which only makes this say less.
+    ns_per_byte: float
+    is_full: bool
+
+
+def _occupied(cell: Cell) -> _Occupied:
+    """How long a line that begins a frame when the one before has left was taken for a byte, in the median.
+
+    What the machine adds to propagation does not hold up the next frame, but tilts the fitted line.
     """
-    gaps = [
-        (after.board.sent_ns - before.board.sent_ns) / before.bytes
-        for before, after in pairwise(cell.ledgers)
-        if after.session == before.session
-    ]
-    return float(np.median(gaps)) if len(gaps) >= _LEAST_GAPS else float("inf")
+    gaps = np.array([after.board.sent_ns - before.board.sent_ns for before, after in pairwise(cell.ledgers)])
+    if gaps.size < _LEAST_GAPS:
+        return _Occupied(float("inf"), is_full=False)
+    size = values_of(cell.ledgers, lambda ledger: ledger.bytes)[:-1]
+    starved = float(np.median(values_of(cell.ledgers, lambda ledger: ledger.starvation_ns))) > 0.0
+    slower = float(np.median(gaps)) > _SLOWER * cell.images.period_ns
+    return _Occupied(float(np.median(gaps / size)), is_full=starved and slower)
 
 
 def nominal_link(profile: Profile, *, self_paced: bool) -> LinkModel:

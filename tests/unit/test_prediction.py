@@ -192,3 +192,19 @@ def test_a_line_is_as_fast_as_it_takes_frames() -> None:
     free = learn_link("tcp", hurried.images, [replace(one, self_paced=False) for one in cells])
     assert not isinstance(free, Unknown)
     assert free.ns_per_byte == pytest.approx(12 * MS / 10_000, rel=1e-3)
+
+
+def test_a_full_line_tells_how_long_it_is_taken() -> None:
+    """A self-paced link that begins a frame only every 15 ms, while the camera shows one every 5 ms and the processor waits, is taken for 15 ms by one."""
+    base = cell(period_ms=15)
+    full = replace(base, self_paced=True, images=replace(base.images, period_ns=5.0 * MS))
+    link = learn_link("tcp", full.images, [full])
+    assert not isinstance(link, Unknown)
+    assert link.ns_per_byte == pytest.approx(15 * MS / 10_000)
+    assert figures(foretell(Target("tcp", link, full.images, FifoSettings()), [full])).pairs_per_s == pytest.approx(
+        1000 / 15, rel=0.02
+    )
+    busy = replace(full, ledgers=tuple(replace(one, previous_done_ns=one.queued_ns) for one in full.ledgers))
+    assert not isinstance(told := learn_link("tcp", busy.images, [busy]), Unknown)
+    # Where the processor is what is waited for, the line may be faster: all that is known is the propagation of 12 ms.
+    assert told.ns_per_byte < 12 * MS / 10_000
