@@ -80,6 +80,11 @@ class WordReader:
     def __init__(self) -> None:
         self._unread = b""
 
+    @property
+    def unread_bytes(self) -> int:
+        """What is kept of a word that is not whole yet."""
+        return len(self._unread)
+
     def feed(self, received: bytes) -> list[Word]:
         """Give the words that are whole now.
 

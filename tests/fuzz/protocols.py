@@ -50,7 +50,7 @@ from common.protocol.pairing_code import (
     Shown,
     Word,
 )
-from common.protocol.pairing_wire import decode_word, encode_word
+from common.protocol.pairing_wire import MAX_WORD_BYTES, WordReader, decode_word, encode_word
 from common.protocol.session import Arrived, Echo, Outgoing
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES, decode, encode
 from common.protocol.zap import KEY_BYTES, deny, read_request
@@ -230,6 +230,11 @@ def pairing(data: bytes) -> None:
     door = Desk(Identity(b"b" * KEY_BYTES, "board"), bytes)
     asking = Asking(Identity(b"h" * KEY_BYTES, "host"), lambda count: b"\1" * count)
     now_ns = 10**12
+    reader = WordReader()
+    with suppress(ProtocolError):
+        for part in _parts(data):
+            reader.feed(part)
+            assert reader.unread_bytes <= MAX_WORD_BYTES, "more than one unfinished word is kept"
     for part in _parts(data):
         try:
             word = decode_word(part[1:])

@@ -305,7 +305,7 @@ def test_words_are_the_same_however_the_stream_is_chopped(sequence: list[Word], 
     for size in (*cuts, *([1] * len(stream))):
         heard += reader.feed(stream[:size])
         stream = stream[size:]
-        assert len(reader._unread) <= MAX_WORD_BYTES
+        assert reader.unread_bytes <= MAX_WORD_BYTES
     assert heard == fitting
 
 
@@ -316,7 +316,7 @@ def test_a_stream_of_anything_is_words_or_refused(stream: bytes) -> None:
     try:
         for at in range(0, len(stream), 7):
             reader.feed(stream[at : at + 7])
-            assert len(reader._unread) <= MAX_WORD_BYTES
+            assert reader.unread_bytes <= MAX_WORD_BYTES
     except ProtocolError as error:
         assert "\n" not in str(error)  # noqa: PT017 - either is right
 
