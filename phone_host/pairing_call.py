@@ -124,8 +124,11 @@ class _Line:
             self._socket.sendall(frame_word(word))
 
     def hear(self) -> Word:
+        deadline_ns = now.monotonic_ns() + round(_ANSWER_S * 1e9)
         while True:
             try:
+                # Not per read: what answers may be no board and say a byte now and then. 0 would mean not to wait at all.
+                self._socket.settimeout(max(1e-3, (deadline_ns - now.monotonic_ns()) / 1e9))
                 received = self._socket.recv(1 + MAX_WORD_BYTES)
                 words = self._reader.feed(received)
             except TimeoutError:

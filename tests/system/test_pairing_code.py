@@ -9,108 +9,17 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
-from itertools import cycle
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 import zmq
 
 from common.keys import KeyFolder
-from common.protocol.pairing_code import CODE_DIGITS, Ask, Identity, code_text
-from common.protocol.pairing_wire import frame_word
+from common.protocol.pairing_code import CODE_DIGITS
 from tests.support.numbered import write_film
-from tests.support.programs import Program, board, host, program, until
-
-_CODE = re.compile(r"pairing_code code=(\d{6}) host=(\S+)")
-
-
-def ports() -> int:
-    """A free port with another free one behind it."""
-    while True:
-        with socket.socket() as first, socket.socket() as second:
-            first.bind(("", 0))
-            port = int(first.getsockname()[1])
-            try:
-                second.bind(("", port + 1))
-            except (OSError, OverflowError):
-                continue
-            return port
-
-
-@dataclass(frozen=True, slots=True)
-class Rig:
-    """A board on every network, and where its host finds it.
-
-    Attributes:
-        agent: the board.
-        link: the host's link to it.
-        folder: of everything.
-    """
-
-    agent: Program
-    link: str
-    folder: Path
-
-    @property
-    def board_keys(self) -> str:
-        """The board's folder of keys."""
-        return str(self.folder / "b")
-
-    @property
-    def host_keys(self) -> str:
-        """The host's folder of keys."""
-        return str(self.folder / "h")
-
-    def codes(self) -> list[str]:
-        """The codes that the board has shown in its log."""
-        return [code for code, _ in _CODE.findall(self.agent.stderr)]
-
-    def pair(self, *options: str) -> "subprocess.Popen[str]":
-        """Start `phone-host pair`."""
-        command = [sys.executable, "-P", "-m", "phone_host.cli", "pair", "--link", self.link, "--keys", self.host_keys]
-        return subprocess.Popen(
-            [*command, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-
-    def pair_by_log(self) -> tuple[int, str, str]:
-        """Pair with the code that the board's log shows; exit code, stdout and stderr."""
-        known = len(self.codes())
-        pairing = self.pair("--json")
-        until(lambda: len(self.codes()) > known or pairing.poll() is not None, "the board shows a code")
-        said = pairing.communicate(f"{self.codes()[-1]}\n", timeout=60)
-        return pairing.returncode, *said
-
-    def pair_wrongly(self, *options: str) -> int:
-        """Type a code that is not the board's; the exit code."""
-        known = len(self.codes())
-        pairing = self.pair(*options)
-        until(lambda: len(self.codes()) > known or pairing.poll() is not None, "a code is shown")
-        wrong = code_text((int(self.codes()[-1]) + 1) % 10**CODE_DIGITS)
-        _, err = pairing.communicate(f"{wrong}\n", timeout=60)
-        assert "the code was" in err
-        return pairing.returncode
-
-    def streams(self, name: str) -> None:
-        """A host gets frames over this link."""
-        images = self.folder / "film"
-        arguments = ["run", "--link", self.link, "--keys", self.host_keys, "--camera", f"replay:{images}?pace=demand"]
-        with host([*arguments, "--pairs", "3", "--json"], self.folder, name) as running:
-            assert running.wait() == 0, running.stderr
-        assert running.json()["frames"]["paired"] >= 3
-
-
-@contextmanager
-def on_every_network(folder: Path, *options: str) -> Iterator[Rig]:
-    """A board that listens on every network, with short paths for its keys."""
-    if not (folder / "film").exists():
-        write_film(folder / "film", 20)
-    port = ports()
-    command = ["run", "--camera", f"replay:{folder / 'film'}?pace=demand&loop=1", "--link", f"tcp://*:{port}", *options]
-    with board([*command, "--keys", str(folder / "b"), "--json"], folder) as agent:
-        until(lambda: " serving " in agent.stderr or agent.process.poll() is not None, "the board serves")
-        yield Rig(agent, f"tcp://127.0.0.1:{port}", folder)
+from tests.support.pairing_rig import Rig, on_every_network, ports
+from tests.support.programs import board, host, program, until
 
 
 @pytest.fixture
@@ -181,121 +90,6 @@ def test_the_owner_takes_in_a_second_host(rig: Rig) -> None:
     assert len(names) == 2
     assert names[1] == f"{names[0]}-2"
     assert json.loads(out)["key"] == KeyFolder(Path(rig.board_keys)).own().public
-
-
-def test_one_code_and_one_account_of_tries_for_all_links(tmp_path: Path) -> None:
-    """A board with two links shows one code, good at either; wrong codes at one and at the other count together, whatever host they come from."""
-    first = ports()
-    second = next(port for port in iter(ports, None) if abs(port - first) > 1)
-    write_film(tmp_path / "film", 10)
-    listening = [word for port in (first, second) for word in ("--link", f"tcp://*:{port}")]
-    serving = ["run", "--camera", f"replay:{tmp_path / 'film'}?pace=demand", "--keys", str(tmp_path / "b"), *listening]
-    with ExitStack() as stack:
-        agent = stack.enter_context(board(serving, tmp_path))
-        until(lambda: "pairing_open" in agent.stderr, "the board takes in hosts")
-        rigs = [Rig(agent, f"tcp://127.0.0.1:{port}", tmp_path) for port in (first, second)]
-        for number, rig in enumerate((rigs[0], rigs[1], rigs[0])):
-            assert rig.pair_wrongly("--keys", str(tmp_path / f"h{number}")) == 4
-        assert "pause_s=60" in agent.stderr
-        refused = rigs[1].pair()
-        assert "pause" in refused.communicate("", timeout=60)[1]
-        assert refused.returncode == 3
-        owner = stack.enter_context(
-            program("board_agent.cli", ["pair", "--keys", rigs[0].board_keys], tmp_path, "pair")
-        )
-        shown = re.compile(
-            rf"^tcp://\*:{first}, tcp://\*:{second}: type this code on the host: (\d{{6}})$", re.MULTILINE
-        )
-        until(lambda: bool(shown.search(owner.out.read_text())), "the code is shown")
-        (code,) = shown.findall(owner.out.read_text())
-        pairing = rigs[1].pair("--code", code)
-        _, err = pairing.communicate(timeout=60)
-        assert pairing.returncode == 0, err
-        assert owner.wait() == 0, owner.stderr
-
-
-def test_strangers_that_say_nothing_keep_nobody_from_pairing(rig: Rig) -> None:
-    """Strangers ask and fall silent, or never end a word, or connect and say nothing at all: a host is paired meanwhile, and they are hung up on."""
-    door = ("127.0.0.1", int(rig.link.rpartition(":")[2]) + 1)
-    ask = frame_word(Ask(Identity(bytes(32), "stranger")))
-    until(lambda: "pairing_open" in rig.agent.stderr, "the door is open")
-    with ExitStack() as stack:
-        strangers = [stack.enter_context(socket.create_connection(door, timeout=60)) for _ in range(40)]
-        for stranger, said in zip(strangers, cycle((ask, ask[:20], b"")), strict=False):
-            with suppress(ConnectionError):  # made room for another one
-                stranger.sendall(said)
-        code, _, err = rig.pair_by_log()
-        assert code == 0, err
-        for stranger in strangers:
-            with suppress(ConnectionError):
-                while stranger.recv(1000):
-                    pass
-    assert "pairing_failed" not in rig.agent.stderr
-    assert rig.agent.stderr.count("pairing_code") <= 2
-
-
-def test_who_is_connected_when_the_door_closes_is_hung_up_on(rig: Rig) -> None:
-    """A stranger that connected while the door was open, and goes on asking, is cut off when it closes: nobody guesses behind it."""
-    until(lambda: "pairing_open" in rig.agent.stderr, "the door is open")
-    door = ("127.0.0.1", int(rig.link.rpartition(":")[2]) + 1)
-    assert rig.pair_by_log()[0] == 0
-    ask = frame_word(Ask(Identity(bytes(32), "stranger")))
-    with suppress(ConnectionError), socket.create_connection(door, timeout=60) as stranger:
-        stranger.sendall(ask)
-        while stranger.recv(1000):
-            pass
-    until(lambda: "pairing_closed" in rig.agent.stderr, "the door closes")
-    with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(door)
-
-
-def test_a_code_typed_before_is_refused_by_every_later_process(rig: Rig) -> None:
-    """Somebody in the middle learns some bits each time a code is proved to him: a host proves one once, however often it is started."""
-    assert rig.pair_wrongly() == 4
-    (typed,) = KeyFolder(Path(rig.host_keys)).spent_codes()
-    assert typed not in rig.codes()
-    for _ in range(2):
-        again = rig.pair("--code", typed)
-        _, err = again.communicate(timeout=60)
-        assert again.returncode == 2, err
-        assert "typed before" in err
-        assert err.count("\n") == 1
-    assert rig.agent.stderr.count("pairing_failed") == 1, "the board has heard nothing of it"
-    assert (Path(rig.host_keys) / "spent-codes").stat().st_mode & 0o077 == 0
-
-
-def test_two_links_side_by_side_are_refused(tmp_path: Path) -> None:
-    """A link on the port where another one's new hosts are taken in ends the start with exit 2 and one line that names both and the remedy."""
-    write_film(tmp_path / "film", 3)
-    port = ports()
-    for other in (f"tcp://*:{port + 1}", f"tcp://127.0.0.1:{port + 1}"):
-        links = ["--link", f"tcp://*:{port}", "--link", other, "--keys", str(tmp_path / "b")]
-        with board(["run", "--camera", f"replay:{tmp_path / 'film'}", *links], tmp_path) as agent:
-            assert agent.wait() == 2
-        assert f"tcp://*:{port} " in agent.stderr
-        assert other in agent.stderr
-        assert str(port + 2) in agent.stderr
-        assert agent.stderr.count("\n") == 1
-
-
-def test_three_wrong_codes_are_followed_by_a_pause(rig: Rig) -> None:
-    """A wrong code ends with exit 4 and spends the code shown; after the third one nobody may try for a minute, until the owner says so."""
-    for _ in range(3):
-        assert rig.pair_wrongly() == 4
-    assert len(set(rig.codes())) == 3
-    pairing = rig.pair()
-    _, err = pairing.communicate("", timeout=60)
-    assert pairing.returncode == 3
-    assert "pause" in err
-    assert re.search(r"wait \d+ s", err)
-    assert rig.agent.stderr.count("pairing_failed") == 3
-    assert "pause_s=60" in rig.agent.stderr
-    with program("board_agent.cli", ["pair", "--keys", rig.board_keys], rig.folder, "pair") as owner:
-        until(lambda: "type this code" in owner.out.read_text(), "the code is shown")
-        pairing = rig.pair("--code", owner.out.read_text().split()[-1])
-        assert pairing.wait(60) == 0, pairing.communicate()
-        pairing.communicate()
-        assert owner.wait() == 0
 
 
 def test_on_a_terminal_a_wrong_code_is_asked_again(rig: Rig) -> None:
