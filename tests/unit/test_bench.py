@@ -4,6 +4,7 @@ import dataclasses
 import html
 import json
 import math
+import re
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 from typing import Any
@@ -354,6 +355,7 @@ def test_page_is_whole_html_and_refers_to_nothing_outside() -> None:
     text = page(results, UNDER, analysed(*results))
     checker.feed(text)
     assert checker.open_tags == []
+    assert not re.search(r"<script|<link|<iframe|<object|@import|url\(|<image", text)
     # In two widths each: four for both kinds of images, one for both interfaces, one for the model.
     assert checker.plots == 2 * (4 * 2 + 2 + 1)
     assert "rfcomm was not run: no radio" in text
