@@ -1,26 +1,42 @@
 """What BlueZ's daemon does for an RFCOMM link: it publishes the service's record, and knows devices by name.
 
-The link listens and dials with sockets of its own, so a missing daemon costs no more than the name (decision 0012).
+The link listens and dials with sockets of its own, so a missing daemon, or a missing dbus-fast, which is needed to speak with it, costs no more
+than the name (decision 0012). dbus-fast wants asyncio: it is imported nowhere else, and its loop runs in a thread of its own, or for one question.
 """
 
+import asyncio
 import logging
 import threading
-from typing import Final
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from functools import partial
+from typing import Any, Final
 
 from common.errors import UnavailableError
-from common.link.dbus import Call, Kind, SystemBus, Variant
 from common.link.sdp import SERVICE_UUID, record_xml
 from common.logs import event
+
+try:
+    from dbus_fast import AuthError, BusType, InvalidAddressError, Message, MessageType, Variant
+    from dbus_fast.aio import MessageBus
+except ImportError:
+    _HAS_LIBRARY = False
+else:
+    _HAS_LIBRARY = True
 
 _LOG = logging.getLogger(__name__)
 
 _BLUEZ: Final = "org.bluez"
+_BUS: Final = "org.freedesktop.DBus"
 _RETRY_S: Final = 5.0
 """A bus that is not there is looked for again after this time; once it is, nothing is asked for twice."""
 
+_PATIENCE_S: Final = 5.0
+"""An answer takes milliseconds; bluetoothd on a busy board was never seen to need a second."""
+
 _GOODBYE_S: Final = 1.0
 
-_APPEARED: Final = f"type='signal',sender='org.freedesktop.DBus',member='NameOwnerChanged',arg0='{_BLUEZ}'"
+_APPEARED: Final = f"type='signal',sender='{_BUS}',member='NameOwnerChanged',arg0='{_BLUEZ}'"
 
 
 class PublishedRecord:
@@ -32,8 +48,8 @@ class PublishedRecord:
 
     def __init__(self, channel: int) -> None:
         self._channel = channel
-        self._bus: SystemBus | None = None
         self._stop = threading.Event()
+        self._cancel: Callable[[], object] | None = None
         self._problem = ""
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
         self._thread.start()
@@ -41,53 +57,82 @@ class PublishedRecord:
     def close(self) -> None:
         """Withdraw it."""
         self._stop.set()
-        if (bus := self._bus) is not None:  # the thread may let go of it at this moment
-            bus.interrupt()
+        if self._cancel is not None:  # else the thread has not begun to wait, and looks at _stop before it does
+            with suppress(RuntimeError):  # the loop has just been closed
+                self._cancel()
         self._thread.join(_GOODBYE_S)
 
     def _run(self) -> None:
         while not self._stop.is_set():
             try:
-                self._bus = SystemBus()
-                self._keep(self._bus)
+                asyncio.run(self._converse())
             except UnavailableError as error:
-                self._note(error.problem)
-            if self._bus is not None:
-                self._bus.close()
-            self._bus = None
+                self._note(error)
+            except asyncio.CancelledError:
+                return
+            if not _HAS_LIBRARY:
+                return
             self._stop.wait(_RETRY_S)
 
-    def _keep(self, bus: SystemBus) -> None:
-        """Register now and whenever the daemon appears; BlueZ forgets the record when this conversation ends."""
-        bus.call(_to_bus("AddMatch", _APPEARED))
-        if bus.call(_to_bus("NameHasOwner", _BLUEZ))[0]:
-            self._register(bus)
-        else:
-            self._note("bluetoothd is not running")
-        while not self._stop.is_set():
-            message = bus.next_message()
-            if message.kind is Kind.SIGNAL and message.member == "NameOwnerChanged" and message.arguments[2]:
-                self._register(bus)
+    async def _converse(self) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        self._cancel = partial(asyncio.get_running_loop().call_soon_threadsafe, task.cancel)
+        if not self._stop.is_set():
+            async with _system_bus() as bus:
+                await self._keep(bus)
 
-    def _register(self, bus: SystemBus) -> None:
+    async def _keep(self, bus: "MessageBus") -> None:
+        """Register now and whenever the daemon appears; BlueZ forgets the record when this conversation ends."""
+        changed = asyncio.Event()
+
+        def heard(message: "Message") -> None:
+            if message.member == "NameOwnerChanged" and message.body[2]:
+                changed.set()
+
+        bus.add_message_handler(heard)
+        await _ask(bus, _of_bus("AddMatch", _APPEARED))
+        if (await _ask(bus, _of_bus("NameHasOwner", _BLUEZ)))[0]:
+            changed.set()
+        else:
+            self._note(UnavailableError("bluetoothd is not running", "systemctl start bluetooth"))
+        gone = asyncio.ensure_future(bus.wait_for_disconnect())
+        gone.add_done_callback(lambda _: changed.set())
+        while True:
+            await changed.wait()
+            if gone.done():
+                raise UnavailableError(f"D-Bus has gone ({gone.exception()})", "systemctl start dbus")
+            changed.clear()
+            await self._register(bus)
+
+    async def _register(self, bus: "MessageBus") -> None:
         options = {
             "Name": Variant("s", "tandemscan"),
             "Role": Variant("s", "server"),
             "ServiceRecord": Variant("s", record_xml(self._channel)),
-        }
-        arguments = ("/tandemscan", str(SERVICE_UUID), options)
-        call = Call(
-            _BLUEZ, "/org/bluez", "org.bluez.ProfileManager1", "RegisterProfile", "osa{sv}", arguments
-        )  # no channel among the options: with one BlueZ would listen there itself
-        bus.call(call)
+        }  # no channel among the options: with one BlueZ would listen there itself
+        register = Message(
+            destination=_BLUEZ,
+            path="/org/bluez",
+            interface="org.bluez.ProfileManager1",
+            member="RegisterProfile",
+            signature="osa{sv}",
+            body=["/tandemscan", str(SERVICE_UUID), options],
+        )
+        await _ask(bus, register)
         self._problem = ""
         _LOG.info(event("bluetooth_record_published", channel=self._channel))
 
-    def _note(self, problem: str) -> None:
-        if problem != self._problem and not self._stop.is_set():
-            self._problem = problem
-            hint = "hosts must name the board's address"
-            _LOG.warning(event("bluetooth_record_missing", channel=self._channel, problem=problem, hint=hint))
+    def _note(self, error: UnavailableError) -> None:
+        if error.problem != self._problem and not self._stop.is_set():
+            self._problem = error.problem
+            told = event(
+                "bluetooth_record_missing",
+                channel=self._channel,
+                problem=error.problem,
+                remedy=f"{error.remedy}; till then hosts must name the board's address",
+            )
+            _LOG.warning(told)
 
 
 def address_of(name: str) -> str:
@@ -102,11 +147,12 @@ def address_of(name: str) -> str:
     Raises:
         UnavailableError: none is known by this name, or several are, or no daemon can be asked.
     """
-    bus = SystemBus()
     try:
-        (objects,) = bus.call(Call(_BLUEZ, "/", "org.freedesktop.DBus.ObjectManager", "GetManagedObjects"))
-    finally:
-        bus.close()
+        objects = asyncio.run(_known_objects())
+    except UnavailableError as error:
+        raise UnavailableError(
+            f"Bluetooth device {name!r} cannot be looked up ({error.problem})", f"give its address, or {error.remedy}"
+        ) from None
     devices = [interfaces["org.bluez.Device1"] for interfaces in objects.values() if "org.bluez.Device1" in interfaces]
     named = {
         device["Address"].value
@@ -125,5 +171,50 @@ def address_of(name: str) -> str:
     )
 
 
-def _to_bus(member: str, argument: str) -> Call:
-    return Call("org.freedesktop.DBus", "/org/freedesktop/DBus", "org.freedesktop.DBus", member, "s", (argument,))
+async def _known_objects() -> dict[str, dict[str, dict[str, Any]]]:
+    """All that the daemon knows, by path and interface."""
+    async with _system_bus() as bus:
+        asking = Message(destination=_BLUEZ, path="/", interface=f"{_BUS}.ObjectManager", member="GetManagedObjects")
+        return dict((await _ask(bus, asking))[0])
+
+
+@asynccontextmanager
+async def _system_bus() -> "AsyncIterator[MessageBus]":
+    """A conversation with the machine's daemons, for the length of a block."""
+    if not _HAS_LIBRARY:
+        raise UnavailableError("dbus-fast is not installed", "apt install python3-dbus-fast")
+    try:
+        async with asyncio.timeout(_PATIENCE_S):
+            bus = await MessageBus(bus_type=BusType.SYSTEM).connect()
+    except (OSError, EOFError, AuthError, InvalidAddressError) as error:
+        told = getattr(error, "strerror", None) or error
+        raise UnavailableError(f"D-Bus does not answer ({told})", "systemctl start dbus") from None
+    try:
+        yield bus
+    finally:
+        bus.disconnect()
+
+
+async def _ask(bus: "MessageBus", question: "Message") -> list[Any]:
+    """Call a method; gives what it answers.
+
+    Raises:
+        UnavailableError: it failed, or the bus is gone.
+    """
+    try:
+        async with asyncio.timeout(_PATIENCE_S):
+            answer = await bus.call(question)
+    except (OSError, EOFError) as error:
+        raise UnavailableError(f"D-Bus gave no answer to {question.member} ({error})", "systemctl start dbus") from None
+    if answer is None:
+        raise UnavailableError("D-Bus has gone", "systemctl start dbus")
+    if answer.message_type is MessageType.ERROR:
+        told = answer.body[0] if answer.body else answer.error_name
+        raise UnavailableError(f"bluetoothd refuses {question.member} ({told})", "systemctl restart bluetooth")
+    return answer.body
+
+
+def _of_bus(member: str, argument: str) -> "Message":
+    return Message(
+        destination=_BUS, path="/org/freedesktop/DBus", interface=_BUS, member=member, signature="s", body=[argument]
+    )
