@@ -103,6 +103,7 @@ class _Dialling:
         self._unpaired = unpaired
         self._socket: socket.socket | None = None
         self._stage = _Stage.IDLE
+        self._published = False
         self._problem = ""
 
     def __call__(self) -> _RfcommLine | Opening:
@@ -111,7 +112,7 @@ class _Dialling:
             return self._step()
         except OSError as error:
             self.close()
-            failure = _undialled(self._uri, error)
+            failure = _undialled(self._uri, error, published=self._published)
             if error.errno in _OWN_ADAPTER:
                 raise failure from None
             if failure.problem != self._problem:
@@ -137,6 +138,7 @@ class _Dialling:
         number = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         if number == errno.ECONNREFUSED and self._stage is _Stage.ASKING:  # it publishes nothing at all
             self.close()
+            self._published = False
             return self._dial(DEFAULT_CHANNEL)
         if number:
             raise OSError(number, os.strerror(number))
@@ -152,6 +154,7 @@ class _Dialling:
         if self._stage is _Stage.ASKED:
             channel = channel_in(opened.recv(65536))
             self.close()
+            self._published = channel > 0
             return self._dial(channel or DEFAULT_CHANNEL)
         self._socket, self._stage, self._problem = None, _Stage.IDLE, ""
         return _RfcommLine(opened)
@@ -359,13 +362,20 @@ def _check_adapter(uri: str) -> None:
         )
 
 
-def _undialled(uri: str, error: OSError) -> UnavailableError:
-    """Put what became of a call into one line with the remedy."""
+def _undialled(uri: str, error: OSError, *, published: bool) -> UnavailableError:
+    """Put what became of a call into one line with the remedy.
+
+    Args:
+        uri: as the user named it.
+        error: what the kernel says.
+        published: whether the peer has just named the channel, so that the service is there.
+    """
     problem = f"{uri} cannot be reached ({error.strerror})"
     if error.errno in _OWN_ADAPTER:
         return UnavailableError(problem, "switch Bluetooth on: bluetoothctl power on")
-    if error.errno == errno.ECONNREFUSED:
-        return UnavailableError(problem, "start board-agent there with --link rfcomm://*")
-    if error.errno in _NOT_PAIRED:
+    # A connection that is there already when encryption fails, as it is after asking for the channel, is told as refused (rfcomm/core.c).
+    if error.errno in _NOT_PAIRED or (error.errno == errno.ECONNREFUSED and published):
         return UnavailableError(problem, "pair the two devices with bluetoothctl")
+    if error.errno == errno.ECONNREFUSED:
+        return UnavailableError(problem, "start board-agent there with --link rfcomm://*, and pair the two devices")
     return UnavailableError(problem, "is it switched on and in reach?")

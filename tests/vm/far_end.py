@@ -1,7 +1,10 @@
 """Runs in the guest: joins a line's host end with stdin and stdout, and opens it again whenever it was lost. Standard library only.
 
+The last one dials as a host does, by the product's own code: it finds the board by its name, asks it for the channel, has the connection encrypted.
+
 far_end.py tty /dev/ttyACM0
 far_end.py rfcomm OWN_ADDRESS BOARD_ADDRESS CHANNEL
+far_end.py dial rfcomm://NAME
 """
 
 import os
@@ -10,6 +13,7 @@ import socket
 import sys
 import time
 import tty
+from typing import Any
 
 _RETRY_S = 0.1
 
@@ -20,12 +24,31 @@ def open_line() -> int:
         descriptor = os.open(sys.argv[2], os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         tty.setraw(descriptor)
         return descriptor
+    if sys.argv[1] == "dial":
+        return dialled(sys.argv[2])
     own, board, channel = sys.argv[2:]
     with socket.socket(socket.AF_BLUETOOTH, socket.SOCK_STREAM, socket.BTPROTO_RFCOMM) as dialling:
         dialling.bind((own, 0))
         dialling.connect((board, int(channel)))
         dialling.settimeout(0)
         return dialling.detach()
+
+
+def dialled(uri: str) -> int:
+    """Open the line as a host's link does."""
+    sys.path.insert(0, "/usr/lib/tandemscan")  # where only the guest has it
+    from common.errors import UnavailableError  # noqa: PLC0415 - from there
+    from common.link.factory import open_link, parse_link  # noqa: PLC0415
+    from common.link.stream import Opening  # noqa: PLC0415
+
+    try:
+        link: Any = open_link(parse_link(uri, listens_by_default=False))
+    except UnavailableError as error:
+        print(error, file=sys.stderr)
+        raise OSError from None
+    while isinstance(line := link._dialling(), Opening):
+        time.sleep(_RETRY_S)
+    return int(line.connected.detach())
 
 
 def join(line: int) -> bool:

@@ -81,6 +81,56 @@ def _switch_off_and_on(guest: Guest, adapters: str, stream: Stream) -> None:
     guest.sh(_SWITCH_ON)
 
 
+def test_a_paired_host_finds_the_board_by_name_and_a_forgotten_one_is_refused(
+    package: Path, film: Film, tmp_path: Path
+) -> None:
+    """Two adapters are paired by bluetoothd; a host then finds board and channel by the board's name, and pairs are right over the encrypted link; forgotten, it is told to pair."""
+    with booted(Architecture.AMD64) as guest:
+        guest.sh(_AIR)
+        guest.put(Path(__file__).with_name("pair.py"), "/root")
+        guest.put(Path(__file__).with_name("far_end.py"), "/root")
+        # All by the daemon: what hciconfig does behind its back may hide an adapter from the other.
+        guest.sh("systemctl unmask bluetooth && systemctl start bluetooth")
+        guest.sh(f"timeout 60 python3 -u /root/pair.py {HOST} {BOARD}")
+        guest.install(package)
+        camera = Webcam(film.frames, FPS, READOUT_MS * 1_000_000)
+        try:
+            camera.plug(guest)
+            guest.configure(CAMERA, "rfcomm://*/7")
+            guest.until("StatusText", "waiting for a host", "the service listens")
+            until(lambda: "bluetooth_record_published channel=7" in guest.journal(), "the channel is published")
+            guest.sh(f"busctl set-property org.bluez {_DEVICE.format(1, _path(BOARD))} Alias s 'bench board'")
+            with (
+                extension(guest, "dial", "rfcomm://Bench%20Board") as link,
+                streaming(guest, film.right, tmp_path / "out", (), link) as stream,
+            ):
+                stream.more(30, "over RFCOMM, encrypted")
+                connections = guest.sh("hcitool con").splitlines()[1:]
+                assert len(connections) == 2
+                assert all("AUTH ENCRYPT" in connection for connection in connections), connections
+                stream.finish(webcam_skew(camera.late_ns))
+        finally:
+            camera.close()
+        for adapter, other in ((0, HOST), (1, BOARD)):
+            guest.sh(
+                f"busctl call org.bluez /org/bluez/hci{adapter} org.bluez.Adapter1 RemoveDevice o {_DEVICE.format(adapter, _path(other)).split()[0]}"
+            )
+        # With nobody known it would not even answer.
+        guest.sh("busctl set-property org.bluez /org/bluez/hci0 org.bluez.Adapter1 Discoverable b true")
+        guest.sh(f"setsid python3 -u /root/far_end.py dial rfcomm://{BOARD} </dev/null >/root/refused 2>&1 &")
+        until(lambda: guest.sh("cat /root/refused").count("\n") > 0, "a stranger is told")
+        assert "pair the two devices with bluetoothctl" in guest.sh("cat /root/refused")
+        check_journal(guest)
+        assert "list_del corruption" not in guest.console
+
+
+_DEVICE = "/org/bluez/hci{}/dev_{} org.bluez.Device1"
+
+
+def _path(address: str) -> str:
+    return address.replace(":", "_")
+
+
 def test_the_record_is_published_and_published_again(package: Path) -> None:
     """With bluetoothd the channel is found by asking the board; a restarted daemon is told anew; a stopped service withdraws the record."""
     # bluetoothd may refuse one of the two, when the kernel has not put it to rest yet: the other one is asked then.
