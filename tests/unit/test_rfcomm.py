@@ -1,5 +1,9 @@
 """RFCOMM where there is no Bluetooth, and units that fill its frames. The link itself is tested in the guest (tests/vm/test_bluetooth.py)."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,6 +30,26 @@ def test_a_machine_without_bluetooth_says_so(uri: str) -> None:
     assert caught.value.exit_code == 3
     assert "\n" not in str(caught.value)
     assert caught.value.remedy
+
+
+@pytest.mark.parametrize("link", ["rfcomm://*", "rfcomm://my%20board?connect=1"])
+def test_a_python_without_bluetooth_says_so(link: str, tmp_path: Path) -> None:
+    """board-agent run by a Python that was built without Bluetooth sockets ends with one line that says so and what to do, exit 3."""
+    (tmp_path / "1.pgm").write_bytes(b"P5 2 2 255\nabcd")
+    script = f"""
+import socket, sys
+vars(socket).pop("AF_BLUETOOTH", None)  # as in such a build
+from board_agent.cli import main
+sys.exit(main(["run", "--camera", "replay:{tmp_path}?fps=10&loop=1", "--link", "{link}"]))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=Path(__file__).parents[2]
+    )
+    assert done.returncode == 3, done.stderr
+    assert done.stderr.splitlines()[-1] == (
+        "board-agent: error: this Python was built without Bluetooth: use the system's own, or build one with libbluetooth-dev installed"
+    )
+    assert "Traceback" not in done.stderr
 
 
 def test_what_cannot_be_dialled_or_listened_on() -> None:
