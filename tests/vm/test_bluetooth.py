@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.programs import until
+from tests.vm.air import AIR, DAEMON, SWITCH_ON
 from tests.vm.conftest import CAMERA, READOUT_MS, booted
 from tests.vm.contract import run_contract
 from tests.vm.extension import extension
@@ -23,31 +24,13 @@ _BOARD_SEEN, _HOST_SEEN = "/org/bluez/hci1/dev_00_AA_01_00_00_00", "/org/bluez/h
 """What the daemon calls each where the other knows it."""
 
 CHANNEL = 1
-_AIR = """
-modprobe -a hci_vhci rfcomm
-ready() { [ "$(hciconfig | grep -c 'BD Address: 00:AA:01')" = 2 ]; }
-until ready; do # on a busy machine the kernel may give an adapter up that did not answer in 10 s, and bluetoothd never sees that one
-    kill $(pidof btvirt) 2>/dev/null
-    (setsid btvirt -l2 >/root/btvirt.log 2>&1 &)
-    for _ in $(seq 75); do ready && break; sleep 0.2; done
-done
-"""
-_DAEMON = """
-systemctl unmask bluetooth && systemctl start bluetooth
-for h in hci0 hci1; do for name in Powered Discoverable; do
-    until busctl set-property org.bluez /org/bluez/$h org.bluez.Adapter1 $name b true; do sleep 0.2; done
-done; done 2>/dev/null
-"""
-"""Adapters are switched on by the daemon: it refuses one that somebody else has, and does not know what hciconfig does behind its back."""
-
-_SWITCH_ON = "for h in hci0 hci1; do until hciconfig $h up && hciconfig $h piscan; do sleep 0.2; done; done 2>/dev/null"
 
 
 @pytest.fixture
 def radio() -> Iterator[Guest]:
     """A fresh board with two controllers, without bluetoothd."""
     with booted(Architecture.AMD64) as guest:
-        guest.sh(f"{_AIR}{_SWITCH_ON}")
+        guest.sh(f"{AIR}{SWITCH_ON}")
         yield guest
         assert "list_del corruption" not in guest.console
 
@@ -97,7 +80,7 @@ def _switch_off_and_on(guest: Guest, adapters: str, stream: Stream) -> None:
     guest.sh(f"for h in {adapters}; do hciconfig $h down; done")
     guest.until("StatusText", "waiting for a host", "the board gives the host up")
     until(lambda: stream.receiver.stderr.count("board_gone") > lost, "the host gives the board up")
-    guest.sh(_SWITCH_ON)
+    guest.sh(SWITCH_ON)
 
 
 def test_a_paired_host_finds_the_board_by_name_and_a_forgotten_one_is_refused(
@@ -105,10 +88,10 @@ def test_a_paired_host_finds_the_board_by_name_and_a_forgotten_one_is_refused(
 ) -> None:
     """Two adapters are paired by bluetoothd; a host then finds board and channel by the board's name, and pairs are right over the encrypted link; forgotten, it is told to pair."""
     with booted(Architecture.AMD64) as guest:
-        guest.sh(_AIR)
+        guest.sh(AIR)
         guest.put(Path(__file__).with_name("pair.py"), "/root")
         guest.put(Path(__file__).with_name("far_end.py"), "/root")
-        guest.sh(_DAEMON)
+        guest.sh(DAEMON)
         guest.sh(f"timeout 60 python3 -u /root/pair.py {HOST} {BOARD}")
         guest.install(package)
         camera = Webcam(film.frames, FPS, READOUT_MS * 1_000_000)
@@ -159,14 +142,14 @@ for own, other in (("{HOST}", "{BOARD}"), ("{BOARD}", "{HOST}")):
         def found() -> set[str]:
             return set(radio.sh("timeout 50 python3 -P /root/ask.py 2>/dev/null || echo nobody").split())
 
-        radio.sh(_AIR)
+        radio.sh(AIR)
         radio.write("/root/ask.py", ask)
         radio.install(package)
         radio.sh("mkdir /srv/frames && printf 'P5 2 2 255\nabcd' >/srv/frames/1.pgm")
         radio.configure("replay:/srv/frames?fps=10&loop=1", "rfcomm://*/7")
         radio.until("StatusText", "waiting for a host", "the service listens")
         until(lambda: "bluetooth_record_missing" in radio.journal(), "the missing daemon is told")
-        radio.sh(_DAEMON)
+        radio.sh(DAEMON)
         until(lambda: "7" in found(), "the channel is found by asking")
         radio.sh("systemctl stop board-agent")
         until(lambda: found() == {"0"}, "a service that has stopped is not found")

@@ -1,0 +1,23 @@
+"""Shell commands that put two virtual Bluetooth adapters on the air of one guest."""
+
+AIR = """
+modprobe -a hci_vhci rfcomm
+ready() { [ "$(hciconfig | grep -c 'BD Address: 00:AA:01')" = 2 ]; }
+until ready; do # on a busy machine the kernel may give an adapter up that did not answer in 10 s, and bluetoothd never sees that one
+    kill $(pidof btvirt) 2>/dev/null
+    (setsid btvirt -l2 >/root/btvirt.log 2>&1 &)
+    for _ in $(seq 75); do ready && break; sleep 0.2; done
+done
+"""
+"""The adapters, not switched on."""
+
+DAEMON = """
+systemctl unmask bluetooth && systemctl start bluetooth
+for h in hci0 hci1; do for name in Powered Discoverable; do
+    until busctl set-property org.bluez /org/bluez/$h org.bluez.Adapter1 $name b true; do sleep 0.2; done
+done; done 2>/dev/null
+"""
+"""Adapters are switched on by the daemon: it refuses one that somebody else has, and does not know what hciconfig does behind its back."""
+
+SWITCH_ON = "for h in hci0 hci1; do until hciconfig $h up && hciconfig $h piscan; do sleep 0.2; done; done 2>/dev/null"
+"""The same without a daemon; they can be found and dialled then."""
