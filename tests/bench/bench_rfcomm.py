@@ -78,6 +78,7 @@ def _disk(folder: Path) -> Path:
     subprocess.run(
         ["mke2fs", "-q", "-t", "ext4", "-O", "^has_journal", "-d", content, disk, f"{megabytes * 5 // 4 + 50}M"],
         check=True,
+        stdout=subprocess.DEVNULL,
     )
     shutil.rmtree(content)
     return disk
