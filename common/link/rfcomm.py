@@ -21,7 +21,6 @@ from typing import Final
 from common.errors import MissingDeviceError, UnavailableError
 from common.frame import Buffer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
-from common.link.bluez import PublishedRecord, address_of
 from common.link.sdp import PSM, channel_in, query
 from common.link.stream import Opening, StreamLink
 from common.logs import event
@@ -192,7 +191,7 @@ class RfcommDialler(StreamLink):
     def __init__(self, uri: str, device: str, channel: int, *, unpaired: bool, waits: bool = False) -> None:
         if not waits:
             _check_adapter(uri)
-        address = device if is_address(device) else address_of(device)
+        address = device if is_address(device) else _address_of(device)
         self._dialling = _Dialling(uri, address, channel, unpaired=unpaired)
         super().__init__("rfcomm", Side.DIALLER, self._dialling, FRAME_BYTES, waits=waits)
 
@@ -242,6 +241,8 @@ class RfcommListener:
             raise
         self._epoll = select.epoll()
         self._epoll.register(self._listening.fileno(), select.EPOLLIN)
+        from common.link.bluez import PublishedRecord  # noqa: PLC0415 - brings asyncio, for listeners only
+
         self._record = PublishedRecord(channel or DEFAULT_CHANNEL)
 
     @property
@@ -309,6 +310,12 @@ class RfcommListener:
         stream = self._streams.pop(prefix)
         self._epoll.unregister(stream.pollables[0].fileno())
         stream.close()
+
+
+def _address_of(name: str) -> str:
+    from common.link.bluez import address_of  # noqa: PLC0415 - brings asyncio, for names only
+
+    return address_of(name)
 
 
 def is_address(text: str) -> bool:
