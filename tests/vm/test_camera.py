@@ -163,6 +163,8 @@ def test_a_camera_out_of_step_is_steered_by_restarting_it(
         stream.more(5, "in step")
         alignment = stream.finish(skew)["phase"]["alignment"]
     assert abs(alignment["before_ms"]) > 25  # 37, and some ms on the way into the driver
+    # A few ms; a processor that is emulated may stamp later by as much again while the last frames come.
+    assert abs(alignment["after_ms"]) < abs(alignment["before_ms"]) / 2
     assert webcam.starts >= starts + 2
     # What the stamps cannot tell: the way into the driver of a board whose processor is emulated.
     assert abs(phase_ms) < 15
