@@ -134,6 +134,8 @@ def _pair(options: argparse.Namespace) -> int:
     for state in follow(keys, options.seconds):
         if state == NOBODY:
             print(f"board-agent: waiting: {absence(keys)}", file=sys.stderr)
+        if state.problem:
+            print(f"board-agent: waiting: {state.problem}: stop what uses that port, or move the link", file=sys.stderr)
         name = state.paired
         if state.code and not name:
             asks = f"{state.asking} asks; " if state.asking else ""

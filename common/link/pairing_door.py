@@ -10,7 +10,7 @@ import os
 import socket
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import Final, assert_never
 
@@ -62,6 +62,7 @@ class DoorState:
         asking: name of the host that has asked last; empty if none.
         paired: name of the host that was taken in last since the command began; empty if none.
         failed: attempts that came to nothing since then.
+        problem: why the door cannot be opened; empty if it is open.
     """
 
     address: str
@@ -69,17 +70,17 @@ class DoorState:
     asking: str
     paired: str
     failed: int
+    problem: str = ""
 
     def encode(self) -> bytes:
         """Its bytes."""
-        packed: bytes = msgpack.packb([self.address, self.code, self.asking, self.paired, self.failed])
+        packed: bytes = msgpack.packb(astuple(self))
         return packed
 
     @staticmethod
     def decode(packed: bytes) -> "DoorState":
         """Read it; from the own service only."""
-        address, code, asking, paired, failed = msgpack.unpackb(packed)
-        return DoorState(address, code, asking, paired, failed)
+        return DoorState(*msgpack.unpackb(packed))
 
 
 class Door:
@@ -145,7 +146,7 @@ class Door:
             self._state = self._before
         self._owner_until_ns = now_ns + _OWNER_NS
         self._open_or_close(now_ns)
-        self._state = replace(self._state, code=code_text(self._desk.code(now_ns)))
+        self._state = replace(self._state, code=code_text(self._desk.code(now_ns)) if self._is_open else "")
         while self._control.poll(0):
             connection = self._control.recv_multipart(_NOW)[0]
             with suppress(zmq.ZMQError):  # gone already
@@ -164,10 +165,12 @@ class Door:
             else:
                 self._callers.shut()
         except OSError as error:
+            self._state = replace(self._state, problem=f"{addresses} cannot be had ({os.strerror(error.errno or 0)})")
             if self._troubles.now(now_ns):
-                _LOG.warning(event("pairing_impossible", address=addresses, problem=error.strerror))
+                _LOG.warning(event("pairing_impossible", address=addresses, problem=os.strerror(error.errno or 0)))
             return
         self._is_open = wanted
+        self._state = replace(self._state, problem="")
         _LOG.info(event("pairing_open" if wanted else "pairing_closed", address=addresses))
 
     def _hear(self, call: Call, now_ns: int) -> None:

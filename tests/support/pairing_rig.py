@@ -1,11 +1,12 @@
 """A board that no host knows yet, on every network, and `phone-host pair` beside it."""
 
+import random
 import re
 import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,15 +18,12 @@ _CODE = re.compile(r"pairing_code code=(\d{6}) host=(\S+)")
 
 
 def ports() -> int:
-    """A free port with another free one behind it."""
+    """A free port with another free one behind it, below those that the kernel gives to whoever dials (32768 and up on Linux)."""
     while True:
-        with socket.socket() as first, socket.socket() as second:
-            first.bind(("", 0))
-            port = int(first.getsockname()[1])
-            try:
-                second.bind(("", port + 1))
-            except (OSError, OverflowError):
-                continue
+        port = random.randrange(20000, 32000)
+        with socket.socket() as first, socket.socket() as second, suppress(OSError):
+            first.bind(("", port))
+            second.bind(("", port + 1))
             return port
 
 

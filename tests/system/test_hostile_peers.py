@@ -18,7 +18,8 @@ from common.protocol.message import PROTOCOL_VERSION
 from common.protocol.pairing_code import Ask, Identity
 from common.protocol.pairing_wire import frame_word
 from tests.support.numbered import write_film
-from tests.support.programs import Program, board, free_port, host, lines, until
+from tests.support.pairing_rig import ports
+from tests.support.programs import Program, board, host, lines, until
 
 _GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00"
 _MOST_LINES = 12
@@ -83,7 +84,7 @@ class Target:
 def target(tmp_path: Path) -> Iterator[Target]:
     """A board that knows one host."""
     write_film(tmp_path / "film", 30)
-    port = free_port()
+    port = ports()
     board_keys, host_keys = KeyFolder(tmp_path / "b"), KeyFolder(tmp_path / "h")
     board_keys.add(Peer("victim", host_keys.own().public, ""))
     host_keys.add(Peer("board", board_keys.own().public, "", f"tcp://127.0.0.1:{port}"))

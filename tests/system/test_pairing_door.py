@@ -165,3 +165,18 @@ def test_three_wrong_codes_are_followed_by_a_pause(rig: Rig) -> None:
         assert pairing.wait(60) == 0, pairing.communicate()
         pairing.communicate()
         assert owner.wait() == 0
+
+
+def test_the_owner_is_told_that_the_door_cannot_be_opened(rig: Rig) -> None:
+    """While another program has the door's port `board-agent pair` says so and shows no code; it goes on when the port is free."""
+    assert rig.pair_by_log()[0] == 0
+    until(lambda: "pairing_closed" in rig.agent.stderr, "the door closes")
+    door = int(rig.link.rpartition(":")[2]) + 1
+    with ExitStack() as stack:
+        taken = stack.enter_context(socket.create_server(("", door)))
+        owner = stack.enter_context(program("board_agent.cli", ["pair", "--keys", rig.board_keys], rig.folder, "pair"))
+        until(lambda: str(door) in owner.stderr, "the owner is told")
+        assert "Address already in use" in owner.stderr
+        assert owner.out.read_text() == ""
+        taken.close()
+        until(lambda: "type this code" in owner.out.read_text(), "the code is shown")
