@@ -171,8 +171,7 @@ def predict(setting: Setting, frames: int, random: np.random.Generator) -> Predi
     """
 
     def drawn(values: Values) -> Values:
-        chosen: Values = values[neighbours(values.size, frames, random)]
-        return chosen
+        return np.take(values, neighbours(values.size, frames, random))
 
     exposed_ns = np.arange(frames) * setting.period_ns
     # A driver gives frames in their order: none overtakes the one before.
