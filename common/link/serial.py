@@ -4,6 +4,7 @@ import errno
 import fcntl
 import grp
 import os
+import select
 import sys
 import termios
 from contextlib import suppress
@@ -19,6 +20,13 @@ DEFAULT_BAUD: Final = 115200
 
 _GONE: Final = {errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO}
 _TAKEN: Final = {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}
+
+_QUIET_MS: Final = 5
+"""So long nothing comes when a driver has handed on all that it holds."""
+
+_DISCARDED_BYTES: Final = 64 * 1024
+_MOST_DISCARDED: Final = 1000
+"""Reads; each gives 4 KB at most where a tty holds no more. A peer that talks for ever is not listened to for ever."""
 
 
 class SerialLine:
@@ -69,10 +77,18 @@ class SerialLine:
         """
         if not self.is_drained():
             self.discard_output()
-        with suppress(termios.error):
-            termios.tcflush(self._fd, termios.TCIFLUSH)
+        self._discard_input()
         with suppress(OSError, termios.error):
             self._port.close()
+
+    def _discard_input(self) -> None:
+        """Read until nothing more comes: to throw away what is there (tcflush) would let in as much again."""
+        poll = select.poll()
+        poll.register(self._fd, select.POLLIN)
+        with suppress(OSError):
+            for _ in range(_MOST_DISCARDED):
+                if not poll.poll(_QUIET_MS) or not os.read(self._fd, _DISCARDED_BYTES):
+                    return
 
 
 class SerialLink(StreamLink):
