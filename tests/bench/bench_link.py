@@ -167,7 +167,7 @@ def _missing(wanted: list[str]) -> dict[str, str]:
     if "rfcomm" in wanted:
         adapters = len(list(Path("/sys/class/bluetooth").glob("hci*")))
         missing["rfcomm"] = (
-            f"rfcomm: both ends on one machine need two Bluetooth adapters, here are {adapters}; see make test-board"
+            f"rfcomm: both ends on one machine need two Bluetooth adapters, here are {adapters}; bench_rfcomm has them in a virtual board"
         )
     return missing
 

@@ -51,7 +51,7 @@ def main() -> int:
         try:
             guest.start()
             guest.sh(f"mkdir -p /mnt/host && mount -o ro /dev/vdb /mnt/host{AIR}{SWITCH_ON}")
-            command = "delay-bench --links tcp,ipc,serial,rfcomm --size 320x240 --fps 10"
+            command = "delay-bench --links tcp,ipc,serial,rfcomm --size 320x240 --fps 5 --matcher block"
             print(f"{command} --seconds {options.seconds}, in the guest:", flush=True)
             running = guest.popen(
                 "cd /root && export PYTHONPATH=/mnt/host && exec python3 -P -m phone_host.bench.cli "
