@@ -15,9 +15,9 @@ from common.protocol.message import Lane
 
 _NEVER: Final = 2**63 - 1
 
-GAP_NS: Final = 250_000_000
+GAP_NS: Final = 1_000_000_000
 """A unit is written at one go: where the line is silent for this long in the middle of one, bytes were lost. A busy machine's stalls are shorter
-(100 ms was not enough on one with a load of 5)."""
+(100 ms were not enough under a load of 5, 250 ms under one of 17). Whatever comes meanwhile ends the wait as well, for it fills the unit up."""
 
 
 class Change(Enum):
