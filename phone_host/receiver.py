@@ -174,6 +174,8 @@ class Receiver:
         while farewell and not self._settled and (left_ns := deadline_ns - now.monotonic_ns()) > 0:
             self._waiter.wait(left_ns // 1_000_000 + 1)
             self._receive()
+        if farewell and not self._settled:
+            self._current.vanished = True  # what it sent since its newest account is not known
 
     def _receive(self) -> None:
         """Take all that has come."""
