@@ -66,13 +66,14 @@ def test_depth_is_that_of_the_whole_size(side: Side) -> None:
 
 @given(st.sampled_from([2, 3, 4]), st.integers(2, 12), st.integers(2, 12), st.floats(-2, 2), st.floats(-2, 2))
 def test_edges_coincide(part: int, width: int, height: int, slope_x: float, slope_y: float) -> None:
-    """A plane of grey levels whose pixels were averaged comes back as the same plane, but for two roundings and the outermost pixels."""
+    """A plane of grey levels whose pixels were averaged comes back as the same plane, but for the roundings and the outermost pixels."""
     y, x = np.mgrid[: height * part, : width * part].astype(np.float64)
     level = 128 + slope_x * (x - x.mean()) + slope_y * (y - y.mean())
     small = level.reshape(height, part, width, part).mean(axis=(1, 3))
     back = enlarged(np.asarray(small.round(), np.uint8), (width * part, height * part), "image")
     inside = (slice(part, -part), slice(part, -part))
-    np.testing.assert_allclose(back[inside], level[inside], atol=1.1)
+    # Half a level for each rounding, and a half for OpenCV's fixed-point sums, which cut off quarters of a level.
+    np.testing.assert_allclose(back[inside], level[inside], rtol=0, atol=1.5)
 
 
 def test_another_shape_is_refused() -> None:
