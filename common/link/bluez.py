@@ -8,7 +8,7 @@ import asyncio
 import logging
 import threading
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from contextlib import ExitStack, asynccontextmanager, suppress
 from functools import partial
 from typing import Any, Final
 
@@ -183,16 +183,16 @@ async def _system_bus() -> "AsyncIterator[MessageBus]":
     """A conversation with the machine's daemons, for the length of a block."""
     if not _HAS_LIBRARY:
         raise UnavailableError("dbus-fast is not installed", "apt install python3-dbus-fast")
-    try:
-        async with asyncio.timeout(_PATIENCE_S):
-            bus = await MessageBus(bus_type=BusType.SYSTEM).connect()
-    except (OSError, EOFError, AuthError, InvalidAddressError) as error:
-        told = getattr(error, "strerror", None) or error
-        raise UnavailableError(f"D-Bus does not answer ({told})", "systemctl start dbus") from None
-    try:
+    with ExitStack() as ending:
+        try:
+            bus = MessageBus(bus_type=BusType.SYSTEM)  # Debian 12's version connects here already
+            ending.callback(bus.disconnect)  # also where it is cancelled while it connects
+            async with asyncio.timeout(_PATIENCE_S):
+                await bus.connect()
+        except (OSError, EOFError, AuthError, InvalidAddressError) as error:
+            told = getattr(error, "strerror", None) or error
+            raise UnavailableError(f"D-Bus does not answer ({told})", "systemctl start dbus") from None
         yield bus
-    finally:
-        bus.disconnect()
 
 
 async def _ask(bus: "MessageBus", question: "Message") -> list[Any]:
