@@ -263,7 +263,8 @@ class Guest:
         links = links or (f"tcp://*:{LINK_PORT}" if secured else OPEN_TO_ALL,)
         edits = (f'camera = "{camera}"', f"link = {json.dumps(links)}")
         script = " ".join(f"-e {shlex.quote(f's|^{edit.split()[0]} = .*|{_literal(edit)}|')}" for edit in edits)
-        self.sh(f"sed -i {script} /etc/tandemscan/board-agent.toml && systemctl restart {UNIT}")
+        self.sh(f"sed -i {script} /etc/tandemscan/board-agent.toml")
+        assert self.code(f"systemctl restart {UNIT}") == 0, f"{camera}, {links}: {self.journal()[-2000:]}"
 
     def show(self, name: str, unit: str = UNIT) -> str:
         """Give one property of a unit, such as ActiveState or StatusText."""

@@ -163,6 +163,7 @@ def test_no_login_prompt_on_the_port(cabled: Guest) -> None:
     assert cabled.show("ConditionResult", prompt) == "yes"
     assert cabled.show("ActiveState", prompt) == "active"
     cabled.sh(f"systemctl stop {prompt}; mv /run/board-gadget/unsaid /run/board-gadget/ttyGS0")
+    cabled.sh("udevadm trigger --action=add --settle /dev/ttyGS0")  # a prompt takes the port for root alone
     assert cabled.show("ActiveState", "serial-getty@ttyS0") == "active"
 
 
