@@ -151,6 +151,7 @@ class _Device:
         self._streaming = False
         self._odd = False
         self._number = 0
+        self._newest = -1  # image, counted over all laps of the film
         self._rest = b""
         self._ignored: set[int] = set()  # sequence numbers of requests that never got an answer
         self._taken: deque[tuple[int, int] | None] = (
@@ -259,6 +260,9 @@ class _Device:
         now_ns = time.monotonic_ns()
         self._set_phase(now_ns)
         self._number = math.floor((now_ns - self._phase_ns - self._delay_ns()) * self._rate_hz() / 1e9) + 1
+        # No image twice, though a restart with a later phase could: an image's number names one moment.
+        while self._image() <= self._newest:
+            self._number += 1
 
     def _set_phase(self, now_ns: int) -> None:
         camera, period_ns = self._camera, 10**9 // self._rate_hz()
@@ -275,6 +279,10 @@ class _Device:
     def _rate_hz(self) -> int:
         interval: int = struct.unpack_from("<I", self._commit, 4)[0]
         return min(self._camera._fps, round(1e7 / interval))
+
+    def _image(self) -> int:
+        """The image of the next number: at half of the rate every other one is shown."""
+        return self._number * self._camera._fps // self._rate_hz()
 
     def _delay_ns(self) -> int:
         """From the middle of an exposure to the first byte."""
@@ -304,11 +312,12 @@ class _Device:
         skipped = int(
             (now_ns - due_ns) * self._rate_hz() / 1e9
         )  # stalled for whole periods: those images were never taken
-        number = self._number + skipped
-        self._number = number + 1
+        self._number += skipped
+        number, self._newest = self._number, self._image()
+        self._number += 1
         due_ns += round(skipped * 1e9 / self._rate_hz())
         due_ns -= self._phase_ns  # image k belongs to k / fps: what its exposure was later is told as lateness
-        image = number * camera._fps // self._rate_hz() % len(camera._frames)  # at half of the rate every other one
+        image = self._newest % len(camera._frames)
         camera.late_ns[image] = (now_ns - due_ns, now_ns - due_ns)
         self._first = (image, due_ns)
         frames = camera._smaller if self._commit[3] == 2 else camera._frames  # bFrameIndex
