@@ -31,10 +31,10 @@ _QUEUE_PACKETS: Final = 8
 """Packets in ZeroMQ's own queue for a connection: a wave of echoes and a few accounts; frames wait in the outbox instead."""
 
 _LINGER_MS: Final = 500
-_HEARTBEAT_MS: Final = 1000
-_HEARTBEAT_TIMEOUT_MS: Final = 30_000
-"""ZeroMQ hears a peer by whole packets: at 100 kbit/s a frame of 50 KB takes 4 s, and a shorter time would cut the link before any has come. That a
-peer has gone is noticed by the session, and by TCP itself as soon as there is somebody to answer."""
+_GONE_S: Final = 30
+_PROBE_S: Final = 5
+"""A machine that answers nothing for so long is given up by TCP, which asks at these distances. The session notices earlier. Not by ZeroMQ's heartbeat: it hears
+a peer by whole packets, of which one may take seconds, and with a full queue it ends the process (libzmq issues 3937, 4767: an assertion)."""
 
 _SET_UP_MS: Final = 3000
 _RECONNECT_MS: Final = 50
@@ -63,8 +63,11 @@ def _configure(sock: zmq.Socket[bytes], most_bytes: int) -> None:
         (zmq.RCVHWM, _QUEUE_PACKETS),
         (zmq.SNDBUF, _SOCKET_BUFFER_BYTES),
         (zmq.RCVBUF, _SOCKET_BUFFER_BYTES),
-        (zmq.HEARTBEAT_IVL, _HEARTBEAT_MS),
-        (zmq.HEARTBEAT_TIMEOUT, _HEARTBEAT_TIMEOUT_MS),
+        (zmq.TCP_KEEPALIVE, 1),
+        (zmq.TCP_KEEPALIVE_IDLE, _PROBE_S),
+        (zmq.TCP_KEEPALIVE_INTVL, _PROBE_S),
+        (zmq.TCP_KEEPALIVE_CNT, _GONE_S // _PROBE_S - 1),
+        (zmq.TCP_MAXRT, 1000 * _GONE_S),
         (zmq.HANDSHAKE_IVL, _SET_UP_MS),
         (zmq.CONNECT_TIMEOUT, _SET_UP_MS),
         (zmq.RECONNECT_IVL, _RECONNECT_MS),
