@@ -311,8 +311,8 @@ class Agent:
                 self._outbox.discard(DropReason.LINK_FULL)
             case SendResult.FULL:
                 self._retry_ns = now.monotonic_ns() + _FULL_RETRY_NS
-            case _:
-                pass  # unreachable: the frame waits for the host to come back, or for a newer one
+            case SendResult.UNREACHABLE:
+                pass  # the frame waits for the host to come back, or for a newer one
 
     def _adapt(self, control: RateControl, now_ns: int) -> None:
         """Let the camera give what the link carries."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from common import now
-from common.camera.base import Skipped, Spoiled
+from common.camera.base import Ended, Skipped, Spoiled
 from common.camera.factory import open_camera, parse_camera
 from common.camera.replay import ReplaySettings
 from common.camera.v4l2_device import Device, capture_nodes, lasting_name, video_nodes
@@ -173,10 +173,8 @@ def _stream(path: Path, settings: V4l2Settings) -> Sample:
                         frames += 1
                         total_bytes += len(grab.payload)
                         first_ns = first_ns or now.monotonic_ns() - started_ns
-                    case Skipped() | Spoiled():
-                        pass  # the tally has the spoiled ones; one that was passed over is nothing bad
-                    case _:
-                        pass
+                    case Skipped() | Spoiled() | Ended():
+                        pass  # the tally has the spoiled ones; one that was passed over is nothing bad, and a device does not end
     finally:
         stream.close()
     return Sample(

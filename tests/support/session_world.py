@@ -8,6 +8,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from common.frame import Frame, PixelFormat
+from common.ledger import BoardMarks
 from common.protocol.board_session import BoardSession
 from common.protocol.host_session import HostSession
 from common.protocol.message import (
@@ -325,6 +326,11 @@ class World:
             if name == connection:
                 assert not isinstance(message, HostHello) or message.lane is place[1]
                 host.wires[place].to_board.append(message)
+
+
+def frame(session: str, sent_index: int) -> FrameMessage:
+    """A frame as it was once sent."""
+    return FrameMessage(session, sent_index, 0, 1, 1, PixelFormat.MJPEG, None, BoardMarks(0, 0, 0), b"")
 
 
 def _dialled(place: Place) -> bytes:

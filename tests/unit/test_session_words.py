@@ -1,0 +1,337 @@
+"""What board and host say to each other in single cases: greetings, refusals, ends, echoes, accounts, rungs; on simulated time."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.ledger import BoardMarks
+from common.protocol.board_session import BoardSession
+from common.protocol.message import (
+    BoardCounts,
+    BoardHello,
+    Bye,
+    Credit,
+    End,
+    FrameMessage,
+    HostHello,
+    Knock,
+    Lane,
+    Message,
+    Ping,
+    Pong,
+    Refusal,
+    RefusalReason,
+    Rung,
+    Status,
+    Steer,
+)
+from common.protocol.session import (
+    MS,
+    SILENCE_NS,
+    STATUS_NS,
+    TAKEOVER_NS,
+    Accepted,
+    Counted,
+    Echo,
+    LinkUp,
+    Outgoing,
+    Output,
+    Refused,
+    Stepped,
+    Vanished,
+    connection_name,
+)
+from common.protocol.waves import YOUNG_NS
+from common.protocol.wire import decode, encode_stamped
+from tests.support.session_world import CAMERA, World, frame
+
+
+def test_an_answer_of_a_dead_board_opens_nothing() -> None:
+    """A hello of the board's old life on one lane and of its new life on the other do not make a session."""
+    world = World()
+    world.pass_time(20 * MS)
+    host = world.hosts[0]
+    for to_board in (True, False):
+        world.deliver(host, (0, Lane.CONTROL), to_board=to_board)
+    world.deliver(host, (0, Lane.FRAMES), to_board=True)
+    late = host.wires[0, Lane.FRAMES].to_host[-1]
+    assert isinstance(late, BoardHello)
+    world.restart_board()
+    for lane in Lane:
+        world.deliver(host, (0, lane), to_board=False)
+    for to_board in (True, False):
+        world.deliver(host, (0, Lane.CONTROL), to_board=to_board)
+    assert not any(
+        isinstance(output, Accepted) for output in host.session.receive(host.names[0, Lane.FRAMES], late, world.now_ns)
+    )
+    world.settle(1000 * MS)
+    assert host.board_session == world.board.session
+    assert host.arrived
+
+
+def test_a_second_host_waits_until_the_first_is_silent() -> None:
+    """While the first host is alive a second one is told busy; one second after its last word the second one gets in."""
+    world = World()
+    world.settle(500 * MS)
+    first, second = world.hosts[0], world.add_host()
+    world.settle(3000 * MS)
+    assert not second.arrived
+    assert Refused(RefusalReason.BUSY) in second.others
+    assert len(first.arrived) > 60
+    for lane in Lane:  # the first one falls silent
+        world.wires = {name: held for name, held in world.wires.items() if held[2] is not first.wires[0, lane]}
+    silent_ns = world.now_ns
+    world.hosts.remove(first)
+    while not second.arrived:
+        world.settle(20 * MS)
+        assert world.now_ns - silent_ns < TAKEOVER_NS + 1000 * MS
+    assert world.now_ns - silent_ns >= TAKEOVER_NS - 250 * MS  # its last word was a clock echo
+
+
+def test_a_goodbye_makes_room_at_once() -> None:
+    """After a host's goodbye the next one gets in with its next hello, long before the first would count as silent."""
+    world = World()
+    world.settle(500 * MS)
+    first, second = world.hosts[0], world.add_host()
+    world.settle(500 * MS)
+    assert first.arrived
+    assert not second.arrived
+    world._host_does(first, first.session.leave())
+    world.deliver_all()
+    world.hosts.remove(first)
+    world.settle(300 * MS)
+    assert second.arrived
+
+
+def test_a_strangers_end_is_nothing_to_the_host() -> None:
+    """A connection that was never the host's may vanish without a word to the host."""
+    world = World()
+    world.settle(300 * MS)
+    assert world.board.unreachable(b"a stranger") == []
+    assert world.board.has_host
+
+
+def test_a_silent_board_is_given_up() -> None:
+    """A host that hears nothing for SILENCE_NS says that the board has vanished, and not a moment before."""
+    world = World()
+    world.settle(300 * MS)
+    host = world.hosts[0]
+    heard_ns = world.now_ns
+    host.session.receive(host.names[0, Lane.CONTROL], Status(world.board.session, BoardCounts(), Rung()), heard_ns)
+    assert Vanished(orderly=False) not in host.session.tick(heard_ns + SILENCE_NS - 1)
+    assert host.session.is_open
+    assert Vanished(orderly=False) in host.session.tick(heard_ns + SILENCE_NS)
+
+
+def test_a_link_that_was_only_slow_is_borne_with() -> None:
+    """Where a frame takes five seconds and all else waits behind it, the board is given up once at most; then the host waits long enough."""
+    world = World()
+    world.settle(1000 * MS)
+    host = world.hosts[0]
+    for _ in range(4):
+        before = len(host.arrived)
+        while len(host.wires[0, Lane.FRAMES].to_host) == 0:
+            world.pass_time(20 * MS)
+            while world.deliver(host, (0, Lane.CONTROL), to_board=True):
+                pass
+            while world.deliver(host, (0, Lane.FRAMES), to_board=True):
+                pass
+        for _ in range(250):
+            world.pass_time(20 * MS)
+            for lane in Lane:
+                while world.deliver(host, (0, lane), to_board=True):
+                    pass
+        world.deliver_all()
+        assert len(host.arrived) > before
+    assert host.others.count(Vanished(orderly=False)) <= 1
+    world.camera_runs = False
+    world.settle(2 * STATUS_NS)
+    assert world.sent[host.board_session] == host.base_sent + host.received + host.lost
+
+
+def test_a_boards_goodbye_gives_its_last_account() -> None:
+    """A board that leaves on purpose is known as such, with its final counts and what they show as lost, and is sought again."""
+    world = World()
+    world.settle(300 * MS)
+    host = world.hosts[0]
+    sent = world.counts.sent
+    counts = BoardCounts(sent + 9, sent + 3)
+    [goodbye] = world.board.leave(counts)
+    assert goodbye.message == Bye(counts)
+    frames = host.names[0, Lane.FRAMES]
+    outputs = host.session.receive(frames, goodbye.message, world.now_ns)
+    assert outputs == [Outgoing(frames, Bye()), Counted(counts, ended=False, lost=3, last=True), Vanished(orderly=True)]
+    assert not host.session.is_open
+    world.settle(1000 * MS)
+    assert host.session.is_open
+
+
+def test_a_goodbye_counts_also_when_the_other_lane_broke_first() -> None:
+    """The last account is taken even when the frames' lane was seen to break just before it, but not that of another life."""
+    world = World()
+    world.settle(300 * MS)
+    host = world.hosts[0]
+    host.session.interrupted(host.names[0, Lane.FRAMES], world.now_ns)
+    counts = BoardCounts(100, 90)
+    control = host.names[0, Lane.CONTROL]
+    assert host.session.receive(control, Bye(BoardCounts(1, 1)), world.now_ns) == []
+    outputs = host.session.receive(control, Bye(counts), world.now_ns)
+    assert outputs == [Outgoing(control, Bye()), Counted(counts, ended=False, last=True), Vanished(orderly=True)]
+
+
+def test_the_end_is_said_until_it_is_heard() -> None:
+    """The word that no frame follows is repeated, so that a host that lost it, or comes back later, hears it, too."""
+    world = World()
+    world.settle(300 * MS)
+    host = world.hosts[0]
+    world.camera_runs = False
+    world.board.end(world.counts)  # these words are lost
+    heard: list[object] = []
+    for _ in range(50):
+        world.pass_time(20 * MS)
+        heard += [message for message in host.wires[0, Lane.FRAMES].to_host if isinstance(message, End)]
+        world.deliver_all()
+    assert End(world.board.session, world.counts) in heard
+
+
+def test_echoes_of_an_old_wave_are_ignored() -> None:
+    """Only answers to the wave that is under way are clock echoes; late ones and those of another life are not."""
+    world = World()
+    world.settle(300 * MS)
+    host = world.hosts[0]
+    control = host.names[0, Lane.CONTROL]
+    [ping] = [
+        output.message
+        for output in host.session.tick(host.session.due_ns)
+        if isinstance(output, Outgoing) and isinstance(output.message, Ping)
+    ]
+    sound = Pong(ping.wave, 1, 2, 3)
+    assert Echo(ping.wave, 1, 2, 3, world.now_ns) in host.session.receive(control, sound, world.now_ns)
+    assert host.session.receive(control, Pong(ping.wave - 1, 1, 2, 3), world.now_ns) == []
+    world.restart_board()
+    world.settle(20 * MS)
+    assert host.session.is_open
+    assert not any(isinstance(o, Echo) for o in host.session.receive(control, sound, world.now_ns))
+
+
+def test_a_refusal_for_the_version_reaches_the_host() -> None:
+    """A host that is refused, busy or for its version, is told the reason and goes on asking."""
+    for reason in RefusalReason:
+        world = World()
+        host = world.hosts[0]
+        assert host.session.receive(host.names[0, Lane.CONTROL], Refusal(reason), world.now_ns) == [Refused(reason)]
+        assert not host.session.is_open
+        assert any(
+            isinstance(output, Outgoing) and isinstance(output.message, HostHello)
+            for output in host.session.tick(host.session.due_ns)
+        )
+
+
+def test_strangers_are_asked_who_they_are() -> None:
+    """Words of a host from before a restart are answered with a knock, except its goodbye; no word of it counts."""
+    world = World()
+    knock = [Outgoing(b"x", Knock(Lane.CONTROL, world.board.session))]
+    for message in (Ping(1, 2), Credit(10**6), Pong(1, 2, 3, 4)):
+        assert world.board.receive(b"x", message, world.now_ns, BoardCounts()) == knock
+    assert world.board.receive(b"x", Bye(), world.now_ns, BoardCounts()) == []
+    assert not world.board.has_credit
+
+
+@given(st.integers(0, 2**62), st.integers(0, 2**62))
+@settings(deadline=None)
+def test_send_times_are_set_at_the_last_moment(then_ns: int, now_ns: int) -> None:
+    """Stamping sets a ping's t0, a pong's t2 and a frame's `sent` to now, keeps all else, and leaves other messages alone."""
+
+    def stamped(message: Message, now_ns: int) -> Message:
+        return decode(*encode_stamped(message, lambda: now_ns))
+
+    assert stamped(Ping(3, then_ns), now_ns) == Ping(3, now_ns)
+    assert stamped(Pong(3, 1, 2, then_ns), now_ns) == Pong(3, 1, 2, now_ns)
+    stamped_frame = stamped(frame("s", 5), now_ns)
+    assert isinstance(stamped_frame, FrameMessage)
+    assert stamped_frame.marks == BoardMarks(0, 0, now_ns)
+    assert stamped(Credit(9), now_ns) == Credit(9)
+
+
+@pytest.mark.parametrize(("round_trip_ns", "echoes"), [(MS // 2, 3), (2 * MS, 8)])
+def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, echoes: int) -> None:
+    """In a young session a wave on a link with slow echoes has eight of them, on a swift one three, and in an old session always three."""
+    world = World()
+    world.settle(1500 * MS)
+    host = world.hosts[0]
+    control = host.names[0, Lane.CONTROL]
+    for begin_ns, expected in ((world.now_ns, echoes), (world.now_ns + YOUNG_NS, 3)):
+        now_ns, heard = begin_ns, 0
+        outputs: list[Output] = []
+        while not outputs:
+            now_ns += MS
+            host.session.receive(control, Status("", BoardCounts(), Rung()), now_ns)  # a sign of life
+            outputs = host.session.tick(now_ns)
+        while pings := [o.message for o in outputs if isinstance(o, Outgoing) and isinstance(o.message, Ping)]:
+            t0_ns, now_ns, heard = now_ns, now_ns + round_trip_ns, heard + 1
+            outputs = host.session.receive(control, Pong(pings[0].wave, t0_ns, 1, 2), now_ns)
+        assert heard == expected
+
+
+def test_a_wish_to_steer_is_given_once() -> None:
+    """What the host asks for reaches the board's camera once, and never more than a period, whoever asks."""
+    world = World(board_dials=False)
+    world.settle()
+    host = world.hosts[0]
+    connection = next(name for name, (_, place, _) in world.wires.items() if place == (0, Lane.CONTROL))
+    (asked,) = host.session.steer(7 * MS)
+    assert isinstance(asked, Outgoing)
+    for message, given_ns in ((asked.message, 7 * MS), (Steer(CAMERA.period_ns * 5 + 3), 3)):
+        world.board.receive(connection, message, world.now_ns, BoardCounts())
+        assert world.board.take_steering() == given_ns
+        assert world.board.take_steering() == 0
+
+
+@pytest.mark.parametrize(("apart_ns", "accounts"), [(33 * MS, 20), (900 * MS, 20), (1500 * MS, 10)])
+def test_accounts_are_rarer_where_frames_are_far_apart(apart_ns: int, accounts: int) -> None:
+    """In ten seconds the host is told twenty accounts, and ten where frames are more than a second apart, as on a line of 115200 baud."""
+    board, control, now_ns = BoardSession("board", "boot", CAMERA), connection_name(0, b"control"), 10**12
+    board.receive(control, HostHello("host", Lane.CONTROL), now_ns, BoardCounts())
+    told, sent_ns = 0, now_ns
+    for step in range(1400):
+        now_ns += 10 * MS
+        if now_ns - sent_ns >= apart_ns:
+            sent_ns = now_ns
+            board.sent(now_ns)
+        board.receive(control, Ping(0, 0), now_ns, BoardCounts())  # a sign of life
+        accounted = any(isinstance(said.message, Status) for said in board.tick(now_ns, BoardCounts()))
+        told += accounted and step >= 400  # before that the first two frames leave
+    assert told == pytest.approx(accounts, abs=2)
+
+
+def test_the_host_is_told_once_of_each_rung() -> None:
+    """A camera that was set anew is told of at once, once, though accounts go over two lanes and repeat it; an account from before changes nothing."""
+    world = World()
+    world.settle(500 * MS)
+    host = world.hosts[0]
+    first, second = Rung(1, 3, 1, 66 * MS), Rung(2, 3, 2, 132 * MS)
+    for rung in (first, second):
+        camera = replace(CAMERA, period_ns=rung.period_ns)
+        world.board.describe(camera, rung)
+        assert world.board.due_ns <= world.now_ns
+        world.settle(1500 * MS)
+    assert [output for output in host.others if isinstance(output, Stepped)] == [Stepped(first), Stepped(second)]
+    late = Status(world.board.session, BoardCounts(), first)
+    outputs = host.session.receive(host.names[0, Lane.CONTROL], late, world.now_ns)
+    assert not any(isinstance(output, Stepped) for output in outputs)
+
+
+def test_a_host_that_comes_later_finds_the_camera_as_it_is() -> None:
+    """A hello describes the camera with the rung that it is on; the accounts that follow are no news."""
+    world = World()
+    world.settle(500 * MS)
+    rung = Rung(2, 3, 2, 132 * MS, 45)
+    world.board.describe(replace(CAMERA, period_ns=132 * MS), rung)
+    host = world.restart_host(world.hosts[0])
+    world.settle(3000 * MS)
+    assert host.session.is_open
+    hellos = [output.hello for output in host.others if isinstance(output, LinkUp)]
+    assert [(hello.rung, hello.camera.period_ns) for hello in hellos] == [(rung, 132 * MS)]
+    assert not any(isinstance(output, Stepped) for output in host.others)
