@@ -30,7 +30,7 @@ def summary(facts: RunFacts) -> str:
             f"clock known to +-{facts.estimate.uncertainty_ns / 1000:.0f} us"
             f" (+-{facts.estimate.bound_ns / 1000:.0f} us whatever the link does), skew {facts.estimate.skew * 1e6:+.1f} ppm"
         )
-    lines.append(_offset_text(facts.time_offset))
+    lines += _agreement(facts)
     lines += phase_lines(facts.phase, facts.alignment)
     lines += _arrivals(facts.camera, facts.time_offset)
     lines.append(judge(figures(facts)).sentence)
@@ -74,11 +74,15 @@ def camera_troubles(health: CameraHealth) -> list[str]:
     return [f"own camera: {', '.join(parts)}".replace("_", " ")] if parts else []
 
 
-def _offset_text(offset: TimeOffset) -> str:
+def _agreement(facts: RunFacts) -> list[str]:
+    """How well the two cameras' stamps agree; nothing where they say by definition when their images were exposed."""
+    offset = facts.time_offset
     known = f"+-{offset.uncertainty_ns / _MS:.2f} ms"
-    if offset == TimeOffset():
-        return f"the cameras' stamps agree to {known}: not measured (phone-host calibrate-time)"
-    return f"the cameras' stamps differ by {offset.offset_ns / _MS:+.2f} {known}, which is taken out"
+    if offset != TimeOffset():
+        return [f"the cameras' stamps differ by {offset.offset_ns / _MS:+.2f} {known}, which is taken out"]
+    if facts.stamps_exact:
+        return []
+    return [f"the cameras' stamps agree to {known}: not measured (phone-host calibrate-time)"]
 
 
 def _arrivals(health: CameraHealth, offset: TimeOffset) -> list[str]:
