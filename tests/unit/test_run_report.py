@@ -11,7 +11,7 @@ from common.protocol.message import BoardCounts
 from phone_host.accounts import LinkAccount, SessionAccount
 from phone_host.delays import DelayStatistics
 from phone_host.facts import RunFacts
-from phone_host.model import Side
+from phone_host.model import Side, TimeOffset
 from phone_host.pairqueue import PairCounts
 from phone_host.report import build
 from phone_host.results import Unwritten
@@ -71,3 +71,12 @@ def test_a_late_frame_has_one_reason() -> None:
     assert told[0]["sent"] == told[0]["received"] + told[0]["lost"]
     assert (told[0]["lost_late"], told[0]["stale"]) == (2, {"duplicate": 1, "old_session": 0})
     assert "3 lost on the link (2 of them came too late), 1 stale" in summary(seen)
+
+
+def test_only_stamps_that_nobody_knows_are_called_unmeasured() -> None:
+    """Cameras whose stamps say by definition when they exposed need no measuring; others are told how; what was measured is told."""
+    told = "cameras' stamps"
+    assert f"{told} agree to" in summary(facts(31))
+    assert told not in summary(replace(facts(31), stamps_exact=True))
+    measured = TimeOffset(offset_ns=3 * MS, uncertainty_ns=MS // 2)
+    assert f"{told} differ by +3.00 +-0.50 ms" in summary(replace(facts(31), time_offset=measured))
