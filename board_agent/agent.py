@@ -21,7 +21,16 @@ from common.link.several import SeveralLinks
 from common.link.wait import Waiter
 from common.logs import event
 from common.protocol.board_session import BoardSession
-from common.protocol.message import PROTOCOL_VERSION, BoardCounts, DropReason, Pacing, Refusal, RefusalReason, Rung
+from common.protocol.message import (
+    PROTOCOL_VERSION,
+    BoardCounts,
+    DropReason,
+    Pacing,
+    Ping,
+    Refusal,
+    RefusalReason,
+    Rung,
+)
 from common.protocol.session import Outgoing
 from common.protocol.wire import VersionError, decode, encode_for_any_version, encode_stamped
 
@@ -262,6 +271,8 @@ class Agent:
                     self._refuse_garbage(connection, error.problem)
                 else:
                     self._send_all(self._session.receive(connection, message, arrived_ns, self._outbox.counts))
+                    if isinstance(message, Ping):
+                        self._waiter.stay_awake()
 
     def _refuse_garbage(self, connection: bytes, problem: str) -> None:
         self._garbage += 1

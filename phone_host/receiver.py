@@ -15,7 +15,7 @@ from common.link.several import SeveralLinks
 from common.link.wait import Waiter
 from common.logs import event
 from common.protocol.host_session import HostSession
-from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Pacing, RefusalReason, Rung
+from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Pacing, Ping, RefusalReason, Rung
 from common.protocol.session import (
     Accepted,
     Arrived,
@@ -238,12 +238,17 @@ class Receiver:
         if frames:
             self._handle(self._session.grant(frames), now_ns)
 
+    def _send(self, outgoing: Outgoing) -> None:
+        header, payload = encode_stamped(outgoing.message, now.monotonic_ns)
+        self._links[outgoing.connection[0]].send(outgoing.connection[1:], header, payload)
+        if isinstance(outgoing.message, Ping):
+            self._waiter.stay_awake()
+
     def _handle(self, outputs: list[Output], now_ns: int) -> None:
         for output in outputs:
             match output:
-                case Outgoing(connection, message):
-                    header, payload = encode_stamped(message, now.monotonic_ns)
-                    self._links[connection[0]].send(connection[1:], header, payload)
+                case Outgoing():
+                    self._send(output)
                 case Arrived(frame, lost, link):
                     self._accept_frame(frame, lost, link, now_ns)
                 case Echo(_, t0_ns, t1_ns, t2_ns, t3_ns, link):

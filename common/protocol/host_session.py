@@ -346,11 +346,8 @@ class HostSession:
         path.heard_ns = now_ns
         match message:
             case Pong():
-                answered = path.waves.answered(message, now_ns)
-                if answered is None:
-                    return []
-                echo, ping = answered
-                return [echo, *([] if ping is None else [Outgoing(path.lanes[Lane.CONTROL], ping)])]
+                ping, echoes = path.waves.answered(message, now_ns)
+                return [*([] if ping is None else [Outgoing(path.lanes[Lane.CONTROL], ping)]), *echoes]
             case Status(session, counts) | End(session, counts):
                 if self._hello is None or session != self._hello.session:
                     return []

@@ -22,7 +22,7 @@ YOUNG_NS: Final = 10_000 * MS
 REPEATS: Final = 5
 SLOW_ECHO_NS: Final = 1 * MS
 """An echo that took longer than any swift link's says little; while the skew is learnt it is repeated, up to so many times a wave: errors
-after ten seconds of Wi-Fi are halved by it (bench_clock)."""
+after ten seconds of Wi-Fi are halved by it (bench_clock). Of a swift link's nothing is learnt before its wave has ended (`Waves.answered`)."""
 
 WAVE_EARLY_NS: Final = 50 * MS
 EARLY_NS: Final = 1000 * MS
@@ -54,6 +54,7 @@ class Waves:
         self._echoes_left = 0
         self._repeats_left = 0
         self._unanswered = False
+        self._kept: list[Echo] = []
 
     @property
     def due_ns(self) -> int:
@@ -64,6 +65,7 @@ class Waves:
         """The link came up: echoes under way are of an earlier connection, perhaps of another clock."""
         self._wave += 1
         self._echoes_left = 0
+        self._kept.clear()
         self._unanswered = False
         self._opened_ns = self._due_ns = now_ns
 
@@ -90,18 +92,21 @@ class Waves:
         self._repeats_left = REPEATS if EARLY_NS <= age_ns < YOUNG_NS else 0
         return self._ping()
 
-    def answered(self, pong: Pong, now_ns: int) -> tuple[Echo, Ping | None] | None:
-        """Take an answer.
+    def answered(self, pong: Pong, now_ns: int) -> tuple[Ping | None, list[Echo]]:
+        """Take an answer; one of an older wave tells nothing.
+
+        A swift echo is kept until its wave has ended. To learn from it takes longer than the echo did; the board's processor would rest meanwhile and wake
+        late, so that every question travelled longer than its answer (bench_clock: 20 us in the median).
 
         Args:
             pong: the answer.
             now_ns: its arrival, host's clock, ns.
 
         Returns:
-            The echo and the wave's next question, if there is one; None for an answer of an older wave.
+            The wave's next question, if there is one, and echoes to learn from once it has been sent.
         """
         if pong.wave != self._wave:
-            return None
+            return None, []
         self._unanswered = False
         if self._repeats_left and now_ns - pong.t0_ns >= SLOW_ECHO_NS:
             self._repeats_left -= 1
@@ -111,7 +116,12 @@ class Waves:
             rest = WAVE_REST_YOUNG if age_ns < YOUNG_NS else WAVE_REST
             rest_ns = min(WAVE_PATIENCE_NS, rest * (now_ns - self._wave_ns))
             self._due_ns = max(self._due_ns, now_ns + rest_ns)
-        return Echo(pong.wave, pong.t0_ns, pong.t1_ns, pong.t2_ns, now_ns, self._link), self._ping()
+        self._kept.append(Echo(pong.wave, pong.t0_ns, pong.t1_ns, pong.t2_ns, now_ns, self._link))
+        ping = self._ping()
+        if ping is not None and now_ns - pong.t0_ns < SLOW_ECHO_NS:
+            return ping, []
+        echoes, self._kept = self._kept, []
+        return ping, echoes
 
     def _ping(self) -> Ping | None:
         if not self._echoes_left:

@@ -43,7 +43,7 @@ from common.protocol.session import (
     Vanished,
     connection_name,
 )
-from common.protocol.waves import YOUNG_NS
+from common.protocol.waves import SLOW_ECHO_NS, WAVE_ECHOES_EARLY, YOUNG_NS
 from common.protocol.wire import decode, encode_stamped
 from tests.support.session_world import CAMERA, World, frame
 
@@ -273,6 +273,38 @@ def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, e
             t0_ns, now_ns, heard = now_ns, now_ns + round_trip_ns, heard + 1
             outputs = host.session.receive(control, Pong(pings[0].wave, t0_ns, 1, 2), now_ns)
         assert heard == expected
+
+
+def test_swift_echoes_are_learnt_from_when_their_wave_has_ended() -> None:
+    """The next question goes out before anything is done with the echo before, also with those of a wave whose last answer was lost; a slow echo is given at once."""
+    world = World()
+    world.settle(300 * MS)
+    host = world.hosts[0]
+    control = host.names[0, Lane.CONTROL]
+
+    def begun() -> int:
+        while True:
+            world.now_ns += MS
+            host.session.receive(control, Status("", BoardCounts(), Rung()), world.now_ns)  # a sign of life
+            for output in host.session.tick(world.now_ns):
+                if isinstance(output, Outgoing) and isinstance(output.message, Ping):
+                    return output.message.wave
+
+    def answered(wave: int, took_ns: int) -> list[Output]:
+        return host.session.receive(control, Pong(wave, world.now_ns - took_ns, 1, 2), world.now_ns)
+
+    swift_ns, slow_ns = SLOW_ECHO_NS - 1, SLOW_ECHO_NS
+    cut_short = begun()
+    for _ in range(WAVE_ECHOES_EARLY - 1):
+        (question,) = answered(cut_short, swift_ns)
+        assert question == Outgoing(control, Ping(cut_short, 0))
+    whole = begun()
+    assert answered(whole, swift_ns) == [Outgoing(control, Ping(whole, 0))]
+    question, *echoes = answered(whole, slow_ns)
+    assert question == Outgoing(control, Ping(whole, 0))
+    assert [echo.wave for echo in echoes if isinstance(echo, Echo)] == [cut_short] * (WAVE_ECHOES_EARLY - 1) + [
+        whole
+    ] * 2
 
 
 def test_a_wish_to_steer_is_given_once() -> None:
