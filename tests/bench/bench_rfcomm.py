@@ -54,7 +54,7 @@ def main() -> int:
             command = "delay-bench --links tcp,ipc,serial,rfcomm --size 320x240 --fps 5 --matcher block"
             print(f"{command} --seconds {options.seconds}, in the guest:", flush=True)
             running = guest.popen(
-                "cd /root && export PYTHONPATH=/mnt/host && exec python3 -P -m phone_host.bench.cli "
+                "cd /srv && export PYTHONPATH=/mnt/host && exec python3 -P -m phone_host.bench.cli "
                 f"{command.partition(' ')[2]} --seconds {options.seconds} 2>&1"
             )
             with running:

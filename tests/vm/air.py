@@ -5,7 +5,7 @@ modprobe -a hci_vhci rfcomm
 ready() { [ "$(hciconfig | grep -c 'BD Address: 00:AA:01')" = 2 ]; }
 until ready; do # on a busy machine the kernel may give an adapter up that did not answer in 10 s, and bluetoothd never sees that one
     kill $(pidof btvirt) 2>/dev/null
-    (setsid btvirt -l2 >/root/btvirt.log 2>&1 &)
+    (setsid btvirt -l2 >/srv/btvirt.log 2>&1 &)
     for _ in $(seq 75); do ready && break; sleep 0.2; done
 done
 """

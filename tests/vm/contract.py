@@ -22,17 +22,17 @@ def run_contract(guest: Guest, transport: str) -> str:
     Returns:
         The last line of pytest: how many passed, how many were skipped.
     """
-    guest.code("rm -rf /root/suite")
+    guest.code("rm -rf /srv/suite")
     with tempfile.TemporaryDirectory() as folder:
         suite = Path(folder) / "suite"
         for name in _FILES:
             (suite / name).parent.mkdir(parents=True, exist_ok=True)
             (suite / name).write_bytes((ROOT / name).read_bytes())
-        guest.put(suite, "/root")
-    guest.put(ROOT / "common", "/root/suite")
-    guest.put(ROOT / "tests" / "support", "/root/suite/tests")
+        guest.put(suite, "/srv")
+    guest.put(ROOT / "common", "/srv/suite")
+    guest.put(ROOT / "tests" / "support", "/srv/suite/tests")
     running = guest.popen(
-        f"cd /root/suite && TEST_PATIENCE_S={_PATIENCE_S} exec python3 -m pytest -q -p no:cacheprovider --import-mode=importlib "
+        f"cd /srv/suite && TEST_PATIENCE_S={_PATIENCE_S} exec python3 -m pytest -q -p no:cacheprovider --import-mode=importlib "
         f"-W error tests/contract/test_link.py -k {transport} 2>&1"
     )
     with running:

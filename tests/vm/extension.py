@@ -27,13 +27,13 @@ def extension(guest: Guest, *far_end: str) -> Iterator[str]:
     Yields:
         The link URI for the host.
     """
-    guest.put(_FAR_END, "/root")
+    guest.put(_FAR_END, "/srv")
     master, slave = pty.openpty()
     path = os.ttyname(slave)
     os.close(slave)
     os.set_blocking(master, False)
     stop = threading.Event()
-    carrier = guest.popen(f"exec python3 -u /root/{_FAR_END.name} {' '.join(far_end)}")
+    carrier = guest.popen(f"exec python3 -u /srv/{_FAR_END.name} {' '.join(far_end)}")
     threads = [threading.Thread(target=way, args=(carrier, master, stop), daemon=True) for way in (_inwards, _outwards)]
     for thread in threads:
         thread.start()

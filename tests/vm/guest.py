@@ -255,8 +255,8 @@ class Guest:
 
     def install(self, package: Path) -> None:
         """Install the board's package."""
-        self.put(package, "/root")
-        self.sh(f"dpkg -i /root/{package.name}")
+        self.put(package, "/var/tmp")
+        self.sh(f"dpkg -i /var/tmp/{package.name}")
 
     def configure(self, camera: str, *links: str, secured: bool = False) -> None:
         """Set the service's camera and its links, by default one on every network, open to everybody unless it is to be secured, and restart it."""

@@ -89,10 +89,10 @@ def test_a_paired_host_finds_the_board_by_name_and_a_forgotten_one_is_refused(
     """Two adapters are paired by bluetoothd; a host then finds board and channel by the board's name, and pairs are right over the encrypted link; forgotten, it is told to pair."""
     with booted(Architecture.AMD64) as guest:
         guest.sh(AIR)
-        guest.put(Path(__file__).with_name("pair.py"), "/root")
-        guest.put(Path(__file__).with_name("far_end.py"), "/root")
+        guest.put(Path(__file__).with_name("pair.py"), "/srv")
+        guest.put(Path(__file__).with_name("far_end.py"), "/srv")
         guest.sh(DAEMON)
-        guest.sh(f"timeout 60 python3 -u /root/pair.py {HOST} {BOARD}")
+        guest.sh(f"timeout 60 python3 -u /srv/pair.py {HOST} {BOARD}")
         guest.install(package)
         camera = Webcam(film.frames, FPS, READOUT_MS * 1_000_000)
         try:
@@ -116,10 +116,10 @@ def test_a_paired_host_finds_the_board_by_name_and_a_forgotten_one_is_refused(
             guest.sh(f"busctl call org.bluez /org/bluez/{adapter} org.bluez.Adapter1 RemoveDevice o {device}")
         # With nobody known it would not even answer.
         guest.sh("busctl set-property org.bluez /org/bluez/hci0 org.bluez.Adapter1 Discoverable b true")
-        guest.sh(f"setsid python3 -u /root/far_end.py dial rfcomm://{BOARD} </dev/null >/root/refused 2>&1 &")
+        guest.sh(f"setsid python3 -u /srv/far_end.py dial rfcomm://{BOARD} </dev/null >/srv/refused 2>&1 &")
         remedy = "pair the two devices with bluetoothctl"  # the radio may first have to find its way: a line of its own
-        until(lambda: remedy in guest.sh("cat /root/refused"), "a stranger is told")
-        assert guest.sh("cat /root/refused").count(remedy) == 1
+        until(lambda: remedy in guest.sh("cat /srv/refused"), "a stranger is told")
+        assert guest.sh("cat /srv/refused").count(remedy) == 1
         check_journal(guest)
         assert "list_del corruption" not in guest.console
 
@@ -141,10 +141,10 @@ for own, other in (("{HOST}", "{BOARD}"), ("{BOARD}", "{HOST}")):
     with booted(Architecture.AMD64) as radio:
 
         def found() -> set[str]:
-            return set(radio.sh("timeout 50 python3 -P /root/ask.py 2>/dev/null || echo nobody").split())
+            return set(radio.sh("timeout 50 python3 -P /srv/ask.py 2>/dev/null || echo nobody").split())
 
         radio.sh(AIR)
-        radio.write("/root/ask.py", ask)
+        radio.write("/srv/ask.py", ask)
         radio.install(package)
         radio.sh("mkdir /srv/frames && printf 'P5 2 2 255\nabcd' >/srv/frames/1.pgm")
         radio.configure("replay:/srv/frames?fps=10&loop=1", "rfcomm://*/7")

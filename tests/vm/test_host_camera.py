@@ -77,7 +77,7 @@ def cameras(machine: Guest, film: Film) -> Iterator[tuple[Webcam, Webcam]]:
 
 def pairs_so_far(machine: Guest) -> int:
     """Lines of the host's delays."""
-    return int(machine.sh("cat /root/out/delays.jsonl 2>/dev/null | wc -l"))
+    return int(machine.sh("cat /srv/out/delays.jsonl 2>/dev/null | wc -l"))
 
 
 def test_two_webcams_are_paired_and_a_pulled_one_comes_back(
@@ -85,21 +85,21 @@ def test_two_webcams_are_paired_and_a_pulled_one_comes_back(
 ) -> None:
     """Every pair shows one moment by the webcams' own word; the host's camera, pulled and plugged in again, goes on, and its report tells so."""
     left, right = cameras
-    run = f"{HOST} run --link tcp://127.0.0.1:{LINK_PORT} --camera '{BY_ID.format('RIGHT')}' --out /root/out --save-every 1 --json"
-    host = machine.popen(f"cd /; {run} > /root/report 2> /root/host.err & echo $!; wait; cat /root/report")
+    run = f"{HOST} run --link tcp://127.0.0.1:{LINK_PORT} --camera '{BY_ID.format('RIGHT')}' --out /srv/out --save-every 1 --json"
+    host = machine.popen(f"cd /; {run} > /srv/report 2> /srv/host.err & echo $!; wait; cat /srv/report")
     assert host.stdout is not None
     pid = host.stdout.readline().decode().strip()
     until(lambda: pairs_so_far(machine) >= 40, "40 pairs of two webcams")
     right.unplug()
-    until(lambda: "camera_lost" in machine.sh("cat /root/host.err"), "the host notices that its camera is gone")
+    until(lambda: "camera_lost" in machine.sh("cat /srv/host.err"), "the host notices that its camera is gone")
     before = pairs_so_far(machine)
     right.plug(machine, usb_port=2)
     until(lambda: pairs_so_far(machine) >= before + 20, "pairs after the plug")
     machine.sh(f"kill {pid}")
     report: dict[str, Any] = json.loads(host.communicate(timeout=PATIENCE_S)[0])
-    assert "Traceback" not in machine.sh("cat /root/host.err")
-    machine.sh("tar -C /root -cf /root/out.tar out")
-    machine.get("/root/out.tar", tmp_path / "out.tar")
+    assert "Traceback" not in machine.sh("cat /srv/host.err")
+    machine.sh("tar -C /srv -cf /srv/out.tar out")
+    machine.get("/srv/out.tar", tmp_path / "out.tar")
     with tarfile.open(tmp_path / "out.tar") as archive:
         archive.extractall(tmp_path, filter="data")
     check_pairs(tmp_path / "out", webcam_skew(left.late_ns, right.late_ns))
@@ -118,7 +118,7 @@ def test_two_webcams_are_paired_and_a_pulled_one_comes_back(
 def test_the_hosts_doctor_streams_from_its_camera(machine: Guest, cameras: tuple[Webcam, Webcam]) -> None:
     """phone-host doctor finds its packages, proves the own camera by streaming, and gets the board's answer."""
     assert cameras[1].plugged
-    asked = f"--link tcp://127.0.0.1:{LINK_PORT} --camera '{BY_ID.format('RIGHT')}' --wait 30 --out /root/out --json"
+    asked = f"--link tcp://127.0.0.1:{LINK_PORT} --camera '{BY_ID.format('RIGHT')}' --wait 30 --out /srv/out --json"
     shown = machine.sh(f"cd / && {HOST} doctor {asked}")
     checks = {check["what"]: check for check in json.loads(shown)["checks"]}
     assert checks["cv2"]["verdict"] == checks["numpy"]["verdict"] == "ok"
@@ -128,7 +128,7 @@ def test_the_hosts_doctor_streams_from_its_camera(machine: Guest, cameras: tuple
 
 def folders(machine: Guest) -> list[str]:
     """The folders of results that the user's unit has made, the oldest first."""
-    return machine.sh("ls -d /root/tandemscan-scans/* 2>/dev/null || true").split()
+    return machine.sh("ls -d ~/tandemscan-scans/* 2>/dev/null || true").split()
 
 
 def await_pairs(machine: Guest, runs: int) -> str:
@@ -143,12 +143,12 @@ def test_the_users_unit_pairs_frames(machine: Guest, cameras: tuple[Webcam, Webc
     """deploy/host's unit, with a settings file as it says, is understood without a warning, pairs frames and ends in order; a later start leaves the results."""
     assert all(camera.plugged for camera in cameras)
     # As a unit of the system manager its home folder is root's: there a checkout's command stands in for the one of `make venv`.
-    command = "/root/tandemscan/.venv/bin/phone-host"
+    command = "~/tandemscan/.venv/bin/phone-host"
     machine.sh(
         f"install -D -m 755 /dev/stdin {command} <<'E'\n#!/bin/sh\ncd / && export PYTHONPATH=/mnt && exec python3 -P -m phone_host.cli \"$@\"\nE"
     )
     settings = f'link = ["tcp://127.0.0.1:{LINK_PORT}"]\ncamera = "{BY_ID.format("RIGHT")}"'
-    machine.sh(f"install -D -m 600 /dev/stdin /root/.config/tandemscan/phone-host.toml <<'E'\n{settings}\nE")
+    machine.sh(f"install -D -m 600 /dev/stdin ~/.config/tandemscan/phone-host.toml <<'E'\n{settings}\nE")
     machine.put(ROOT / "deploy" / "host" / "phone-host.service", "/run/systemd/system")
     unit = "/run/systemd/system/phone-host.service"
     assert machine.sh(f"systemd-analyze verify --man=no {unit} 2>&1") == ""
@@ -161,5 +161,5 @@ def test_the_users_unit_pairs_frames(machine: Guest, cameras: tuple[Webcam, Webc
             assert machine.sh("systemctl show -P Result -P NRestarts phone-host").split() == ["success", "0"]
             check_counts(json.loads(machine.sh(f"cat {newest}/report.json")))
     finally:
-        machine.sh(f"systemctl stop phone-host; rm -r {unit} /root/tandemscan; systemctl daemon-reload")
+        machine.sh(f"systemctl stop phone-host; rm -r {unit} ~/tandemscan; systemctl daemon-reload")
     assert all(machine.sh(f"cat {folder}/report.json") for folder in folders(machine))

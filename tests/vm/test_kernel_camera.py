@@ -22,7 +22,7 @@ DROPPED: Final = "Percentage of Dropped Buffers"
 def vivid(guest: Guest) -> Iterator[Guest]:
     """The board with one virtual capture device (single planes, no other node) that no service has."""
     guest.sh(f"systemctl stop {UNIT} && modprobe vivid n_devs=1 node_types=0x1 multiplanar=1 && udevadm settle")
-    guest.put(Path(__file__).with_name("kernel_camera.py"), "/root")
+    guest.put(Path(__file__).with_name("kernel_camera.py"), "/srv")
     yield guest
     guest.sh(f"modprobe -r vivid && systemctl start {UNIT}")
 
@@ -30,7 +30,7 @@ def vivid(guest: Guest) -> Iterator[Guest]:
 def capture(guest: Guest, options: str, *orders: str) -> dict[str, Any]:
     """Follow orders with the camera; gives what came."""
     words = (f"size={WIDTH_PX}x{HEIGHT_PX}&fps=10&{options}", *orders)
-    shown: dict[str, Any] = json.loads(guest.sh(f"python3 -P /root/kernel_camera.py {shlex.join(words)}"))
+    shown: dict[str, Any] = json.loads(guest.sh(f"python3 -P /srv/kernel_camera.py {shlex.join(words)}"))
     assert shown["sequences"] == sorted(set(shown["sequences"]))
     return shown
 

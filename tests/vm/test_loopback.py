@@ -18,11 +18,11 @@ def loopback(guest: Guest) -> Iterator[Guest]:
     if not module.is_file():
         pytest.skip(f"no {module}: .ci/board builds it where apt has the kernel's headers")
     for path in (module, *(Path(__file__).with_name(name) for name in ("kernel_camera.py", "loopback_writer.py"))):
-        guest.put(path, "/root")
-    guest.sh(f"systemctl stop {UNIT} && modprobe videodev && insmod /root/{module.name} && udevadm settle")
-    writer = guest.popen("exec python3 /root/loopback_writer.py /dev/video0 320 240")
+        guest.put(path, "/srv")
+    guest.sh(f"systemctl stop {UNIT} && modprobe videodev && insmod /srv/{module.name} && udevadm settle")
+    writer = guest.popen("exec python3 /srv/loopback_writer.py /dev/video0 320 240")
     yield guest
-    guest.sh("pkill -f /root/loopback_writer.py")
+    guest.sh("pkill -f /srv/loopback_writer.py")
     with writer:  # closes its pipes and waits
         pass
     guest.sh(f"rmmod v4l2loopback && systemctl start {UNIT}")
@@ -31,7 +31,7 @@ def loopback(guest: Guest) -> Iterator[Guest]:
 def test_its_first_buffer_is_no_frame_and_its_stamps_are_believed(loopback: Guest) -> None:
     """The first buffer (never written, number 0) is spoiled, the jump of the numbers after it is no loss, and stamps of an unnamed clock that fit are taken."""
     loopback.sh("until board-agent cameras | grep -q MJPG; do sleep 0.1; done")
-    order = "python3 -P /root/kernel_camera.py 'size=320x240&fps=30&format=mjpeg' frames=20"
+    order = "python3 -P /srv/kernel_camera.py 'size=320x240&fps=30&format=mjpeg' frames=20"
     shown = json.loads(loopback.sh(order))
     health = shown["health"]
     assert (shown["format"], shown["bytes"]) == ("mjpeg", 8004)

@@ -36,8 +36,8 @@ def before(bare_guest: Guest) -> str:
 def installed(bare_guest: Guest, before: str, package: Path) -> Iterator[Guest]:
     """The board with the package as it comes."""
     assert before
-    bare_guest.put(package, "/root")
-    bare_guest.sh(f"dpkg -i /root/{package.name}")
+    bare_guest.put(package, "/var/tmp")
+    bare_guest.sh(f"dpkg -i /var/tmp/{package.name}")
     yield bare_guest
     bare_guest.sh("dpkg --purge tandemscan-board")
 
@@ -83,11 +83,11 @@ def test_the_launcher_ignores_a_foreign_common(installed: Guest) -> None:
 def test_keys_are_those_of_the_service(installed: Guest) -> None:
     """Without options `keys` shows the folder that the service's settings name."""
     settings = "/etc/tandemscan/board-agent.toml"
-    installed.sh(f"cp -p {settings} /root/good && sed -i 's,^keys = .*,keys = \"/run/other\",' {settings}")
+    installed.sh(f"cp -p {settings} /var/tmp/good && sed -i 's,^keys = .*,keys = \"/run/other\",' {settings}")
     try:
         shown = json.loads(installed.sh("board-agent keys --json"))
     finally:
-        installed.sh(f"mv /root/good {settings}; rm -rf /run/other")
+        installed.sh(f"mv /var/tmp/good {settings}; rm -rf /run/other")
     assert shown["folder"] == "/run/other"
 
 
@@ -102,19 +102,19 @@ def test_a_changed_conffile_outlives_an_upgrade_and_the_service_is_restarted(ins
     """Installing again keeps the owner's settings and starts the new code."""
     installed.sh("echo '# mine' >> /etc/tandemscan/board-agent.toml")
     process = installed.show("MainPID")
-    installed.sh(f"dpkg -i /root/{package.name}")
+    installed.sh(f"dpkg -i /var/tmp/{package.name}")
     assert "# mine" in installed.sh("cat /etc/tandemscan/board-agent.toml")
     until(lambda: installed.show("MainPID") not in {process, "0"}, "the service runs the new code")
 
 
 def test_a_settings_mistake_is_one_line_in_the_journal_and_heals_by_itself(installed: Guest) -> None:
     """With a bad value the service says which one and keeps trying; once mended it comes up without being asked."""
-    installed.sh("cp -p /etc/tandemscan/board-agent.toml /root/good")
+    installed.sh("cp -p /etc/tandemscan/board-agent.toml /var/tmp/good")
     installed.write("/etc/tandemscan/board-agent.toml", 'camera = 7\nlink = ["tcp://*:5555"]\n')
     installed.code(f"systemctl restart {UNIT}")
     until(lambda: "camera in /etc/tandemscan/board-agent.toml is 7" in installed.journal(), "the mistake is named")
     until(lambda: int(installed.show("NRestarts")) >= 6, "it never gives up: systemd's own default would after five")
-    installed.sh("cp -p /root/good /etc/tandemscan/board-agent.toml && rm /root/good")
+    installed.sh("cp -p /var/tmp/good /etc/tandemscan/board-agent.toml && rm /var/tmp/good")
     installed.until("ActiveState", "active", "the service is back")
     assert "Traceback" not in installed.journal()
 
@@ -135,7 +135,7 @@ def test_removal_keeps_the_settings_and_purge_leaves_nothing(installed: Guest, b
         if not line.startswith(("/etc/passwd- ", "/etc/group- ", "/etc/shadow- ", "/etc/gshadow- "))
     } == set()
     assert installed.show("LoadState") == "not-found"
-    installed.sh(f"dpkg -i /root/{package.name}")
+    installed.sh(f"dpkg -i /var/tmp/{package.name}")
     installed.until("ActiveState", "active", "it can be installed again")
 
 
