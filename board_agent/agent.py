@@ -26,7 +26,7 @@ from common.protocol.message import (
     BoardCounts,
     DropReason,
     Pacing,
-    Ping,
+    Pong,
     Refusal,
     RefusalReason,
     Rung,
@@ -271,8 +271,6 @@ class Agent:
                     self._refuse_garbage(connection, error.problem)
                 else:
                     self._send_all(self._session.receive(connection, message, arrived_ns, self._outbox.counts))
-                    if isinstance(message, Ping):
-                        self._waiter.stay_awake()
 
     def _refuse_garbage(self, connection: bytes, problem: str) -> None:
         self._garbage += 1
@@ -346,6 +344,8 @@ class Agent:
         result = link.send(outgoing.connection[1:], header, payload)
         if result is SendResult.UNREACHABLE:
             self._send_all(self._session.unreachable(outgoing.connection))
+        if isinstance(outgoing.message, Pong):
+            self._waiter.stay_awake()
         return result
 
     def _watch_host(self, now_ns: int) -> None:

@@ -15,8 +15,9 @@ from zmq.utils import z85
 from common import now
 from common.errors import DataError, ProtocolError, SettingsError, TandemError, UnavailableError
 from common.keys import KeyFolder, Peer, clean_name
-from common.protocol.pairing_code import Asking, Identity, Open, Refuse, Refused, Word, code_text
+from common.protocol.pairing_code import Asking, code_text
 from common.protocol.pairing_wire import MAX_WORD_BYTES, WordReader, frame_word
+from common.protocol.pairing_words import Identity, Open, Refuse, Refused, Word
 
 _ANSWER_S: Final = 10.0
 """A word takes a round trip and one round of the board's loop; a board that is busy elsewhere, or opens its door only now, gets this long."""

@@ -25,18 +25,8 @@ from common.link.callers import Call, Callers, Left, Nonsense, Said
 from common.link.curve import Guard, Seldom
 from common.link.wait import is_readable
 from common.logs import event
-from common.protocol.pairing_code import (
-    Desk,
-    Failed,
-    Identity,
-    Output,
-    Paired,
-    Refuse,
-    Refused,
-    Say,
-    ShowCode,
-    code_text,
-)
+from common.protocol.pairing_code import Desk, Failed, Output, Paired, Say, ShowCode, code_text
+from common.protocol.pairing_words import Identity, Refuse, Refused
 
 _LOG = logging.getLogger(__name__)
 

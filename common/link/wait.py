@@ -7,7 +7,7 @@ is news, and any call of the socket may have taken it in. So ZMQ_EVENTS is asked
 
 import os
 import select
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 import zmq
@@ -19,7 +19,10 @@ _EVENTS: Final = int(zmq.EVENTS)
 _READABLE: Final = int(zmq.POLLIN)
 
 _AWAKE_NS: Final = 200_000
-"""Longer than an echo over loopback takes; twice as long gained nothing (bench_clock)."""
+"""Longer than an echo over loopback takes; twice as long gained nothing (decision 0009)."""
+
+_WANTED_NS: Final = 50_000
+"""A core that was given away for longer has other work to do; ZeroMQ's own thread needs some 20 us."""
 
 
 def is_readable(sock: "zmq.Socket[bytes]") -> bool:
@@ -32,11 +35,13 @@ class Waiter:
 
     Args:
         pollables: ZeroMQ sockets, descriptors, or objects with one.
+        clock: monotonic, ns.
     """
 
-    def __init__(self, pollables: Iterable[Any]) -> None:
+    def __init__(self, pollables: Iterable[Any], clock: Callable[[], int] = now.monotonic_ns) -> None:
         self._poll = select.poll()
         self._sockets: list[tuple[int, zmq.Socket[bytes]]] = []
+        self._clock = clock
         self._awake_until_ns = 0
         for item in pollables:
             fd = item if isinstance(item, int) else item.fileno()
@@ -58,24 +63,28 @@ class Waiter:
         self._poll.unregister(fd)
 
     def stay_awake(self) -> None:
-        """Wait without sleep for the next 200 us, as the other side's part of an echo is expected.
+        """Let `wait` look again and again before it sleeps, for 200 us from now, as the other side's part of an echo is expected.
 
         A processor that rests wakes some 20 us late, and not equally late on both sides of a link.
         """
-        self._awake_until_ns = now.monotonic_ns() + _AWAKE_NS
+        self._awake_until_ns = self._clock() + _AWAKE_NS
 
     def wait(self, wait_ms: int) -> list[int]:
         """Wait until there is something to look at.
 
         Args:
-            wait_ms: at most so long, ms.
+            wait_ms: at most so long, ms, beside the time to stay awake.
 
         Returns:
             Descriptors, those of ZeroMQ sockets included; a socket may turn out to have nothing to receive.
         """
         ready = [fd for fd, sock in self._sockets if is_readable(sock)]
-        while wait_ms and not ready and now.monotonic_ns() < self._awake_until_ns:
+        now_ns = self._clock() if wait_ms and not ready else self._awake_until_ns
+        while now_ns < self._awake_until_ns:
             os.sched_yield()  # ZeroMQ's thread may share the core
             if found := self._poll.poll(0):
                 return [fd for fd, _ in found]
+            before_ns, now_ns = now_ns, self._clock()
+            if now_ns - before_ns > _WANTED_NS:
+                break
         return ready + [fd for fd, _ in self._poll.poll(0 if ready else wait_ms)]

@@ -333,12 +333,12 @@ class HostSession:
 
     def _begin_wave(self, path: HostPath, now_ns: int) -> list[Output]:
         control = path.lanes[Lane.CONTROL]
-        ping = path.waves.begin_wave(now_ns, standby=path is not self._carrier)
+        echoes, ping = path.waves.begin_wave(now_ns, standby=path is not self._carrier)
         if ping is None:
             return []
         # Credit is granted up to an index, so repeating it is harmless and mends one that a broken connection swallowed.
         again = path is self._carrier and self._below_index
-        return [Outgoing(control, ping), *([Outgoing(control, Credit(self._below_index))] if again else [])]
+        return [*echoes, Outgoing(control, ping), *([Outgoing(control, Credit(self._below_index))] if again else [])]
 
     def _attend(self, path: HostPath, connection: bytes, message: Pong | Status | End, now_ns: int) -> list[Output]:
         if path.hello is None or connection not in path.lanes.values():
@@ -346,8 +346,8 @@ class HostSession:
         path.heard_ns = now_ns
         match message:
             case Pong():
-                ping, echoes = path.waves.answered(message, now_ns)
-                return [*([] if ping is None else [Outgoing(path.lanes[Lane.CONTROL], ping)]), *echoes]
+                echoes, ping = path.waves.answered(message, now_ns)
+                return [*echoes, *([] if ping is None else [Outgoing(path.lanes[Lane.CONTROL], ping)])]
             case Status(session, counts) | End(session, counts):
                 if self._hello is None or session != self._hello.session:
                     return []

@@ -8,10 +8,10 @@ from typing import Any, Final, assert_never
 import msgpack
 
 from common.errors import ProtocolError
-from common.protocol.pairing_code import (
+from common.protocol.pairing_code import ROUNDS
+from common.protocol.pairing_words import (
     COMMITMENT_BYTES,
     NONCE_BYTES,
-    ROUNDS,
     Ask,
     Begin,
     Commit,

@@ -22,7 +22,7 @@ YOUNG_NS: Final = 10_000 * MS
 REPEATS: Final = 5
 SLOW_ECHO_NS: Final = 1 * MS
 """An echo that took longer than any swift link's says little; while the skew is learnt it is repeated, up to so many times a wave: errors
-after ten seconds of Wi-Fi are halved by it (bench_clock). Of a swift link's nothing is learnt before its wave has ended (`Waves.answered`)."""
+after ten seconds of Wi-Fi are halved by it (bench_clock)."""
 
 WAVE_EARLY_NS: Final = 50 * MS
 EARLY_NS: Final = 1000 * MS
@@ -69,7 +69,7 @@ class Waves:
         self._unanswered = False
         self._opened_ns = self._due_ns = now_ns
 
-    def begin_wave(self, now_ns: int, *, standby: bool) -> Ping | None:
+    def begin_wave(self, now_ns: int, *, standby: bool) -> tuple[list[Echo], Ping | None]:
         """Begin a wave that is due.
 
         Args:
@@ -77,11 +77,11 @@ class Waves:
             standby: whether the link carries no frames.
 
         Returns:
-            The first question; None while the wave before is still under way.
+            Echoes of the wave before, if it was cut short, and the first question; None while the wave before is still under way.
         """
         if self._unanswered and now_ns - self._wave_ns < WAVE_PATIENCE_NS:
             self._due_ns = min(now_ns + WAVE_EARLY_NS, self._wave_ns + WAVE_PATIENCE_NS)
-            return None
+            return [], None
         self._wave_ns = now_ns
         age_ns = now_ns - self._opened_ns
         early = age_ns < EARLY_NS
@@ -90,23 +90,23 @@ class Waves:
         self._wave += 1
         self._echoes_left = WAVE_ECHOES_EARLY if early else WAVE_ECHOES
         self._repeats_left = REPEATS if EARLY_NS <= age_ns < YOUNG_NS else 0
-        return self._ping()
+        return self._given(), self._ping()
 
-    def answered(self, pong: Pong, now_ns: int) -> tuple[Ping | None, list[Echo]]:
+    def answered(self, pong: Pong, now_ns: int) -> tuple[list[Echo], Ping | None]:
         """Take an answer; one of an older wave tells nothing.
 
         A swift echo is kept until its wave has ended. To learn from it takes longer than the echo did; the board's processor would rest meanwhile and wake
-        late, so that every question travelled longer than its answer (bench_clock: 20 us in the median).
+        late, so that every question travelled longer than its answer (decision 0009).
 
         Args:
             pong: the answer.
             now_ns: its arrival, host's clock, ns.
 
         Returns:
-            The wave's next question, if there is one, and echoes to learn from once it has been sent.
+            Echoes to learn from, and the wave's next question, if there is one.
         """
         if pong.wave != self._wave:
-            return None, []
+            return [], None
         self._unanswered = False
         if self._repeats_left and now_ns - pong.t0_ns >= SLOW_ECHO_NS:
             self._repeats_left -= 1
@@ -118,10 +118,12 @@ class Waves:
             self._due_ns = max(self._due_ns, now_ns + rest_ns)
         self._kept.append(Echo(pong.wave, pong.t0_ns, pong.t1_ns, pong.t2_ns, now_ns, self._link))
         ping = self._ping()
-        if ping is not None and now_ns - pong.t0_ns < SLOW_ECHO_NS:
-            return ping, []
+        swift = now_ns - pong.t0_ns < SLOW_ECHO_NS
+        return [] if swift and ping is not None else self._given(), ping
+
+    def _given(self) -> list[Echo]:
         echoes, self._kept = self._kept, []
-        return ping, echoes
+        return echoes
 
     def _ping(self) -> Ping | None:
         if not self._echoes_left:

@@ -33,24 +33,21 @@ from common.protocol.message import (
     Rung,
     Status,
 )
-from common.protocol.pairing_code import (
+from common.protocol.pairing_code import Asking, Desk, Paired, Say
+from common.protocol.pairing_wire import MAX_WORD_BYTES, WordReader, decode_word, encode_word
+from common.protocol.pairing_words import (
     COMMITMENT_BYTES,
     NONCE_BYTES,
     Ask,
-    Asking,
     Begin,
     Commit,
-    Desk,
     Identity,
     Open,
-    Paired,
     Refuse,
     Refused,
-    Say,
     Shown,
     Word,
 )
-from common.protocol.pairing_wire import MAX_WORD_BYTES, WordReader, decode_word, encode_word
 from common.protocol.session import Arrived, Echo, Outgoing
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES, decode, encode
 from common.protocol.zap import KEY_BYTES, deny, read_request

@@ -174,13 +174,13 @@ def waves(
         if under_way and under_way[0][0] <= session.due_ns:
             now_ns, pong = under_way.pop(0)
             outputs: list[Output] = session.receive(_LANES[Lane.CONTROL], pong, now_ns)
-            echoes += [output for output in outputs if isinstance(output, Echo)]
             first = False
         else:
             if echoes:
                 yield now_ns, echoes
             echoes, now_ns, first = [], session.due_ns, True
             outputs = session.tick(now_ns)
+        echoes += [output for output in outputs if isinstance(output, Echo)]
         for output in outputs:
             if isinstance(output, Outgoing) and isinstance(output.message, Ping):
                 t0_ns, age_ns = now_ns + 5 * US, now_ns - clocks.start_ns

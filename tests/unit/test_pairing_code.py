@@ -16,27 +16,19 @@ from common.protocol.pairing_code import (
     PROOF_NS,
     ROUNDS,
     TRIES,
-    Ask,
     Asking,
-    Begin,
-    Commit,
     Desk,
     Failed,
-    Identity,
-    Open,
     Output,
     Paired,
-    Refuse,
-    Refused,
     Say,
     ShowCode,
-    Shown,
-    Word,
     code_text,
     new_code,
     read_code,
 )
 from common.protocol.pairing_wire import MAX_WORD_BYTES, WordReader, decode_word, encode_word, frame_word
+from common.protocol.pairing_words import Ask, Begin, Commit, Identity, Open, Refuse, Refused, Shown, Word
 
 BOARD = Identity(bytes(range(32)), "bone")
 HOST = Identity(bytes(range(32, 64)), "phone")

@@ -144,6 +144,16 @@ def settled(*, board_dials: bool = False) -> World:
     return world
 
 
+def with_second_link_lost() -> World:
+    """A settled world whose second link has just broken; the first one carries."""
+    world = settled()
+    for lane in Lane:
+        world.break_lane(world.hosts[0], (1, lane))
+    world.cut_link(1)
+    world.settle(20 * MS)
+    return world
+
+
 def shoot(world: World) -> None:
     """Let the board have credit for one frame, and send it."""
     host = world.hosts[0]
@@ -247,12 +257,8 @@ def test_a_link_that_comes_up_later_stands_by() -> None:
 
 def test_another_board_on_the_second_link_is_told_and_left_alone() -> None:
     """A link that leads to another board while ours is alive is told within two seconds, is said goodbye to, and no frame of it is taken."""
-    world = settled()
+    world = with_second_link_lost()
     host = world.hosts[0]
-    for lane in Lane:
-        world.break_lane(host, (1, lane))
-    world.cut_link(1)
-    world.settle(20 * MS)
     other = BoardHello("other", "another boot", CAMERA, BoardCounts(), Rung())
     control = host.names[1, Lane.CONTROL]
     begin_ns = world.now_ns
@@ -272,12 +278,8 @@ def test_another_board_on_the_second_link_is_told_and_left_alone() -> None:
 
 def test_a_busy_board_on_the_second_link_is_asked_calmly() -> None:
     """A link whose board is busy with somebody else is told with its number and asked again every five seconds, while the first one carries."""
-    world = settled()
+    world = with_second_link_lost()
     host = world.hosts[0]
-    for lane in Lane:
-        world.break_lane(host, (1, lane))
-    world.cut_link(1)
-    world.settle(20 * MS)
     ours, other = host.names[0, Lane.CONTROL], host.names[1, Lane.CONTROL]
     account = Status(world.board.session, world.counts, Rung())
     told: list[Refused] = []

@@ -276,35 +276,51 @@ def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, e
 
 
 def test_swift_echoes_are_learnt_from_when_their_wave_has_ended() -> None:
-    """The next question goes out before anything is done with the echo before, also with those of a wave whose last answer was lost; a slow echo is given at once."""
+    """They are given with the last answer, a slow one among them gives all at once, a wave that is cut short gives its own when the next one begins; none outlives its connection."""
     world = World()
     world.settle(300 * MS)
     host = world.hosts[0]
     control = host.names[0, Lane.CONTROL]
 
-    def begun() -> int:
+    def heard(outputs: list[Output]) -> list[int]:
+        return [output.wave for output in outputs if isinstance(output, Echo)]
+
+    def begun() -> tuple[int, list[int]]:
         while True:
             world.now_ns += MS
             host.session.receive(control, Status("", BoardCounts(), Rung()), world.now_ns)  # a sign of life
-            for output in host.session.tick(world.now_ns):
+            outputs = host.session.tick(world.now_ns)
+            for output in outputs:
                 if isinstance(output, Outgoing) and isinstance(output.message, Ping):
-                    return output.message.wave
+                    return output.message.wave, heard(outputs)
 
     def answered(wave: int, took_ns: int) -> list[Output]:
         return host.session.receive(control, Pong(wave, world.now_ns - took_ns, 1, 2), world.now_ns)
 
     swift_ns, slow_ns = SLOW_ECHO_NS - 1, SLOW_ECHO_NS
-    cut_short = begun()
+    whole, _ = begun()
     for _ in range(WAVE_ECHOES_EARLY - 1):
-        (question,) = answered(cut_short, swift_ns)
-        assert question == Outgoing(control, Ping(cut_short, 0))
-    whole = begun()
-    assert answered(whole, swift_ns) == [Outgoing(control, Ping(whole, 0))]
-    question, *echoes = answered(whole, slow_ns)
-    assert question == Outgoing(control, Ping(whole, 0))
-    assert [echo.wave for echo in echoes if isinstance(echo, Echo)] == [cut_short] * (WAVE_ECHOES_EARLY - 1) + [
-        whole
-    ] * 2
+        assert answered(whole, swift_ns) == [Outgoing(control, Ping(whole, 0))]
+    assert heard(answered(whole, swift_ns)) == [whole] * WAVE_ECHOES_EARLY
+    mixed, before = begun()
+    assert before == []
+    assert heard(answered(mixed, swift_ns)) == []
+    outputs = answered(mixed, slow_ns)
+    assert heard(outputs) == [mixed] * 2
+    assert outputs[-1] == Outgoing(control, Ping(mixed, 0))
+    assert heard(answered(mixed, swift_ns)) == []
+    cut_short = mixed
+    following, before = begun()
+    assert before == [cut_short]
+    assert heard(answered(following, swift_ns)) == []
+    world.restart_board()
+    world.settle(20 * MS)
+    assert host.session.is_open
+    of_another_life, before = begun()
+    assert before == []
+    for _ in range(WAVE_ECHOES_EARLY):
+        before += heard(answered(of_another_life, swift_ns))
+    assert set(before) == {of_another_life}
 
 
 def test_a_wish_to_steer_is_given_once() -> None:

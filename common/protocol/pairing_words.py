@@ -1,0 +1,79 @@
+"""The words of pairing by a code (`pairing_code` says who says which when, `pairing_wire` how they travel)."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+NONCE_BYTES: Final = 16
+COMMITMENT_BYTES: Final = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What one side says of itself, in the open.
+
+    Attributes:
+        key: its public key, 32 bytes.
+        name: for people.
+    """
+
+    key: bytes
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Host: I want to be trusted; this is who I am."""
+
+    host: Identity
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """Board: this is who I am, and now I show a code."""
+
+    board: Identity
+
+
+@dataclass(frozen=True, slots=True)
+class Begin:
+    """Host: the code was typed; this is who I am, and my commitment to its first bit."""
+
+    host: Identity
+    commitment: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Commit:
+    """Either side: my commitment to this round's bit."""
+
+    round: int
+    commitment: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Open:
+    """Either side: the nonce with which my commitment can be checked."""
+
+    round: int
+    nonce: bytes
+
+
+class Refused(Enum):
+    """Why an attempt has no future."""
+
+    CLOSED = 0
+    PAUSE = 1
+    BUSY = 2
+    WRONG = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Refuse:
+    """Either side: no. `seconds` until it may be tried again, where that is known; else 0."""
+
+    reason: Refused
+    seconds: int = 0
+
+
+Word = Ask | Shown | Begin | Commit | Open | Refuse
