@@ -21,8 +21,8 @@ _READABLE: Final = int(zmq.POLLIN)
 _AWAKE_NS: Final = 200_000
 """Longer than an echo over loopback takes; twice as long gained nothing (decision 0009)."""
 
-_WANTED_NS: Final = 50_000
-"""A core that was given away for longer has other work to do; ZeroMQ's own thread needs some 20 us."""
+_ASLEEP_NS: Final = 1_000_000_000
+"""A core that others want is left to them for so long: who gives it away waits for their milliseconds, who sleeps is woken before them."""
 
 
 def is_readable(sock: "zmq.Socket[bytes]") -> bool:
@@ -43,6 +43,7 @@ class Waiter:
         self._sockets: list[tuple[int, zmq.Socket[bytes]]] = []
         self._clock = clock
         self._awake_until_ns = 0
+        self._asleep_until_ns = 0
         for item in pollables:
             fd = item if isinstance(item, int) else item.fileno()
             self.add(fd)
@@ -65,9 +66,11 @@ class Waiter:
     def stay_awake(self) -> None:
         """Let `wait` look again and again before it sleeps, for 200 us from now, as the other side's part of an echo is expected.
 
-        A processor that rests wakes some 20 us late, and not equally late on both sides of a link.
+        A core that rests wakes late, and not equally late on both sides of a link (decision 0009). Where others want the core it sleeps as ever.
         """
-        self._awake_until_ns = self._clock() + _AWAKE_NS
+        now_ns = self._clock()
+        if now_ns >= self._asleep_until_ns:
+            self._awake_until_ns = now_ns + _AWAKE_NS
 
     def wait(self, wait_ms: int) -> list[int]:
         """Wait until there is something to look at.
@@ -82,9 +85,10 @@ class Waiter:
         now_ns = self._clock() if wait_ms and not ready else self._awake_until_ns
         while now_ns < self._awake_until_ns:
             os.sched_yield()  # ZeroMQ's thread may share the core
-            if found := self._poll.poll(0):
-                return [fd for fd, _ in found]
+            found = self._poll.poll(0)
             before_ns, now_ns = now_ns, self._clock()
-            if now_ns - before_ns > _WANTED_NS:
-                break
+            if now_ns - before_ns > _AWAKE_NS:
+                self._asleep_until_ns = now_ns + _ASLEEP_NS
+            if found:
+                return [fd for fd, _ in found]
         return ready + [fd for fd, _ in self._poll.poll(0 if ready else wait_ms)]
