@@ -303,7 +303,7 @@ class Agent:
         _LOG.info(event("slept", session=self._session.session, seconds=round(slept_ns / 1e9, 1)))
 
     def _flush(self) -> None:
-        """Send the waiting frame if there is credit for it."""
+        """Send the waiting frame if there is credit for it; one that reaches nobody waits for the host to come back, or for a newer one."""
         frame = self._outbox.waiting
         self._held_back = False
         if frame is None or not self._session.has_credit:
@@ -320,8 +320,6 @@ class Agent:
                 self._outbox.discard(DropReason.LINK_FULL)
             case SendResult.FULL:
                 self._retry_ns = now.monotonic_ns() + _FULL_RETRY_NS
-            case SendResult.UNREACHABLE:
-                pass  # the frame waits for the host to come back, or for a newer one
 
     def _adapt(self, control: RateControl, now_ns: int) -> None:
         """Let the camera give what the link carries."""

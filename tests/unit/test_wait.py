@@ -1,4 +1,4 @@
-"""What a loop waits on, and when it looks without sleep."""
+"""What a loop waits on, and when it looks without sleep: on real pipes, with a clock that counts who reads it."""
 
 import os
 from collections.abc import Iterator
@@ -7,27 +7,28 @@ import pytest
 
 from common.link.wait import Waiter
 
+_TURN_NS = 10_000
 
-class Core:
-    """A core that others have for `turn_ns` whenever it is given away, and its clock."""
+
+class Clock:
+    """A clock that goes on by 10 us with each reading, or by what it was told."""
 
     def __init__(self) -> None:
         self.now_ns = 10**12
-        self.turn_ns = 10_000
-        self.turns = 0
+        self.read = 0
+        self.steps_ns: list[int] = []
 
-    def give_away(self) -> None:
-        """Stand in for sched_yield."""
-        self.turns += 1
-        self.now_ns += self.turn_ns
+    def __call__(self) -> int:
+        """Read it."""
+        self.read += 1
+        self.now_ns += self.steps_ns.pop(0) if self.steps_ns else _TURN_NS
+        return self.now_ns
 
 
 @pytest.fixture
-def core(monkeypatch: pytest.MonkeyPatch) -> Core:
-    """The core that waiters give away."""
-    found = Core()
-    monkeypatch.setattr(os, "sched_yield", found.give_away)
-    return found
+def clock() -> Clock:
+    """The waiter's."""
+    return Clock()
 
 
 @pytest.fixture
@@ -39,43 +40,48 @@ def pipe() -> Iterator[tuple[int, int]]:
         os.close(end)
 
 
-def test_a_waiter_sleeps_unless_it_is_to_stay_awake(core: Core, pipe: tuple[int, int]) -> None:
-    """It gives the core away again and again for 200 us after `stay_awake`, and sleeps before and afterwards, and where it was not to wait at all."""
-    waiter = Waiter(pipe[:1], lambda: core.now_ns)
+def looks(waiter: Waiter, clock: Clock) -> int:
+    """How often a wait for nothing looked without sleep: it reads the clock once before, and after each look."""
+    before = clock.read
     assert waiter.wait(1) == []
+    return clock.read - before - 1
+
+
+def test_a_waiter_sleeps_unless_it_is_to_stay_awake(clock: Clock, pipe: tuple[int, int]) -> None:
+    """It looks again and again for 200 us after `stay_awake`, and sleeps before and afterwards, and where it was not to wait at all."""
+    waiter = Waiter(pipe[:1], clock)
+    assert looks(waiter, clock) == 0
     waiter.stay_awake()
+    read = clock.read
     assert waiter.wait(0) == []
-    assert core.turns == 0
-    assert waiter.wait(1) == []
-    assert core.turns == 20
-    assert waiter.wait(1) == []
-    assert core.turns == 20
+    assert clock.read == read
+    assert looks(waiter, clock) == 200_000 // _TURN_NS - 1
+    assert looks(waiter, clock) == 0
 
 
-def test_what_is_readable_ends_the_looking(core: Core, pipe: tuple[int, int]) -> None:
+def test_what_is_readable_ends_the_looking(clock: Clock, pipe: tuple[int, int]) -> None:
     """It is told at once, and once."""
-    waiter = Waiter(pipe[:1], lambda: core.now_ns)
+    waiter = Waiter(pipe[:1], clock)
     waiter.stay_awake()
     os.write(pipe[1], b"x")
+    read = clock.read
     assert waiter.wait(10_000) == [pipe[0]]
-    assert core.turns == 1
+    assert clock.read - read == 2
 
 
-def test_a_core_that_others_want_is_left_to_them(core: Core, pipe: tuple[int, int]) -> None:
+def test_a_core_that_others_want_is_left_to_them(clock: Clock, pipe: tuple[int, int]) -> None:
     """Once others had it for longer than it may look, it sleeps as ever for a second, however often it is to stay awake; news of that turn is told."""
-    waiter = Waiter(pipe[:1], lambda: core.now_ns)
-    core.turn_ns = 3_000_000
+    waiter = Waiter(pipe[:1], clock)
     waiter.stay_awake()
     os.write(pipe[1], b"x")
+    clock.steps_ns = [_TURN_NS, 3_000_000]
     assert waiter.wait(1) == [pipe[0]]
     os.read(pipe[0], 1)
-    for turns in (1, 2):
-        begin_ns = core.now_ns
-        while core.now_ns - begin_ns < 999_000_000:
-            waiter.stay_awake()
-            assert waiter.wait(1) == []
-            assert core.turns == turns
-            core.now_ns += 100_000_000
+    begin_ns = clock.now_ns
+    while clock.now_ns - begin_ns < 900_000_000:
         waiter.stay_awake()
-        assert waiter.wait(1) == []
-        assert core.turns == turns + 1
+        assert looks(waiter, clock) == 0
+        clock.now_ns += 50_000_000
+    clock.now_ns = begin_ns + 1_000_000_000
+    waiter.stay_awake()
+    assert looks(waiter, clock) > 0
