@@ -10,6 +10,7 @@ from typing import assert_never
 
 from common.frame import Frame
 from common.ledger import BoardMarks
+from common.protocol.absence import absent_ns
 from common.protocol.message import (
     BoardCounts,
     BoardHello,
@@ -64,6 +65,12 @@ class _Host:
         """The control connection beside the frames; any where there is none."""
         beside = None if self.frames is None else self.controls.get(self.frames[0])
         return beside if beside is not None else next(iter(self.controls.values()), None)
+
+    def excuse(self, absent: int, now_ns: int) -> None:
+        """Take out of its silence the time, ns, in which this process did not run."""
+        self.heard_ns = min(now_ns, self.heard_ns + absent)
+        self.heard_by = {link: min(now_ns, heard_ns + absent) for link, heard_ns in self.heard_by.items()}
+        self.silence_due_ns = min(self.heard_by.values(), default=now_ns) + SILENCE_NS
 
     def knows(self, connection: bytes) -> bool:
         """Whether a connection is one of this host's."""
@@ -168,6 +175,7 @@ class BoardSession:
         Returns:
             What to send.
         """
+        self._notice_absence(now_ns)
         if isinstance(message, HostHello):
             return self._greet(connection, message, now_ns, counts)
         host = self._host
@@ -201,6 +209,7 @@ class BoardSession:
 
     def tick(self, now_ns: int, counts: BoardCounts) -> list[Outgoing]:
         """Do what time demands: account to the host, give up a silent one, knock where this side has dialled."""
+        self._notice_absence(now_ns)
         outgoing: list[Outgoing] = []
         host = self._host
         if host is not None and now_ns >= host.silence_due_ns:
@@ -266,10 +275,16 @@ class BoardSession:
         connection = None if host is None else host.frames if host.frames is not None else host.account_lane
         return [] if connection is None else [Outgoing(connection, Bye(counts))]
 
+    def _notice_absence(self, now_ns: int) -> None:
+        """Time in which this process did not run is not its host's silence."""
+        if self._host is not None and (absent := absent_ns(self.due_ns, now_ns)):
+            self._host.excuse(absent, now_ns)
+
     def _ask_for_frames_lane(self, host: _Host) -> list[Outgoing]:
+        """Say where the host is known that its frames' lane is not; a knock for the control lane would say that the host is not known either."""
         if host.frames is not None:
             return []
-        return [Outgoing(control, Knock(Lane.CONTROL, self.session)) for control in host.controls.values()]
+        return [Outgoing(control, Knock(Lane.FRAMES, self.session)) for control in host.controls.values()]
 
     def _account(self, host: _Host, counts: BoardCounts) -> list[Outgoing]:
         """Give the account of the frames, and mend what a lost packet could have left for ever.

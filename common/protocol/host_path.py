@@ -20,6 +20,7 @@ class HostPath:
 
     def __init__(self, link: int, dialled: dict[Lane, bytes]) -> None:
         self.link = link
+        self.dialled = dict(dialled)
         self.lanes = dict(dialled)
         self.waves = Waves(link)
         self.hello: BoardHello | None = None

@@ -4,12 +4,17 @@ A link is open when the board answers hello on its control lane; all open links 
 carrier: the one on which the board answered hello for frames last. That answer stands in line behind the last frame of this lane, and overtakes what
 is under way on others: what it counts and has not come is lost, and a frame that comes behind a newer one stays lost (`StaleReason.LATE`).
 `now_ns` is passed in; which open link is to be the carrier is its owner's choice (`carry`).
+
+Nothing that arrives is believed: a refusal counts on a lane that this side dialled only, a frame only within the credit that was granted, an account
+only up to that credit. Time in which this process did not run is nobody's silence.
 """
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Final, assert_never
 
+from common.protocol.absence import absent_ns
 from common.protocol.host_path import HostPath
 from common.protocol.message import (
     BoardCounts,
@@ -34,6 +39,7 @@ from common.protocol.session import (
     TAKEOVER_NS,
     Accepted,
     Arrived,
+    ClockVoid,
     Counted,
     LinkDown,
     LinkUp,
@@ -44,6 +50,7 @@ from common.protocol.session import (
     Stale,
     StaleReason,
     Stepped,
+    Unbelievable,
     Vanished,
 )
 
@@ -58,8 +65,50 @@ SILENCE_BESIDE_NS: Final = 1500 * MS
 _FOREIGN_RETRY_NS: Final = 5000 * MS
 """A link that leads to another board, or is refused beside one that is not, is asked again after this time: the cable may be moved."""
 
+_TOO_MANY: Final = Unbelievable("an account of more frames than were allowed")
+
 _MOST_MISSING: Final = 64
 """Lost frames that are remembered, so that one which comes late is not taken for a repetition: more than any link holds."""
+
+
+@dataclass(slots=True)
+class _Stream:
+    """The frames of one life of the board; nothing of it outlives that.
+
+    Attributes:
+        hello: what the board said of itself when its frames were accepted last.
+        changes: how often its camera had been set anew, as far as was told.
+        next_index: of the frame that is expected next.
+        below_index: credit was granted up to here since frames were accepted last.
+        granted_index: the same over the whole life: no honest frame has this index or a higher one.
+        missing: frames that were given up of late.
+    """
+
+    hello: BoardHello
+    changes: int
+    next_index: int
+    below_index: int = 0
+    granted_index: int = 0
+    missing: deque[int] = field(default_factory=lambda: deque(maxlen=_MOST_MISSING))
+
+    def pass_over(self, index: int) -> int:
+        """Give up the frames below an index that have not come; gives how many."""
+        lost = max(0, index - self.next_index)
+        self.missing.extend(range(max(self.next_index, index - _MOST_MISSING), index))
+        self.next_index += lost
+        return lost
+
+    def resume(self, hello: BoardHello) -> int:
+        """Take a hello of the same life. Frames beyond the credit went to another host, which was there between; they are not lost."""
+        lost = self.pass_over(min(hello.counts.sent, self.granted_index))
+        self.next_index = max(self.next_index, hello.counts.sent)
+        self.granted_index = max(self.granted_index, hello.counts.sent)
+        self.below_index = 0
+        return lost
+
+    def can_be(self, counts: BoardCounts) -> bool:
+        """Whether an account can be true: a board sends no more than it is allowed to."""
+        return counts.sent <= self.granted_index
 
 
 class HostSession:
@@ -80,12 +129,8 @@ class HostSession:
         self._frames_hello_due_ns = 0
         self._streams = False
         self._leaving = False
-        self._hello: BoardHello | None = None
+        self._stream: _Stream | None = None
         self._boot_id = ""
-        self._changes = 0
-        self._next_index = 0
-        self._below_index = 0
-        self._missing: deque[int] = deque(maxlen=_MOST_MISSING)
 
     @property
     def is_open(self) -> bool:
@@ -100,7 +145,8 @@ class HostSession:
     @property
     def outstanding(self) -> int:
         """Frames that the board may still send against credit already granted."""
-        return max(0, self._below_index - self._next_index) if self.is_open else 0
+        stream = self._stream
+        return max(0, stream.below_index - stream.next_index) if stream is not None and self.is_open else 0
 
     @property
     def due_ns(self) -> int:
@@ -121,11 +167,14 @@ class HostSession:
         Returns:
             What to send, and what happened.
         """
+        self._notice_absence(now_ns)
         path = self._paths[connection[0]]
         match message:
             case Knock():
                 return self._answer_knock(path, connection, message, now_ns)
             case Refusal(reason):
+                if connection not in path.dialled.values():
+                    return []  # whoever called here may be anybody
                 if not path.is_open and any(other.is_open for other in self._paths):
                     path.shut(now_ns + _FOREIGN_RETRY_NS)  # our board talks to us elsewhere: this is another one
                 return [Refused(reason, path.link)]
@@ -146,6 +195,7 @@ class HostSession:
 
     def tick(self, now_ns: int) -> list[Output]:
         """Do what time demands: hello again while unanswered, the next clock wave, give up a silent or stuck link."""
+        self._notice_absence(now_ns)
         outputs: list[Output] = []
         for path in self._paths:
             if path.is_open and self._is_silent(path, now_ns):
@@ -175,10 +225,11 @@ class HostSession:
         Args:
             slots: free places for frames now.
         """
-        below_index = self._next_index + slots
-        if self._carrier is None or below_index <= self._below_index:
+        stream = self._stream
+        if self._carrier is None or stream is None or stream.next_index + slots <= stream.below_index:
             return []
-        self._below_index = below_index
+        below_index = stream.below_index = stream.next_index + slots
+        stream.granted_index = max(stream.granted_index, below_index)
         return [Outgoing(self._carrier.lanes[Lane.CONTROL], Credit(below_index))]
 
     def steer(self, later_ns: int) -> list[Output]:
@@ -188,6 +239,22 @@ class HostSession:
             later_ns: by how much, less than its period.
         """
         return [] if self._carrier is None else [Outgoing(self._carrier.lanes[Lane.CONTROL], Steer(later_ns))]
+
+    def probe(self, now_ns: int) -> None:
+        """Let the carrier's next echoes be asked for as soon as its line permits: something waits for an answer that is younger than itself."""
+        if self._carrier is not None:
+            self._carrier.waves.hasten(now_ns)
+
+    def begin_clock(self, now_ns: int) -> list[Output]:
+        """Take note that this machine's clock stood still: every echo under way is void, and so is the credit that was granted.
+
+        Args:
+            now_ns: host's clock, ns.
+        """
+        for path in self._paths:
+            if path.is_open:
+                path.waves.open(now_ns)
+        return [] if self._wanted is None else self._want(self._wanted, now_ns)
 
     def interrupted(self, connection: bytes, now_ns: int) -> list[Output]:
         """Take note that a connection broke: what was under way on it is gone, so its link's lanes are greeted anew."""
@@ -209,13 +276,22 @@ class HostSession:
             path.lanes[lane] = connection
         if lane is Lane.FRAMES and path.is_open:
             return self._want(path, now_ns) if path is self._wanted else []
-        if path.is_open and knock.session == path.session:
+        if path.is_open and knock.session == path.session and knock.lane is Lane.FRAMES:
+            # The board knows us and has lost its frames' lane, which it says on all others; the carrier has to answer then, or gives way.
             path.heard_ns = now_ns
-            outputs: list[Output] = [*path.say_hello(self._host_id, Lane.CONTROL)]
-        else:
-            outputs = self._lose(path, now_ns)
-        # A board that has lost its frames' lane says so on all others; the carrier has to answer then, or gives way.
-        return outputs if self._wanted is None or self._pending else outputs + self._want(self._wanted, now_ns)
+            return [] if self._wanted is None or self._pending else self._want(self._wanted, now_ns)
+        # The board has forgotten us: for a while one of the two was not there, and its clock may have stood still meanwhile.
+        void: list[Output] = [ClockVoid()] if path.is_open and knock.session == path.session else []
+        return void + self._lose(path, now_ns)
+
+    def _notice_absence(self, now_ns: int) -> None:
+        """Take out of all silence the time in which this process did not run."""
+        absent = absent_ns(self.due_ns, now_ns)
+        if not absent:
+            return
+        for path in self._paths:
+            path.heard_ns = min(now_ns, path.heard_ns + absent)
+        self._pending_since_ns = min(now_ns, self._pending_since_ns + absent)
 
     def _open(self, path: HostPath, hello: BoardHello, now_ns: int) -> list[Output]:
         """Take a board's hello on a control lane."""
@@ -297,33 +373,36 @@ class HostSession:
         if path is not self._wanted:
             # The answer to a hello of a while ago: the board may send its frames there now.
             return [] if self._wanted is None else self._want(self._wanted, now_ns)
-        resumed = self._hello is not None and self._hello.session == hello.session
-        if resumed:
-            lost = self._settle(hello.counts)
+        stream = self._stream
+        resumed = stream is not None and stream.hello.session == hello.session
+        if stream is None or not resumed:
+            lost, stream = 0, _Stream(hello, hello.rung.changes, hello.counts.sent, granted_index=hello.counts.sent)
+            self._stream = stream
         else:
-            lost, self._next_index = 0, hello.counts.sent
-            self._missing.clear()
-        self._below_index = 0
+            lost = stream.resume(hello)
         path.heard_ns = now_ns
         if not self._pending and resumed:  # the answer to a hello that was said twice: credit is void once more
             return [Counted(hello.counts, ended=False, lost=lost)]
         self._carrier, self._pending, self._streams = path, False, True
-        self._hello, self._changes = hello, hello.rung.changes
+        stream.hello, stream.changes = hello, hello.rung.changes
         return [Accepted(hello, resumed, lost, path.link)]
 
     def _take_frame(self, path: HostPath, frame: FrameMessage, now_ns: int) -> list[Output]:
-        if self._hello is None or frame.session != self._hello.session:
+        stream = self._stream
+        if stream is None or frame.session != stream.hello.session:
             return [Stale(frame, StaleReason.OLD_SESSION)]
-        if self._hello.boot_id != self._boot_id:
+        if stream.hello.boot_id != self._boot_id:
             return [Stale(frame, StaleReason.OLD_SESSION)]  # sent before a sleep; its marks are of the clock before
         index = frame.sent_index
-        if index < self._next_index:
-            if index not in self._missing:
+        if index >= stream.granted_index:
+            return [Stale(frame, StaleReason.BEYOND_CREDIT)]
+        if index < stream.next_index:
+            if index not in stream.missing:
                 return [Stale(frame, StaleReason.DUPLICATE)]
-            self._missing.remove(index)
+            stream.missing.remove(index)
             return [Stale(frame, StaleReason.LATE)]
-        lost = self._pass_over(index)
-        self._next_index = index + 1
+        lost = stream.pass_over(index)
+        stream.next_index = index + 1
         if not path.is_open:
             path.lived(now_ns)
         path.heard_ns = now_ns
@@ -337,8 +416,8 @@ class HostSession:
         if ping is None:
             return []
         # Credit is granted up to an index, so repeating it is harmless and mends one that a broken connection swallowed.
-        again = path is self._carrier and self._below_index
-        return [*echoes, Outgoing(control, ping), *([Outgoing(control, Credit(self._below_index))] if again else [])]
+        below_index = 0 if path is not self._carrier or self._stream is None else self._stream.below_index
+        return [*echoes, Outgoing(control, ping), *([Outgoing(control, Credit(below_index))] if below_index else [])]
 
     def _attend(self, path: HostPath, connection: bytes, message: Pong | Status | End, now_ns: int) -> list[Output]:
         if path.hello is None or connection not in path.lanes.values():
@@ -349,44 +428,41 @@ class HostSession:
                 echoes, ping = path.waves.answered(message, now_ns)
                 return [*echoes, *([] if ping is None else [Outgoing(path.lanes[Lane.CONTROL], ping)])]
             case Status(session, counts) | End(session, counts):
-                if self._hello is None or session != self._hello.session:
+                stream = self._stream
+                if stream is None or session != stream.hello.session:
                     return []
+                if not stream.can_be(counts):
+                    return [_TOO_MANY]
                 behind = connection == path.lanes.get(Lane.FRAMES)
-                lost = self._settle(counts) if behind else 0
+                lost = stream.pass_over(counts.sent) if behind else 0  # what it tells of and has not come before it is lost
                 counted = Counted(counts, isinstance(message, End), lost, last=behind and self._leaving)
-                return [*self._note_rung(message), counted]
+                return [*_note_rung(stream, message), counted]
             case _:
                 assert_never(message)
 
-    def _note_rung(self, message: Status | End) -> list[Output]:
-        """Tell of a camera that was set anew, once; accounts on two lanes may overtake each other."""
-        if isinstance(message, End) or message.rung.changes <= self._changes:
-            return []
-        self._changes = message.rung.changes
-        return [Stepped(message.rung)]
-
     def _part(self, path: HostPath, connection: bytes, counts: BoardCounts, now_ns: int) -> list[Output]:
         """Take a board's goodbye. It may come on one lane just after the other one broke: its account is the session's last all the same."""
-        if self._hello is None or path.session != self._hello.session or connection not in path.lanes.values():
+        stream = self._stream
+        if stream is None or path.session != stream.hello.session or connection not in path.lanes.values():
             return []
-        if counts.sent < self._next_index:
+        if counts.sent < stream.next_index:
             return []
         for known in self._paths:
             if known.is_open:
                 known.shut(now_ns + HELLO_RETRY_NS)
         self._carrier = self._wanted = None
         self._pending = self._streams = False
-        lost = self._settle(counts) if connection == path.lanes.get(Lane.FRAMES) else 0
         # Answered, so that the board keeps the connection until its last words were read.
-        return [Outgoing(connection, Bye()), Counted(counts, ended=False, lost=lost, last=True), Vanished(orderly=True)]
+        answer = Outgoing(connection, Bye())
+        if not stream.can_be(counts):
+            return [answer, _TOO_MANY, Vanished(orderly=False)]
+        lost = stream.pass_over(counts.sent) if connection == path.lanes.get(Lane.FRAMES) else 0
+        return [answer, Counted(counts, ended=False, lost=lost, last=True), Vanished(orderly=True)]
 
-    def _settle(self, counts: BoardCounts) -> int:
-        """Take an account that came behind the last frame: what it tells of and has not come is lost. Gives how many."""
-        return self._pass_over(counts.sent)
 
-    def _pass_over(self, index: int) -> int:
-        """Give up the frames below an index that have not come; gives how many."""
-        lost = max(0, index - self._next_index)
-        self._missing.extend(range(max(self._next_index, index - _MOST_MISSING), index))
-        self._next_index += lost
-        return lost
+def _note_rung(stream: _Stream, message: Status | End) -> list[Output]:
+    """Tell of a camera that was set anew, once; accounts on two lanes may overtake each other."""
+    if isinstance(message, End) or message.rung.changes <= stream.changes:
+        return []
+    stream.changes = message.rung.changes
+    return [Stepped(message.rung)]

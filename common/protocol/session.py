@@ -93,11 +93,13 @@ class StaleReason(Enum):
     """Why a frame that came must not be used.
 
     LATE: a newer one had overtaken it over another link; it has been counted as lost then and stays so.
+    BEYOND_CREDIT: the board had no leave to send it; an honest one never does.
     """
 
     OLD_SESSION = 0
     DUPLICATE = 1
     LATE = 2
+    BEYOND_CREDIT = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +148,18 @@ class Refused:
 
 
 @dataclass(frozen=True, slots=True)
+class Unbelievable:
+    """Host: the board says what cannot be; nothing of it was used."""
+
+    problem: str
+
+
+@dataclass(frozen=True, slots=True)
+class ClockVoid:
+    """Host: the board had forgotten us, so that one of the two clocks may have stood still: nothing learnt of them so far may be used."""
+
+
+@dataclass(frozen=True, slots=True)
 class Vanished:
     """Host: the board fell silent or said goodbye; frames still under way in that session are unknown."""
 
@@ -164,6 +178,8 @@ Output = (
     | Counted
     | Stepped
     | Refused
+    | Unbelievable
+    | ClockVoid
     | Vanished
 )
 

@@ -5,6 +5,8 @@ time of board time b:    t0 - t1 <= offset(t1)    and    offset(t2) <= t3 - t2.
 Averages are useless when frames fill the link (study of links, 3d); extremes are not. `hull` keeps the extremes, `strip` finds the lines between
 them and weighs them; this module feeds both, notices clocks that jump, and states two figures.
 
+A fact that contradicts the others is no knowledge yet: a clock has jumped, or the echo lies. Until further waves have decided, nothing is known.
+
 `bound`: hard. It contains the truth whatever the delays, as long as the clocks' rates differ by at most MAX_SKEW and their difference changes by at
 most SKEW_CHANGE. Half of the least round trip is the best it can be.
 `uncertainty`: contains the truth in 99.9 % if the link is nearly symmetric: the least delays there and back differ by at most twice ASYMMETRY of the
@@ -16,13 +18,14 @@ Sources: Mills, RFC 5905 (four stamps, minimum filter); `hull` and `strip` name 
 import math
 from collections import deque
 from dataclasses import dataclass
+from enum import Enum
 from typing import Final
 
 from common.protocol.session import Echo
 from phone_host.sync.hull import SKEW_CHANGE, Hull, widening_ns
 from phone_host.sync.strip import MAX_SKEW, Allowed, Belief, Spacing, allowed_lines, believe
 
-__all__ = ["ASYMMETRY", "MAX_SKEW", "ClockEstimate", "ClockEstimator", "HostTime"]
+__all__ = ["ASYMMETRY", "CONFIRMED_WAVES", "MAX_SKEW", "ClockEstimate", "ClockEstimator", "Heard", "HostTime"]
 
 ASYMMETRY: Final = 0.04
 """Error per least round trip that an unequal pair of least delays may make: half of their difference (bench_clock, real processes)."""
@@ -36,8 +39,25 @@ _SMALLEST: Final = 12
 _LEAST_SPACING_NS: Final = 500.0
 """Nobody takes a stamp more exactly than this in an interpreter."""
 
-_CONFIRMED_WAVES: Final = 3
-"""After so many waves on the new side of a jump it was no outlier."""
+CONFIRMED_WAVES: Final = 3
+"""After so many waves on the new side of a jump it was no lie and no accident: 100 ms, as waves follow each other early (`Waves.hasten`)."""
+
+_HARMLESS_NS: Final = 2_000_000
+"""Two sides of a jump that cannot be further apart are as good as each other: no camera's frames are so close that a wrong pair could come of it. So a
+clock that is being steered (NTP slews by 500 ppm) interrupts nothing."""
+
+
+class Heard(Enum):
+    """What an echo meant.
+
+    NOTHING: it was no echo. AGREED: it fits what is known. DOUBTED: it does not; until that is decided there is no estimate.
+    STEPPED: a jump of the clocks is confirmed; what was known before holds no more.
+    """
+
+    NOTHING = 0
+    AGREED = 1
+    DOUBTED = 2
+    STEPPED = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,50 +258,79 @@ class _Learned:
         return Spacing(there_ns, back_ns, count - 1)
 
 
+def may_harm(old: ClockEstimate, new: ClockEstimate) -> bool:
+    """Whether two estimates may be so far apart that frames would be paired wrongly by one of them."""
+    low_ns, high_ns = old.limits_at(new.reference_ns)
+    return max(high_ns - new.low_ns, new.high_ns - low_ns) > _HARMLESS_NS
+
+
 class ClockEstimator:
     """Learns one board clock; a new boot of the board needs a new estimator.
 
-    A contradiction means that a clock jumped (a phone slept, a debugger stopped one): the new side is believed at once. The old side is set aside
-    until three waves confirm the jump; an echo that agrees only with the old side ends the excursion as an outlier.
+    An echo that contradicts what is known begins a rival: a second state that knows of this echo and its like only. While the two may be further
+    apart than is harmless there is no estimate. The rival falls with the first echo that agrees with the old state alone, and takes its place when
+    CONFIRMED_WAVES have agreed with it.
+
+    Args:
+        prior_skew: what the skew was before, where it is known.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, prior_skew: float = 0.0) -> None:
+        self._prior_skew = prior_skew
         self._learned: _Learned | None = None
-        self._aside: _Learned | None = None
+        self._rival: _Learned | None = None
 
     @property
     def estimate(self) -> ClockEstimate | None:
-        """The present estimate; None before the first echo."""
+        """The present estimate; None before the first echo, and while what was heard contradicts itself."""
+        if self._rival is not None:
+            return None if self.in_doubt else self._rival.estimate
         return self._learned.estimate if self._learned is not None else None
 
-    def add(self, echo: Echo) -> None:
+    @property
+    def skew(self) -> float:
+        """The rate as far as it is known well enough to survive a jump; a crystal does not change when a clock is set."""
+        learned = self._learned
+        if learned is None or learned.estimate is None or len(learned.waves) < CONFIRMED_WAVES:
+            return self._prior_skew
+        return learned.estimate.skew
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Whether enough waves agree to be believed against all that was known before."""
+        return self._rival is None and self._learned is not None and len(self._learned.waves) >= CONFIRMED_WAVES
+
+    @property
+    def in_doubt(self) -> bool:
+        """Whether echoes contradict each other by more than is harmless, and no later ones have decided yet."""
+        old, new = (None if side is None else side.estimate for side in (self._learned, self._rival))
+        return old is not None and new is not None and may_harm(old, new)
+
+    def add(self, echo: Echo) -> Heard:
         """Learn from one echo; one whose times run backwards is no echo and is passed over.
 
         Args:
             echo: its four times.
+
+        Returns:
+            What it meant.
         """
         if echo.t3_ns - echo.t0_ns < echo.t2_ns - echo.t1_ns or echo.t2_ns < echo.t1_ns:
-            return
-        learned = self._learned
-        if learned is None:
-            self._learned = _Learned(echo, 0.0)
-        elif learned.agrees_with(echo):
-            self._continue(learned, echo)
-        elif self._aside is not None and self._aside.agrees_with(echo):
-            self._learned, self._aside = self._aside, None
-            self._continue(self._learned, echo)
-        else:
-            self._begin(learned, echo)
-
-    def _continue(self, learned: _Learned, echo: Echo) -> None:
-        if not learned.add(echo):
-            self._begin(None, echo)
-        elif len(learned.waves) >= _CONFIRMED_WAVES:
-            self._aside = None
-
-    def _begin(self, before: _Learned | None, echo: Echo) -> None:
-        """Believe this echo alone."""
-        if before is not None and len(before.waves) >= _CONFIRMED_WAVES:
-            self._aside = before
-        known = self._aside.estimate if self._aside is not None else None
-        self._learned = _Learned(echo, known.skew if known is not None else 0.0)
+            return Heard.NOTHING
+        if self._learned is None:
+            self._learned = _Learned(echo, self._prior_skew)
+            return Heard.AGREED
+        # The rival is asked first: an echo that fits both, having taken long, speaks for the newer one, which rests on a hard fact.
+        if self._rival is not None and self._rival.agrees_with(echo) and self._rival.add(echo):
+            if len(self._rival.waves) < CONFIRMED_WAVES:
+                return Heard.DOUBTED if self.in_doubt else Heard.AGREED
+            was_harmless = not self.in_doubt
+            self._learned, self._rival = self._rival, None
+            return Heard.AGREED if was_harmless else Heard.STEPPED
+        if self._learned.agrees_with(echo):
+            self._rival = None
+            if not self._learned.add(echo):  # within the bound, but the premise of its drift is broken
+                self._learned = _Learned(echo, self.skew)
+            return Heard.AGREED
+        self._rival = _Learned(echo, self.skew)
+        return Heard.DOUBTED if self.in_doubt else Heard.AGREED

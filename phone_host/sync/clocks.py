@@ -3,14 +3,15 @@
 All echoes are facts about the same two clocks, so the truth lies where the hard limits of all links meet: `bound` is that of the intersection. That
 the ways there and back are alike holds for each link by itself and for none between two, so offset, skew and `uncertainty` are those of one
 link: the one that knows best at the newest echo. An offset outside what the others' facts allow is moved to the nearest that they do
-allow, which is never further from the truth.
+allow, which is never further from the truth. While echoes contradict each other, those of one link or those of two, nothing is known over any; a jump
+that one link has confirmed is one for all.
 """
 
 from collections.abc import Iterable
 from dataclasses import replace
 
 from common.protocol.session import Echo
-from phone_host.sync.clock import ClockEstimate, ClockEstimator
+from phone_host.sync.clock import ClockEstimate, ClockEstimator, Heard, may_harm
 from phone_host.sync.hull import SKEW_CHANGE
 
 
@@ -22,36 +23,89 @@ class LinkClocks:
     """
 
     def __init__(self, links: int) -> None:
-        self._estimators = tuple(ClockEstimator() for _ in range(links))
+        self._estimators = [ClockEstimator() for _ in range(links)]
         self._estimate: ClockEstimate | None = None
+        self._believed: ClockEstimate | None = None
+        self._contested = False
 
     @property
     def estimate(self) -> ClockEstimate | None:
-        """The present estimate; None before the first echo."""
+        """The present estimate; None before the first echo, and while echoes contradict each other."""
         return self._estimate
+
+    @property
+    def in_doubt(self) -> bool:
+        """Whether echoes contradict each other, and no later ones have decided yet."""
+        return self._contested or any(estimator.in_doubt for estimator in self._estimators)
 
     def round_trip_ns(self, link: int) -> int | None:
         """Least round trip of late over one link; None before its first echo."""
         own = self._estimators[link].estimate
         return None if own is None else own.round_trip_ns
 
-    def add(self, echo: Echo) -> None:
+    def add(self, echo: Echo) -> Heard:
         """Learn from one echo.
 
         Args:
             echo: its four times, and the link that it came over.
+
+        Returns:
+            What it meant.
         """
         estimator = self._estimators[echo.link]
-        estimator.add(echo)
+        heard = estimator.add(echo)
+        self._contested = heard is Heard.AGREED and self._contradicts_others(estimator)
+        if self._contested:
+            heard = Heard.STEPPED if estimator.is_confirmed else Heard.DOUBTED
+        if heard is Heard.STEPPED:
+            self._contested = False
+            self._forget(keep=echo.link)
+            if estimator.estimate is not None and self._fits_what_was_believed(estimator.estimate):
+                heard = Heard.AGREED  # it was the other link that lied
+        self._estimate = None if self.in_doubt else self._solved(estimator.estimate)
+        self._believed = self._estimate or self._believed
+        return heard
+
+    def void(self) -> None:
+        """Forget the offset: one of the two clocks may have stood still. What is known of their rates stays."""
+        self._forget(keep=None)
+        self._contested = False
+        self._estimate = self._believed = None
+
+    def down(self, link: int) -> None:
+        """Take note that a link is gone: a doubt that only its echoes could have settled goes with it."""
+        if self.in_doubt:
+            self._estimators[link] = ClockEstimator(self._estimators[link].skew)
+            self._contested = False
+
+    def _forget(self, keep: int | None) -> None:
+        self._estimators = [
+            estimator if link == keep else ClockEstimator(estimator.skew)
+            for link, estimator in enumerate(self._estimators)
+        ]
+
+    def _fits_what_was_believed(self, newest: ClockEstimate) -> bool:
+        believed = self._believed
+        return believed is not None and _meet(newest, [moved(believed, newest.reference_ns)]) is not None
+
+    def _contradicts_others(self, estimator: ClockEstimator) -> bool:
+        """Whether what one link says can be true with what no other says."""
         newest = estimator.estimate
         if newest is None:
-            return
+            return False
+        others = [one.estimate for one in self._estimators if one is not estimator and one.estimate is not None]
+        found = [moved(other, newest.reference_ns) for other in others]
+        return _meet(newest, found) is None and any(may_harm(other, newest) for other in found)
+
+    def _solved(self, newest: ClockEstimate | None) -> ClockEstimate | None:
+        if newest is None:
+            return self._estimate
         moment_ns = newest.reference_ns
-        known = [moved(other.estimate, moment_ns) for other in self._estimators if other.estimate is not None]
+        known = [moved(own, moment_ns) for one in self._estimators if (own := one.estimate) is not None]
         best = min(known, key=lambda one: one.uncertainty_ns)
         met = _meet(best, [one for one in known if one is not best])
-        # Links that contradict each other: a clock jumped, and the one that was heard last knows.
-        self._estimate = newest if met is None else met
+        # Links that contradict each other by as little as is harmless: a clock is being steered, and the link that was heard last knows.
+        return newest if met is None else met
 
 
 def moved(estimate: ClockEstimate, board_ns: int) -> ClockEstimate:

@@ -25,6 +25,7 @@ from common.protocol.session import (
     MS,
     Accepted,
     Arrived,
+    ClockVoid,
     Counted,
     Echo,
     LinkDown,
@@ -35,6 +36,7 @@ from common.protocol.session import (
     Refused,
     Stale,
     Stepped,
+    Unbelievable,
     Vanished,
     connection_name,
 )
@@ -315,7 +317,16 @@ class World:
                 case LinkUp(_, hello):
                     host.boot_id = hello.boot_id
                     host.others.append(output)
-                case Echo() | Refused() | Vanished() | LinkDown() | OtherBoard() | Stepped():
+                case (
+                    Echo()
+                    | Refused()
+                    | Vanished()
+                    | LinkDown()
+                    | OtherBoard()
+                    | Stepped()
+                    | Unbelievable()
+                    | ClockVoid()
+                ):
                     host.others.append(output)
 
     def _host_sends(self, host: HostNode, connection: bytes, message: Message) -> None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.protocol.session import Echo
-from phone_host.sync.clock import MAX_SKEW, ClockEstimate, ClockEstimator
+from phone_host.sync.clock import MAX_SKEW, ClockEstimate, ClockEstimator, Heard
 from tests.support.two_clocks import START_NS, TwoClocks
 
 MS, SECOND_NS = 1_000_000, 1_000_000_000
@@ -39,8 +39,12 @@ def run(
     seconds: float = 12,
     least_ns: int = 50_000,
     jitter_ns: int = 200_000,
+    doubtful_waves: int = 0,
 ) -> list[Error]:
-    """Waves as the session sends them (50 ms apart in the first second, then 250 ms); the errors for a frame after each of them."""
+    """Waves as the session sends them (50 ms apart in the first second, then 250 ms); the errors for a frame after each of them.
+
+    After at most `doubtful_waves` of them there may be no estimate, because they contradict what was known.
+    """
     errors, host_ns, number = [], START_NS + from_ns, from_ns // MS
     end_ns = host_ns + round(seconds * SECOND_NS)
     while host_ns < end_ns:
@@ -49,8 +53,11 @@ def run(
         for echo in echoes:
             estimator.add(echo)
         estimate = estimator.estimate
-        assert estimate is not None
-        errors.append(error_at(estimate, clocks, clocks.board(behind_ns + chance.randrange(250 * MS))))
+        assert estimate is not None or doubtful_waves > 0
+        if estimate is None:
+            doubtful_waves -= 1
+        else:
+            errors.append(error_at(estimate, clocks, clocks.board(behind_ns + chance.randrange(250 * MS))))
         host_ns += 50 * MS if host_ns - START_NS < SECOND_NS else 250 * MS
     return errors
 
@@ -113,16 +120,51 @@ def test_skew_is_found() -> None:
 
 @pytest.mark.parametrize("jump_ns", [-20 * SECOND_NS, -SECOND_NS, -20 * MS, 20 * MS, SECOND_NS, 3600 * SECOND_NS])
 @pytest.mark.parametrize("pause_ns", [250 * MS, 60 * SECOND_NS])
-def test_a_jump_is_noticed_at_once(jump_ns: int, pause_ns: int) -> None:
-    """When a clock jumps (a phone that slept), the first wave after it gives the new offset, and so do all waves that follow."""
+def test_a_jump_is_doubted_at_once_and_believed_when_confirmed(jump_ns: int, pause_ns: int) -> None:
+    """When a clock jumps (a phone that slept) nothing is known for two waves; the third gives the new offset, and so do all that follow."""
     chance = random.Random(jump_ns)
     clocks = TwoClocks(START_NS + SECOND_NS, Fraction(80, 10**6))
     estimator = ClockEstimator()
     run(estimator, clocks, chance, seconds=15)
     jumped = TwoClocks(clocks.board_start_ns + jump_ns, clocks.skew)
-    errors = run(estimator, jumped, chance, from_ns=15 * SECOND_NS + pause_ns, seconds=10)
+    errors = run(estimator, jumped, chance, from_ns=15 * SECOND_NS + pause_ns, seconds=10, doubtful_waves=2)
     assert all(item.error_ns < MS for item in errors)
     assert sum(item.error_ns > item.uncertainty_ns for item in errors) <= 1
+
+
+@pytest.mark.parametrize("echoes", [1, 5])
+@pytest.mark.parametrize("lie_ns", [-3600 * SECOND_NS, -20 * MS, 20 * MS, 3600 * SECOND_NS])
+def test_a_wave_that_lies_is_never_believed(lie_ns: int, echoes: int) -> None:
+    """One echo, or a whole wave, an hour off leaves the clock in doubt until the next wave; then what was known before is known again."""
+    chance = random.Random(lie_ns)
+    clocks = TwoClocks(START_NS + SECOND_NS, Fraction(80, 10**6))
+    estimator = ClockEstimator()
+    run(estimator, clocks, chance, seconds=15)
+    told, behind_ns = clocks.wave(10**6, START_NS + 15 * SECOND_NS, chance, least_ns=50_000, jitter_ns=0, echoes=echoes)
+    for echo in told:
+        lie = Echo(echo.wave, echo.t0_ns, echo.t1_ns + lie_ns, echo.t2_ns + lie_ns, echo.t3_ns)
+        assert estimator.add(lie) is Heard.DOUBTED
+        assert estimator.estimate is None
+        assert estimator.in_doubt
+    true, _ = clocks.wave(10**6 + 1, behind_ns + 50 * MS, chance, least_ns=50_000, jitter_ns=0, echoes=1)
+    assert estimator.add(true[0]) is Heard.AGREED
+    assert estimator.estimate is not None
+    assert error_at(estimator.estimate, clocks, true[0].t1_ns).error_ns < 50_000
+
+
+def test_a_clock_that_is_steered_interrupts_nothing() -> None:
+    """A clock that slews by a millisecond within a second (NTP at full speed and more) contradicts itself and is believed all the same."""
+    chance, estimator = random.Random(9), ClockEstimator()
+    clocks = TwoClocks(START_NS, Fraction(0))
+    run(estimator, clocks, chance, seconds=15)
+    for number in range(20):
+        slewed = TwoClocks(clocks.board_start_ns + number * 50_000, clocks.skew)
+        at_ns = START_NS + 15 * SECOND_NS + number * 50 * MS
+        for echo in slewed.wave(10**6 + number, at_ns, chance, least_ns=50_000, jitter_ns=10_000)[0]:
+            assert estimator.add(echo) is Heard.AGREED
+        estimate = estimator.estimate
+        assert estimate is not None
+        assert error_at(estimate, slewed, slewed.board(at_ns)).error_ns < MS
 
 
 def test_a_long_silence_is_no_jump() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from common.protocol.session import Echo
-from phone_host.sync.clock import ClockEstimator
+from phone_host.sync.clock import ClockEstimator, Heard
 from phone_host.sync.clocks import LinkClocks, moved
 from tests.support.clock_sim import (
     MS,
@@ -95,24 +95,61 @@ def test_the_uncertainty_holds_beside_a_slow_link_and_after_the_swift_one(second
     assert sum(errors) <= max(2, 0.002 * len(errors))
 
 
-def test_a_link_that_contradicts_shows_a_jump() -> None:
-    """After a clock jumped, the link that is heard first is believed, though the other one still swears by the old time."""
-    chance = random.Random(7)
-    clocks = DriftingClocks(chance, PPM_PER_MINUTE)
-    together = LinkClocks(2)
+def known_over_two_links(seed: int) -> tuple[LinkClocks, DriftingClocks, int]:
+    """Two clocks well known over loopback and Wi-Fi, and the host's time then."""
+    chance = random.Random(seed)
+    clocks, together = DriftingClocks(chance, PPM_PER_MINUTE), LinkClocks(2)
     for _, echoes in mixed(clocks, (loopback, wifi), chance, 5):
         for echo in echoes:
             together.add(echo)
-    before = together.estimate
-    assert before is not None
-    late = replace(echoes[-1], wave=10**6, link=1)
+    assert together.estimate is not None
+    return together, clocks, echoes[-1].t3_ns + 100 * MS
+
+
+def echo_at(clocks: DriftingClocks, host_ns: int, wave: int, link: int, jump_ns: int = 0) -> Echo:
+    """An echo of 2 ms, after the board's clock has jumped."""
+    board_ns = clocks.board(host_ns + MS) + jump_ns
+    return Echo(wave, host_ns, board_ns, board_ns, host_ns + 2 * MS, link)
+
+
+def test_a_jump_that_one_link_confirms_is_one_for_all() -> None:
+    """After a clock jumped by 3 s nothing is known until three waves over the link that is heard agree, though the other one swears by the old time."""
+    together, clocks, host_ns = known_over_two_links(7)
     jump_ns = 3 * SECOND_NS
-    host_ns = late.t3_ns + 100 * MS
-    board_ns = clocks.board(host_ns) + jump_ns
-    together.add(Echo(10**6, host_ns, board_ns, board_ns, host_ns + 5 * MS, 1))
+    heard = [
+        together.add(echo_at(clocks, host_ns + wave * 50 * MS, 10**6 + wave, 1, jump_ns)) for wave in range(3)
+    ]
+    assert heard == [Heard.DOUBTED, Heard.DOUBTED, Heard.STEPPED]
     after = together.estimate
     assert after is not None
-    assert after.offset_at(board_ns) - before.offset_at(board_ns) == pytest.approx(-jump_ns, abs=10 * MS)
+    board_ns = clocks.board(host_ns) + jump_ns
+    assert after.offset_at(board_ns) + board_ns == pytest.approx(host_ns, abs=10 * MS)
+
+
+def test_a_new_link_that_lies_is_not_believed() -> None:
+    """A link that was not heard before and says otherwise leaves all in doubt; the other link's next word ends it."""
+    together, clocks, host_ns = known_over_two_links(8)
+    together.void()
+    assert together.estimate is None
+    for wave in range(3):
+        together.add(echo_at(clocks, host_ns + wave * 50 * MS, 10**6 + wave, 0))
+    known = together.estimate
+    assert known is not None
+    assert together.add(echo_at(clocks, host_ns + 200 * MS, 10**6, 1, 3600 * SECOND_NS)) is Heard.DOUBTED
+    assert together.estimate is None
+    assert together.add(echo_at(clocks, host_ns + 250 * MS, 10**6 + 9, 0)) is Heard.AGREED
+    assert together.estimate is not None
+    board_ns = clocks.board(host_ns)
+    assert together.estimate.offset_at(board_ns) == pytest.approx(known.offset_at(board_ns), abs=2 * MS)
+
+
+def test_a_doubt_goes_with_the_link_that_could_settle_it() -> None:
+    """Where the link that contradicted goes down the other one's knowledge counts again with its next word."""
+    together, clocks, host_ns = known_over_two_links(9)
+    assert together.add(echo_at(clocks, host_ns, 10**6, 1, SECOND_NS)) is Heard.DOUBTED
+    together.down(1)
+    assert together.add(echo_at(clocks, host_ns + 50 * MS, 10**6, 0)) is Heard.AGREED
+    assert together.estimate is not None
 
 
 def test_an_estimate_told_at_another_moment_says_no_more_than_before() -> None:

@@ -33,13 +33,18 @@ from common.protocol.session import (
     STATUS_NS,
     TAKEOVER_NS,
     Accepted,
+    ClockVoid,
     Counted,
     Echo,
+    LinkDown,
     LinkUp,
     Outgoing,
     Output,
     Refused,
+    Stale,
+    StaleReason,
     Stepped,
+    Unbelievable,
     Vanished,
     connection_name,
 )
@@ -120,9 +125,100 @@ def test_a_silent_board_is_given_up() -> None:
     host = world.hosts[0]
     heard_ns = world.now_ns
     host.session.receive(host.names[0, Lane.CONTROL], Status(world.board.session, BoardCounts(), Rung()), heard_ns)
+    for quiet_ns in range(0, SILENCE_NS, 50 * MS):
+        assert Vanished(orderly=False) not in host.session.tick(heard_ns + quiet_ns)
     assert Vanished(orderly=False) not in host.session.tick(heard_ns + SILENCE_NS - 1)
     assert host.session.is_open
     assert Vanished(orderly=False) in host.session.tick(heard_ns + SILENCE_NS)
+
+
+@pytest.mark.parametrize("stopped", ["host", "board", "both"])
+def test_silence_is_not_ones_own_absence(stopped: str) -> None:
+    """A program that was stopped for ten seconds takes nobody for gone; only who ran and heard nothing does."""
+    world = World()
+    world.settle(2000 * MS)
+    host, board = world.hosts[0], world.board
+    arrived, others = len(host.arrived), len(host.others)
+    awake = {"host": "board", "board": "host"}.get(stopped)
+    for _ in range(500):
+        world.now_ns += 20 * MS
+        if awake == "board" and world.now_ns >= board.due_ns:
+            world._board_says(board.tick(world.now_ns, world.counts))
+        if awake == "host" and world.now_ns >= host.session.due_ns:
+            world._host_does(host, host.session.tick(world.now_ns))
+    assert board.has_host == (stopped != "host")
+    assert host.session.is_open == (stopped != "board")
+    world.settle(1000 * MS)
+    assert len(host.arrived) > arrived
+    told = [output for output in host.others[others:] if not isinstance(output, Echo)]
+    assert told == [] if stopped == "both" else told
+
+
+def test_a_board_that_forgot_its_host_voids_what_is_known_of_the_clocks() -> None:
+    """Where the board says to a host of its session that it does not know it, one of the two was away: clock, echoes and credit begin anew."""
+    world = World()
+    world.settle(2000 * MS)
+    host = world.hosts[0]
+    world.board._host = None
+    before = len(host.others)
+    world.settle(500 * MS)
+    told = [output for output in host.others[before:] if not isinstance(output, Echo)]
+    assert [type(output) for output in told] == [ClockVoid, LinkDown, Vanished, LinkUp]
+    echoes = [output for output in host.others[before:] if isinstance(output, Echo)]
+    assert len(echoes) > 5 * 5, "waves follow each other as in the first second"
+
+
+def test_a_board_without_its_frames_lane_keeps_the_clock() -> None:
+    """Where the board has lost the frames' lane alone it knows its host still, and nothing that is known of the clocks is given up."""
+    world = World(links=2)
+    world.settle(2000 * MS)
+    host = world.hosts[0]
+    before = len(host.arrived)
+    name = world._board_name(host, (0, Lane.FRAMES))
+    world._board_says(world.board.unreachable(name))
+    world.settle(1000 * MS)
+    assert not any(isinstance(output, ClockVoid) for output in host.others)
+    assert len(host.arrived) > before
+
+
+@pytest.mark.parametrize("board_dials", [False, True])
+def test_a_refusal_counts_on_a_lane_that_was_dialled_only(board_dials: bool) -> None:
+    """A stranger who calls a waiting host may say anything; only who was called can refuse."""
+    world = World(board_dials=board_dials)
+    host = world.hosts[0]
+    names = {lane: host.names[0, lane] for lane in Lane}
+    for connection in (*names.values(), connection_name(0, b"a stranger")):
+        told = host.session.receive(connection, Refusal(RefusalReason.BUSY), world.now_ns)
+        assert told == ([Refused(RefusalReason.BUSY)] if connection in names.values() and not board_dials else [])
+
+
+def test_frames_beyond_the_credit_are_named_and_change_nothing() -> None:
+    """A board that sends more than it may, or with an index from nowhere, spends nothing of what an honest frame needs."""
+    world = World()
+    world.settle(1000 * MS)
+    host = world.hosts[0]
+    before = len(host.arrived)
+    for index in (2**53 - 1, world.counts.sent + 5):
+        [told] = host.session.receive(host.names[0, Lane.FRAMES], frame(world.board.session, index), world.now_ns)
+        assert isinstance(told, Stale)
+        assert told.reason is StaleReason.BEYOND_CREDIT
+    world.settle(1000 * MS)
+    assert len(host.arrived) > before + 10
+    assert host.lost == 0
+
+
+def test_an_account_of_more_than_was_allowed_is_not_believed() -> None:
+    """A board cannot have sent what it had no leave for: no frame is taken for lost or repeated because it says so."""
+    world = World()
+    world.settle(1000 * MS)
+    host = world.hosts[0]
+    before = len(host.arrived)
+    lie = BoardCounts(2**53, 2**53)
+    told = host.session.receive(host.names[0, Lane.FRAMES], Status(world.board.session, lie, Rung()), world.now_ns)
+    assert [type(output) for output in told] == [Unbelievable]
+    world.settle(1000 * MS)
+    assert len(host.arrived) > before + 10
+    assert host.lost == 0
 
 
 def test_a_link_that_was_only_slow_is_borne_with() -> None:
@@ -157,6 +253,7 @@ def test_a_boards_goodbye_gives_its_last_account() -> None:
     world.settle(300 * MS)
     host = world.hosts[0]
     sent = world.counts.sent
+    host.session.grant(3)
     counts = BoardCounts(sent + 9, sent + 3)
     [goodbye] = world.board.leave(counts)
     assert goodbye.message == Bye(counts)
@@ -173,6 +270,7 @@ def test_a_goodbye_counts_also_when_the_other_lane_broke_first() -> None:
     world = World()
     world.settle(300 * MS)
     host = world.hosts[0]
+    host.session.grant(90)
     host.session.interrupted(host.names[0, Lane.FRAMES], world.now_ns)
     counts = BoardCounts(100, 90)
     control = host.names[0, Lane.CONTROL]
