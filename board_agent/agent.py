@@ -45,9 +45,6 @@ _FAREWELL_NS: Final = 300_000_000
 _FULL_RETRY_NS: Final = 2_000_000
 """A frame that may not be dropped is offered again after this time to a link that was full; ZeroMQ does not say when it has room."""
 
-_LEAST_SLEEP_NS: Final = 5_000_000
-"""A shorter sleep would spoil no pair; a process that is held up between two readings of clocks makes less than nothing of it."""
-
 _LONGEST_WAIT_MS: Final = 1000
 
 _CAMERA_RETRY_MS: Final = 500
@@ -153,7 +150,7 @@ class Agent:
         self._service = service
         self._idle_ns = idle_ns
         self._alone_since_ns = now.monotonic_ns()
-        self._asleep_ns = max(now.asleep_ns() for _ in range(3))  # held up between its readings, one says less
+        self._sleep = now.SleepWatch()
         self._camera = camera
         self._links = links
         self._several = SeveralLinks(links)
@@ -294,10 +291,9 @@ class Agent:
 
     def _watch_clock(self) -> None:
         """Notice that the machine has slept. A frame from before is dropped: between its exposure and its sending the clock stood still."""
-        slept_ns = now.asleep_ns() - self._asleep_ns
-        if slept_ns < _LEAST_SLEEP_NS:
+        slept_ns = self._sleep.slept_ns()
+        if not slept_ns:
             return
-        self._asleep_ns += slept_ns
         self._outbox.discard(DropReason.NO_HOST)
         self._session.begin_clock(now.random_id())
         _LOG.info(event("slept", session=self._session.session, seconds=round(slept_ns / 1e9, 1)))

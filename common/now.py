@@ -3,6 +3,10 @@
 import os
 import time
 from pathlib import Path
+from typing import Final
+
+_LEAST_SLEEP_NS: Final = 5_000_000
+"""A shorter sleep would spoil no pair; a process that is held up between two readings of clocks makes less than nothing of it."""
 
 
 def monotonic_ns() -> int:
@@ -16,6 +20,21 @@ def asleep_ns() -> int:
     At most that: what passes between the two readings makes it less, never more. 0 where the kernel has no clock that runs on.
     """
     return time.clock_gettime_ns(time.CLOCK_BOOTTIME) - time.monotonic_ns() if hasattr(time, "CLOCK_BOOTTIME") else 0
+
+
+class SleepWatch:
+    """Tells when this machine has slept since it was last asked; its CLOCK_MONOTONIC stood still meanwhile."""
+
+    def __init__(self) -> None:
+        self._asleep_ns = max(asleep_ns() for _ in range(3))  # held up between its readings, one says less
+
+    def slept_ns(self) -> int:
+        """Nanoseconds of sleep that were not told yet; 0: none."""
+        slept_ns = asleep_ns() - self._asleep_ns
+        if slept_ns < _LEAST_SLEEP_NS:
+            return 0
+        self._asleep_ns += slept_ns
+        return slept_ns
 
 
 def wall_time() -> str:

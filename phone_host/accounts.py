@@ -1,12 +1,17 @@
 """What the host saw of a board and its links, in figures. Written by the receiver's thread only, read by others at leisure."""
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 from common.protocol.message import BoardCounts, Rung
 from common.protocol.session import StaleReason
 from phone_host.delays import Series
+from phone_host.sync.gate import Disbelief, Suspects
+
+_MOST_SUSPECTS: Final = 64
+"""Steps whose frames are remembered by number; all are counted."""
 
 
 @dataclass(slots=True)
@@ -23,6 +28,7 @@ class SessionAccount:
         late: how many of the lost came after all, behind a newer one over another link, and were dropped.
         old_session: frames of an older life of the board, dropped.
         rung: how far the board has lowered what its camera gives.
+        disbelieved: frames that came and were not believed, by reason.
         ended: whether the board said that no frame follows.
         vanished: whether the board went without a word: what it sent after `latest` is unknown.
     """
@@ -36,6 +42,7 @@ class SessionAccount:
     late: int = 0
     old_session: int = 0
     rung: Rung = field(default_factory=Rung)
+    disbelieved: Counter[Disbelief] = field(default_factory=Counter)
     ended: bool = False
     vanished: bool = False
 
@@ -48,6 +55,8 @@ class SessionAccount:
                 self.duplicate += 1
             case StaleReason.LATE:
                 self.late += 1
+            case StaleReason.BEYOND_CREDIT:
+                self.disbelieved[Disbelief.CREDIT] += 1
 
 
 @dataclass(slots=True)
@@ -84,6 +93,9 @@ class LinkAccount:
         switches: how often the stream went from one link to another.
         garbage: packets that were none of ours.
         no_clock: frames that came before the clock was known.
+        clock_doubts: how often what was known of the clocks was contradicted, or void.
+        clock_steps: how often one of the clocks had stepped.
+        suspects: frames that were believed between a step and the echo that told of it, newest last.
     """
 
     sessions: list[SessionAccount] = field(default_factory=list)
@@ -92,6 +104,17 @@ class LinkAccount:
     switches: int = 0
     garbage: int = 0
     no_clock: int = 0
+    clock_doubts: int = 0
+    clock_steps: int = 0
+    suspects: deque[Suspects] = field(default_factory=lambda: deque(maxlen=_MOST_SUSPECTS))
+
+    @property
+    def disbelieved(self) -> Counter[Disbelief]:
+        """Frames that came and were not believed, over all sessions, by reason."""
+        total: Counter[Disbelief] = Counter()
+        for account in tuple(self.sessions):
+            total.update(account.disbelieved)
+        return total
 
 
 def link_names(kinds: Sequence[str]) -> list[str]:

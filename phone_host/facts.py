@@ -12,7 +12,7 @@ from phone_host.results import Unwritten
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.phase import Alignment, Phase
-from phone_host.trust import NO_DOUBT, Timing, stamp_doubt
+from phone_host.trust import NO_DOUBT, Border, Concern, Timing, border_concerns, stamp_doubt, timing_concerns
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +33,7 @@ class RunFacts:
         unwritten: what the disk did not take.
         spoiled: own frames that were no whole images.
         skipped: own frames that a newer one had replaced before they were looked at.
+        own_future: own frames whose stamps lay in the future, dropped.
         time_offset: between the two cameras' stamps, as it was applied.
         phase: of the two cameras at the end; None: not known, or there is none.
         alignment: how the steering of a camera came out; None: not asked for.
@@ -61,6 +62,7 @@ class RunFacts:
     period_ns: int
     motion_px_s: float
     width_px: int
+    own_future: int = 0
     interpolated: bool = False
     stamps_exact: bool = False
     time_offset: TimeOffset = field(default_factory=TimeOffset)
@@ -141,6 +143,29 @@ def time_and_motion(facts: RunFacts, last: int | None = None) -> Timing:
         width_px=facts.width_px,
         stamps=NO_DOUBT if facts.stamps_exact else stamp_doubt(facts.time_offset, facts.camera),
     )
+
+
+def concerns(facts: RunFacts, last: int | None = None) -> tuple[Concern, ...]:
+    """What makes the depth of a run wrong or its figures doubtful, the gravest first.
+
+    Args:
+        facts: the run.
+        last: how many of the newest pairs time and motion are judged by; None: all.
+    """
+    link = facts.link
+    border = Border(
+        clock_steps=link.clock_steps,
+        suspect_frames=sum(suspects.frames for suspects in link.suspects),
+        disbelieved=disbelieved(facts),
+        received=sum(account.received for account in link.sessions),
+    )
+    return border_concerns(border) + timing_concerns(time_and_motion(facts, last))
+
+
+def disbelieved(facts: RunFacts) -> dict[str, int]:
+    """Frames that came and were not believed, by reason, the own camera's last."""
+    found = {reason.value: count for reason, count in facts.link.disbelieved.items()}
+    return found | ({"own_from_the_future": facts.own_future} if facts.own_future else {})
 
 
 def board_drops(link: LinkAccount) -> dict[str, int]:

@@ -16,7 +16,7 @@ from common.link.base import Link
 from common.logs import event
 from common.protocol.message import Pacing, RefusalReason, Steering
 from phone_host.delays import DelayStatistics, Sample
-from phone_host.facts import RunFacts, time_and_motion
+from phone_host.facts import RunFacts, concerns
 from phone_host.model import FramePair, Side, TimeOffset
 from phone_host.motion import MotionMeter
 from phone_host.pairqueue import PairQueue
@@ -28,7 +28,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Alignment, PhaseController, Whose
-from phone_host.trust import Concern, Doubt, concerns
+from phone_host.trust import Concern, Doubt
 
 _LOG = logging.getLogger(__name__)
 
@@ -188,6 +188,7 @@ class Host:
             unwritten=self.results.unwritten,
             spoiled=self.source.spoiled,
             skipped=self.source.skipped,
+            own_future=self.source.from_the_future,
             time_offset=self.settings.time_offset,
             phase=self.queue.phase,
             alignment=self.alignment,
@@ -215,7 +216,7 @@ class Host:
 
     def concerns(self) -> tuple[Concern, ...]:
         """What makes the depth of the last pairs wrong."""
-        return concerns(time_and_motion(self.facts("running"), _RECENT))
+        return concerns(self.facts("running"), _RECENT)
 
     def _watch_trust(self, now_ns: int) -> None:
         """Log each reason not to trust the depth when it comes, and when it has gone."""

@@ -110,6 +110,7 @@ class LiveTable:
         board = f"board connected over {carrier}" if carrier else "waiting for the board"
         drops = {f"{reason} (board)": count for reason, count in board_drops(receiver.account).items()}
         drops["lost on the link"] = sum(account.lost for account in receiver.account.sessions)
+        drops |= {f"not believed: {reason.value}": count for reason, count in receiver.account.disbelieved.items()}
         drops |= {f"{reason} (host)": count for reason, count in counts.board_orphans}
         drops["full FIFO"] = counts.dropped
         shown = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in drops.items() if count) or "none"

@@ -19,6 +19,9 @@ from phone_host.sync.phase import Phase, PhaseMeter
 _SIDE_BYTES: Final = 64 * 1024 * 1024
 """Frames of each side wait for their partners, still encoded, in at most this much memory: 40 s of 50 KB JPEGs at 30 fps, more than any link delays."""
 
+_SIDE_FRAMES: Final = 4096
+"""The same in number: over a minute at 60 fps. Of the smallest frames 64 MB would be a million objects."""
+
 _NEWEST: Final = 4
 """Board frames kept beside those that wait: a pair is nearly always formed before its frame has three successors."""
 
@@ -156,6 +159,16 @@ class PairQueue:
                     self._settle(self._pairing.finish())
                 self._pairing = Pairing(PairingSettings(self.tolerance_ns, board_period_ns, self._host_period_ns))
 
+    def void(self) -> None:
+        """One of the two clocks may have stood still: no frame from before is paired with one from after it."""
+        with self._changed:
+            self._newest.clear()
+            self._delay_ns = _LEAST_WAIT_NS
+            if self._meter is not None:
+                self._meter.restart()
+            if self._pairing is not None and not self._closed and not self._timeless:
+                self._settle(self._pairing.void())
+
     def change_period(self, board_period_ns: int) -> None:
         """The board's camera has another rate from now on; frames that wait for their partners go on waiting.
 
@@ -192,7 +205,7 @@ class PairQueue:
             if self._meter is not None:
                 self._meter.add_board(exposed_ns)
             self._settle(self._pairing.add_board(exposed_ns, frame, now.monotonic_ns()))
-            while self._board_bytes > _SIDE_BYTES:
+            while self._board_bytes > _SIDE_BYTES or self._pairing.held_board > _SIDE_FRAMES:
                 self._settle(self._pairing.evict_oldest_board())
             return exposed_ns
 
@@ -222,7 +235,7 @@ class PairQueue:
             self._host_bytes += len(frame.payload)
             self._settle(self._pairing.add_host(frame.exposed.ns, frame, now_ns))
             self._evict(now_ns)
-            while self._host_bytes > _SIDE_BYTES:
+            while self._host_bytes > _SIDE_BYTES or self._pairing.held_host > _SIDE_FRAMES:
                 self._settle(self._pairing.evict_oldest_host())
 
     def tick(self) -> None:

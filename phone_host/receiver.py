@@ -19,6 +19,7 @@ from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Pacin
 from common.protocol.session import (
     Accepted,
     Arrived,
+    ClockVoid,
     Counted,
     Echo,
     LinkDown,
@@ -29,16 +30,17 @@ from common.protocol.session import (
     Refused,
     Stale,
     Stepped,
+    Unbelievable,
     Vanished,
     connection_name,
 )
 from common.protocol.wire import VersionError, decode, encode_stamped
 from phone_host.accounts import LinkAccount, LinkTally, SessionAccount, link_names
+from phone_host.border import Border
 from phone_host.model import BoardFrame
 from phone_host.pairqueue import PairQueue
 from phone_host.sync.choice import LinkChoice
 from phone_host.sync.clock import ClockEstimate
-from phone_host.sync.clocks import LinkClocks
 from phone_host.sync.flow import Flow
 
 _LOG = logging.getLogger(__name__)
@@ -84,7 +86,6 @@ class Receiver:
         ]
         self._session = HostSession(host_id, dialled)
         self._choice = LinkChoice(len(dialled))
-        self._clock = LinkClocks(len(dialled))
         self._boot_id = ""
         self._hello: BoardHello | None = None
         self._flow = Flow()
@@ -93,9 +94,11 @@ class Receiver:
         self._waiter = Waiter([*(item for link in links for item in link.pollables), self._wake_read])
         self._stopping = False
         self._later_ns = 0
-        self._settled = False
+        self._tail_known = False
+        self._sleep = now.SleepWatch()
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
         self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
+        self._border = Border(self.account, queue.void)
         self.failure: Exception | None = None
         self._refused: tuple[RefusalReason, int] | None = None
         self._turned_away: set[int] = set()
@@ -103,9 +106,8 @@ class Receiver:
     @property
     def refused(self) -> RefusalReason | None:
         """Why the board that was last heard does not talk to us; None when it does, or is silent now."""
-        if self._refused is None or now.monotonic_ns() - self._refused[1] > _REFUSAL_NS:
-            return None
-        return self._refused[0]
+        refused = self._refused  # read once: the receiver's thread may set it to None meanwhile
+        return None if refused is None or now.monotonic_ns() - refused[1] > _REFUSAL_NS else refused[0]
 
     @property
     def connected(self) -> bool:
@@ -125,8 +127,8 @@ class Receiver:
 
     @property
     def estimate(self) -> ClockEstimate | None:
-        """The clock estimate now."""
-        return self._clock.estimate
+        """The clock estimate now; None before the first echo, and while it is in doubt."""
+        return self._border.estimate
 
     @property
     def ended(self) -> bool:
@@ -163,6 +165,8 @@ class Receiver:
         except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
             self.failure = error
         finally:
+            for frame in self._border.leave():
+                self._queue.add_board(frame)  # the stream has ended for them
             for link in self._links:
                 link.close()
 
@@ -171,10 +175,10 @@ class Receiver:
         farewell = self._session.leave()
         self._handle(farewell, now.monotonic_ns())
         deadline_ns = now.monotonic_ns() + _FAREWELL_NS
-        while farewell and not self._settled and (left_ns := deadline_ns - now.monotonic_ns()) > 0:
+        while farewell and not self._tail_known and (left_ns := deadline_ns - now.monotonic_ns()) > 0:
             self._waiter.wait(left_ns // 1_000_000 + 1)
             self._receive()
-        if farewell and not self._settled:
+        if farewell and not self._tail_known:
             self._current.vanished = True  # what it sent since its newest account is not known
 
     def _receive(self) -> None:
@@ -188,11 +192,14 @@ class Receiver:
         due_ns = min(self._session.due_ns, links_due_ns)
         wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
         ready = self._waiter.wait(wait_ms)
+        self._watch_clock()
         if ready or now.monotonic_ns() >= links_due_ns:
             self._receive()
             if self._wake_read in ready:
                 os.read(self._wake_read, 4096)
         now_ns = now.monotonic_ns()
+        if self._border.waits_for_echo:
+            self._session.probe(now_ns)
         if now_ns >= self._session.due_ns:
             self._handle(self._session.tick(now_ns), now_ns)
             if len(self._links) > 1 and (best := self._choice.best(now_ns)) is not None:
@@ -213,7 +220,8 @@ class Receiver:
                 try:
                     message = decode(header, payload)
                 except VersionError as error:
-                    if not self._session.is_open:  # in a running session it is somebody else's noise
+                    # In a running session it is somebody else's noise, and whoever called here may be anybody.
+                    if not self._session.is_open and path in self._links[link].dialled.values():
                         self._refused = (RefusalReason.VERSION, now_ns)
                     self._count_garbage(error.problem)
                 except ProtocolError as error:
@@ -228,12 +236,12 @@ class Receiver:
 
     def _grant(self, now_ns: int) -> None:
         carrier, hello = self._session.carrier, self._hello
-        if carrier is None or hello is None or self._clock.estimate is None:
+        if carrier is None or hello is None or not self._border.takes_frames:
             return  # without a clock a frame could not be paired
         if hello.camera.pacing is Pacing.DEMAND or self._queue.held_back_by_credit:
             self._handle(self._session.grant(self._queue.free_slots()), now_ns)
             return
-        round_trip_ns = (self._clock.round_trip_ns(carrier) or 0) if self._links[carrier].self_paced else None
+        round_trip_ns = (self._border.round_trip_ns(carrier) or 0) if self._links[carrier].self_paced else None
         frames = self._flow.credit(self._session.outstanding, hello.camera.period_ns, round_trip_ns)
         if frames:
             self._handle(self._session.grant(frames), now_ns)
@@ -251,38 +259,65 @@ class Receiver:
                     self._send(output)
                 case Arrived(frame, lost, link):
                     self._accept_frame(frame, lost, link, now_ns)
-                case Echo(_, t0_ns, t1_ns, t2_ns, t3_ns, link):
-                    self._clock.add(output)
-                    self._choice.echo(link, (t3_ns - t0_ns) - (t2_ns - t1_ns), now_ns)
+                case Echo() | ClockVoid():
+                    self._note_clock(output, now_ns)
                 case Stale(_, reason):
                     self._current.count_stale(reason)
                 case Accepted():
                     self._begin(output, now_ns)
                 case LinkUp() | LinkDown() | OtherBoard():
                     self._note_link(output, now_ns)
-                case Counted(counts, ended, lost, last):
-                    self._settled = last
-                    self._current.lost += lost
-                    self._current.latest = max(counts, self._current.latest, key=lambda account: account.grabbed)
-                    self._current.ended |= ended
-                    self._choice.account(counts.grabbed, now_ns, has_credit=self._session.outstanding > 0)
+                case Counted():
+                    self._note_account(output, now_ns)
                 case Stepped(rung):
                     self._note_rung(rung)
-                case Refused(reason, link):
-                    self._note_refusal(reason, link, now_ns)
+                case Refused() | Unbelievable():
+                    self._note_refusal(output, now_ns)
                 case Vanished(orderly):
                     self._note_gone(orderly=orderly, now_ns=now_ns)
 
-    def _note_refusal(self, reason: RefusalReason, link: int, now_ns: int) -> None:
-        """A board does not talk to us; told once where another link is up, because then the run goes on."""
-        self._refused = (reason, now_ns)
-        if self._session.is_open and link not in self._turned_away:
-            self._turned_away.add(link)
-            problem, remedy = refusal_text(reason)
-            _LOG.warning(event("link_refused", link=self.account.links[link].name, problem=problem, remedy=remedy))
+    def _watch_clock(self) -> None:
+        """Notice that this machine has slept: its clock stood still, the board's and the cameras' went on."""
+        slept_ns = self._sleep.slept_ns()
+        if slept_ns:
+            self._border.void(f"this machine slept for {slept_ns / 1e9:.1f} s")
+            now_ns = now.monotonic_ns()
+            self._handle(self._session.begin_clock(now_ns), now_ns)
+
+    def _note_clock(self, echo: Echo | ClockVoid, now_ns: int) -> None:
+        """Take an echo to the clock, and let frames pass that it has proven; or begin anew."""
+        if isinstance(echo, ClockVoid):
+            self._border.void("the board had forgotten this host")
+            return
+        for link, frame in self._border.learn(echo):
+            self._pass(link, frame)
+        self._choice.echo(echo.link, (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns), now_ns)
+
+    def _note_account(self, counted: Counted, now_ns: int) -> None:
+        """Take the board's account of the running session."""
+        self._tail_known = counted.last
+        account = self._current
+        account.lost += counted.lost
+        account.latest = max(counted.counts, account.latest, key=lambda counts: counts.grabbed)
+        account.ended |= counted.ended
+        self._choice.account(counted.counts.grabbed, now_ns, has_credit=self._session.outstanding > 0)
+
+    def _note_refusal(self, refused: Refused | Unbelievable, now_ns: int) -> None:
+        """A board does not talk to us, which is told once where another link is up, because then the run goes on; or it talks nonsense."""
+        if isinstance(refused, Unbelievable):
+            self._count_garbage(refused.problem)
+            return
+        self._refused = (refused.reason, now_ns)
+        if self._session.is_open and refused.link not in self._turned_away:
+            self._turned_away.add(refused.link)
+            problem, remedy = refusal_text(refused.reason)
+            _LOG.warning(
+                event("link_refused", link=self.account.links[refused.link].name, problem=problem, remedy=remedy)
+            )
 
     def _note_gone(self, *, orderly: bool, now_ns: int) -> None:
         """The board is not there any more, on no link."""
+        self._border.close()
         self._current.vanished = not orderly
         for number, tally in enumerate(self.account.links):
             self._choice.down(number, now_ns)
@@ -298,12 +333,13 @@ class Receiver:
                 self._turned_away.discard(link)
                 if hello.boot_id != self._boot_id:
                     self._boot_id = hello.boot_id
-                    self._clock = LinkClocks(len(self._links))  # another boot is another clock
+                    self._border.other_clock()
                 self._choice.up(link, now_ns)
                 _LOG.info(event("link_up", link=tally.name))
             case LinkDown(link, stuck):
                 tally.is_up = stuck
                 tally.lost += 1
+                self._border.link_down(link)
                 self._choice.down(link, now_ns)
                 if stuck:
                     self._choice.up(link, now_ns)
@@ -330,6 +366,7 @@ class Receiver:
         self._refused = None
         self._hello = hello
         self._flow = Flow()
+        self._tail_known = False
         self._choice.carries(link, now_ns)
         tally, before = self.account.links[link], self._streamed_over
         self._streamed_over = link
@@ -365,31 +402,29 @@ class Receiver:
         _LOG.info(event("board_camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality))
 
     def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
+        """Take a frame of the running session to the border."""
         account, tally = self._current, self.account.links[link]
         account.received += 1
         account.lost += lost
         tally.frames += 1
         tally.bytes += len(frame.payload)
-        estimate = self._clock.estimate
-        if estimate is None:
-            self.account.no_clock += 1
-            return
-        # Only `sent` is mapped to the host's clock, once, here; the other marks keep their distance to it.
-        sent_ns = frame.marks.sent_ns
-        offset_ns = estimate.offset_at(sent_ns)
-        marks = frame.marks.moved_to(sent_ns + offset_ns)
-        uncertainty_ns = estimate.uncertainty_at(sent_ns)
-        transit_ns = now_ns - marks.sent_ns
-        self._choice.frame(link, transit_ns, now_ns)
         assert self._hello is not None
-        camera = self._hello.camera
-        self._flow.arrived(transit_ns, marks.sent_ns - marks.grabbed_ns, camera.period_ns, now_ns)
-        tally.age.add(now_ns - marks.exposed_ns)
-        asked_px = (camera.width_px, camera.height_px)
-        stamp_ns = self._queue.add_board(
-            BoardFrame(frame, tally.name, marks, now_ns, offset_ns, uncertainty_ns, asked_px)
-        )
-        self._listener.frame_arrived(stamp_ns, frame.sequence if camera.pacing is Pacing.DEMAND else None)
+        admitted = self._border.admit(frame, link, account, self._hello.camera, now_ns)
+        if admitted is not None:
+            self._pass(link, admitted)
+
+    def _pass(self, link: int, frame: BoardFrame) -> None:
+        """Give a frame that is believed to the pair queue."""
+        assert self._hello is not None
+        camera, message, marks = self._hello.camera, frame.message, frame.marks
+        transit_ns = frame.received_ns - marks.sent_ns
+        self._choice.frame(link, transit_ns, frame.received_ns)
+        self._flow.arrived(transit_ns, marks.sent_ns - marks.grabbed_ns, camera.period_ns, frame.received_ns)
+        self.account.links[link].age.add(frame.received_ns - marks.exposed_ns)
+        self._border.passed(message)
+        stamp_ns = self._queue.add_board(frame)
+        on_demand = camera.pacing is Pacing.DEMAND
+        self._listener.frame_arrived(stamp_ns, message.sequence if on_demand else None)
 
 
 def refusal_text(reason: RefusalReason) -> tuple[str, str]:

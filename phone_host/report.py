@@ -7,11 +7,10 @@ from typing import Final
 from common.camera.base import CameraHealth, health_values
 from phone_host.accounts import LinkTally, rung_values
 from phone_host.delays import DELAYS, STAGES, Spread
-from phone_host.facts import RunFacts, figures, time_and_motion
+from phone_host.facts import RunFacts, concerns, disbelieved, figures
 from phone_host.model import TimeOffset
 from phone_host.regime import Judgement, judge
 from phone_host.sync.fifo import Overflow
-from phone_host.trust import concerns
 
 _MS: Final = 1e6
 
@@ -49,11 +48,13 @@ def build(facts: RunFacts) -> dict[str, object]:
             "held": facts.counts.held_board,
             "orphaned": dict(facts.counts.board_orphans),
             "before_clock": facts.link.no_clock,
+            "disbelieved": disbelieved(facts),
         },
         "host_frames": {
-            "grabbed": facts.counts.host_frames + facts.spoiled + facts.skipped,
+            "grabbed": facts.counts.host_frames + facts.spoiled + facts.skipped + facts.own_future,
             "spoiled": facts.spoiled,
             "skipped": facts.skipped,
+            "from_the_future": facts.own_future,
             "paired": facts.counts.paired,
             "held": facts.counts.held_host,
             "orphaned": dict(facts.counts.host_orphans),
@@ -62,8 +63,7 @@ def build(facts: RunFacts) -> dict[str, object]:
         "regime": _regime(judge(figures(facts))),
         "image_motion_px_per_s": _number(facts.motion_px_s),
         "warnings": [
-            {"doubt": item.doubt.value, "sentence": item.sentence, "remedy": item.remedy}
-            for item in concerns(time_and_motion(facts))
+            {"doubt": item.doubt.value, "sentence": item.sentence, "remedy": item.remedy} for item in concerns(facts)
         ],
         "pairs_account": {
             "paired": facts.counts.paired,
@@ -132,10 +132,15 @@ def _regime(judgement: Judgement) -> dict[str, object]:
 
 
 def _clock(facts: RunFacts) -> dict[str, object]:
-    estimate = facts.estimate
+    estimate, link = facts.estimate, facts.link
+    told = {
+        "doubts": link.clock_doubts,
+        "steps": link.clock_steps,
+        "suspects": [asdict(suspects) for suspects in link.suspects],
+    }
     if estimate is None:
-        return {"known": False}
-    return {
+        return {"known": False} | told
+    return told | {
         "known": True,
         "offset_ns": estimate.offset_ns,
         "skew_ppm": estimate.skew * 1e6,
@@ -195,6 +200,7 @@ def _session(facts: RunFacts, index: int) -> dict[str, object]:
         "lost_late": account.late,
         "camera": rung_values(account.rung),
         "stale": {"duplicate": account.duplicate, "old_session": account.old_session},
+        "disbelieved": {reason.value: count for reason, count in account.disbelieved.items()},
         "ended": account.ended,
         "tail": "unknown" if account.vanished else "known",
     }

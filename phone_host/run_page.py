@@ -9,14 +9,14 @@ from common import now
 from common.camera.base import CameraHealth
 from common.ledger import PairLedger
 from phone_host.accounts import rung_lines
-from phone_host.facts import RunFacts, board_drops, figures, time_and_motion
+from phone_host.facts import RunFacts, board_drops, concerns, disbelieved, figures
 from phone_host.formats.preview import colour_disparity, colour_range_px
 from phone_host.model import Image, Side
 from phone_host.pipeline import Processed
 from phone_host.regime import Judgement, Regime, judge
 from phone_host.report_page import Figure, PageData, Picture, Table, Verdict, delay_series, page
 from phone_host.summary import phase_lines
-from phone_host.trust import Concern, concerns
+from phone_host.trust import Concern
 
 
 def run_page(facts: RunFacts, last: Processed | None, board_side: Side, ledgers: Sequence[PairLedger]) -> str:
@@ -31,7 +31,7 @@ def run_page(facts: RunFacts, last: Processed | None, board_side: Side, ledgers:
     Returns:
         One self-contained HTML document.
     """
-    judgement, found = judge(figures(facts)), concerns(time_and_motion(facts))
+    judgement, found = judge(figures(facts)), concerns(facts)
     verdict, sentence = _verdict(facts, judgement, found)
     return page(
         PageData(
@@ -54,7 +54,7 @@ def notes(facts: RunFacts) -> tuple[str, ...]:
     return (
         f"Queue: {judgement.sentence}.",
         *(f"Would help: {remedy}." for remedy in judgement.remedies),
-        *(f"Warning: {item.sentence}. Remedy: {item.remedy}." for item in concerns(time_and_motion(facts))),
+        *(f"Warning: {item.sentence}. Remedy: {item.remedy}." for item in concerns(facts)),
         *phase_lines(facts.phase, facts.alignment),
         *rung_lines(facts.link),
     )
@@ -153,6 +153,7 @@ def drops_table(facts: RunFacts) -> Table:
             for reason, count in board_drops(facts.link).items()
         ),
         ("frames lost on the link", sum(account.lost for account in facts.link.sessions)),
+        *((f"frames not believed: {reason.replace('_', ' ')}", count) for reason, count in disbelieved(facts).items()),
         *(
             (f"board frames without partner: {reason.replace('_', ' ')}", count)
             for reason, count in facts.counts.board_orphans

@@ -37,6 +37,7 @@ class Source:
         self._last_health: CameraHealth | None = None
         self.spoiled = 0
         self.skipped = 0
+        self.from_the_future = 0
         self.ended = False
         self.failure: Exception | None = None
 
@@ -128,6 +129,8 @@ class Source:
 
     def _take(self, grab: Grab) -> None:
         match grab:
+            case Frame() if grab.exposed.ns > now.monotonic_ns() and not self.on_demand:
+                self.from_the_future += 1  # no frame after it could be paired; on demand, stamps are labels
             case Frame():
                 self._deliver(grab)
             case Spoiled():

@@ -6,11 +6,10 @@ from typing import Final
 from common.camera.base import CameraHealth
 from phone_host.accounts import LinkAccount, rung_lines
 from phone_host.delays import DELAYS
-from phone_host.facts import RunFacts, board_drops, figures, time_and_motion
+from phone_host.facts import RunFacts, board_drops, concerns, disbelieved, figures
 from phone_host.model import TimeOffset
 from phone_host.regime import judge
 from phone_host.sync.phase import Alignment, Phase
-from phone_host.trust import concerns
 
 _MS: Final = 1e6
 
@@ -35,7 +34,7 @@ def summary(facts: RunFacts) -> str:
     lines += _arrivals(facts.camera, facts.time_offset)
     lines.append(judge(figures(facts)).sentence)
     lines += [f"  {remedy}" for remedy in judge(figures(facts)).remedies]
-    lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(time_and_motion(facts))]
+    lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(facts)]
     lines += camera_troubles(facts.camera)
     lines += [*rung_lines(facts.link), *_links(facts.link), *_losses(facts)]
     return "\n".join(lines)
@@ -122,6 +121,7 @@ def _losses(facts: RunFacts) -> list[str]:
         *(f"{n} {reason} on the board" for reason, n in board.items()),
         *([f"{lost} lost on the link{f' ({late} of them came too late)' if late else ''}"] if lost else []),
         *([f"{stale} stale"] if stale else []),
+        *(f"{n} not believed: {reason}" for reason, n in disbelieved(facts).items()),
         *(f"{n} board frames {reason}" for reason, n in facts.counts.board_orphans),
         *(f"{n} host frames {reason}" for reason, n in facts.counts.host_orphans),
         *([f"{facts.counts.dropped} pairs in a full FIFO"] if facts.counts.dropped else []),

@@ -1,5 +1,7 @@
 """Says in words when time makes depth wrong: frames of a pair apart, clocks or stamps uncertain, results old, while the image moves. Pure.
 
+Also when what arrived was not believed: then clocks had stepped, or a board, a driver or a stranger says what cannot be.
+
 A point that moves v px a second stands t * v px elsewhere in a frame that is t s late, and a matcher takes that for disparity: beyond half a pixel
 depth is wrong by more than a good matcher's own error.
 """
@@ -29,6 +31,8 @@ class Doubt(Enum):
     CLOCK = "clock"
     STAMPS = "stamps"
     AGE = "age"
+    CLOCK_STEPPED = "clock_stepped"
+    DISBELIEVED = "disbelieved"
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +120,52 @@ class Concern:
     remedy: str
 
 
-def concerns(timing: Timing) -> tuple[Concern, ...]:
+@dataclass(frozen=True, slots=True)
+class Border:
+    """What was not believed at the border.
+
+    Attributes:
+        clock_steps: how often a clock was found to have stepped.
+        suspect_frames: frames that had passed between a step and the echo that told of it.
+        disbelieved: frames that came and were dropped, by reason.
+        received: frames that came.
+    """
+
+    clock_steps: int
+    suspect_frames: int
+    disbelieved: dict[str, int]
+    received: int
+
+
+def border_concerns(border: Border) -> tuple[Concern, ...]:
+    """Say what was not believed, and what that means; nothing where all was."""
+    found = []
+    if border.clock_steps:
+        suspect = (
+            f"; up to {border.suspect_frames} pairs before that was noticed are suspect"
+            if border.suspect_frames
+            else ""
+        )
+        found.append(
+            Concern(
+                Doubt.CLOCK_STEPPED,
+                f"one of the two clocks stepped {border.clock_steps} times{suspect}",
+                "do not let the board or the host sleep during a run; leave the suspect pairs out (report.json names them)",
+            )
+        )
+    if border.disbelieved:
+        reasons = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in border.disbelieved.items())
+        found.append(
+            Concern(
+                Doubt.DISBELIEVED,
+                f"{sum(border.disbelieved.values())} frames of {border.received} were not believed and dropped ({reasons})",
+                "none of them was used; if it goes on, update the board's software and check its camera and who else uses the link",
+            )
+        )
+    return tuple(found)
+
+
+def timing_concerns(timing: Timing) -> tuple[Concern, ...]:
     """Say what makes depth wrong; nothing where it is right or motion is not known."""
     motion = timing.motion_px_s
     if not math.isfinite(motion):

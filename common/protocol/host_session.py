@@ -241,9 +241,10 @@ class HostSession:
         return [] if self._carrier is None else [Outgoing(self._carrier.lanes[Lane.CONTROL], Steer(later_ns))]
 
     def probe(self, now_ns: int) -> None:
-        """Let the carrier's next echoes be asked for as soon as its line permits: something waits for an answer that is younger than itself."""
-        if self._carrier is not None:
-            self._carrier.waves.hasten(now_ns)
+        """Let the next echoes be asked for as soon as the lines permit: something waits for an answer that is younger than itself."""
+        for path in self._paths:
+            if path.is_open:
+                path.waves.hasten(now_ns)
 
     def begin_clock(self, now_ns: int) -> list[Output]:
         """Take note that this machine's clock stood still: every echo under way is void, and so is the credit that was granted.
@@ -434,7 +435,9 @@ class HostSession:
                 if not stream.can_be(counts):
                     return [_TOO_MANY]
                 behind = connection == path.lanes.get(Lane.FRAMES)
-                lost = stream.pass_over(counts.sent) if behind else 0  # what it tells of and has not come before it is lost
+                lost = (
+                    stream.pass_over(counts.sent) if behind else 0
+                )  # what it tells of and has not come before it is lost
                 counted = Counted(counts, isinstance(message, End), lost, last=behind and self._leaving)
                 return [*_note_rung(stream, message), counted]
             case _:

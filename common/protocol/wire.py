@@ -53,6 +53,9 @@ _MAX_COUNT: Final = 2**53
 _NS: Final = 2**62
 """146 years in ns: no honest clock is further from its zero; keeps sums inside 64 bits."""
 
+_MAX_PERIOD_NS: Final = 3_600_000_000_000
+"""A frame an hour: what counts as a pair follows from the period, so it is believed only as far as somebody would call it a stream."""
+
 _KINDS: Final[tuple[type, ...]] = (
     HostHello,
     BoardHello,
@@ -361,7 +364,7 @@ class _Reader:
             width_px,
             height_px,
             self.choice(_PIXEL_FORMATS),
-            self._integer(1, _NS),
+            self._integer(1, _MAX_PERIOD_NS),
             self.enum(Pacing),
             self.enum(Steering),
         )
@@ -376,7 +379,7 @@ class _Reader:
         )
 
     def rung(self) -> Rung:
-        index, last, changes, period_ns = self.count(), self.count(), self.count(), self._integer(1, _NS)
+        index, last, changes, period_ns = self.count(), self.count(), self.count(), self._integer(1, _MAX_PERIOD_NS)
         size = [self.count(), self._integer(0, MAX_SIZE_PX), self._integer(0, MAX_SIZE_PX)]
         return Rung(index, last, changes, period_ns, *size)
 

@@ -86,6 +86,7 @@ def losses(result: CaseResult) -> dict[str, int]:
     lost["lost_on_link"] = sum(account.lost for account in link.sessions)
     lost["stale"] = sum(account.duplicate + account.old_session for account in link.sessions)
     lost["before_clock"] = link.no_clock
+    lost |= {f"disbelieved_{reason.value}": count for reason, count in link.disbelieved.items()}
     lost |= {f"{reason}_board_frame": count for reason, count in counts.board_orphans}
     lost["dropped_in_fifo"] = counts.dropped
     lost["undecodable"] = result.undecodable
@@ -139,6 +140,7 @@ def _counts(result: CaseResult) -> dict[str, object]:
         "under_way_at_end_frames": board.sent - received - lost,
         "received_frames": received,
         "before_clock_frames": link.no_clock,
+        "disbelieved_frames": {reason.value: count for reason, count in link.disbelieved.items()},
         "orphaned_frames": dict(counts.board_orphans),
         "held_at_end_frames": counts.held_board,
         "paired_pairs": counts.paired,

@@ -26,7 +26,7 @@ class LinkClocks:
         self._estimators = [ClockEstimator() for _ in range(links)]
         self._estimate: ClockEstimate | None = None
         self._believed: ClockEstimate | None = None
-        self._contested = False
+        self._contested = self._void = False
 
     @property
     def estimate(self) -> ClockEstimate | None:
@@ -35,8 +35,8 @@ class LinkClocks:
 
     @property
     def in_doubt(self) -> bool:
-        """Whether echoes contradict each other, and no later ones have decided yet."""
-        return self._contested or any(estimator.in_doubt for estimator in self._estimators)
+        """Whether echoes contradict each other, or what was known is void, and no later ones have decided yet."""
+        return self._void or self._contested or any(estimator.in_doubt for estimator in self._estimators)
 
     def round_trip_ns(self, link: int) -> int | None:
         """Least round trip of late over one link; None before its first echo."""
@@ -60,17 +60,21 @@ class LinkClocks:
         if heard is Heard.STEPPED:
             self._contested = False
             self._forget(keep=echo.link)
-            if estimator.estimate is not None and self._fits_what_was_believed(estimator.estimate):
-                heard = Heard.AGREED  # it was the other link that lied
+        if heard is Heard.STEPPED or (heard is Heard.AGREED and self._void):
+            # What was known may hold still: it was another link that lied, or neither clock has stood still.
+            heard = Heard.AGREED if self._fits_what_was_believed(estimator.estimate) else Heard.STEPPED
+            self._void = False
         self._estimate = None if self.in_doubt else self._solved(estimator.estimate)
         self._believed = self._estimate or self._believed
         return heard
 
     def void(self) -> None:
-        """Forget the offset: one of the two clocks may have stood still. What is known of their rates stays."""
+        """Forget the offset: one of the two clocks may have stood still. What is known of their rates stays; the next echo tells whether one has."""
+        if self._believed is None:
+            return
         self._forget(keep=None)
-        self._contested = False
-        self._estimate = self._believed = None
+        self._void, self._contested = True, False
+        self._estimate = None
 
     def down(self, link: int) -> None:
         """Take note that a link is gone: a doubt that only its echoes could have settled goes with it."""
@@ -84,9 +88,10 @@ class LinkClocks:
             for link, estimator in enumerate(self._estimators)
         ]
 
-    def _fits_what_was_believed(self, newest: ClockEstimate) -> bool:
-        believed = self._believed
-        return believed is not None and _meet(newest, [moved(believed, newest.reference_ns)]) is not None
+    def _fits_what_was_believed(self, newest: ClockEstimate | None) -> bool:
+        if newest is None or self._believed is None:
+            return False
+        return _meet(newest, [moved(self._believed, newest.reference_ns)]) is not None
 
     def _contradicts_others(self, estimator: ClockEstimator) -> bool:
         """Whether what one link says can be true with what no other says."""

@@ -35,6 +35,7 @@ class OrphanReason(Enum):
     OUT_OF_ORDER = "out_of_order"
     EVICTED = "evicted"
     STREAM_ENDED = "stream_ended"
+    CLOCK = "clock_in_doubt"
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,6 +174,13 @@ class Pairing(Generic[B, H]):
         self._last_board_ns = -(2**63)
         self._undecided_since_ns = None
         self._aligned = False
+        return outcomes
+
+    def void(self) -> list[Outcome[B, H]]:
+        """Give up all frames of both sides: one of the two clocks may have stood still, so that frames from before mean nothing to those that follow."""
+        outcomes = self.restart(OrphanReason.CLOCK)
+        outcomes += [HostOrphan(frame, OrphanReason.CLOCK) for _, frame in self._host]
+        self._host.clear()
         return outcomes
 
     def finish(self) -> list[Outcome[B, H]]:

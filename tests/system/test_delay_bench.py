@@ -68,6 +68,7 @@ def test_every_delay_is_measured_and_every_frame_accounted_for(tmp_path: Path) -
     )
     assert whole["under_way_at_end_frames"] >= 0
     orphaned = sum(whole["orphaned_frames"].values())
+    assert whole["disbelieved_frames"] == {}
     assert whole["received_frames"] - whole["before_clock_frames"] == (
         whole["paired_pairs"] + orphaned + whole["held_at_end_frames"]
     )

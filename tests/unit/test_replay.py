@@ -111,6 +111,8 @@ def test_the_image_of_a_moment(
         now_ns += step_ns
         grabs = camera.read(now_ns)
         for grab in grabs:
+            if isinstance(grab, Skipped):  # after a long pause, the older ones by their number
+                continue
             assert isinstance(grab, Frame)
             number = round(grab.exposed.ns * fps / 10**9)
             assert abs(grab.exposed.ns - Fraction(number * 10**9) / fps) <= Fraction(1, 2)

@@ -182,7 +182,7 @@ def test_a_board_without_its_frames_lane_keeps_the_clock() -> None:
 
 
 @pytest.mark.parametrize("board_dials", [False, True])
-def test_a_refusal_counts_on_a_lane_that_was_dialled_only(board_dials: bool) -> None:
+def test_a_refusal_counts_on_a_lane_that_was_dialled_only(*, board_dials: bool) -> None:
     """A stranger who calls a waiting host may say anything; only who was called can refuse."""
     world = World(board_dials=board_dials)
     host = world.hosts[0]

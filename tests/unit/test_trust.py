@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from common.camera.base import CameraHealth, CameraState
 from phone_host.model import UNMEASURED_NS, TimeOffset
-from phone_host.trust import Doubt, Timing, concerns, stamp_doubt
+from phone_host.trust import Doubt, Timing, stamp_doubt, timing_concerns
 
 MS = 1_000_000
 STILL = Timing(time_skew_ns=16 * MS, uncertainty_ns=0.1 * MS, end_to_end_ns=80 * MS, motion_px_s=0.0, width_px=640)
@@ -39,14 +39,16 @@ STILL = Timing(time_skew_ns=16 * MS, uncertainty_ns=0.1 * MS, end_to_end_ns=80 *
 )
 def test_the_limits(timing: Timing, found: list[Doubt]) -> None:
     """Half a pixel by time skew or clock, a twentieth of the width by age; what is not known makes no warning."""
-    assert [concern.doubt for concern in concerns(timing)] == found
+    assert [concern.doubt for concern in timing_concerns(timing)] == found
 
 
 @given(st.floats(0, 1e8), st.floats(0, 1e4))
 def test_more_skew_or_motion_never_silences_the_warning(skew_ns: float, motion_px_s: float) -> None:
     """The skew warning stands exactly where skew x motion passes half a pixel, and names a remedy."""
     warned = [
-        c for c in concerns(replace(STILL, time_skew_ns=skew_ns, motion_px_s=motion_px_s)) if c.doubt is Doubt.TIME_SKEW
+        c
+        for c in timing_concerns(replace(STILL, time_skew_ns=skew_ns, motion_px_s=motion_px_s))
+        if c.doubt is Doubt.TIME_SKEW
     ]
     assert bool(warned) is (skew_ns / 1e9 * motion_px_s > 0.5)
     assert all(concern.remedy for concern in warned)
@@ -95,8 +97,8 @@ def test_what_is_not_known_of_the_stamps_adds_up(
     assert doubt.half_width_ns == half_width_ns
     limit_px_s = 0.5e9 / half_width_ns
     calm = replace(STILL, time_skew_ns=0, uncertainty_ns=0, end_to_end_ns=0, stamps=doubt)
-    assert concerns(replace(calm, motion_px_s=0.99 * limit_px_s)) == ()
-    (concern,) = concerns(replace(calm, motion_px_s=1.01 * limit_px_s))
+    assert timing_concerns(replace(calm, motion_px_s=0.99 * limit_px_s)) == ()
+    (concern,) = timing_concerns(replace(calm, motion_px_s=1.01 * limit_px_s))
     assert concern.doubt is Doubt.STAMPS
     assert said in concern.sentence
     assert remedy in concern.remedy
