@@ -19,7 +19,8 @@ from common.protocol.message import FrameMessage, Pacing
 from phone_host.formats.atomic import write_bytes
 from phone_host.model import BoardFrame
 from phone_host.pairqueue import PairQueue
-from phone_host.receiver import Receiver, refusal_text
+from phone_host.receiver import Receiver
+from phone_host.reception import refusal_text
 from phone_host.source import Source
 from phone_host.stereo.raw_images import EncodedImage
 from phone_host.sync.fifo import FifoSettings

@@ -21,7 +21,8 @@ from phone_host.model import FramePair, Side, TimeOffset
 from phone_host.motion import MotionMeter
 from phone_host.pairqueue import PairQueue
 from phone_host.pipeline import Pipeline, Processed
-from phone_host.receiver import Receiver, refusal_text
+from phone_host.receiver import Receiver
+from phone_host.reception import refusal_text
 from phone_host.results import Results
 from phone_host.source import Source
 from phone_host.stereo.core import StereoCore

@@ -5,7 +5,7 @@ Conservation: received = paired + orphaned(by reason) + held; paired = taken + d
 
 import threading
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final, assert_never
 
@@ -71,6 +71,7 @@ class PairQueue:
         host_period_ns: time between two frames of the own camera.
         on_demand: whether the own camera shows images on demand.
         time_offset_ns: added to the board's stamps before they are compared with the host's.
+        clock: monotonic, ns.
     """
 
     def __init__(
@@ -81,7 +82,9 @@ class PairQueue:
         *,
         on_demand: bool = False,
         time_offset_ns: int = 0,
+        clock: Callable[[], int] = now.monotonic_ns,
     ) -> None:
+        self._clock = clock
         self._settings = fifo
         self._fifo: Fifo[FramePair] = Fifo(fifo)
         self._tolerance_ns = tolerance_ns
@@ -182,7 +185,7 @@ class PairQueue:
             self._meter = PhaseMeter(board_period_ns, self._host_period_ns)
             changed = PairingSettings(self.tolerance_ns, board_period_ns, self._host_period_ns)
             if not self._closed:
-                self._settle(self._pairing.change(changed, now.monotonic_ns()))
+                self._settle(self._pairing.change(changed, self._clock()))
 
     def add_board(self, frame: BoardFrame) -> int:
         """Take a frame of the board.
@@ -204,7 +207,7 @@ class PairQueue:
             self._newest.append(frame)
             if self._meter is not None:
                 self._meter.add_board(exposed_ns)
-            self._settle(self._pairing.add_board(exposed_ns, frame, now.monotonic_ns()))
+            self._settle(self._pairing.add_board(exposed_ns, frame, self._clock()))
             while self._board_bytes > _SIDE_BYTES or self._pairing.held_board > _SIDE_FRAMES:
                 self._settle(self._pairing.evict_oldest_board())
             return exposed_ns
@@ -229,7 +232,7 @@ class PairQueue:
             if self._pairing is None or self._closed:
                 self._count(self._host_orphans, OrphanReason.STREAM_ENDED.value if self._closed else "no_board")
                 return
-            now_ns = now.monotonic_ns()
+            now_ns = self._clock()
             if self._meter is not None:
                 self._meter.add_host(frame.exposed.ns)
             self._host_bytes += len(frame.payload)
@@ -242,7 +245,7 @@ class PairQueue:
         """Let time pass: settle what has waited long enough."""
         with self._changed:
             if self._pairing is not None and not self._closed:
-                now_ns = now.monotonic_ns()
+                now_ns = self._clock()
                 self._settle(self._pairing.decide(now_ns))
                 self._evict(now_ns)
 
@@ -279,9 +282,9 @@ class PairQueue:
                 case Paired(board, host, time_skew_ns):
                     self._host_bytes -= len(host.payload)
                     self._board_bytes -= len(board.message.payload)
-                    paired_ns = now.monotonic_ns()
+                    paired_ns = self._clock()
                     self._paired += 1
-                    pair = FramePair(board, host, time_skew_ns, paired_ns, now.monotonic_ns(), self._before(board))
+                    pair = FramePair(board, host, time_skew_ns, paired_ns, self._clock(), self._before(board))
                     self._dropped += len(self._fifo.put(pair))
                     self._changed.notify()
                 case BoardOrphan(frame, reason):

@@ -1,68 +1,29 @@
-"""The host's end of all links in a thread of its own: session, choice of the link, clock estimate, credit. Frames go to the pair queue with all marks set."""
+"""The host's end of all links, in a thread of its own: bytes become messages for the reception, what that says goes out."""
 
-import logging
 import os
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
-from typing import Final, Protocol
+from typing import Final
 
 from common import now
-from common.errors import ProtocolError, UnavailableError
+from common.errors import ProtocolError
 from common.link.base import Broken, Garbage, Incoming, Link, Packet
 from common.link.several import SeveralLinks
 from common.link.wait import Waiter
-from common.logs import event
-from common.protocol.host_session import HostSession
-from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Pacing, Ping, RefusalReason, Rung
-from common.protocol.session import (
-    Accepted,
-    Arrived,
-    ClockVoid,
-    Counted,
-    Echo,
-    LinkDown,
-    LinkUp,
-    OtherBoard,
-    Outgoing,
-    Output,
-    Refused,
-    Stale,
-    Stepped,
-    Unbelievable,
-    Vanished,
-    connection_name,
-)
+from common.protocol.message import BoardHello, Ping, RefusalReason
+from common.protocol.session import Outgoing, connection_name
 from common.protocol.wire import VersionError, decode, encode_stamped
-from phone_host.accounts import LinkAccount, LinkTally, SessionAccount, link_names
-from phone_host.border import Border
-from phone_host.model import BoardFrame
+from phone_host.accounts import LinkAccount
 from phone_host.pairqueue import PairQueue
-from phone_host.sync.choice import LinkChoice
+from phone_host.reception import BoardListener, LinkFacts, Reception
 from phone_host.sync.clock import ClockEstimate
-from phone_host.sync.flow import Flow
-
-_LOG = logging.getLogger(__name__)
 
 _LONGEST_WAIT_MS: Final = 50
 """The pair queue's patience is checked at least this often."""
 
 _FAREWELL_NS: Final = 300_000_000
 """How long a leaving host waits for the board's last account: a few round trips of any usable link."""
-
-_REFUSAL_NS: Final = 1_000_000_000
-"""A board that refuses does so at every hello, five times a second; one that has not done so for this long is gone."""
-
-
-class BoardListener(Protocol):
-    """Who is told of the board by the receiver's thread."""
-
-    def session_began(self) -> None:
-        """A life of the board begins; nothing of the one before will follow."""
-
-    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """A frame has come: its exposure on the host's clock, and its number if the board shows images on demand."""
 
 
 class Receiver:
@@ -78,62 +39,57 @@ class Receiver:
     def __init__(self, links: Sequence[Link], host_id: str, queue: PairQueue, listener: BoardListener) -> None:
         self._links = tuple(links)
         self._several = SeveralLinks(links)
-        self._queue = queue
-        self._listener = listener
-        dialled = [
-            {lane: connection_name(number, path) for lane, path in link.dialled.items()}
+        facts = [
+            LinkFacts(
+                link.kind,
+                {lane: connection_name(number, path) for lane, path in link.dialled.items()},
+                link.self_paced,
+            )
             for number, link in enumerate(links)
         ]
-        self._session = HostSession(host_id, dialled)
-        self._choice = LinkChoice(len(dialled))
-        self._boot_id = ""
-        self._hello: BoardHello | None = None
-        self._flow = Flow()
-        self._streamed_over: int | None = None
+        self._reception = Reception(facts, host_id, queue, listener, self._send)
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._waiter = Waiter([*(item for link in links for item in link.pollables), self._wake_read])
         self._stopping = False
         self._later_ns = 0
-        self._tail_known = False
         self._sleep = now.SleepWatch()
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
-        self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
-        self._border = Border(self.account, queue.void)
         self.failure: Exception | None = None
-        self._refused: tuple[RefusalReason, int] | None = None
-        self._turned_away: set[int] = set()
+
+    @property
+    def account(self) -> LinkAccount:
+        """What was seen so far."""
+        return self._reception.account
 
     @property
     def refused(self) -> RefusalReason | None:
         """Why the board that was last heard does not talk to us; None when it does, or is silent now."""
-        refused = self._refused  # read once: the receiver's thread may set it to None meanwhile
-        return None if refused is None or now.monotonic_ns() - refused[1] > _REFUSAL_NS else refused[0]
+        return self._reception.refused(now.monotonic_ns())
 
     @property
     def connected(self) -> bool:
         """Whether a board talks to us now."""
-        return self._session.is_open
+        return self._reception.connected
 
     @property
     def carrier(self) -> str:
         """Name of the link that frames come over now; empty while there is none."""
-        link = self._session.carrier
-        return "" if link is None else self.account.links[link].name
+        return self._reception.carrier
 
     @property
     def hello(self) -> BoardHello | None:
         """What the board said of itself; None before the first contact."""
-        return self._hello
+        return self._reception.hello
 
     @property
     def estimate(self) -> ClockEstimate | None:
         """The clock estimate now; None before the first echo, and while it is in doubt."""
-        return self._border.estimate
+        return self._reception.estimate
 
     @property
     def ended(self) -> bool:
         """Whether the board's camera has come to its end."""
-        return bool(self.account.sessions) and self.account.sessions[-1].ended
+        return self._reception.ended
 
     def start(self) -> None:
         """Begin to look for the board."""
@@ -165,21 +121,20 @@ class Receiver:
         except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
             self.failure = error
         finally:
-            for frame in self._border.leave():
-                self._queue.add_board(frame)  # the stream has ended for them
+            self._reception.close()
             for link in self._links:
                 link.close()
 
     def _part(self) -> None:
         """Say goodbye and wait a moment for the board's last account: it comes behind the last frame."""
-        farewell = self._session.leave()
-        self._handle(farewell, now.monotonic_ns())
+        reception = self._reception
+        heard = reception.leave(now.monotonic_ns())
         deadline_ns = now.monotonic_ns() + _FAREWELL_NS
-        while farewell and not self._tail_known and (left_ns := deadline_ns - now.monotonic_ns()) > 0:
+        while heard and not reception.tail_known and (left_ns := deadline_ns - now.monotonic_ns()) > 0:
             self._waiter.wait(left_ns // 1_000_000 + 1)
             self._receive()
-        if farewell and not self._tail_known:
-            self._current.vanished = True  # what it sent since its newest account is not known
+        if heard and not reception.tail_known:
+            reception.lose_tail()
 
     def _receive(self) -> None:
         """Take all that has come."""
@@ -189,248 +144,40 @@ class Receiver:
     def _step(self) -> None:
         now_ns = now.monotonic_ns()
         links_due_ns = min(link.due_ns for link in self._links)
-        due_ns = min(self._session.due_ns, links_due_ns)
+        due_ns = min(self._reception.due_ns, links_due_ns)
         wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
         ready = self._waiter.wait(wait_ms)
-        self._watch_clock()
+        if slept_ns := self._sleep.slept_ns():
+            self._reception.slept(slept_ns, now.monotonic_ns())
         if ready or now.monotonic_ns() >= links_due_ns:
             self._receive()
             if self._wake_read in ready:
                 os.read(self._wake_read, 4096)
         now_ns = now.monotonic_ns()
-        if self._border.waits_for_echo:
-            self._session.probe(now_ns)
-        if now_ns >= self._session.due_ns:
-            self._handle(self._session.tick(now_ns), now_ns)
-            if len(self._links) > 1 and (best := self._choice.best(now_ns)) is not None:
-                self._handle(self._session.carry(best, now_ns), now_ns)
-        self._queue.tick()
-        self._grant(now_ns)
+        self._reception.tick(now_ns)
         if self._later_ns:
             later_ns, self._later_ns = self._later_ns, 0
-            self._handle(self._session.steer(later_ns), now_ns)
+            self._reception.steer(later_ns, now_ns)
 
     def _take(self, link: int, incoming: Incoming, now_ns: int) -> None:
+        reception, connection = self._reception, connection_name(link, incoming.connection)
         match incoming:
-            case Broken(path):
-                self._handle(self._session.interrupted(connection_name(link, path), now_ns), now_ns)
+            case Broken():
+                reception.interrupted(connection, now_ns)
             case Garbage():
-                self._count_garbage("not a packet")
-            case Packet(path, header, payload):
+                reception.count_garbage("not a packet")
+            case Packet(_, header, payload):
                 try:
                     message = decode(header, payload)
                 except VersionError as error:
-                    # In a running session it is somebody else's noise, and whoever called here may be anybody.
-                    if not self._session.is_open and path in self._links[link].dialled.values():
-                        self._refused = (RefusalReason.VERSION, now_ns)
-                    self._count_garbage(error.problem)
+                    reception.refuse_version(connection, error.problem, now_ns)
                 except ProtocolError as error:
-                    self._count_garbage(error.problem)
+                    reception.count_garbage(error.problem)
                 else:
-                    self._handle(self._session.receive(connection_name(link, path), message, now_ns), now_ns)
-
-    def _count_garbage(self, problem: str) -> None:
-        self.account.garbage += 1
-        if self.account.garbage.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: a hostile peer must not fill the log
-            _LOG.warning(event("garbage", count=self.account.garbage, problem=problem))
-
-    def _grant(self, now_ns: int) -> None:
-        carrier, hello = self._session.carrier, self._hello
-        if carrier is None or hello is None or not self._border.takes_frames:
-            return  # without a clock a frame could not be paired
-        if hello.camera.pacing is Pacing.DEMAND or self._queue.held_back_by_credit:
-            self._handle(self._session.grant(self._queue.free_slots()), now_ns)
-            return
-        round_trip_ns = (self._border.round_trip_ns(carrier) or 0) if self._links[carrier].self_paced else None
-        frames = self._flow.credit(self._session.outstanding, hello.camera.period_ns, round_trip_ns)
-        if frames:
-            self._handle(self._session.grant(frames), now_ns)
+                    reception.receive(connection, message, now_ns)
 
     def _send(self, outgoing: Outgoing) -> None:
         header, payload = encode_stamped(outgoing.message, now.monotonic_ns)
         self._links[outgoing.connection[0]].send(outgoing.connection[1:], header, payload)
         if isinstance(outgoing.message, Ping):
             self._waiter.stay_awake()
-
-    def _handle(self, outputs: list[Output], now_ns: int) -> None:
-        for output in outputs:
-            match output:
-                case Outgoing():
-                    self._send(output)
-                case Arrived(frame, lost, link):
-                    self._accept_frame(frame, lost, link, now_ns)
-                case Echo() | ClockVoid():
-                    self._note_clock(output, now_ns)
-                case Stale(_, reason):
-                    self._current.count_stale(reason)
-                case Accepted():
-                    self._begin(output, now_ns)
-                case LinkUp() | LinkDown() | OtherBoard():
-                    self._note_link(output, now_ns)
-                case Counted():
-                    self._note_account(output, now_ns)
-                case Stepped(rung):
-                    self._note_rung(rung)
-                case Refused() | Unbelievable():
-                    self._note_refusal(output, now_ns)
-                case Vanished(orderly):
-                    self._note_gone(orderly=orderly, now_ns=now_ns)
-
-    def _watch_clock(self) -> None:
-        """Notice that this machine has slept: its clock stood still, the board's and the cameras' went on."""
-        slept_ns = self._sleep.slept_ns()
-        if slept_ns:
-            self._border.void(f"this machine slept for {slept_ns / 1e9:.1f} s")
-            now_ns = now.monotonic_ns()
-            self._handle(self._session.begin_clock(now_ns), now_ns)
-
-    def _note_clock(self, echo: Echo | ClockVoid, now_ns: int) -> None:
-        """Take an echo to the clock, and let frames pass that it has proven; or begin anew."""
-        if isinstance(echo, ClockVoid):
-            self._border.void("the board had forgotten this host")
-            return
-        for link, frame in self._border.learn(echo):
-            self._pass(link, frame)
-        self._choice.echo(echo.link, (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns), now_ns)
-
-    def _note_account(self, counted: Counted, now_ns: int) -> None:
-        """Take the board's account of the running session."""
-        self._tail_known = counted.last
-        account = self._current
-        account.lost += counted.lost
-        account.latest = max(counted.counts, account.latest, key=lambda counts: counts.grabbed)
-        account.ended |= counted.ended
-        self._choice.account(counted.counts.grabbed, now_ns, has_credit=self._session.outstanding > 0)
-
-    def _note_refusal(self, refused: Refused | Unbelievable, now_ns: int) -> None:
-        """A board does not talk to us, which is told once where another link is up, because then the run goes on; or it talks nonsense."""
-        if isinstance(refused, Unbelievable):
-            self._count_garbage(refused.problem)
-            return
-        self._refused = (refused.reason, now_ns)
-        if self._session.is_open and refused.link not in self._turned_away:
-            self._turned_away.add(refused.link)
-            problem, remedy = refusal_text(refused.reason)
-            _LOG.warning(
-                event("link_refused", link=self.account.links[refused.link].name, problem=problem, remedy=remedy)
-            )
-
-    def _note_gone(self, *, orderly: bool, now_ns: int) -> None:
-        """The board is not there any more, on no link."""
-        self._border.close()
-        self._current.vanished = not orderly
-        for number, tally in enumerate(self.account.links):
-            self._choice.down(number, now_ns)
-            tally.is_up = False
-        _LOG.info(event("board_gone", session=self._current.session, orderly=orderly))
-
-    def _note_link(self, news: LinkUp | LinkDown | OtherBoard, now_ns: int) -> None:
-        """Take note of a link that came up, went down, or leads astray."""
-        tally = self.account.links[news.link]
-        match news:
-            case LinkUp(link, hello):
-                tally.is_up = True
-                self._turned_away.discard(link)
-                if hello.boot_id != self._boot_id:
-                    self._boot_id = hello.boot_id
-                    self._border.other_clock()
-                self._choice.up(link, now_ns)
-                _LOG.info(event("link_up", link=tally.name))
-            case LinkDown(link, stuck):
-                tally.is_up = stuck
-                tally.lost += 1
-                self._border.link_down(link)
-                self._choice.down(link, now_ns)
-                if stuck:
-                    self._choice.up(link, now_ns)
-                _LOG.info(event("link_down", link=tally.name, stuck=stuck))
-            case OtherBoard(link, hello):
-                ours = self._hello
-                names = " and ".join(tally.name for tally in self.account.links)
-                if tally.frames or tally.lost or ours is None:  # it was right once: somebody has moved a cable
-                    _LOG.warning(event("other_board", link=tally.name, camera=hello.camera.name))
-                    return
-                raise UnavailableError(
-                    f"links {names} lead to different boards ({ours.camera.name} and, on link {link + 1}, {hello.camera.name})",
-                    "give --link only addresses of one board",
-                )
-
-    @property
-    def _current(self) -> SessionAccount:
-        if not self.account.sessions:
-            self.account.sessions.append(SessionAccount("", BoardCounts(), BoardCounts()))
-        return self.account.sessions[-1]
-
-    def _begin(self, accepted: Accepted, now_ns: int) -> None:
-        hello, link = accepted.hello, accepted.link
-        self._refused = None
-        self._hello = hello
-        self._flow = Flow()
-        self._tail_known = False
-        self._choice.carries(link, now_ns)
-        tally, before = self.account.links[link], self._streamed_over
-        self._streamed_over = link
-        if accepted.resumed:
-            self._current.lost += accepted.lost
-            self._current.vanished = False
-        else:
-            self.account.sessions.append(SessionAccount(hello.session, hello.counts, hello.counts))
-            self._listener.session_began()
-            self._queue.begin(hello.camera.period_ns, on_demand=hello.camera.pacing is Pacing.DEMAND)
-        self._current.rung = hello.rung
-        self._queue.change_period(hello.camera.period_ns)
-        if link != before:
-            tally.carried += 1
-        if accepted.resumed and before is not None and link != before:
-            self.account.switches += 1
-            names = self.account.links
-            _LOG.info(event("link_switched", source=names[before].name, target=tally.name, lost=accepted.lost))
-            return
-        self.account.connects += 1
-        camera = hello.camera
-        size = f"{camera.width_px}x{camera.height_px}"
-        found = {"session": hello.session, "resumed": accepted.resumed, "link": tally.name}
-        _LOG.info(event("board_found", **found, camera=camera.name, size=size))
-
-    def _note_rung(self, rung: Rung) -> None:
-        """Go by another rate of the board's camera."""
-        assert self._hello is not None
-        self._hello = replace(self._hello, camera=replace(self._hello.camera, period_ns=rung.period_ns), rung=rung)
-        self._current.rung = rung
-        self._queue.change_period(rung.period_ns)
-        fps = round(1e9 / rung.period_ns, 2)
-        _LOG.info(event("board_camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality))
-
-    def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
-        """Take a frame of the running session to the border."""
-        account, tally = self._current, self.account.links[link]
-        account.received += 1
-        account.lost += lost
-        tally.frames += 1
-        tally.bytes += len(frame.payload)
-        assert self._hello is not None
-        admitted = self._border.admit(frame, link, account, self._hello.camera, now_ns)
-        if admitted is not None:
-            self._pass(link, admitted)
-
-    def _pass(self, link: int, frame: BoardFrame) -> None:
-        """Give a frame that is believed to the pair queue."""
-        assert self._hello is not None
-        camera, message, marks = self._hello.camera, frame.message, frame.marks
-        transit_ns = frame.received_ns - marks.sent_ns
-        self._choice.frame(link, transit_ns, frame.received_ns)
-        self._flow.arrived(transit_ns, marks.sent_ns - marks.grabbed_ns, camera.period_ns, frame.received_ns)
-        self.account.links[link].age.add(frame.received_ns - marks.exposed_ns)
-        self._border.passed(message)
-        stamp_ns = self._queue.add_board(frame)
-        on_demand = camera.pacing is Pacing.DEMAND
-        self._listener.frame_arrived(stamp_ns, message.sequence if on_demand else None)
-
-
-def refusal_text(reason: RefusalReason) -> tuple[str, str]:
-    """What a refusal means, and its remedy."""
-    match reason:
-        case RefusalReason.BUSY:
-            return "the board is busy with another host", "stop the other one first"
-        case RefusalReason.VERSION:
-            return "the board speaks another protocol version", "update the older of the two"

@@ -23,7 +23,8 @@ from phone_host.bench.cases import BOARD_SETS, Case, Interface, Size
 from phone_host.boardprocess import BoardAccount, BoardProcess, board_process, free_port
 from phone_host.emulate import NOTHING
 from phone_host.pairqueue import PairQueue
-from phone_host.receiver import Receiver, refusal_text
+from phone_host.receiver import Receiver
+from phone_host.reception import refusal_text
 from phone_host.relay import RelayAccount, RelayProcess, relay_process
 from phone_host.sync.fifo import FifoSettings
 

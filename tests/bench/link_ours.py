@@ -15,7 +15,7 @@ from common.link.base import Link
 from common.link.factory import open_link, parse_link
 from common.link.stream import StreamLink
 from common.protocol.framing import Side
-from common.protocol.message import FrameMessage, Pacing
+from common.protocol.message import Pacing
 from phone_host.model import BoardFrame
 from phone_host.pairqueue import PairQueue
 from phone_host.receiver import Receiver
@@ -84,21 +84,16 @@ def receive_tandemscan(job: Job) -> Tally:
     """Our host: the receiver with session, clock and credit."""
     tally = job.tally()
 
-    class Stamping(Receiver):
-        """Stamps frames when they are decoded and the session has taken them."""
-
-        def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
-            tally.arrived(frame.sequence, frame.marks.sent_ns, len(frame.payload))
-            super()._accept_frame(frame, lost, link, now_ns)
-
     class NoPairing(PairQueue):
-        """Ends the frames' way: pairing is no part of a link."""
+        """Ends the frames' way when they have passed the border: pairing is no part of a link."""
 
         def add_board(self, frame: BoardFrame) -> int:
+            message = frame.message
+            tally.arrived(message.sequence, message.marks.sent_ns, len(message.payload))
             return frame.marks.exposed_ns
 
     queue = NoPairing(FifoSettings(_SLOTS), None, 1_000_000_000 // (job.fps or 30))
-    receiver = Stamping([_open(job.address)], now.random_id(), queue, Unheard())
+    receiver = Receiver([_open(job.address)], now.random_id(), queue, Unheard())
     receiver.start()
     while not receiver.ended and receiver.failure is None:
         time.sleep(0.1)

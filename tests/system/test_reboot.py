@@ -50,7 +50,7 @@ def test_another_boot_is_another_clock(tmp_path: Path) -> None:
             with life(folder, address, boot_id):
                 until(lambda n=number: receiver.account.connects > n, "the host has met this life of the board")  # type: ignore[misc]
                 until(lambda: receiver.estimate is not None and receiver.connected, "its clock is known")
-                clocks.append(receiver._border._clock)
+                clocks.append(receiver._reception._border._clock)
             until(lambda: not receiver.connected, "the host has noticed its end")
     finally:
         receiver.stop()
