@@ -6,6 +6,7 @@ check of its stamps any more. Belongs to the receiver's thread.
 
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 from common.logs import event
@@ -21,6 +22,18 @@ _LOG = logging.getLogger(__name__)
 
 _MOST_HELD: Final = 4
 """While so many frames wait for an echo no more are asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """A frame that came, with what was known of it at that moment: link, session's account, camera, and its last byte's arrival, ns."""
+
+    frame: FrameMessage
+    link: int
+    account: SessionAccount
+    camera: CameraDescription
+    received_ns: int
+
 
 Admitted = tuple[int, BoardFrame]
 """A frame that may pass, and the link that it came over."""
@@ -38,9 +51,8 @@ class Border:
         self._account = account
         self._on_doubt = on_doubt
         self._clock = LinkClocks(len(account.links))
-        self._gate: Gate[Admitted] = Gate()
+        self._gate: Gate[Arrival] = Gate()
         self._unproven = Unproven()
-        self._session: SessionAccount | None = None
 
     @property
     def estimate(self) -> ClockEstimate | None:
@@ -72,18 +84,20 @@ class Border:
         self._clock.void()
         self._begin_doubt(why)
 
+    def slept(self, slept_ns: int) -> None:
+        """This machine has slept: its clock stood still, the board's and the cameras' went on."""
+        self._clock.void(stepped=True)
+        self._begin_doubt(f"this machine slept for {slept_ns / 1e9:.1f} s")
+        self._note_step()
+
     def link_down(self, link: int) -> None:
         """A link is lost, and with it what its echoes left open."""
         self._clock.down(link)
 
     def close(self) -> None:
         """Give up the frames that wait for an echo: none will come for them."""
-        for _ in self._gate.void():
-            self._drop(Disbelief.CLOCK)
-
-    def leave(self) -> list[BoardFrame]:
-        """Give the frames that wait for an echo at the end of the run."""
-        return [frame for _, frame in self._gate.void()]
+        for arrival in self._gate.void():
+            arrival.account.disbelieved[Disbelief.CLOCK] += 1
 
     def learn(self, echo: Echo) -> list[Admitted]:
         """Take an echo to the clock.
@@ -102,61 +116,65 @@ class Border:
                 self._note_step()
             case Heard.AGREED:
                 if was_in_doubt and not self._clock.in_doubt:
-                    _LOG.info(event("clock_known_again", stepped=False))
+                    _LOG.info(event("clock_confirmed"))
                 self._unproven.confirmed(echo.t1_ns)
-                return self._gate.confirmed(echo.t1_ns)
+                return [known for arrival in self._gate.confirmed(echo.t1_ns) for known in self._examine(arrival)]
             case _:
                 pass
         return []
 
-    def admit(
-        self, frame: FrameMessage, link: int, account: SessionAccount, camera: CameraDescription, now_ns: int
-    ) -> BoardFrame | None:
+    def admit(self, arrival: Arrival) -> list[Admitted]:
         """Take a frame that has come.
 
         Args:
-            frame: what came.
-            link: over which link.
-            account: of its session.
-            camera: what the board says of its camera.
-            now_ns: arrival of the last byte, ns.
+            arrival: what came.
 
         Returns:
-            The frame with its marks on the host's clock, if it may pass now; None where it was dropped or has to wait for an echo.
+            The frame with its marks on the host's clock, if it may pass now; none where it was dropped or has to wait for an echo.
         """
-        self._session = account
-        estimate = self._clock.estimate
-        if frame.width_px > camera.width_px or frame.height_px > camera.height_px:
-            self._drop(Disbelief.SIZE)
-            return None
-        if estimate is None:
-            if self._clock.in_doubt:
-                self._drop(Disbelief.CLOCK)
-            else:
-                self._account.no_clock += 1
-            return None
-        # Only `sent` is mapped to the host's clock, once, here; the other marks keep their distance to it.
+        if self._clock.estimate is None and not self._clock.in_doubt:
+            self._account.no_clock += 1
+            return []
+        known = self._examine(arrival)
+        if not known or arrival.camera.pacing is Pacing.DEMAND:
+            return known
+        transit_ns = arrival.received_ns - known[0][1].marks.sent_ns
+        sent_ns, period_ns = arrival.frame.marks.sent_ns, arrival.camera.period_ns
+        return known if self._gate.arrived(arrival, sent_ns, transit_ns, period_ns) else []
+
+    def _examine(self, arrival: Arrival) -> list[Admitted]:
+        """Map a frame's marks to the host's clock; nothing where they cannot be, which is counted."""
+        frame, estimate = arrival.frame, self._clock.estimate
+        reason = Disbelief.CLOCK if estimate is None else self._doubts(arrival, estimate)
+        if estimate is None or reason is not None:
+            arrival.account.disbelieved[reason or Disbelief.CLOCK] += 1
+            return []
+        # Only `sent` is mapped to the host's clock, once, when the frame is believed; the other marks keep their distance to it.
         sent_ns = frame.marks.sent_ns
         told = estimate.to_host(sent_ns)
+        name, asked_px = self._account.links[arrival.link].name, (arrival.camera.width_px, arrival.camera.height_px)
         marks = frame.marks.moved_to(told.ns)
-        labelled = camera.pacing is Pacing.DEMAND
-        reason = disbelief(marks, now_ns, told.bound_ns, labelled=labelled)
-        if reason is not None:
-            self._drop(reason)
-            return None
-        name = self._account.links[link].name
-        asked_px = (camera.width_px, camera.height_px)
-        taken = BoardFrame(frame, name, marks, now_ns, told.ns - sent_ns, told.uncertainty_ns, asked_px)
-        passes = labelled or self._gate.arrived((link, taken), sent_ns, now_ns - marks.sent_ns, camera.period_ns)
-        return taken if passes else None
+        offset_ns = told.ns - sent_ns
+        return [
+            (
+                arrival.link,
+                BoardFrame(frame, name, marks, arrival.received_ns, offset_ns, told.uncertainty_ns, asked_px),
+            )
+        ]
+
+    def _doubts(self, arrival: Arrival, estimate: ClockEstimate) -> Disbelief | None:
+        frame, camera = arrival.frame, arrival.camera
+        if frame.width_px > camera.width_px or frame.height_px > camera.height_px:
+            return Disbelief.SIZE
+        labelled, since_ns = camera.pacing is Pacing.DEMAND, self._clock.since_ns
+        if since_ns is not None and frame.marks.exposed_ns < since_ns and not labelled:
+            return Disbelief.CLOCK
+        arrived_ns = arrival.received_ns - estimate.offset_at(arrival.received_ns - estimate.offset_ns)
+        return disbelief(frame.marks, arrived_ns, estimate.bound_at(arrived_ns), labelled=labelled)
 
     def passed(self, frame: FrameMessage) -> None:
         """Take note of a frame that was given on: until an echo proves it, it counts as suspect."""
         self._unproven.passed(frame.marks.sent_ns, frame.session, frame.sequence)
-
-    def _drop(self, reason: Disbelief) -> None:
-        if self._session is not None:
-            self._session.disbelieved[reason] += 1
 
     def _begin_doubt(self, why: str) -> None:
         self._account.clock_doubts += 1
@@ -165,10 +183,10 @@ class Border:
         _LOG.warning(event("clock_in_doubt", count=self._account.clock_doubts, why=why))
 
     def _note_step(self) -> None:
-        """A step is confirmed: what passed since the last echo before it may be paired wrongly."""
+        """A clock has stepped: what passed since the last echo before may be paired wrongly."""
         self._account.clock_steps += 1
         suspects = self._unproven.stepped()
         if suspects is not None:
             self._account.suspects.append(suspects)
         frames = 0 if suspects is None else suspects.frames
-        _LOG.warning(event("clock_known_again", stepped=True, count=self._account.clock_steps, suspect_frames=frames))
+        _LOG.warning(event("clock_stepped", count=self._account.clock_steps, suspect_frames=frames))

@@ -30,7 +30,7 @@ from common.protocol.session import (
     Vanished,
 )
 from phone_host.accounts import LinkAccount, LinkTally, SessionAccount, link_names
-from phone_host.border import Border
+from phone_host.border import Arrival, Border
 from phone_host.model import BoardFrame
 from phone_host.pairqueue import PairQueue
 from phone_host.sync.choice import LinkChoice
@@ -179,7 +179,7 @@ class Reception:
 
     def slept(self, slept_ns: int, now_ns: int) -> None:
         """Take note that this machine has slept: its clock stood still, the board's and the cameras' went on."""
-        self._border.void(f"this machine slept for {slept_ns / 1e9:.1f} s")
+        self._border.slept(slept_ns)
         self._handle(self._session.begin_clock(now_ns), now_ns)
 
     def leave(self, now_ns: int) -> bool:
@@ -189,9 +189,8 @@ class Reception:
         return bool(farewell)
 
     def close(self) -> None:
-        """Take note that nothing comes any more; frames that wait for an echo are the queue's, whose stream has ended."""
-        for frame in self._border.leave():
-            self._queue.add_board(frame)
+        """Take note that nothing comes any more."""
+        self._border.close()
 
     def lose_tail(self) -> None:
         """Take note that the last account did not come: what the board sent since its newest one is not known."""
@@ -244,8 +243,8 @@ class Reception:
         if isinstance(echo, ClockVoid):
             self._border.void("the board had forgotten this host")
             return
-        for link, frame in self._border.learn(echo):
-            self._pass(link, frame)
+        for passed in self._border.learn(echo):
+            self._pass(*passed)
         self._choice.echo(echo.link, (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns), now_ns)
 
     def _note_account(self, counted: Counted, now_ns: int) -> None:
@@ -364,9 +363,8 @@ class Reception:
         tally.frames += 1
         tally.bytes += len(frame.payload)
         assert self._hello is not None
-        admitted = self._border.admit(frame, link, account, self._hello.camera, now_ns)
-        if admitted is not None:
-            self._pass(link, admitted)
+        for passed in self._border.admit(Arrival(frame, link, account, self._hello.camera, now_ns)):
+            self._pass(*passed)
 
     def _pass(self, link: int, frame: BoardFrame) -> None:
         """Give a frame that is believed to the pair queue."""

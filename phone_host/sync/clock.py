@@ -153,6 +153,7 @@ class _Learned:
         self._prior_skew = prior_skew
         self._spacing: Spacing | None = None
         self.waves: deque[_Wave] = deque(maxlen=WAVES)
+        self.began_ns = echo.t1_ns
         self._store(echo)
         self.estimate = self._solved()
         assert self.estimate is not None
@@ -286,6 +287,11 @@ class ClockEstimator:
         if self._rival is not None:
             return None if self.in_doubt else self._rival.estimate
         return self._learned.estimate if self._learned is not None else None
+
+    @property
+    def began_ns(self) -> int | None:
+        """Board's time of the oldest echo that counts; None before the first."""
+        return None if self._learned is None else self._learned.began_ns
 
     @property
     def skew(self) -> float:

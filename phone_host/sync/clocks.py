@@ -20,6 +20,9 @@ class LinkClocks:
 
     Args:
         links: how many.
+
+    Attributes:
+        since_ns: board's time of the first echo after the last doubt: what was stamped before may be of a clock that has stepped since. None: no doubt yet.
     """
 
     def __init__(self, links: int) -> None:
@@ -27,6 +30,7 @@ class LinkClocks:
         self._estimate: ClockEstimate | None = None
         self._believed: ClockEstimate | None = None
         self._contested = self._void = False
+        self.since_ns: int | None = None
 
     @property
     def estimate(self) -> ClockEstimate | None:
@@ -64,14 +68,20 @@ class LinkClocks:
             # What was known may hold still: it was another link that lied, or neither clock has stood still.
             heard = Heard.AGREED if self._fits_what_was_believed(estimator.estimate) else Heard.STEPPED
             self._void = False
+            self.since_ns = estimator.began_ns
         self._estimate = None if self.in_doubt else self._solved(estimator.estimate)
         self._believed = self._estimate or self._believed
         return heard
 
-    def void(self) -> None:
-        """Forget the offset: one of the two clocks may have stood still. What is known of their rates stays; the next echo tells whether one has."""
+    def void(self, *, stepped: bool = False) -> None:
+        """Forget the offset: one of the two clocks may have stood still. What is known of their rates stays.
+
+        Args:
+            stepped: whether one certainly has; else the next echo tells.
+        """
         if self._believed is None:
             return
+        self._believed = None if stepped else self._believed
         self._forget(keep=None)
         self._void, self._contested = True, False
         self._estimate = None
@@ -90,7 +100,7 @@ class LinkClocks:
 
     def _fits_what_was_believed(self, newest: ClockEstimate | None) -> bool:
         if newest is None or self._believed is None:
-            return False
+            return newest is not None
         return _meet(newest, [moved(self._believed, newest.reference_ns)]) is not None
 
     def _contradicts_others(self, estimator: ClockEstimator) -> bool:

@@ -46,12 +46,12 @@ class Disbelief(Enum):
 
 
 def disbelief(marks: BoardMarks, received_ns: int, bound_ns: int, *, labelled: bool) -> Disbelief | None:
-    """Say what about a frame's marks cannot be.
+    """Say what about a frame's marks cannot be. All times on the board's clock, so that no claim of the frame is used to judge it.
 
     Args:
-        marks: on the host's clock.
+        marks: as they came.
         received_ns: arrival of the last byte, ns.
-        bound_ns: hard half-width of what is known of the offset.
+        bound_ns: hard half-width of what is known of that moment.
         labelled: the exposure is a label, as of images shown on demand.
 
     Returns:

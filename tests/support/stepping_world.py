@@ -1,0 +1,332 @@
+"""A board, a host and their cameras on simulated time, whose clocks step, sleep and are lied about. The world knows when each image was really exposed.
+
+Both roles of the session, the reception with its border, and the pair queue are the real ones; the wires keep their order and take their time. True
+time runs evenly; each machine's clock is true time plus a shift. A machine that sleeps is not run and its clock stands still, a program that
+is stopped is not run and its clock goes on.
+"""
+
+import random
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Final
+
+from common.frame import Frame, PixelFormat
+from common.ledger import BoardMarks
+from common.protocol.board_session import BoardSession
+from common.protocol.message import (
+    BoardCounts,
+    CameraDescription,
+    FrameMessage,
+    Lane,
+    Message,
+    Pacing,
+    Ping,
+    Pong,
+)
+from common.protocol.session import MS, Outgoing, connection_name
+from common.stamp import HOST_CLOCK, Stamp
+from phone_host.pairqueue import PairQueue
+from phone_host.reception import LinkFacts, Reception
+from phone_host.sync.fifo import FifoSettings, Overflow
+from phone_host.sync.gate import Disbelief
+
+PERIOD_NS: Final = 33_333_333
+_STEP_NS: Final = 5 * MS
+_BOARD_GRABS_NS: Final = 4 * MS
+_HOST_PHASE_NS: Final = 3 * MS
+_CAMERA = CameraDescription("simulated", 640, 480, PixelFormat.MJPEG, PERIOD_NS, Pacing.CLOCK)
+_NAMES: Final = {lane: connection_name(0, lane.name.encode()) for lane in Lane}
+
+
+@dataclass(slots=True)
+class Machine:
+    """A machine's clock, and until when (true time, ns) it or its program is not there."""
+
+    shift_ns: int
+    asleep_until_ns: int = 0
+    stopped_until_ns: int = 0
+    slept_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class WrongPair:
+    """A pair whose images were exposed too far apart, although what was known of the clocks said otherwise."""
+
+    session: str
+    sequence: int
+    apart_ns: int
+    allowed_ns: int
+
+
+class SteppingWorld:
+    """The world.
+
+    Args:
+        latency_ns: of the wires.
+        jitter: frames take up to this part of the latency longer.
+        seed: of everything that is left to chance.
+    """
+
+    def __init__(self, latency_ns: int, jitter: float, seed: int) -> None:
+        self._chance = random.Random(seed)
+        self._latency_ns, self._jitter = latency_ns, jitter
+        self.true_ns = 10**13
+        self.host = Machine(-(10**12))
+        self.board = Machine(7 * 10**12)
+        self.lives = 0
+        self.boot_id = "boot"
+        self._wires: dict[tuple[Lane, str], deque[tuple[int, Message]]] = {}
+        self._outbox: Frame | None = None
+        self._sent = self._grabbed = self._sequence = self._host_sequence = 0
+        self._board_shot_ns = self._host_shot_ns = self.true_ns
+        self._exposed: dict[tuple[str, int], int] = {}
+        self._host_exposed: dict[int, int] = {}
+        self._bound_ns = 0
+        self.queue = PairQueue(FifoSettings(64, Overflow.DROP_OLDEST), None, PERIOD_NS, clock=self.host_clock)
+        facts = [LinkFacts("tcp", dict(_NAMES), self_paced=False)]
+        self.reception = Reception(facts, "host", self.queue, self, self._host_says)
+        self._new_board()
+        self.pairs = 0
+        self.wrong: list[WrongPair] = []
+        self.answered_ns = 0
+        self.stepped_ns = 0
+        self.stepped_far_ns = 0
+        self._asked: dict[int, int] = {}
+
+    def host_clock(self) -> int:
+        """What the host's CLOCK_MONOTONIC shows."""
+        return self.true_ns + self.host.shift_ns
+
+    def board_clock(self) -> int:
+        """What the board's CLOCK_MONOTONIC shows."""
+        return self.true_ns + self.board.shift_ns
+
+    # What may happen.
+
+    def run(self, duration_ns: int) -> None:
+        """Let true time pass."""
+        end_ns = self.true_ns + duration_ns
+        while self.true_ns < end_ns:
+            self.true_ns += _STEP_NS
+            self._wake()
+            self._shoot()
+            self._deliver("board")
+            self._run_board()
+            self._deliver("host")
+            self._run_host()
+            self._judge()
+
+    def step(self, which: Machine, by_ns: int) -> None:
+        """A clock steps while everything runs."""
+        which.shift_ns += by_ns
+        self._note_step(by_ns)
+
+    def sleep(self, which: Machine, duration_ns: int) -> None:
+        """A machine sleeps: it is not run, and its clock stands still."""
+        which.asleep_until_ns = self.true_ns + duration_ns
+        which.slept_ns += duration_ns
+        self._note_step(duration_ns)
+
+    def stop(self, which: Machine, duration_ns: int) -> None:
+        """A program is stopped; its machine's clock goes on."""
+        which.stopped_until_ns = self.true_ns + duration_ns
+
+    def tell_sleep(self) -> None:
+        """The machines notice that they have slept, as their kernels tell them."""
+        if self.host.slept_ns:
+            self.reception.slept(self.host.slept_ns, self.host_clock())
+        if self.board.slept_ns:
+            self.lives += 1
+            self.boot_id = f"boot-{self.lives}"
+            self._outbox = None
+            self._board.begin_clock(self.boot_id)
+        self.host.slept_ns = self.board.slept_ns = 0
+
+    def lose(self, lane: Lane, to: str) -> None:
+        """The oldest message under way is lost without a sound."""
+        wire = self._wire(lane, to)
+        if wire:
+            wire.popleft()
+
+    def break_lane(self, lane: Lane) -> None:
+        """A connection breaks: both sides are told, what was under way is gone."""
+        self._wire(lane, "board").clear()
+        self._wire(lane, "host").clear()
+        for outgoing in self._board.unreachable(_NAMES[lane]):
+            self._board_says(outgoing)
+        self.reception.interrupted(_NAMES[lane], self.host_clock())
+
+    def restart_board(self) -> None:
+        """The board's program dies and begins anew; its machine's clock goes on."""
+        self._new_board()
+        for lane in Lane:
+            self.break_lane(lane)
+
+    def lie(self, message: Message) -> None:
+        """The board says something more, on the lane where it belongs."""
+        self._wire(Lane.FRAMES if isinstance(message, FrameMessage) else Lane.CONTROL, "host").append(
+            (self.true_ns, message)
+        )
+
+    def false_frame(self, by_ns: int) -> FrameMessage:
+        """A frame that the board might send next, with stamps that are off; its image is of this moment."""
+        board_ns = self.board_clock()
+        self._exposed[self._board.session, 10**9 + self._sequence] = self.true_ns - _BOARD_GRABS_NS
+        marks = BoardMarks(board_ns - _BOARD_GRABS_NS + by_ns, board_ns + by_ns, board_ns + by_ns)
+        size = (640, 480, PixelFormat.MJPEG)
+        return FrameMessage(self._board.session, self._sent, 10**9 + self._sequence, *size, None, marks, b"")
+
+    # What is watched.
+
+    @property
+    def unsettled(self) -> bool:
+        """Whether a clock has stepped and no echo that was asked for since then has been answered."""
+        return self.answered_ns < self.stepped_ns
+
+    def check_accounts(self) -> None:
+        """Frames and pairs are conserved."""
+        counts, account = self.queue.counts, self.reception.account
+        assert counts.received == counts.paired + sum(n for _, n in counts.board_orphans) + counts.held_board
+        received = sum(session.received for session in account.sessions)
+        dropped = sum(count for reason, count in account.disbelieved.items() if reason is not Disbelief.CREDIT)
+        waiting = self.reception._border._gate.held
+        assert received == counts.received + account.no_clock + dropped + waiting
+
+    def is_suspect(self, pair: WrongPair) -> bool:
+        """Whether the report names a pair's frame as one that had passed before a step was noticed."""
+        return any(
+            told.session == pair.session and told.first <= pair.sequence <= told.last
+            for told in self.reception.account.suspects
+        )
+
+    # The listener of the reception.
+
+    def session_began(self) -> None:
+        """See BoardListener."""
+
+    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
+        """See BoardListener."""
+        del exposed_ns, index
+        estimate = self.reception.estimate
+        assert estimate is not None
+        self._bound_ns = max(self._bound_ns, estimate.bound_at(self.board_clock()))
+
+    # How the shells of both sides behave.
+
+    def _note_step(self, by_ns: int) -> None:
+        self.stepped_ns = self.true_ns
+        if abs(by_ns) >= 2 * PERIOD_NS:
+            self.stepped_far_ns = self.true_ns
+
+    def _is_there(self, machine: Machine) -> bool:
+        return self.true_ns >= max(machine.asleep_until_ns, machine.stopped_until_ns)
+
+    def _wake(self) -> None:
+        """Clocks of machines that sleep stand still."""
+        for machine in (self.host, self.board):
+            if self.true_ns <= machine.asleep_until_ns:
+                machine.shift_ns -= _STEP_NS
+
+    def _new_board(self) -> None:
+        self.lives += 1
+        self._sent = self._grabbed = self._sequence = 0
+        self._outbox = None
+        self._board = BoardSession(f"board-{self.lives}", self.boot_id, _CAMERA)
+
+    def _wire(self, lane: Lane, to: str) -> deque[tuple[int, Message]]:
+        return self._wires.setdefault((lane, to), deque())
+
+    def _put(self, lane: Lane, to: str, message: Message) -> None:
+        took_ns = self._latency_ns
+        if isinstance(message, FrameMessage):
+            took_ns += round(self._latency_ns * self._jitter * self._chance.random())
+        wire = self._wire(lane, to)
+        wire.append((max(self.true_ns + took_ns, wire[-1][0] if wire else 0), message))
+
+    def _shoot(self) -> None:
+        while self._board_shot_ns + PERIOD_NS + _BOARD_GRABS_NS <= self.true_ns:
+            self._board_shot_ns += PERIOD_NS
+            if self.true_ns > self.board.asleep_until_ns:
+                exposed = Stamp(self._board_shot_ns + self.board.shift_ns, "board")
+                grabbed = exposed.plus(_BOARD_GRABS_NS)
+                self._outbox = Frame(self._sequence, exposed, grabbed, 640, 480, PixelFormat.MJPEG, None, b"")
+                self._exposed[self._board.session, self._sequence] = self._board_shot_ns
+                self._sequence += 1
+                self._grabbed += 1
+        while self._host_shot_ns + PERIOD_NS + _HOST_PHASE_NS <= self.true_ns:
+            self._host_shot_ns += PERIOD_NS
+            if self.true_ns > self.host.asleep_until_ns and self._is_there(self.host):
+                true_ns = self._host_shot_ns + _HOST_PHASE_NS
+                exposed = Stamp(true_ns + self.host.shift_ns, HOST_CLOCK)
+                size = (640, 480, PixelFormat.MJPEG)
+                self._host_exposed[self._host_sequence] = true_ns
+                self.queue.add_host(Frame(self._host_sequence, exposed, exposed, *size, None, b""))
+                self._host_sequence += 1
+
+    def _deliver(self, to: str) -> None:
+        if not self._is_there(self.board if to == "board" else self.host):
+            return
+        for lane in Lane:
+            wire = self._wire(lane, to)
+            while wire and wire[0][0] <= self.true_ns:
+                _, message = wire.popleft()
+                if to == "board":
+                    answers = self._board.receive(_NAMES[lane], message, self.board_clock(), self._counts)
+                    for outgoing in answers:
+                        self._board_says(outgoing)
+                else:
+                    if isinstance(message, Pong) and message.wave in self._asked:
+                        self.answered_ns = max(self.answered_ns, self._asked[message.wave])
+                    self.reception.receive(_NAMES[lane], message, self.host_clock())
+
+    @property
+    def _counts(self) -> BoardCounts:
+        return BoardCounts(self._grabbed, self._sent)
+
+    def _run_board(self) -> None:
+        if not self._is_there(self.board):
+            return
+        now_ns = self.board_clock()
+        if self._outbox is not None and self._board.has_credit:
+            outgoing = self._board.send(self._outbox)
+            self._board_says(outgoing)
+            self._board.sent(now_ns)
+            self._sent += 1
+            self._outbox = None
+        if now_ns >= self._board.due_ns:
+            for outgoing in self._board.tick(now_ns, self._counts):
+                self._board_says(outgoing)
+
+    def _run_host(self) -> None:
+        if self._is_there(self.host):
+            self.reception.tick(self.host_clock())
+
+    def _board_says(self, outgoing: Outgoing) -> None:
+        message = outgoing.message
+        if isinstance(message, FrameMessage):
+            message = replace(message, marks=replace(message.marks, sent_ns=self.board_clock()))
+        elif isinstance(message, Pong):
+            message = replace(message, t2_ns=self.board_clock())
+        self._put(_lane(outgoing.connection), "host", message)
+
+    def _host_says(self, outgoing: Outgoing) -> None:
+        message = outgoing.message
+        if isinstance(message, Ping):
+            message = replace(message, t0_ns=self.host_clock())
+            self._asked[message.wave] = self.true_ns
+        self._put(_lane(outgoing.connection), "board", message)
+
+    def _judge(self) -> None:
+        while self.queue.counts.waiting:
+            pair = self.queue.take()
+            assert pair is not None
+            self.pairs += 1
+            message = pair.board.message
+            apart_ns = abs(self._exposed[message.session, message.sequence] - self._host_exposed[pair.host.sequence])
+            allowed_ns = self.queue.tolerance_ns + self._bound_ns
+            if apart_ns > allowed_ns:
+                self.wrong.append(WrongPair(message.session, message.sequence, apart_ns, allowed_ns))
+
+
+def _lane(connection: bytes) -> Lane:
+    return next(lane for lane, name in _NAMES.items() if name == connection)

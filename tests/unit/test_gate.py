@@ -1,0 +1,109 @@
+"""Which frames are believed at once, which have to wait for an echo, and which never are."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.ledger import BoardMarks
+from phone_host.sync.gate import LABELS_NS, Disbelief, Gate, Suspects, Unproven, disbelief
+
+MS, SECOND_NS = 1_000_000, 1_000_000_000
+PERIOD_NS = 33_000_000
+NOW_NS = 500 * SECOND_NS
+
+
+@pytest.mark.parametrize(
+    ("exposed_ms", "grabbed_ms", "sent_ms", "reason"),
+    [
+        (-40, -10, -5, None),
+        (-2, -2, 0, None),
+        (-40, -10, 2, None),
+        (-40, -10, 3, Disbelief.FUTURE),
+        (4, -10, -5, Disbelief.FUTURE),
+        (3_600_000, 3_600_000, 3_600_000, Disbelief.FUTURE),
+        (-10, -40, -5, Disbelief.MARKS),
+        (-40, -5, -10, Disbelief.MARKS),
+        (-60_001, -10, -5, Disbelief.PAST),
+        (-59_999, -10, -5, None),
+    ],
+)
+def test_marks_that_cannot_be(exposed_ms: int, grabbed_ms: int, sent_ms: int, reason: Disbelief | None) -> None:
+    """With the moment of arrival known to 2 ms: nothing is sent after that, exposed after it was grabbed, or older than a minute."""
+    marks = BoardMarks(*(NOW_NS + value * MS for value in (exposed_ms, grabbed_ms, sent_ms)))
+    assert disbelief(marks, NOW_NS, 2 * MS, labelled=False) is reason
+
+
+@given(st.integers(-(2**62), 2**62), st.integers(-(2**62), 2**62))
+def test_labels_may_lie_anywhere_but_at_the_ends(exposed_ns: int, received_ns: int) -> None:
+    """Stamps of images shown on demand are believed unless a difference of two would not fit into 64 bits."""
+    marks = BoardMarks(exposed_ns, 0, 0)
+    far = abs(received_ns - exposed_ns) >= LABELS_NS
+    assert disbelief(marks, received_ns, 0, labelled=True) is (Disbelief.PAST if far else None)
+
+
+def opened(transits_ms: list[float]) -> Gate[int]:
+    """A gate that has proven frames with these times under way."""
+    gate: Gate[int] = Gate()
+    for number, transit in enumerate(transits_ms):
+        gate.arrived(-1 - number, number, round(transit * MS), PERIOD_NS)
+        gate.confirmed(number)
+    return gate
+
+
+def test_the_first_frame_waits_for_an_echo() -> None:
+    """Before anything is proven nothing passes; an echo from before the frame's sending proves nothing."""
+    gate: Gate[str] = Gate()
+    assert not gate.arrived("first", 1000, 3 * MS, PERIOD_NS)
+    assert not gate.arrived("second", 2000, 3 * MS, PERIOD_NS), "order is kept"
+    assert gate.confirmed(999) == []
+    assert gate.confirmed(1000) == ["first"]
+    assert gate.held == 1
+    assert gate.confirmed(5000) == ["second"]
+    assert gate.arrived("third", 6000, 3 * MS, PERIOD_NS)
+
+
+@given(
+    st.lists(st.floats(0, 16), min_size=1, max_size=40),
+    st.floats(0, 16),
+    st.floats(2.0, 1000.0),
+    st.booleans(),
+)
+def test_no_step_of_two_periods_passes(recent_ms: list[float], true_ms: float, periods: float, back: bool) -> None:  # noqa: FBT001 - drawn
+    """Where frames take up to half a period, a clock that steps by two periods or more, either way, holds the next frame up."""
+    step_ns = round(periods * PERIOD_NS)
+    transit_ns = round(true_ms * MS) + (step_ns if back else -step_ns)
+    assert not opened(recent_ms).arrived(7, 10**6, transit_ns, PERIOD_NS)
+
+
+@given(st.lists(st.floats(0, 16), min_size=1, max_size=40), st.floats(0, 16))
+def test_a_steady_link_holds_nothing_up(recent_ms: list[float], transit_ms: float) -> None:
+    """Where frames take up to half a period and no clock steps every frame passes at once."""
+    assert opened(recent_ms).arrived(7, 10**6, round(transit_ms * MS), PERIOD_NS)
+
+
+def test_an_unsteady_link_waits_each_time() -> None:
+    """Where frames take 500 to 900 ms no frame passes without an echo: a step of two periods would not be seen."""
+    gate = opened([500, 900, 700, 650])
+    for transit_ms in (500, 650, 700, 900):
+        assert not gate.arrived(transit_ms, 10**6, transit_ms * MS, PERIOD_NS)
+        assert gate.confirmed(10**6) == [transit_ms]
+
+
+def test_a_doubt_drops_what_waits() -> None:
+    """Frames that waited for an echo are given back to be counted, and the next frame has to wait again."""
+    gate = opened([3, 3, 3])
+    gate.arrived(8, 10**6, 900 * MS, PERIOD_NS)
+    assert gate.void() == [8]
+    assert gate.void() == []
+    assert not gate.arrived(9, 10**6, 3 * MS, PERIOD_NS)
+
+
+def test_frames_since_the_last_echo_are_suspect() -> None:
+    """After a step the report names the frames that no echo had proven, and no others."""
+    unproven = Unproven()
+    assert unproven.stepped() is None
+    for number in range(10, 20):
+        unproven.passed(number * 100, "s", number)
+    unproven.confirmed(1299)
+    assert unproven.stepped() == Suspects("s", 13, 19, 7)
+    assert unproven.stepped() is None
