@@ -1,12 +1,13 @@
 """Whatever happens to clocks, programs and wires, in any order: no pair of images of different moments, and every frame accounted for."""
 
 import hypothesis.strategies as st
+import pytest
 from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from common.protocol.message import Knock, Lane, Pong
 from common.protocol.session import MS
-from tests.support.stepping_world import PERIOD_NS, Machine, SteppingWorld, WrongPair
+from tests.support.stepping_world import PERIOD_NS, Machine, SteppingWorld
 
 SECOND_NS = 1000 * MS
 FAR_NS = st.one_of(
@@ -19,7 +20,6 @@ class Happenings(RuleBasedStateMachine):
     """Everything that may happen between two machines."""
 
     world: SteppingWorld
-    excused: list[WrongPair]
 
     @initialize(
         latency_ns=st.sampled_from([MS // 2, 20 * MS, 150 * MS]),
@@ -28,7 +28,7 @@ class Happenings(RuleBasedStateMachine):
     )
     def begin(self, latency_ns: int, jitter: float, seed: int) -> None:
         """Two machines that have met."""
-        self.world, self.excused = SteppingWorld(latency_ns, jitter, seed), []
+        self.world = SteppingWorld(latency_ns, jitter, seed)
         self.world.run(2500 * MS)
 
     def machine(self, *, of_board: bool) -> Machine:
@@ -59,11 +59,11 @@ class Happenings(RuleBasedStateMachine):
 
     @rule(of_board=st.booleans(), duration_ns=st.one_of(FAR_NS, NEAR_NS), told=st.booleans())
     def a_machine_sleeps(self, *, of_board: bool, duration_ns: int, told: bool) -> None:
-        """Its clock stands still; its kernel tells, or does not."""
-        self.world.sleep(self.machine(of_board=of_board), duration_ns)
+        """Its clock stands still; its kernel tells, or does not. What no echo can have proven before the clock's life ends nobody can judge."""
+        if self.world.unsettled or self.world.reception.estimate is None:
+            return
+        self.world.sleep(self.machine(of_board=of_board), duration_ns, told=told)
         self.world.run(duration_ns)
-        if told:
-            self.world.tell_sleep()
 
     @rule(of_board=st.booleans(), both=st.booleans(), duration_ns=st.integers(50 * MS, 5 * SECOND_NS))
     def a_program_is_stopped(self, *, of_board: bool, both: bool, duration_ns: int) -> None:
@@ -109,10 +109,7 @@ class Happenings(RuleBasedStateMachine):
         """After a step of two periods none is wrong; after a smaller one none from the first answered echo on."""
         if not hasattr(self, "world"):
             return
-        wrong, self.world.wrong = self.world.wrong, []
-        far = self.world.stepped_far_ns > self.world.answered_ns
-        assert not wrong or not far or self.world.stepped_ns > self.world.stepped_far_ns, wrong
-        self.excused += wrong
+        assert all(pair.excusable for pair in self.world.wrong), self.world.wrong
 
     @invariant()
     def accounts_conserve(self) -> None:
@@ -129,9 +126,24 @@ class Happenings(RuleBasedStateMachine):
         self.world.run(2 * SECOND_NS)
         assert self.world.pairs - before >= 2, "pairs come again"
         self.world.check_accounts()
-        unnamed = [pair for pair in (*self.excused, *self.world.wrong) if not self.world.is_suspect(pair)]
+        self.no_wrong_pair()
+        unnamed = [pair for pair in self.world.wrong if not self.world.is_suspect(pair)]
         assert unnamed == []
 
 
 TestHappenings = Happenings.TestCase
 TestHappenings.settings = settings(deadline=None, max_examples=25, stateful_step_count=15)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_step_that_hides_in_a_slow_link(seed: int) -> None:
+    """Frames that take 30 to 120 ms cannot show a step of 67 to 90 ms: they wait for an echo, and no pair is wrong, also before it comes."""
+    world = SteppingWorld(30 * MS, 3.0, seed)
+    world.run(2500 * MS + seed * 41 * MS)
+    world.step(world.board, 2 * PERIOD_NS + seed * 2 * MS)
+    world.run(3 * SECOND_NS)
+    assert world.wrong == []
+    assert world.reception.account.clock_steps == 1
+    before = world.pairs
+    world.run(2 * SECOND_NS)
+    assert world.pairs > before
