@@ -2,6 +2,7 @@
 
 import json
 import math
+import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -198,7 +199,9 @@ class Scene:
         """End the host and judge its pairs, its report and its log; gives the report."""
         if self.receiver.process.poll() is None:
             outcome.memory = max(outcome.memory, self.watched.memory)
-            outcome.expect(self.receiver.stop() == 0, "the host did not end with 0")
+            self.receiver.send(signal.SIGTERM)
+        code = self.receiver.wait()
+        outcome.expect(code == 0, f"the host ended with {code}")
         self.watched.judge_log(outcome, most_lines)
         self.judge_pairs(outcome)
         report = json.loads(self.receiver.out.read_text() or "{}")
