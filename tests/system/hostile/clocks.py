@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from tests.support.programs import Program, free_port
+from tests.support.programs import Program
 from tests.system.hostile.attack import Attack, Outcome, Rounds
 from tests.system.hostile.scene import PERIOD_NS, Scene, board_and_host
 from tests.system.hostile.shim import ShiftedClock, stopped
@@ -93,7 +93,7 @@ def _run(whose: Whose, steps: Sequence[Step], folder: Path, rounds: Rounds) -> O
     outcome = Outcome()
     clock = ShiftedClock(folder / "clock")
     clocks = (clock, None) if whose is Whose.BOARD else (None, clock)
-    with board_and_host(folder, clocks=clocks, address=f"tcp://127.0.0.1:{free_port()}") as (agent, watched):
+    with board_and_host(folder, clocks=clocks) as (agent, watched):
         mine, other = (agent, watched.receiver) if whose is Whose.BOARD else (watched.receiver, agent)
         goes_on = True
         for _ in rounds:
@@ -101,7 +101,7 @@ def _run(whose: Whose, steps: Sequence[Step], folder: Path, rounds: Rounds) -> O
                 if goes_on:
                     step(clock, mine, other, this, watched)
                     goes_on = watched.cause_gone(outcome, f"{this.words} on the {whose.value}")
-        watched.stop(outcome, most_lines=200)
+        watched.stop(outcome)
         outcome.expect(agent.stop() == 0, "the board did not end with 0")
     return outcome
 

@@ -24,9 +24,9 @@ from common.protocol.message import (
     Status,
 )
 from common.protocol.wire import MAX_SIZE_PX
+from tests.support.bombs import LARGE_PX, jpeg_bomb, png_bomb, torn_jpeg
 from tests.support.programs import free_port
 from tests.system.hostile.attack import Attack, Outcome, Rounds
-from tests.system.hostile.bombs import LARGE_PX, jpeg_bomb, png_bomb, torn_jpeg
 from tests.system.hostile.lying_board import LyingBoard
 from tests.system.hostile.scene import PERIOD_NS, scene
 
@@ -60,7 +60,7 @@ def _frames(name: str, change: Callable[[FrameMessage], FrameMessage], times: in
         assert isinstance(message, FrameMessage)
         return (change(message),)
 
-    return Lie(name, lambda board: board.lie(FrameMessage, times, changed))
+    return Lie(name, lambda board: board.lie(FrameMessage, times, changed, spoils=True))
 
 
 def _moved(frame: FrameMessage, exposed_ns: int, grabbed_ns: int, sent_ns: int) -> FrameMessage:
@@ -210,7 +210,11 @@ def _run(lies: Sequence[Lie], folder: Path, rounds: Rounds) -> Outcome:
                 if goes_on:
                     lie.tell(board)
                     goes_on = watched.cause_gone(outcome, lie.name)
-        watched.stop(outcome, most_lines=300)
+        report = watched.stop(outcome)
+        used = sum(pair.sequence in board.spoilt for pair in watched.pairs)
+        outcome.expect(not used, f"{used} pairs with a frame that cannot be used")
+        if board.spoilt:
+            outcome.expect(bool(report) and bool(report["warnings"]), "frames were dropped, and nothing is doubted")
     return outcome
 
 
@@ -224,7 +228,7 @@ def _end_without_end(folder: Path, rounds: Rounds) -> Outcome:
         with LyingBoard(address) as board, scene(within, address=address, true_board_ns=board.true_ns) as watched:
             watched.settle()
             for _ in range(20):
-                board.do(partial(board.end, BoardCounts(_MOST, 1)))
+                board.do(board.end)
                 time.sleep(0.1)
             watched.stop(outcome)
     return outcome

@@ -64,7 +64,7 @@ class LyingBoard:
         self._waiter = Waiter(self._link.pollables)
         self._images = [(film() / f"{number}.jpg").read_bytes() for number in range(FRAMES)]
         self.camera = CameraDescription(
-            "liar", WIDTH_PX, HEIGHT_PX, PixelFormat.MJPEG, PERIOD_NS, Pacing.CLOCK, Steering.NONE
+            "liar", WIDTH_PX, HEIGHT_PX, PixelFormat.MJPEG, PERIOD_NS, Pacing.CLOCK, Steering.GRID
         )
         self._boot_id = now.random_id()
         self.lanes: dict[Lane, bytes] = {}
@@ -72,6 +72,7 @@ class LyingBoard:
         self.session = BoardSession(now.random_id(), self._boot_id, self.camera)
         self._sequence = 0
         self._exposed: dict[int, int] = {}
+        self.spoilt: set[int] = set()
         self._next = self._image_at(now.monotonic_ns()) + 1
         self._twist: Twist = honest
         self._jobs: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
@@ -93,8 +94,17 @@ class LyingBoard:
         """Let everything go through this from now on."""
         self._twist = twist
 
-    def lie(self, kind: type[Message], times: int, change: Callable[[Message], Iterable[Message]]) -> None:
-        """Change the next messages of a kind, and wait until that was done."""
+    def lie(
+        self, kind: type[Message], times: int, change: Callable[[Message], Iterable[Message]], *, spoils: bool = False
+    ) -> None:
+        """Change the next messages of a kind, and wait until that was done.
+
+        Args:
+            kind: of messages.
+            times: how many.
+            change: what becomes of one.
+            spoils: whether these are frames that cannot be used any more, with any partner.
+        """
         done = threading.Event()
         left = times
 
@@ -103,6 +113,8 @@ class LyingBoard:
             if not isinstance(message, kind):
                 return (message,)
             left -= 1
+            if spoils and isinstance(message, FrameMessage):
+                self.spoilt.add(message.sequence)
             if left <= 0:
                 self._twist = honest
                 done.set()
@@ -152,9 +164,9 @@ class LyingBoard:
             self.session.session, index, frame.sequence, *size, None, BoardMarks(ns, ns, ns), frame.payload
         )
 
-    def end(self, counts: BoardCounts) -> None:
+    def end(self) -> None:
         """Say that no frame follows."""
-        self.say(Lane.FRAMES, End(self.session.session, counts))
+        self.say(Lane.FRAMES, End(self.session.session, self.counts))
 
     def stop(self) -> None:
         """End it without a word."""

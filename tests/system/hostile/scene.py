@@ -1,7 +1,7 @@
 """A running pair of programs under attack, and the judge of what comes out: pairs from delays.jsonl, accounts from report.json, memory and log of a process."""
 
 import json
-import math
+import re
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -25,13 +25,17 @@ TOLERANCE_NS: Final = PERIOD_NS // 2
 _SLACK_NS: Final = 1_000_000
 """What the stated uncertainty may be wrong by on a machine where others work: the ledger has no hard bound, and the steps that are looked for are ten times that."""
 
-_STREAM: Final = 10
-_STREAM_S: Final = 1.0
-"""So many pairs within so much time are a stream; a single one is not."""
+_HOLE_NS: Final = 400_000_000
+_STREAM_NS: Final = 700_000_000
+"""Pairs for so long without such a hole are a stream; a few of them are not: an estimate may still be about to break."""
 
 _SETTLED: Final = 30
-_MOST_LINES: Final = 16
-"""Of a log: start and end are six, and an attack may add some, each kind a few times."""
+_MOST_LINES: Final = 24
+_MOST_LINES_EACH: Final = 8
+"""Of a log: what belongs to start and end, and what each outage may add."""
+
+_LOG_LINE: Final = re.compile(r"\d{4}-\d\d-\d\d [\d:,]+ (DEBUG|INFO|WARNING|ERROR) ")
+_OWN_WORDS: Final = ("phone-host", "board-agent", "warning: ")
 
 
 @cache
@@ -106,11 +110,15 @@ class Watched:
         """The peak in multiples of the normal one."""
         return self._peak_bytes() / self._normal_bytes
 
-    def judge_log(self, outcome: Outcome, most: int = _MOST_LINES) -> None:
-        """Look at what it has logged."""
+    def judge_log(self, outcome: Outcome) -> None:
+        """Look at what it has logged, and at what else wrote to its stderr."""
         said = self._program.stderr
+        most = _MOST_LINES + _MOST_LINES_EACH * len(outcome.gaps_s)
         outcome.expect("Traceback" not in said, "a traceback in the log")
-        outcome.expect(said.count("\n") <= most, f"{said.count(chr(10))} lines in the log, {most} are enough")
+        log = [line for line in said.splitlines() if _LOG_LINE.match(line)]
+        past = [line for line in said.splitlines() if not _LOG_LINE.match(line) and not line.startswith(_OWN_WORDS)]
+        outcome.expect(len(log) <= most, f"{len(log)} lines in the log, {most} are enough")
+        outcome.expect(not past, f"{len(past)} lines past the log, such as {''.join(past[:1])[:80]!r}")
 
     def _peak_bytes(self) -> int:
         status = Path(f"/proc/{self._program.process.pid}/status").read_text(encoding="ascii")
@@ -187,22 +195,20 @@ class Scene:
         """Count the pairs that are wrong by true exposure, and those whose offset is further from the truth than stated."""
         misstated = 0
         for pair in self.look():
-            board_ns, host_ns = self._true_ns(pair)
             excused = any(0 <= self._on_host(pair.received_ns) - step_ns <= _WAVE_NS for step_ns in self._small_steps)
-            apart_ns = abs(board_ns - host_ns)
-            outcome.wrong += apart_ns > TOLERANCE_NS + pair.uncertainty_ns + _SLACK_NS and not excused
+            outcome.wrong += self._apart_ns(pair) > TOLERANCE_NS + pair.uncertainty_ns + _SLACK_NS and not excused
             misstated += self._offset_error_ns(pair) > pair.uncertainty_ns + _SLACK_NS and not excused
         outcome.pairs += len(self.pairs)
         outcome.expect(not misstated, f"{misstated} pairs whose offset is further from the truth than stated")
 
-    def stop(self, outcome: Outcome, *, most_lines: int = _MOST_LINES) -> Any:
+    def stop(self, outcome: Outcome) -> Any:
         """End the host and judge its pairs, its report and its log; gives the report."""
         if self.receiver.process.poll() is None:
             outcome.memory = max(outcome.memory, self.watched.memory)
             self.receiver.send(signal.SIGTERM)
         code = self.receiver.wait()
         outcome.expect(code == 0, f"the host ended with {code}")
-        self.watched.judge_log(outcome, most_lines)
+        self.watched.judge_log(outcome)
         self.judge_pairs(outcome)
         report = json.loads(self.receiver.out.read_text() or "{}")
         outcome.expect(bool(report), "no report")
@@ -224,17 +230,22 @@ class Scene:
         done = [
             self._on_host(pair.done_ns)
             for pair in self.look()[-20 * FPS :]
-            if self._on_host(pair.host_ns) >= at_ns and abs(math.dist(*((ns,) for ns in self._true_ns(pair)))) <= PERIOD_NS
+            if self._on_host(pair.host_ns) >= at_ns and self._apart_ns(pair) <= PERIOD_NS
         ]
-        for first, last in zip(done, done[_STREAM - 1 :], strict=False):
-            if last - first <= _STREAM_S * 1e9:
-                return first
+        first_ns = last_ns = done[0] if done else 0
+        for ns in done:
+            if ns - last_ns > _HOLE_NS:
+                first_ns = ns
+            last_ns = ns
+            if last_ns - first_ns >= _STREAM_NS:
+                return first_ns
         return None
 
-    def _true_ns(self, pair: Pair) -> tuple[int, int]:
-        if self._told_board_ns is not None:
-            return self._told_board_ns(pair), self._on_host(pair.host_ns)
-        return self._on_board(pair.board_ns), self._on_host(pair.host_ns)
+    def _apart_ns(self, pair: Pair) -> int:
+        """By how much the two frames of a pair were truly exposed apart."""
+        told = self._told_board_ns
+        board_ns = self._on_board(pair.board_ns) if told is None else told(pair)
+        return abs(board_ns - self._on_host(pair.host_ns))
 
     def _offset_error_ns(self, pair: Pair) -> int:
         if self._told_board_ns is not None:
@@ -276,10 +287,11 @@ def scene(
     clocks: tuple[ShiftedClock | None, ShiftedClock | None] = (None, None),
     address: str = "",
     options: Sequence[str] = (),
+    own: str = "",
     true_board_ns: Callable[[Pair], int] | None = None,
 ) -> Iterator[Scene]:
     """A host that dials an address, where somebody else is to be; ended with the block."""
-    with _host(folder, address, options, clocks[1]) as receiver:
+    with _host(folder, address, ("--camera", own or camera(), *options), clocks[1]) as receiver:
         yield Scene(receiver, folder / "out", clocks, true_board_ns)
 
 
@@ -288,20 +300,26 @@ def board_and_host(
     folder: Path,
     *,
     clocks: tuple[ShiftedClock | None, ShiftedClock | None] = (None, None),
-    address: str = "",
+    addresses: tuple[str, str] | None = None,
     options: Sequence[str] = (),
+    own: str = "",
 ) -> Iterator[tuple[Program, Scene]]:
-    """Both real programs over loopback tcp, pairs flowing."""
-    address = address or f"tcp://127.0.0.1:{free_port()}"
-    arguments = ["run", "--camera", camera(), "--link", address, "--json", "--log-level", "info"]
+    """Both real programs over loopback tcp, or at these addresses of board and host; pairs flowing."""
+    tcp = f"tcp://127.0.0.1:{free_port()}"
+    listens, dials = addresses or (tcp, tcp)
     with ExitStack() as held:
-        agent = held.enter_context(board(arguments, folder, more=clocks[0].environment if clocks[0] else None))
-        watched = held.enter_context(scene(folder, clocks=clocks, address=address, options=options))
+        more = clocks[0].environment if clocks[0] else None
+        agent = held.enter_context(board(board_arguments(listens), folder, more=more))
+        watched = held.enter_context(scene(folder, clocks=clocks, address=dials, options=options, own=own))
         watched.settle()
         yield agent, watched
 
 
+def board_arguments(address: str) -> list[str]:
+    """Of a board that shows the film."""
+    return ["run", "--camera", camera(), "--link", address, "--json", "--log-level", "info"]
+
+
 def _host(folder: Path, address: str, options: Sequence[str], clock: ShiftedClock | None) -> Any:
     out = ["--out", str(folder / "out"), "--save-every", "0", "--json", "--log-level", "info"]
-    arguments = ["run", "--camera", camera(), "--link", address, *out, *options]
-    return host(arguments, folder, more=clock.environment if clock else None)
+    return host(["run", "--link", address, *out, *options], folder, more=clock.environment if clock else None)

@@ -27,7 +27,9 @@ def png_bomb(size_px: int = LARGE_PX) -> bytes:
     packer, row = zlib.compressobj(9), bytes(1 + size_px)
     body = b"".join(packer.compress(row) for _ in range(size_px)) + packer.flush()
     header = struct.pack(">IIBBBBB", size_px, size_px, 8, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*part) for part in ((b"IHDR", header), (b"IDAT", body), (b"IEND", b"")))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        _chunk(*part) for part in ((b"IHDR", header), (b"IDAT", body), (b"IEND", b""))
+    )
 
 
 @cache
