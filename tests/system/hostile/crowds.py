@@ -42,7 +42,7 @@ def cpu_s(program: Program) -> float:
 
 def _dial(port: int) -> socket.socket:
     caller = socket.socket()
-    caller.setblocking(False)
+    caller.settimeout(0)
     with suppress(BlockingIOError):
         caller.connect(("127.0.0.1", port))
     return caller
@@ -85,8 +85,7 @@ def _http(folder: Path, rounds: Rounds) -> Outcome:
         try:
             with board_and_host(within, own=f"{server.uri}?latency_ms=0") as (_, watched):
                 resource.prlimit(watched.receiver.process.pid, resource.RLIMIT_AS, (6 * 2**30, 6 * 2**30))
-                held = len(watched.look()) + _BOMBS_COME
-                until(lambda: len(watched.look()) >= held or watched.receiver.process.poll() is not None, "bombs come")
+                watched.more(_BOMBS_COME)
                 watched.cause_gone(outcome, "bombs from the own camera")
                 watched.stop(outcome)
         finally:

@@ -47,6 +47,7 @@ class LyingHost:
     def __init__(self, address: str) -> None:
         self._link = ZeroMqDialer(address)
         self._host_id = now.random_id()
+        self._gone = False
 
     def say(self, message: Message, lane: Lane = Lane.CONTROL) -> bool:
         """Say something; whether the link took it."""
@@ -80,8 +81,10 @@ class LyingHost:
                 self.read()
 
     def close(self) -> None:
-        """Go."""
-        self._link.close()
+        """Go; a second time does nothing."""
+        if not self._gone:
+            self._gone = True
+            self._link.close()
 
 
 @contextmanager

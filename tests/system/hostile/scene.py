@@ -107,8 +107,8 @@ class Watched:
 
     @property
     def memory(self) -> float:
-        """The peak in multiples of the normal one."""
-        return self._peak_bytes() / self._normal_bytes
+        """The peak in multiples of the normal one; 0 where that is not known."""
+        return self._peak_bytes() / self._normal_bytes if self._normal_bytes else 0.0
 
     def judge_log(self, outcome: Outcome) -> None:
         """Look at what it has logged, and at what else wrote to its stderr."""
@@ -167,6 +167,11 @@ class Scene:
         """Wait until pairs flow, and take memory for normal then."""
         assert self._wait(lambda: len(self.look()) >= _SETTLED), f"no stream came up: {self.receiver.stderr[-2000:]}"
         self.watched.now_is_normal()
+
+    def more(self, pairs: int) -> None:
+        """Wait for so many further pairs, or for the host's end."""
+        enough = len(self.look()) + pairs
+        self._wait(lambda: len(self.look()) >= enough)
 
     def cause_gone(self, outcome: Outcome, name: str = "", at_ns: int | None = None) -> bool:
         """The cause has gone: wait until pairs flow again, and note how long that took; whether they came.
