@@ -97,6 +97,7 @@ STAMPS: Final = (
     _frames("a frame an hour back", lambda frame: _moved(frame, -_HOUR_NS, -_HOUR_NS, -_HOUR_NS)),
     _frames("an exposure an hour ahead", lambda frame: _moved(frame, _HOUR_NS, 0, 0)),
     _echoes("a wave of echoes an hour ahead", _WAVE, _HOUR_NS),
+    _echoes("a wave of echoes an hour back", _WAVE, -_HOUR_NS),
     _echoes("one echo an hour ahead", 1, _HOUR_NS),
     _echoes("one echo an hour back", 1, -_HOUR_NS),
     _frames("exposed at -2^62, sent at 2^62", lambda frame: _set(frame, -_END_NS, -_END_NS, _END_NS)),

@@ -162,7 +162,7 @@ def _instead(talk: Talk, folder: Path, rounds: Rounds) -> Outcome:
                 with scene(within, address=address, options=("--wait", "60")) as watched:
                     liar.say(Credit(_MOST))
                     liar.flood(lambda k: [*talk.messages(k), (Credit(_MOST), Lane.CONTROL)], reads=talk.reads)
-                    until(lambda: liar.say(Bye()) or not talk.reads, "the liar leaves")
+                    until(lambda: all(liar.say(Bye(), lane) for lane in Lane) or not talk.reads, "the liar leaves")
                     liar.close()
                     watched.cause_gone(outcome, f"{talk.name} from its own host")
                     watched.stop(outcome)
