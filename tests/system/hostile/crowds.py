@@ -225,5 +225,5 @@ BOARD_KILLED: Final = Attack("kill -9: board", "killed and started again, 3 a ro
 HOST_KILLED: Final = Attack("kill -9: host", "killed and started again, 3 a round", _host_killed)
 WIRE: Final = Attack("noise on a serial line", "5 % of all pieces with a byte flipped, lost or put in", _wire)
 
-SHORT: Final = (DESCRIPTORS, BOTH_STOPPED, STORM, BOARD_KILLED, HTTP, WIRE)
-LONG: Final = (*SHORT, HOST_KILLED)
+SHORT: Final = (DESCRIPTORS, BOTH_STOPPED, STORM, BOARD_KILLED, WIRE)
+LONG: Final = (*SHORT, HTTP, HOST_KILLED)

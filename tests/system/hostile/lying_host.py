@@ -33,6 +33,7 @@ from tests.system.hostile.attack import Attack, Outcome, Rounds
 from tests.system.hostile.scene import Watched, board_and_host, board_arguments, scene
 
 _FLOOD_S: Final = 1.5
+_QUIET_S: Final = 0.3
 _MOST: Final = 2**53
 _END_NS: Final = 2**62
 
@@ -59,10 +60,17 @@ class LyingHost:
         for lane in Lane:
             until(lambda lane=lane: self.say(HostHello(self._host_id, lane), lane), "the board is there")  # type: ignore[misc]  # bound now
 
-    def read(self) -> None:
-        """Take what has come, and throw it away."""
-        for _ in self._link.receive():
-            pass
+    def read(self) -> int:
+        """Take what has come, and throw it away; gives how much it was."""
+        return sum(1 for _ in self._link.receive())
+
+    def hush(self) -> None:
+        """Wait until the board has answered all that was said: what is still under way when a connection closes is lost, a goodbye, too."""
+        quiet_s = time.monotonic()
+        while time.monotonic() - quiet_s < _QUIET_S:
+            if self.read():
+                quiet_s = time.monotonic()
+            time.sleep(0.01)
 
     def flood(self, messages: Callable[[int], Sequence[tuple[Message, Lane]]], *, reads: bool) -> None:
         """Say things for a while as fast as the link takes them.
@@ -162,6 +170,8 @@ def _instead(talk: Talk, folder: Path, rounds: Rounds) -> Outcome:
                 with scene(within, address=address, options=("--wait", "60")) as watched:
                     liar.say(Credit(_MOST))
                     liar.flood(lambda k: [*talk.messages(k), (Credit(_MOST), Lane.CONTROL)], reads=talk.reads)
+                    if talk.reads:
+                        liar.hush()
                     until(lambda: all(liar.say(Bye(), lane) for lane in Lane) or not talk.reads, "the liar leaves")
                     liar.close()
                     watched.cause_gone(outcome, f"{talk.name} from its own host")
