@@ -1,7 +1,9 @@
 """A running pair of programs under attack, and the judge of what comes out: pairs from delays.jsonl, accounts from report.json, memory and log of a process."""
 
+import atexit
 import json
 import re
+import shutil
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -40,8 +42,10 @@ _OWN_WORDS: Final = ("phone-host", "board-agent", "warning: ")
 
 @cache
 def film() -> Path:
-    """A film of numbered images, written once."""
-    return write_film(Path(mkdtemp(prefix="hostile-film-")) / "numbered", FRAMES)
+    """A film of numbered images, written once; it goes with this process."""
+    folder = Path(mkdtemp(prefix="hostile-film-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return write_film(folder / "numbered", FRAMES)
 
 
 def camera() -> str:

@@ -7,8 +7,10 @@ for what it missed) is handed over behind the gap, and is taken to be of the seg
 machine: its process is stopped meanwhile, so that it never runs backwards; segments do not overlap.
 """
 
+import atexit
 import mmap
 import os
+import shutil
 import signal
 import struct
 import subprocess
@@ -28,8 +30,10 @@ _FOREVER: Final = 2**63
 
 @cache
 def shim_library() -> Path:
-    """Compile the shim; gives the shared object."""
-    library = Path(mkdtemp(prefix="clock-shim-")) / "clock_shim.so"
+    """Compile the shim, once; gives the shared object, which goes with this process."""
+    folder = Path(mkdtemp(prefix="clock-shim-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    library = folder / "clock_shim.so"
     flags = ["-O2", "-Wall", "-Werror", "-shared", "-fPIC"]
     subprocess.run([os.environ.get("CC", "cc"), *flags, "-o", str(library), str(_SOURCE), "-ldl"], check=True)
     return library
