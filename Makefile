@@ -5,7 +5,7 @@
 SHELL := /bin/sh
 BIN := .venv/bin
 READY := .venv/.ready
-PARTS := unit contract system
+PARTS := unit contract system hostile
 BENCHES := $(patsubst tests/bench/%.py,%,$(sort $(wildcard tests/bench/bench_*.py)))
 
 ifndef SCAN_DATA
@@ -15,7 +15,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test soak $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
+.PHONY: help venv demo test soak attack $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -28,7 +28,7 @@ $(READY): requirements/dev.txt pyproject.toml
 demo: $(READY) ## both programs on this machine, a rendered scene, a full report in out/demo
 	@$(BIN)/phone-host demo --out out/demo
 
-test: $(READY) ## unit, contract and system tests, with the minutes of each part
+test: $(READY) ## unit, contract, system and hostile tests, with the minutes of each part
 	@.ci/test $(PARTS)
 
 $(PARTS:%=test-%): test-%: $(READY) # one part alone: make test-unit
@@ -54,6 +54,9 @@ bench: .venv/.ready-bench ## the figures: every benchmark in tests/bench prints 
 
 soak: $(READY) ## ten minutes of a booted board, thirty of both programs (MINUTES=N: each part so long); exit 4 when a limit is missed
 	@$(BIN)/python -m tests.bench.soak $(if $(MINUTES),--minutes $(MINUTES))
+
+attack: $(READY) ## every attack on the running programs for ten minutes in all (MINUTES=N, ONLY=word); exit 4 when a limit is missed
+	@$(BIN)/python -m tests.system.hostile $(if $(MINUTES),--minutes $(MINUTES)) $(if $(ONLY),--only "$(ONLY)")
 
 .venv/.ready-bench: $(READY) requirements/bench.txt
 	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: --no-binary cobs --no-build-isolation -r requirements/bench.txt

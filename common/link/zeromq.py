@@ -13,6 +13,7 @@ import zmq
 from common import now
 from common.frame import Buffer
 from common.keys import KeyFolder, Peer
+from common.link import gate
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.dialled import Dialled
 from common.link.wait import is_readable
@@ -168,7 +169,7 @@ class ZeroMqListener(_AlwaysReady):
         self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # a vanished host is told of instead of swallowing frames
         before = os.umask(0o177)  # an ipc path is for its owner only
         try:
-            self._socket.bind(address)
+            self._gate = gate.bind(self._socket, address)
         except zmq.ZMQError as error:
             self._context.destroy(linger=0)
             raise explained(address, error, "stop what listens there, or choose another with --link") from None
@@ -196,17 +197,21 @@ class ZeroMqListener(_AlwaysReady):
 
     @property
     def pollables(self) -> Sequence[Any]:
-        """The one socket, the guard's and the door's."""
+        """The one socket, the gate, the guard's and the door's."""
+        gates = (self._gate,) if self._gate else ()
         guard = (self._guard.socket,) if self._guard else ()
-        return (self._socket, *guard, *(self._door.pollables if self._door else ()))
+        return (self._socket, *gates, *guard, *(self._door.pollables if self._door else ()))
 
     @property
     def due_ns(self) -> int:
         """When `receive` wants to be called even if nothing is readable."""
-        return self._door.due_ns if self._door else super().due_ns
+        gate_ns = self._gate.due_ns if self._gate else super().due_ns
+        return min(gate_ns, self._door.due_ns) if self._door else gate_ns
 
     def receive(self) -> Iterator[Incoming]:
         """Give all packets that have come in; lets in those whose keys are known."""
+        if self._gate:
+            self._gate.watch()
         if self._guard:
             self._guard.answer()
         if self._door:
@@ -226,6 +231,8 @@ class ZeroMqListener(_AlwaysReady):
         """Let what was handed over leave, then close."""
         if self._door:
             self._door.close()
+        if self._gate:
+            self._gate.close()
         self._context.destroy(linger=_LINGER_MS)
 
 

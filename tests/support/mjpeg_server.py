@@ -20,11 +20,15 @@ from pathlib import Path
 from typing import Final
 
 from common.camera.replay import find_images
+from tests.support.bombs import jpeg_bomb
 
 USER: Final = "me"
 PASSWORD: Final = "a:b@c/%"
 _GOOD_IMAGES: Final = 20
 """So many are sent before a manner goes wrong."""
+
+_BOMBS: Final = range(100, 110)
+"""Late enough for whoever wants to know what is normal before."""
 
 _TYPE: Final = "multipart/x-mixed-replace"
 _LONG_S: Final = 600
@@ -285,11 +289,17 @@ def endless(on: Exchange) -> None:
             on.sock.sendall(bytes(1 << 18))
 
 
+def bombs(on: Exchange) -> None:
+    """Ten small images that claim to be huge, then sound ones again."""
+    for count, image in enumerate(on.first_parts()):
+        on.part(jpeg_bomb() if count in _BOMBS else image)
+
+
 MANNERS: Final[dict[str, Callable[[Exchange], None]]] = {
     manner.__name__: manner
     for manner in (
         plain, dashes, no_dashes, no_line_end, wrong_boundary, chunked, early_boundary, empty_parts, garbage, truncated, password, digest, page,
-        snapshot, missing, moved, moved_here, busy, another_tongue, no_image, mute, drips_head, hangs, closes, resets, bad_chunks, last_chunk, drips, endless,
+        snapshot, missing, moved, moved_here, busy, another_tongue, no_image, mute, drips_head, hangs, closes, resets, bad_chunks, last_chunk, drips, endless, bombs,
     )
 }  # fmt: skip
 

@@ -7,7 +7,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,14 +16,24 @@ PATIENCE_S = 60.0
 
 
 class Program:
-    """One running program with its output in files."""
+    """One running program with its output in files.
 
-    def __init__(self, module: str, arguments: list[str], folder: Path, name: str) -> None:
+    Args:
+        module: what `python -m` runs.
+        arguments: of its command line.
+        folder: for its output.
+        name: of the files there.
+        more: variables beside those of this process.
+    """
+
+    def __init__(
+        self, module: str, arguments: list[str], folder: Path, name: str, more: Mapping[str, str] | None = None
+    ) -> None:
         self.out = folder / f"{name}.out"
         self.err = folder / f"{name}.err"
         with self.out.open("wb") as out, self.err.open("wb") as err:
             # What a program remembers between its lives stays in the test's own folder, too.
-            environment = {**os.environ, "XDG_CONFIG_HOME": str(folder / "config")}
+            environment = {**os.environ, "XDG_CONFIG_HOME": str(folder / "config"), **(more or {})}
             command = [sys.executable, "-P", "-m", module, *arguments]
             self.process = subprocess.Popen(command, stdout=out, stderr=err, env=environment)
 
@@ -51,9 +61,11 @@ class Program:
 
 
 @contextmanager
-def program(module: str, arguments: list[str], folder: Path, name: str) -> Iterator[Program]:
+def program(
+    module: str, arguments: list[str], folder: Path, name: str, more: Mapping[str, str] | None = None
+) -> Iterator[Program]:
     """Run a program for the length of a block."""
-    running = Program(module, arguments, folder, name)
+    running = Program(module, arguments, folder, name, more)
     try:
         yield running
     finally:
@@ -62,14 +74,14 @@ def program(module: str, arguments: list[str], folder: Path, name: str) -> Itera
             running.process.wait()
 
 
-def board(arguments: list[str], folder: Path, name: str = "board") -> Any:
+def board(arguments: list[str], folder: Path, name: str = "board", more: Mapping[str, str] | None = None) -> Any:
     """Run board-agent for the length of a block."""
-    return program("board_agent.cli", arguments, folder, name)
+    return program("board_agent.cli", arguments, folder, name, more)
 
 
-def host(arguments: list[str], folder: Path, name: str = "host") -> Any:
+def host(arguments: list[str], folder: Path, name: str = "host", more: Mapping[str, str] | None = None) -> Any:
     """Run phone-host for the length of a block."""
-    return program("phone_host.cli", arguments, folder, name)
+    return program("phone_host.cli", arguments, folder, name, more)
 
 
 def until(condition: Callable[[], bool], what: str) -> None:

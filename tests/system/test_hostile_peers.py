@@ -20,6 +20,7 @@ from common.protocol.pairing_words import Ask, Identity
 from tests.support.numbered import write_film
 from tests.support.pairing_rig import ports
 from tests.support.programs import Program, board, host, lines, until
+from tests.support.pulse import Pulse
 
 _GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00"
 _MOST_LINES = 12
@@ -70,14 +71,18 @@ class Target:
             str(out),
         ]
         keys = ["--keys", str(self.folder / "h"), "--save-every", "0", "--log-level", "info"]
-        with host([*arguments, *keys], self.folder, "victim") as running:
+        with (
+            host([*arguments, *keys], self.folder, "victim") as running,
+            Pulse({"board": self.agent, "host": running}) as pulse,
+        ):
             done = out / "delays.jsonl"
             until(lambda: lines(done) > 10 or running.process.poll() is not None, "frames come")
             yield done
             seen = lines(done)
             until(lambda: lines(done) > seen + 30 or running.process.poll() is not None, "frames still come")
             assert running.stop() == 0, running.stderr
-            assert running.stderr.count("board_found") == 1, "the stream was never interrupted"
+            # Each gives the other up after three seconds of silence; which of the two was silent the pulse tells.
+            assert running.stderr.count("board_found") == 1, f"the stream was interrupted; {pulse.told}"
 
 
 @pytest.fixture

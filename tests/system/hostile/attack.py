@@ -1,0 +1,96 @@
+"""What an attack is, and what it has shown. Every attack is one `Attack`: the tests run it once, `make attack` runs it for minutes."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import quantiles
+from typing import Final
+
+MOST_MEMORY: Final = 1.3
+"""Peak of a process under attack, in multiples of its peak before."""
+
+MOST_GAP_S: Final = (1.0, 2.0)
+"""Without pairs after the cause is gone: median and p95 of all rounds (DESIGN, section 7)."""
+
+
+class Rounds:
+    """How often an attack is repeated: once at least, then until its time is over.
+
+    Args:
+        seconds: its time; 0: once.
+    """
+
+    def __init__(self, seconds: float = 0.0) -> None:
+        self._until = time.monotonic() + seconds
+
+    def __iter__(self) -> Iterator[int]:
+        """Numbers of the rounds."""
+        number = 0
+        yield number
+        while time.monotonic() < self._until:
+            number += 1
+            yield number
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What an attack has shown so far.
+
+    Attributes:
+        frames: of the board that came to the host.
+        pairs: that the host made.
+        wrong: pairs of frames that do not belong together.
+        gaps_s: from each time that the cause had gone to the first of many pairs.
+        memory: peak of the attacked process, in multiples of its normal one; 0: not looked at.
+        faults: what else must not be, in words.
+        figures: what else was measured, in words.
+    """
+
+    frames: int = 0
+    pairs: int = 0
+    wrong: int = 0
+    gaps_s: list[float] = field(default_factory=list)
+    memory: float = 0.0
+    faults: list[str] = field(default_factory=list)
+    figures: list[str] = field(default_factory=list)
+
+    @property
+    def gap_s(self) -> tuple[float, float]:
+        """Median and p95 of the gaps, s; NaN where there was none."""
+        if len(self.gaps_s) < 2:
+            only = self.gaps_s[0] if self.gaps_s else float("nan")
+            return only, only
+        cuts = quantiles(self.gaps_s, n=20, method="inclusive")
+        return cuts[9], cuts[18]
+
+    def expect(self, holds: bool, otherwise: str) -> None:  # noqa: FBT001 - reads like an assertion
+        """Note a fault unless something holds."""
+        if not holds and otherwise not in self.faults:
+            self.faults.append(otherwise)
+
+    def broken(self) -> list[str]:
+        """What does not hold, whatever the machine is busy with: counts and content."""
+        wrong = [f"{self.wrong} wrong pairs"] if self.wrong else []
+        memory = [f"memory {self.memory:.2f} x normal"] if self.memory > MOST_MEMORY else []
+        return wrong + memory + self.faults
+
+    def missed(self) -> list[str]:
+        """What does not hold, the times of coming back included."""
+        too_long = any(gap > limit for gap, limit in zip(self.gap_s, MOST_GAP_S, strict=True))
+        return self.broken() + (["back too late"] if too_long else [])
+
+
+@dataclass(frozen=True, slots=True)
+class Attack:
+    """One attack.
+
+    Attributes:
+        name: of one or a few words.
+        load: what is done, in words.
+        run: does it in a folder; gives what it has shown.
+    """
+
+    name: str
+    load: str
+    run: Callable[[Path, Rounds], Outcome]

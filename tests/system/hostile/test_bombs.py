@@ -1,0 +1,15 @@
+"""Images of a few bytes that ask for gigabytes, from the board and from the host's own camera: memory stays, the frames are dropped by name."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.system.hostile.attack import Attack, Rounds
+from tests.system.hostile.crowds import HTTP
+from tests.system.hostile.lies import SHORT_BOMBS
+
+
+@pytest.mark.parametrize("attack", [*SHORT_BOMBS, HTTP], ids=lambda attack: attack.name)
+def test_an_image_explodes(attack: Attack, tmp_path: Path) -> None:
+    """No image is decoded that is not as large as its camera's images are."""
+    assert attack.run(tmp_path, Rounds()).broken() == []

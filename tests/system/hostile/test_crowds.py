@@ -1,0 +1,14 @@
+"""Crowds, bombs over HTTP, stops, kills and noise: nothing wrong is paired, the stream comes back, every frame is accounted for."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.system.hostile.attack import Attack, Rounds
+from tests.system.hostile.crowds import SHORT
+
+
+@pytest.mark.parametrize("attack", SHORT, ids=lambda attack: attack.name)
+def test_the_stream_survives(attack: Attack, tmp_path: Path) -> None:
+    """What is done to the programs from outside costs frames at most, each of them named."""
+    assert attack.run(tmp_path, Rounds()).broken() == []
