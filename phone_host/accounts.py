@@ -8,7 +8,7 @@ from typing import Final
 from common.protocol.message import BoardCounts, Rung
 from common.protocol.session import StaleReason
 from phone_host.delays import Series
-from phone_host.sync.gate import Disbelief, Suspects
+from phone_host.sync.quarantine import Disbelief, Suspects
 
 _MOST_SUSPECTS: Final = 64
 """Steps whose frames are remembered by number; all are counted."""

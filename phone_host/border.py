@@ -16,7 +16,7 @@ from phone_host.accounts import LinkAccount, SessionAccount
 from phone_host.model import BoardFrame
 from phone_host.sync.clock import ClockEstimate, Heard
 from phone_host.sync.clocks import LinkClocks
-from phone_host.sync.gate import Disbelief, Gate, Unproven, disbelief
+from phone_host.sync.quarantine import Disbelief, Quarantine, Unproven, disbelief
 
 _LOG = logging.getLogger(__name__)
 
@@ -40,7 +40,7 @@ Admitted = tuple[int, BoardFrame]
 
 
 class Border:
-    """Clock and gate of one board.
+    """Clock and quarantine of one board.
 
     Args:
         account: of the links; doubts, steps and what was not believed are counted there.
@@ -51,7 +51,7 @@ class Border:
         self._account = account
         self._on_doubt = on_doubt
         self._clock = LinkClocks(len(account.links))
-        self._gate: Gate[Arrival] = Gate()
+        self._quarantine: Quarantine[Arrival] = Quarantine()
         self._unproven = Unproven()
 
     @property
@@ -62,12 +62,12 @@ class Border:
     @property
     def waits_for_echo(self) -> bool:
         """Whether the next echo is wanted as soon as possible."""
-        return self._clock.in_doubt or self._gate.held > 0
+        return self._clock.in_doubt or self._quarantine.held > 0
 
     @property
     def takes_frames(self) -> bool:
         """Whether a frame that came now could be of use."""
-        return self._clock.estimate is not None and self._gate.held < _MOST_HELD
+        return self._clock.estimate is not None and self._quarantine.held < _MOST_HELD
 
     def round_trip_ns(self, link: int) -> int | None:
         """Least round trip of late over one link; None before its first echo."""
@@ -96,7 +96,7 @@ class Border:
 
     def close(self) -> None:
         """Give up the frames that wait for an echo: none will come for them."""
-        for arrival in self._gate.void():
+        for arrival in self._quarantine.void():
             arrival.account.disbelieved[Disbelief.CLOCK] += 1
 
     def learn(self, echo: Echo) -> list[Admitted]:
@@ -118,7 +118,7 @@ class Border:
                 if was_in_doubt and not self._clock.in_doubt:
                     _LOG.info(event("clock_confirmed"))
                 self._unproven.confirmed(echo.t1_ns)
-                return [known for arrival in self._gate.confirmed(echo.t1_ns) for known in self._examine(arrival)]
+                return [known for arrival in self._quarantine.confirmed(echo.t1_ns) for known in self._examine(arrival)]
             case _:
                 pass
         return []
@@ -140,7 +140,7 @@ class Border:
             return known
         transit_ns = arrival.received_ns - known[0][1].marks.sent_ns
         sent_ns, period_ns = arrival.frame.marks.sent_ns, arrival.camera.period_ns
-        return known if self._gate.arrived(arrival, sent_ns, transit_ns, period_ns) else []
+        return known if self._quarantine.arrived(arrival, sent_ns, transit_ns, period_ns) else []
 
     def _examine(self, arrival: Arrival) -> list[Admitted]:
         """Map a frame's marks to the host's clock; nothing where they cannot be, which is counted."""

@@ -28,7 +28,7 @@ from common.stamp import HOST_CLOCK, Stamp
 from phone_host.pairqueue import PairQueue
 from phone_host.reception import LinkFacts, Reception
 from phone_host.sync.fifo import FifoSettings, Overflow
-from phone_host.sync.gate import Disbelief
+from phone_host.sync.quarantine import Disbelief
 
 PERIOD_NS: Final = 33_333_333
 _STEP_NS: Final = 5 * MS
@@ -189,7 +189,7 @@ class SteppingWorld:
         assert counts.received == counts.paired + sum(n for _, n in counts.board_orphans) + counts.held_board
         received = sum(session.received for session in account.sessions)
         dropped = sum(count for reason, count in account.disbelieved.items() if reason is not Disbelief.CREDIT)
-        waiting = self.reception._border._gate.held
+        waiting = self.reception._border._quarantine.held
         assert received == counts.received + account.no_clock + dropped + waiting
 
     def is_suspect(self, pair: WrongPair) -> bool:

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.ledger import BoardMarks
-from phone_host.sync.gate import LABELS_NS, Disbelief, Gate, Suspects, Unproven, disbelief
+from phone_host.sync.quarantine import LABELS_NS, Disbelief, Quarantine, Suspects, Unproven, disbelief
 
 MS, SECOND_NS = 1_000_000, 1_000_000_000
 PERIOD_NS = 33_000_000
@@ -41,25 +41,25 @@ def test_labels_may_lie_anywhere_but_at_the_ends(exposed_ns: int, received_ns: i
     assert disbelief(marks, received_ns, 0, labelled=True) is (Disbelief.PAST if far else None)
 
 
-def opened(transits_ms: list[float]) -> Gate[int]:
-    """A gate that has proven frames with these times under way."""
-    gate: Gate[int] = Gate()
+def opened(transits_ms: list[float]) -> Quarantine[int]:
+    """A quarantine that has proven frames with these times under way."""
+    quarantine: Quarantine[int] = Quarantine()
     for number, transit in enumerate(transits_ms):
-        gate.arrived(-1 - number, number, round(transit * MS), PERIOD_NS)
-        gate.confirmed(number)
-    return gate
+        quarantine.arrived(-1 - number, number, round(transit * MS), PERIOD_NS)
+        quarantine.confirmed(number)
+    return quarantine
 
 
 def test_the_first_frame_waits_for_an_echo() -> None:
     """Before anything is proven nothing passes; an echo from before the frame's sending proves nothing."""
-    gate: Gate[str] = Gate()
-    assert not gate.arrived("first", 1000, 3 * MS, PERIOD_NS)
-    assert not gate.arrived("second", 2000, 3 * MS, PERIOD_NS), "order is kept"
-    assert gate.confirmed(999) == []
-    assert gate.confirmed(1000) == ["first"]
-    assert gate.held == 1
-    assert gate.confirmed(5000) == ["second"]
-    assert gate.arrived("third", 6000, 3 * MS, PERIOD_NS)
+    quarantine: Quarantine[str] = Quarantine()
+    assert not quarantine.arrived("first", 1000, 3 * MS, PERIOD_NS)
+    assert not quarantine.arrived("second", 2000, 3 * MS, PERIOD_NS), "order is kept"
+    assert quarantine.confirmed(999) == []
+    assert quarantine.confirmed(1000) == ["first"]
+    assert quarantine.held == 1
+    assert quarantine.confirmed(5000) == ["second"]
+    assert quarantine.arrived("third", 6000, 3 * MS, PERIOD_NS)
 
 
 @given(
@@ -83,19 +83,19 @@ def test_a_steady_link_holds_nothing_up(recent_ms: list[float], transit_ms: floa
 
 def test_an_unsteady_link_waits_each_time() -> None:
     """Where frames take 500 to 900 ms no frame passes without an echo: a step of two periods would not be seen."""
-    gate = opened([500, 900, 700, 650])
+    quarantine = opened([500, 900, 700, 650])
     for transit_ms in (500, 650, 700, 900):
-        assert not gate.arrived(transit_ms, 10**6, transit_ms * MS, PERIOD_NS)
-        assert gate.confirmed(10**6) == [transit_ms]
+        assert not quarantine.arrived(transit_ms, 10**6, transit_ms * MS, PERIOD_NS)
+        assert quarantine.confirmed(10**6) == [transit_ms]
 
 
 def test_a_doubt_drops_what_waits() -> None:
     """Frames that waited for an echo are given back to be counted, and the next frame has to wait again."""
-    gate = opened([3, 3, 3])
-    gate.arrived(8, 10**6, 900 * MS, PERIOD_NS)
-    assert gate.void() == [8]
-    assert gate.void() == []
-    assert not gate.arrived(9, 10**6, 3 * MS, PERIOD_NS)
+    quarantine = opened([3, 3, 3])
+    quarantine.arrived(8, 10**6, 900 * MS, PERIOD_NS)
+    assert quarantine.void() == [8]
+    assert quarantine.void() == []
+    assert not quarantine.arrived(9, 10**6, 3 * MS, PERIOD_NS)
 
 
 def test_frames_since_the_last_echo_are_suspect() -> None:

@@ -77,7 +77,7 @@ class _Held(Generic[F]):
     transit_ns: int
 
 
-class Gate(Generic[F]):
+class Quarantine(Generic[F]):
     """Lets frames pass in the order in which they came, those that an echo has to confirm when it has."""
 
     def __init__(self) -> None:
