@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     rig, scene = unlike_rig(), demo_scene()
 
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        _clear(out)
         film = _render(scene, rig, out / "film", console, signals)
         write_rig(out / "rig.yaml", rig, rectify_rig(rig))
         demo = DemoRun(film, rig, out)
@@ -87,6 +87,22 @@ def run(options: argparse.Namespace) -> int:
     if signals.stop:
         return INTERRUPTED if signals.interrupted else 0
     return 0 if errors.pairs and not errors.wrong_pairs and demo.host.results.complete else _CHECK_FAILED
+
+
+def _clear(out: Path) -> None:
+    """Remove what an earlier demo left in the folder; said before the rendering, what is in the way.
+
+    Raises:
+        UnavailableError: something that is not ours is.
+        OSError: the folder cannot be used.
+    """
+    from phone_host.formats.marked import MarkedFolder  # noqa: PLC0415 - as in run
+    from phone_host.results import NAMES, PAIR_FILES  # noqa: PLC0415
+
+    names = rf"{NAMES}|rig\.yaml|cloud\.ply|disparity\.png"
+    folder = MarkedFolder(out, names, kept="film", inner=PAIR_FILES)
+    folder.mark("film", "rig.yaml", "cloud.ply", "disparity.png")
+    folder.close()
 
 
 class _StoppedError(Exception):
