@@ -39,6 +39,7 @@ def run(options: argparse.Namespace) -> int:
     """Render, stream, measure, compare with the truth."""
     from rich.console import Console  # noqa: PLC0415 - OpenCV and rich, only now
 
+    from phone_host.boardprocess import socket_folder  # noqa: PLC0415 - as below
     from phone_host.demo import DemoRun, truth_json  # noqa: PLC0415
     from phone_host.demo_page import demo_page  # noqa: PLC0415
     from phone_host.formats.atomic import write_text  # noqa: PLC0415
@@ -61,14 +62,15 @@ def run(options: argparse.Namespace) -> int:
         _clear(out)
         film = _render(scene, rig, out / "film", console, signals)
         write_rig(out / "rig.yaml", rig, rectify_rig(rig))
-        demo = DemoRun(film, rig, out)
-        live = LiveTable(demo.host, console, options.seconds) if console.is_terminal else None
-        try:
-            with live or nullcontext():
-                demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
-        except BaseException:
-            demo.host.results.finish(build(demo.host.facts("failed")))
-            raise
+        with socket_folder() as sockets:
+            demo = DemoRun(film, rig, out, sockets)
+            live = LiveTable(demo.host, console, options.seconds) if console.is_terminal else None
+            try:
+                with live or nullcontext():
+                    demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
+            except BaseException:
+                demo.host.results.finish(build(demo.host.facts("failed")))
+                raise
         facts = demo.host.facts("stopped" if signals.stop else "time_over")
         errors = demo.check(scene)
         report = build(facts) | {"truth": truth_json(errors)}
