@@ -14,7 +14,7 @@ EXAMPLES = """  phone-host pair
   phone-host pair --link tcp://192.168.7.2:5555
   phone-host pair --link tcp://raspberrypi.local:5555 --code 123456        (the code that `board-agent pair` shows)
 
-The board shows a code of six digits: in its journal (journalctl -u board-agent), or where `sudo board-agent pair` runs.
+`sudo board-agent pair` on the board shows a code of six digits; it stands in no log.
 """
 
 _TRIES = 3
@@ -80,7 +80,8 @@ def _door(address: str, port: int | None) -> tuple[str, int]:
 def _code(given: str | None, name: str) -> int:
     """Take the code from the option, or from whoever types it."""
     if given is None:
-        print(f"{name} shows a code of {CODE_DIGITS} digits now; type it: ", end="", file=sys.stderr, flush=True)
+        words = f"run `sudo board-agent pair` on {name} and type the {CODE_DIGITS} digits that it shows: "
+        print(words, end="", file=sys.stderr, flush=True)
         given = sys.stdin.readline()
         if not given:
             raise UnavailableError("no code was typed", "type what the board shows, or give --code")
