@@ -17,7 +17,7 @@ from common.frame import Frame, PixelFormat
 from common.link.base import Link
 from common.protocol.message import FrameMessage, Pacing
 from phone_host.formats.atomic import write_bytes
-from phone_host.formats.marked import MarkedFolder
+from phone_host.formats.listed import ListedFolder
 from phone_host.model import BoardFrame
 from phone_host.pairqueue import PairQueue
 from phone_host.receiver import Receiver, refusal_text
@@ -157,9 +157,9 @@ def keep(footage: Footage, folder: Path) -> None:
         suffixes = {PixelFormat.MJPEG: ".jpg", PixelFormat.PNG: ".png"}
         named = [(shot, f"{shot.exposed_ns}{suffixes.get(shot.image.pixel_format, '')}") for shot in shots]
         files = {name: shot for shot, name in named if "." in name}
-        marked = MarkedFolder(folder / side, r"-?[0-9]+\.(jpg|png)")
-        marked.mark(*files)
-        marked.close()
+        listed = ListedFolder(folder / side, r"-?[0-9]+\.(jpg|png)")
+        listed.add(*files)
+        listed.close()
         for name, shot in files.items():
             write_bytes(folder / side / name, bytes(shot.image.payload))
 

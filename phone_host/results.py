@@ -3,7 +3,7 @@
 While writing fails, lines of delays.jsonl wait in memory (bounded) and pairs are counted as unsaved; when there is room again the lines
 follow in order. What is still missing at the end is said with the exit code.
 
-Of an earlier run in the same folder what it listed there as its own is removed (`formats/marked.py`); anything else in the way ends the run
+Of an earlier run in the same folder what it listed there as its own is removed (`formats/listed.py`); anything else in the way ends the run
 before it begins. report.json and the page survive a power cut; saved pairs do not wait for the disk, since the pipeline would wait with them.
 """
 
@@ -20,7 +20,7 @@ from common import now
 from common.errors import UnavailableError
 from common.ledger import PairLedger
 from common.logs import event
-from phone_host.formats.marked import MarkedFolder
+from phone_host.formats.listed import ListedFolder
 from phone_host.formats.pfm import write_pfm
 from phone_host.formats.ply import write_ply
 from phone_host.formats.preview import write_png
@@ -77,11 +77,11 @@ class Results:
         self._tried_ns = 0
         self._file = -1
         self._written_bytes = 0
-        self._own: MarkedFolder | None = None
+        self._own: ListedFolder | None = None
         if folder is not None:
             try:
-                self._own = MarkedFolder(folder, NAMES, inner=PAIR_FILES)
-                self._own.mark("report.json", "index.html")
+                self._own = ListedFolder(folder, NAMES, inner=PAIR_FILES)
+                self._own.add("report.json", "index.html")
                 self._file = self._own.create("delays.jsonl")
             except OSError as error:
                 raise UnavailableError(
@@ -110,7 +110,7 @@ class Results:
         final = self._folder / f"pair-{number:06d}"
         part = final.with_suffix(".part")
         try:
-            self._own.mark(final.name)
+            self._own.add(final.name)
             part.mkdir()
             write_png(part / "left.png", processed.pair.left)
             write_png(part / "right.png", processed.pair.right)

@@ -98,12 +98,12 @@ def _clear(out: Path) -> None:
         UnavailableError: something that is not ours is.
         OSError: the folder cannot be used.
     """
-    from phone_host.formats.marked import MarkedFolder  # noqa: PLC0415 - as in run
+    from phone_host.formats.listed import ListedFolder  # noqa: PLC0415 - as in run
     from phone_host.results import NAMES, PAIR_FILES  # noqa: PLC0415
 
     names = rf"{NAMES}|rig\.yaml|cloud\.ply|disparity\.png"
-    folder = MarkedFolder(out, names, kept="film", inner=PAIR_FILES)
-    folder.mark("film", "rig.yaml", "cloud.ply", "disparity.png")
+    folder = ListedFolder(out, names, kept="film", inner=PAIR_FILES)
+    folder.add("film", "rig.yaml", "cloud.ply", "disparity.png")
     folder.close()
 
 

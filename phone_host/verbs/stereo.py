@@ -135,11 +135,11 @@ def _figures(options: argparse.Namespace, core: "StereoCore", disparity: "Dispar
 
 def _clear(out: Path) -> None:
     """Remove an earlier run's results, or they might be taken for this one's."""
-    from phone_host.formats.marked import MarkedFolder  # noqa: PLC0415
+    from phone_host.formats.listed import ListedFolder  # noqa: PLC0415
 
     try:
-        folder = MarkedFolder(out, r"disparity\.(pfm|png)|cloud\.ply|report\.json")
-        folder.mark("disparity.pfm", "disparity.png", "cloud.ply", "report.json")
+        folder = ListedFolder(out, r"disparity\.(pfm|png)|cloud\.ply|report\.json")
+        folder.add("disparity.pfm", "disparity.png", "cloud.ply", "report.json")
         folder.close()
     except OSError as error:
         raise unwritable(out, error) from error

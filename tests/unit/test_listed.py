@@ -12,7 +12,7 @@ import pytest
 
 from common.errors import TandemError, UnavailableError
 from phone_host.formats.atomic import write_bytes, write_text
-from phone_host.formats.marked import MARK, MarkedFolder
+from phone_host.formats.listed import LIST, ListedFolder
 from phone_host.results import NAMES, PAIR_FILES, Results
 
 FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
@@ -23,11 +23,11 @@ def earlier_run(folder: Path) -> None:
     results = Results(folder, 1)
     assert results._own is not None
     for name in ("pair-000000", "pair-1000000"):
-        results._own.mark(name)
+        results._own.add(name)
         (folder / name).mkdir()
         for file in FILES:
             (folder / name / file).write_bytes(b"x")
-    results._own.mark("pair-000002")
+    results._own.add("pair-000002")
     (folder / "pair-000002.part").mkdir()
     (folder / "pair-000002.part" / f".left.png.{'0' * 16}.part").write_bytes(b"x")
     (folder / f".report.json.{'0' * 16}.part").write_bytes(b"x")
@@ -52,7 +52,7 @@ def test_a_later_run_removes_what_an_earlier_one_left_and_nothing_else(tmp_path:
         (tmp_path / name).write_bytes(content)
     results = Results(tmp_path, 1)
     left = tree(tmp_path)
-    assert left.pop(MARK)
+    assert left.pop(LIST)
     assert left == {**mine, "delays.jsonl": b""}
     results.finish({})
 
@@ -63,7 +63,7 @@ def test_a_run_again_and_again_in_one_folder(tmp_path: Path) -> None:
         Results(tmp_path, 1).finish({"number": number})
     Results(tmp_path, 1)
     Results(tmp_path, 1).finish({})
-    assert sorted(path.name for path in tmp_path.iterdir()) == [MARK, "delays.jsonl", "report.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [LIST, "delays.jsonl", "report.json"]
 
 
 def plant_link(path: Path) -> None:
@@ -86,7 +86,7 @@ def refused(out: Path, name: str) -> None:
     assert tree(out.parent) == before
 
 
-@pytest.mark.parametrize("name", ["delays.jsonl", "report.json", "index.html", "pair-000007", MARK])
+@pytest.mark.parametrize("name", ["delays.jsonl", "report.json", "index.html", "pair-000007", LIST])
 @pytest.mark.parametrize("plant", [plant_link, plant_file, os.mkfifo, Path.mkdir])
 @pytest.mark.timeout(30)
 def test_what_is_not_ours_ends_the_first_run(name: str, plant: Callable[[Path], None], tmp_path: Path) -> None:
@@ -97,7 +97,7 @@ def test_what_is_not_ours_ends_the_first_run(name: str, plant: Callable[[Path], 
     refused(tmp_path / "out", name)
 
 
-@pytest.mark.parametrize("name", ["delays.jsonl", "report.json", "index.html", "pair-000000", MARK])
+@pytest.mark.parametrize("name", ["delays.jsonl", "report.json", "index.html", "pair-000000", LIST])
 @pytest.mark.parametrize("plant", [plant_link, os.mkfifo])
 @pytest.mark.timeout(30)
 def test_a_link_or_pipe_in_place_of_ours_ends_a_later_run(
@@ -153,22 +153,22 @@ def test_every_writer_replaces_a_link(write: Callable[[Path], None], tmp_path: P
 def test_a_torn_last_line_of_the_list_counts_for_nothing(tmp_path: Path) -> None:
     """A list whose last line was cut by a full disk names what stands before it; the next run mends it."""
     Results(tmp_path, 1).finish({})
-    with (tmp_path / MARK).open("a") as mark:
-        mark.write("pair-0000")
+    with (tmp_path / LIST).open("a") as list_file:
+        list_file.write("pair-0000")
     Results(tmp_path, 1).finish({})
-    assert "pair-0000" not in (tmp_path / MARK).read_text()
+    assert "pair-0000" not in (tmp_path / LIST).read_text()
 
 
 def test_what_another_verb_has_listed_stays(tmp_path: Path) -> None:
     """A run leaves what it does not write itself, and it goes on being ours."""
-    other = MarkedFolder(tmp_path, "disparity.pfm")
-    other.mark("disparity.pfm", "report.json")
+    other = ListedFolder(tmp_path, "disparity.pfm")
+    other.add("disparity.pfm", "report.json")
     other.close()
     for name in ("disparity.pfm", "report.json"):
         (tmp_path / name).write_text("of stereo")
     Results(tmp_path, 1).finish({})
     assert (tmp_path / "disparity.pfm").read_text() == "of stereo"
-    MarkedFolder(tmp_path, r"disparity\.pfm").close()
+    ListedFolder(tmp_path, r"disparity\.pfm").close()
     assert not (tmp_path / "disparity.pfm").exists()
 
 
@@ -178,9 +178,9 @@ def test_a_list_with_ways_out_of_the_folder_leads_nowhere(tmp_path: Path) -> Non
     Results(out, 1).finish({})
     (tmp_path / "report.json").write_text("precious")
     (out / "notes.txt").write_text("precious")
-    with (out / MARK).open("a") as mark:
-        mark.write("../report.json\nnotes.txt\n/etc/passwd\n..\n.\n")
-    MarkedFolder(out, NAMES, inner=PAIR_FILES).close()
+    with (out / LIST).open("a") as list_file:
+        list_file.write("../report.json\nnotes.txt\n/etc/passwd\n..\n.\n")
+    ListedFolder(out, NAMES, inner=PAIR_FILES).close()
     assert (tmp_path / "report.json").read_text() == "precious"
     assert (out / "notes.txt").read_text() == "precious"
 

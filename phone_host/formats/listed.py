@@ -16,7 +16,7 @@ from typing import Final
 from common.errors import DataError, UnavailableError
 from common.files import read_file, replacing_in, sync_folder
 
-MARK: Final = ".tandemscan"
+LIST: Final = ".tandemscan"
 
 _HEAD: Final = "# What tandemscan has written here. A later run replaces this, and nothing else.\n"
 _MOST_BYTES: Final = 64 << 20
@@ -26,7 +26,7 @@ _TEMPORARY: Final = re.compile(r"\.(.+)\.[0-9a-f]{16}\.part")
 _FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
-class MarkedFolder:
+class ListedFolder:
     """A folder of results, cleared of those that an earlier run left under the names that this one uses.
 
     Args:
@@ -44,7 +44,7 @@ class MarkedFolder:
         self._path, self._inner = path, re.compile(inner)
         path.mkdir(parents=True, exist_ok=True)
         self.descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-        self._mark = -1
+        self._list = -1
         try:
             listed = self._listed()
             removed = self._ours(re.compile(names), listed)
@@ -55,20 +55,20 @@ class MarkedFolder:
                 self._remove(name)
             listed -= {plain_name(name) for name in removed}
             self._size_bytes = self._write(listed)
-            self._mark = os.open(MARK, os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW | os.O_CLOEXEC, dir_fd=self.descriptor)
+            self._list = os.open(LIST, os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW | os.O_CLOEXEC, dir_fd=self.descriptor)
         except BaseException:
             self.close()
             raise
 
-    def mark(self, *names: str) -> None:
+    def add(self, *names: str) -> None:
         """List names before they are written.
 
         Raises:
             OSError: as the operating system gives it; nothing is listed then.
         """
         lines = "".join(f"{name}\n" for name in names).encode()
-        if os.write(self._mark, lines) < len(lines):
-            os.ftruncate(self._mark, self._size_bytes)
+        if os.write(self._list, lines) < len(lines):
+            os.ftruncate(self._list, self._size_bytes)
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         self._size_bytes += len(lines)
 
@@ -78,7 +78,7 @@ class MarkedFolder:
         Raises:
             OSError: as the operating system gives it.
         """
-        self.mark(name)
+        self.add(name)
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
         return os.open(name, flags, 0o644, dir_fd=self.descriptor)
 
@@ -97,18 +97,18 @@ class MarkedFolder:
         Raises:
             OSError: the disk fails.
         """
-        os.fsync(self._mark)
+        os.fsync(self._list)
         sync_folder(self.descriptor)
 
     def close(self) -> None:
         """Let go of the folder."""
-        for descriptor in (self._mark, self.descriptor):
+        for descriptor in (self._list, self.descriptor):
             if descriptor >= 0:
                 os.close(descriptor)
-        self._mark = self.descriptor = -1
+        self._list = self.descriptor = -1
 
     def _listed(self) -> set[str]:
-        path = self._path / MARK
+        path = self._path / LIST
         try:
             text = read_file(self.descriptor, path, _MOST_BYTES)[0].decode("utf-8", "replace")
         except FileNotFoundError:
@@ -122,7 +122,7 @@ class MarkedFolder:
 
     def _write(self, names: set[str]) -> int:
         lines = (_HEAD + "".join(f"{name}\n" for name in sorted(names))).encode()
-        with replacing_in(self.descriptor, MARK) as file:
+        with replacing_in(self.descriptor, LIST) as file:
             file.write(lines)
         return len(lines)
 
