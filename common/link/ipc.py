@@ -10,7 +10,6 @@ greets a board, which holds no secret. Where the kernel does not say (not Linux)
 import os
 import pwd
 import stat
-import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -121,6 +120,8 @@ def runtime_folder(environment: Mapping[str, str]) -> Path:
     with suppress(OSError):
         if given.is_absolute() and _is_own(given.stat()):
             return given
+    import tempfile  # noqa: PLC0415 - slow to load, and no board needs it
+
     folder = Path(tempfile.gettempdir()) / f"tandemscan-{os.geteuid()}"
     try:
         with suppress(FileExistsError):

@@ -1,4 +1,4 @@
-"""A board's service that was taken over, and its owner who runs `sudo board-agent pair` and `keys`: root gives it nothing."""
+"""A board's service that was taken over, and its owner who runs `sudo board-agent pair`: root gives it nothing. Links in a results folder."""
 
 import os
 import shutil
@@ -13,7 +13,9 @@ import msgpack
 import pytest
 import zmq
 
-from tests.support.programs import program, until
+from tests.support.numbered import write_film
+from tests.support.pairing_rig import ports
+from tests.support.programs import host, program, until
 
 NOBODY = 65534
 
@@ -99,9 +101,6 @@ def test_a_link_to_a_socket_of_roots_is_not_connected_to(folder: Path, tmp_path:
 
 def test_an_agent_that_root_runs_meets_its_owner(folder: Path, tmp_path: Path) -> None:
     """An agent that root started by hand leaves its socket as the folder's owner, so that `pair`, which is that owner by then, reaches it."""
-    from tests.support.numbered import write_film  # noqa: PLC0415
-    from tests.support.pairing_rig import ports  # noqa: PLC0415
-
     write_film(tmp_path / "film", 3)
     serving = ["run", "--camera", f"replay:{tmp_path}/film?pace=demand", "--link", f"tcp://*:{ports()}"]
     with program("board_agent.cli", [*serving, "--keys", str(folder)], tmp_path, "agent") as agent:
@@ -109,3 +108,21 @@ def test_an_agent_that_root_runs_meets_its_owner(folder: Path, tmp_path: Path) -
         with program("board_agent.cli", ["pair", "--keys", str(folder)], tmp_path, "pair") as owner:
             until(lambda: "type this code" in owner.out.read_text(), "the code is shown")
     assert {path.stat().st_uid for path in folder.iterdir()} == {NOBODY}
+
+
+@pytest.mark.parametrize("name", ["delays.jsonl", "report.json", "pair-000000"])
+def test_a_run_ends_before_it_begins_where_a_link_has_a_results_name(name: str, tmp_path: Path) -> None:
+    """`run` into a folder with a planted link ends with exit 3 and one line that names link and remedy; the target and all else stay."""
+    write_film(tmp_path / "film", 3)
+    (tmp_path / "precious").write_text("precious")
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "pair-000123-my-notes").mkdir()
+    (out / name).symlink_to(tmp_path / "precious")
+    arguments = ["run", "--camera", f"replay:{tmp_path}/film?loop=1", "--link", f"ipc://{tmp_path}/link"]
+    with host([*arguments, "--out", str(out)], tmp_path) as running:
+        assert running.wait() == 3
+    assert f"{out}/{name} is a link" in running.stderr.splitlines()[-1]
+    assert "--out" in running.stderr.splitlines()[-1]
+    assert (tmp_path / "precious").read_text() == "precious"
+    assert sorted(path.name for path in out.iterdir()) == sorted([name, "pair-000123-my-notes"])

@@ -241,3 +241,20 @@ def test_a_folder_for_sockets_that_somebody_has_planted_is_refused(
             folder.mkdir(mode=0o755)
     with pytest.raises(UnavailableError, match=f"{folder} .*XDG_RUNTIME_DIR"):
         runtime_folder({})
+
+
+@needs_root
+def test_the_doctor_asks_as_the_user_who_serves(shared: Path) -> None:
+    """Root's doctor finds nothing wrong with a path in the service's own folder."""
+    from common.doctor.access import Account  # noqa: PLC0415
+    from common.doctor.finding import Verdict  # noqa: PLC0415
+    from common.doctor.link_probe import examine_link  # noqa: PLC0415
+    from common.doctor.unit_check import Unit  # noqa: PLC0415
+
+    place = shared / "run"
+    place.mkdir(mode=0o750)
+    os.chown(place, NOBODY, NOBODY)
+    account = Account("nobody", NOBODY, frozenset({NOBODY}), is_me=False)
+    unit = Unit("board-agent.service")
+    findings = examine_link(f"ipc://{place}/link", account, unit, listens_by_default=True)
+    assert [finding.verdict for finding in findings] == [Verdict.OK]
