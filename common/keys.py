@@ -98,8 +98,7 @@ class KeyFolder:
         try:
             secret = self._read(_KEY_FILE).strip()
         except FileNotFoundError:
-            self._make()
-            secret = self._read(_KEY_FILE).strip()
+            secret = self._make().strip()
         with suppress(ValueError):  # of a text that is no Z85
             if is_key(secret):
                 return OwnKey(_curve().curve_public(secret.encode()).decode(), secret)
@@ -112,10 +111,10 @@ class KeyFolder:
         Raises:
             UnavailableError: they cannot be written.
         """
-        secret = _curve().curve_keypair()[1]
+        public, secret = _curve().curve_keypair()
         with self._locked() as folder:
             _write(folder, _KEY_FILE, secret + b"\n")
-        return self.own()
+        return OwnKey(public.decode(), secret.decode())
 
     def peers(self) -> tuple[Peer, ...]:
         """Give all peers, in the order in which they were added.
@@ -243,11 +242,12 @@ class KeyFolder:
             raise _unavailable(self.path, error) from None
         return True
 
-    def _make(self) -> None:
+    def _make(self) -> str:
         secret = _curve().curve_keypair()[1]  # not below: whose rights we have there may not be able to load it
         with self._locked() as folder:
             if not _has(folder, _KEY_FILE):  # another process may have been faster
                 _write(folder, _KEY_FILE, secret + b"\n")
+            return self._read_in(folder, _KEY_FILE)
 
     def _read(self, name: str) -> str:
         """Read a small file that must be its owner's alone; FileNotFoundError where there is none."""
