@@ -35,7 +35,7 @@ _LOG: Final = logging.getLogger("board_agent")
 _EXAMPLES = """examples:
   board-agent run --camera 'v4l2:/dev/video0?size=640x480&fps=30' --link 'tcp://*:5555'
   board-agent run --camera 'replay:frames?fps=30&loop=1'
-  board-agent run --camera 'replay:frames?pace=demand' --link ipc:///tmp/board
+  board-agent run --camera 'replay:frames?pace=demand' --link ipc://$XDG_RUNTIME_DIR/board
   board-agent run --camera 'v4l2:auto?fps=30' --link 'rfcomm://*' --adapt quality,rate --least-fps 5
   board-agent run --config /etc/tandemscan/board-agent.toml
   board-agent cameras
@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
             "--link",
             action="append",
             metavar="URI",
-            help="tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://*; may be given again",
+            help="tcp://HOST:PORT, ipc://PATH[?owner=USER], serial:DEVICE or rfcomm://*; may be given again",
         )
         verb.add_argument(
             "--adapt",

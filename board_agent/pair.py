@@ -1,19 +1,29 @@
-"""What `board-agent pair` does: asks the running agent to take in a new host, and follows what becomes of it."""
+"""What `board-agent pair` does: asks the running agent to take in a new host, and follows what becomes of it.
 
+Rule: root gives up its rights for those of the folder's owner before it touches what lies there, for good: ZeroMQ connects in a thread of its
+own, whenever it likes. What answers is that owner's process, and no more is believed of it than what can be printed.
+"""
+
+import stat
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
 import zmq
 
 from common import now
-from common.errors import UnavailableError
+from common.errors import ProtocolError, UnavailableError
 from common.keys import KeyFolder
 from common.link.pairing_door import CONTROL_PREFIX, DoorState
 
 _ASK_NS: Final = 500_000_000
 _SILENCE_NS: Final = 5_000_000_000
 """An agent on the smallest board answers within one round of its loop, a second at most."""
+
+_MOST_AGENTS: Final = 16
+_MOST_BYTES: Final = 4096
+"""More is no state of a door: addresses of 16 links and names of 64 letters."""
 
 NOBODY: Final = DoorState("", "", "", "", 0)
 """No agent answers: none is running, or it waits for its camera and has opened no link yet."""
@@ -57,6 +67,12 @@ def absence(keys: KeyFolder) -> UnavailableError:
     )
 
 
+def _is_socket(path: Path) -> bool:
+    with suppress(OSError):
+        return stat.S_ISSOCK(path.lstat().st_mode)
+    return False
+
+
 class _Agents:
     """The running agents that use a folder of keys: one, as a rule.
 
@@ -77,10 +93,13 @@ class _Agents:
 
     def ask(self) -> None:
         """Ask all that there are now to keep their doors open."""
+        if not self._keys.become_owner():
+            return
         for path in self._keys.path.glob(f"{CONTROL_PREFIX}*"):
-            if path not in self._sockets:
+            if path not in self._sockets and len(self._sockets) < _MOST_AGENTS and _is_socket(path):
                 sock = self._sockets[path] = self._context.socket(zmq.DEALER)
                 sock.setsockopt(zmq.LINGER, 0)
+                sock.setsockopt(zmq.MAXMSGSIZE, _MOST_BYTES)
                 sock.setsockopt(zmq.IMMEDIATE, 1)  # nothing is kept for an agent that has gone
                 sock.connect(f"ipc://{path}")
                 self._poller.register(sock, zmq.POLLIN)
@@ -93,7 +112,11 @@ class _Agents:
         while (left_ns := until_ns - now.monotonic_ns()) > 0:
             ready = dict(self._poller.poll(left_ns // 1_000_000 + 1))
             for sock in ready:
-                yield DoorState.decode(sock.recv(zmq.DONTWAIT))
+                try:
+                    state = DoorState.decode(sock.recv(zmq.DONTWAIT))
+                except ProtocolError:
+                    continue
+                yield state
 
 
 def _follow(agents: _Agents, deadline_ns: int) -> Iterator[DoorState]:
@@ -104,6 +127,8 @@ def _follow(agents: _Agents, deadline_ns: int) -> Iterator[DoorState]:
         agents.ask()
         for state in agents.answers(now_ns + _ASK_NS):
             silent_since_ns, is_told = now.monotonic_ns(), False
+            if len(shown) > _MOST_AGENTS:  # they make addresses up
+                shown.clear()
             if shown.get(state.address) != state:
                 shown[state.address] = state
                 yield state

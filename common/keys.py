@@ -1,8 +1,9 @@
 """This machine's key and those of the machines that it trusts, as files in one folder.
 
-Rules: files are for their owner only (0600 in a folder of 0700), appear whole or not at all, and belong to the folder's owner whoever
-wrote them, so that root may act for the service. A file that others may read, or that is no key file, is refused with one line: nothing is
-repaired in silence. Keys are Curve25519 in Z85, as CurveZMQ has them (RFC 26, RFC 32).
+Rules: files are for their owner only (0600 in a folder of 0700) and appear whole or not at all. Root acts here for the service with the
+service's rights (`common.files`): what it writes is the folder's owner's, and what that one may have planted leads nowhere. A file that
+others may read, or that is no key file, is refused with one line: nothing is repaired in silence. Keys are Curve25519 in Z85, as CurveZMQ
+has them (RFC 26, RFC 32).
 """
 
 import fcntl
@@ -17,7 +18,9 @@ from functools import reduce
 from pathlib import Path
 from typing import Any, Final
 
-from common.errors import DataError, SettingsError, UnavailableError
+from common import now
+from common.errors import DataError, SettingsError, TakenError, UnavailableError
+from common.files import become_owner, opened_folder, read_file, replacing_in
 
 SERVICE_FOLDER: Final = Path("/var/lib/tandemscan")
 """Where the board's service keeps its state (StateDirectory= of its unit)."""
@@ -35,6 +38,10 @@ _Z85_ALPHABET: Final = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRS
 """RFC 32. A text of 40 of them may still be no 256 bits (each five stand for less than 2^32): see is_key."""
 _MAX_FILE_BYTES: Final = 1 << 20
 """Thousands of peers; more is no file of ours."""
+
+_LOCK_WAIT_NS: Final = 10_000_000_000
+_LOCK_STEP_S: Final = 0.05
+"""Who changes the folder holds it for some ms. A service that was taken over may hold it for ever."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +82,11 @@ class KeyFolder:
     @property
     def has_key(self) -> bool:
         """Whether a key was made already."""
-        return _exists(self.path / _KEY_FILE)
+        try:
+            with self._opened(make=False) as folder:
+                return _has(folder, _KEY_FILE)
+        except FileNotFoundError:
+            return False
 
     def own(self) -> OwnKey:
         """Give this machine's keys; makes them when there are none.
@@ -84,13 +95,14 @@ class KeyFolder:
             DataError: the file is no key, or others may read it.
             UnavailableError: it cannot be read or written.
         """
-        path = self.path / _KEY_FILE
-        if not _exists(path):
-            self._make(path)
-        secret = _read(path, "keys --new").strip()
+        try:
+            secret = self._read(_KEY_FILE).strip()
+        except FileNotFoundError:
+            secret = self._make().strip()
         with suppress(ValueError):  # of a text that is no Z85
             if is_key(secret):
                 return OwnKey(_curve().curve_public(secret.encode()).decode(), secret)
+        path = self.path / _KEY_FILE
         raise DataError(f"{path} is no key", "restore it, or make a new one with keys --new and pair again")
 
     def renew(self) -> OwnKey:
@@ -99,10 +111,10 @@ class KeyFolder:
         Raises:
             UnavailableError: they cannot be written.
         """
-        secret = _curve().curve_keypair()[1]
-        with self._locked():
-            _write(self.path / _KEY_FILE, secret + b"\n")
-        return self.own()
+        public, secret = _curve().curve_keypair()
+        with self._locked() as folder:
+            _write(folder, _KEY_FILE, secret + b"\n")
+        return OwnKey(public.decode(), secret.decode())
 
     def peers(self) -> tuple[Peer, ...]:
         """Give all peers, in the order in which they were added.
@@ -111,16 +123,24 @@ class KeyFolder:
             DataError: the file is none of ours, or others may read it.
             UnavailableError: it cannot be read.
         """
-        path = self.path / _PEERS_FILE
-        if not _exists(path):
+        try:
+            with self._opened(make=False) as folder:
+                return self._peers_in(folder)
+        except FileNotFoundError:
             return ()
-        text = _read(path, "keys --forget")
+
+    def _peers_in(self, folder: int) -> tuple[Peer, ...]:
+        try:
+            text = self._read_in(folder, _PEERS_FILE)
+        except FileNotFoundError:
+            return ()
         try:
             items = json.loads(text)
             if not isinstance(items, list):
                 raise TypeError(items)
             return tuple(_peer(item) for item in items)
         except (ValueError, TypeError, RecursionError):
+            path = self.path / _PEERS_FILE
             raise DataError(
                 f"{path} is no list of peers", "restore it, or delete it and pair every machine again"
             ) from None
@@ -129,7 +149,7 @@ class KeyFolder:
     def peers_state(self) -> tuple[int, int, int] | None:
         """Something that changes when the file of peers does; None while there is none. As cheap as one system call."""
         try:
-            status = os.stat(self.path / _PEERS_FILE)  # noqa: PTH116 - once for each connection
+            status = os.lstat(self.path / _PEERS_FILE)  # once for each connection
         except OSError:
             return None
         return status.st_mtime_ns, status.st_ino, status.st_size
@@ -147,13 +167,13 @@ class KeyFolder:
         """
         if not is_key(peer.key):
             raise SettingsError(f"{peer.key!r} is no public key", "give the 40 characters that `keys` shows there")
-        with self._locked():
-            others = tuple(known for known in self.peers() if known.key != peer.key)
+        with self._locked() as folder:
+            others = tuple(known for known in self._peers_in(folder) if known.key != peer.key)
             taken = {known.name for known in others}
             wanted = clean_name(peer.name)
             names = (wanted, *(f"{wanted}-{number}" for number in range(2, len(taken) + 3)))
             named = replace(peer, name=next(name for name in names if name not in taken))
-            self._write_peers((*others, named))
+            _write_peers(folder, (*others, named))
         return named
 
     def forget(self, name: str) -> Peer:
@@ -164,11 +184,11 @@ class KeyFolder:
             DataError: the file of peers is bad.
             UnavailableError: it cannot be written.
         """
-        with self._locked():
-            peers = self.peers()
+        with self._locked() as folder:
+            peers = self._peers_in(folder)
             for peer in peers:
                 if peer.name == name:
-                    self._write_peers(tuple(known for known in peers if known is not peer))
+                    _write_peers(folder, tuple(known for known in peers if known is not peer))
                     return peer
         raise SettingsError(
             f"{name!r} is not known", f"the names are {', '.join(peer.name for peer in peers) or '(none)'}"
@@ -181,8 +201,10 @@ class KeyFolder:
             DataError: others may read the file.
             UnavailableError: it cannot be read.
         """
-        path = self.path / _CODES_FILE
-        return tuple(_read(path, "pair").split()) if _exists(path) else ()
+        try:
+            return tuple(self._read(_CODES_FILE).split())
+        except FileNotFoundError:
+            return ()
 
     def spend(self, code: str) -> None:
         """Take note that a code is being proved.
@@ -191,34 +213,82 @@ class KeyFolder:
             DataError: others may read the file.
             UnavailableError: it cannot be written.
         """
-        with self._locked():
-            codes = (*self.spent_codes(), code)[-_CODES_KEPT:]
-            _write(self.path / _CODES_FILE, "\n".join(codes).encode() + b"\n")
-
-    def _write_peers(self, peers: tuple[Peer, ...]) -> None:
-        text = json.dumps([asdict(peer) for peer in peers], indent=1)
-        _write(self.path / _PEERS_FILE, text.encode() + b"\n")
-
-    def _make(self, path: Path) -> None:
-        with self._locked():
-            if not _exists(path):  # another process may have been faster
-                _write(path, _curve().curve_keypair()[1] + b"\n")
+        with self._locked() as folder:
+            spent = self._read_in(folder, _CODES_FILE).split() if _has(folder, _CODES_FILE) else []
+            codes = (*spent, code)[-_CODES_KEPT:]
+            _write(folder, _CODES_FILE, "\n".join(codes).encode() + b"\n")
 
     @contextmanager
-    def _locked(self) -> Iterator[None]:
-        """Keep other processes from changing the folder meanwhile."""
-        try:
-            self.path.mkdir(mode=0o700, parents=True, exist_ok=True)
-            folder = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-        except OSError as error:
-            raise _unavailable(self.path, error) from None
-        try:
-            fcntl.flock(folder, fcntl.LOCK_EX)
+    def with_owners_rights(self) -> Iterator[None]:
+        """Do something in the folder, which is made if it is missing, with its owner's rights: root would leave there what is root's.
+
+        Raises:
+            UnavailableError: the folder cannot be used.
+        """
+        with self._opened(make=True):
             yield
+
+    def become_owner(self) -> bool:
+        """Give up root's rights for those of the folder's owner, for good; whether the folder is there.
+
+        Raises:
+            UnavailableError: it cannot be used.
+        """
+        try:
+            become_owner(self.path)
+        except FileNotFoundError:
+            return False
         except OSError as error:
             raise _unavailable(self.path, error) from None
-        finally:
-            os.close(folder)
+        return True
+
+    def _make(self) -> str:
+        secret = _curve().curve_keypair()[1]  # not below: whose rights we have there may not be able to load it
+        with self._locked() as folder:
+            if not _has(folder, _KEY_FILE):  # another process may have been faster
+                _write(folder, _KEY_FILE, secret + b"\n")
+            return self._read_in(folder, _KEY_FILE)
+
+    def _read(self, name: str) -> str:
+        """Read a small file that must be its owner's alone; FileNotFoundError where there is none."""
+        with self._opened(make=False) as folder:
+            return self._read_in(folder, name)
+
+    def _read_in(self, folder: int, name: str) -> str:
+        path = self.path / name
+        content, status = read_file(folder, path, _MAX_FILE_BYTES)
+        if status.st_mode & 0o077:
+            mode = f"mode {stat.S_IMODE(status.st_mode):04o}"
+            raise DataError(f"{path} is open to others ({mode})", f"chmod 600 {path}")
+        return content.decode("ascii", "replace")
+
+    @contextmanager
+    def _opened(self, *, make: bool) -> Iterator[int]:
+        """Open the folder; whatever fails in the block is told, save FileNotFoundError where nothing is to be made."""
+        try:
+            with opened_folder(self.path, make=make) as folder:
+                yield folder
+        except OSError as error:
+            if isinstance(error, FileNotFoundError) and not make:
+                raise
+            raise _unavailable(self.path, error) from None
+
+    @contextmanager
+    def _locked(self) -> Iterator[int]:
+        """Keep other processes from changing the folder meanwhile."""
+        with self._opened(make=True) as folder:
+            until_ns = now.monotonic_ns() + _LOCK_WAIT_NS
+            while True:
+                try:
+                    fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    break
+                except BlockingIOError:
+                    if now.monotonic_ns() > until_ns:
+                        raise TakenError(
+                            f"{self.path} is held by another program", f"stop it: fuser -v {self.path} names it"
+                        ) from None
+                threading.Event().wait(_LOCK_STEP_S)
+            yield folder
 
 
 def default_folder(environment: Mapping[str, str], *, service: bool) -> Path:
@@ -288,53 +358,38 @@ def _curve() -> Any:  # noqa: ANN401 - a module
 
 def _peer(item: Any) -> Peer:  # noqa: ANN401 - whatever JSON holds
     peer = Peer(**item)
-    if not all(isinstance(value, str) for value in asdict(peer).values()) or not is_key(peer.key):
+    texts = asdict(peer).values()
+    # Printable: whoever writes this file must not command the terminal of who lists it.
+    if not all(isinstance(text, str) and text.isprintable() for text in texts) or not is_key(peer.key):
         raise ValueError(item)
     return peer
 
 
-def _exists(path: Path) -> bool:
+def _has(folder: int, name: str) -> bool:
     try:
-        return path.exists()
-    except OSError as error:
-        raise _unavailable(path, error) from None
+        os.stat(name, dir_fd=folder, follow_symlinks=False)
+    except FileNotFoundError:
+        return False
+    return True
 
 
-def _read(path: Path, remedy: str) -> str:
-    """Read a small file that must be its owner's alone."""
-    try:
-        with path.open("rb") as file:
-            status = os.fstat(file.fileno())
-            if not stat.S_ISREG(status.st_mode) or status.st_size > _MAX_FILE_BYTES:
-                raise DataError(f"{path} is no file of keys", f"move it away; see {remedy}")
-            if status.st_mode & 0o077:
-                mode = f"mode {stat.S_IMODE(status.st_mode):04o}"
-                raise DataError(f"{path} is open to others ({mode})", f"chmod 600 {path}")
-            return file.read().decode("ascii", "replace")
-    except OSError as error:
-        raise _unavailable(path, error) from None
+def _write_peers(folder: int, peers: tuple[Peer, ...]) -> None:
+    text = json.dumps([asdict(peer) for peer in peers], indent=1)
+    _write(folder, _PEERS_FILE, text.encode() + b"\n")
 
 
-def _write(path: Path, content: bytes) -> None:
+def _write(folder: int, name: str, content: bytes) -> None:
     """Put a file in place, whole, for its owner only; a power cut leaves the old one or the new one."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_native_id()}.part")
-    try:
-        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600)
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-            if os.geteuid() == 0:
-                owner = path.parent.stat()
-                os.fchown(file.fileno(), owner.st_uid, owner.st_gid)
-        temporary.replace(path)
-    except OSError:
-        temporary.unlink(missing_ok=True)
-        raise
+    with replacing_in(folder, name, mode=0o600) as file:
+        file.write(content)
 
 
 def _unavailable(path: Path, error: OSError) -> UnavailableError:
-    remedy = "run it with sudo, or name another folder with --keys" if error.errno in {1, 13, 30} else "check the disk"
+    remedy = "check the disk"
+    if error.errno in {1, 13, 30}:
+        remedy = "run it with sudo, or name another folder with --keys"
+        if os.geteuid() == 0:  # which has acted for whoever owns the way to it
+            remedy = f"give all of it to one user (ls -ld {path} and above), or name another folder with --keys"
     return UnavailableError(f"{path} cannot be used ({error.strerror})", remedy)
 
 

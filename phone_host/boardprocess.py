@@ -1,14 +1,18 @@
 """A board-agent process on this machine, for the demo and the delay benchmark."""
 
 import json
+import os
 import socket
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 from common.commandline import INTERRUPTED
 from common.errors import UnavailableError
+from common.link.ipc import runtime_folder
 from phone_host.childprocess import GOODBYE_S, child_process
 
 
@@ -60,6 +64,22 @@ def board_process(camera: str, address: str) -> Iterator[BoardProcess]:
     arguments = ["run", "--camera", camera, "--link", address, "--log-level", "warning", "--json"]
     with child_process("board_agent.cli", arguments, errors=True) as process:
         yield BoardProcess(process)
+
+
+@contextmanager
+def socket_folder() -> Iterator[Path]:
+    """A folder of this user's alone for sockets, for the length of a block.
+
+    Raises:
+        UnavailableError: it cannot be made.
+    """
+    parent = runtime_folder(os.environ)
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="tandemscan-", dir=parent)
+    except OSError as error:
+        raise UnavailableError(f"{parent} cannot be used ({error.strerror})", "make room, or set TMPDIR") from None
+    with folder as name:
+        yield Path(name)
 
 
 def free_port() -> int:

@@ -13,7 +13,7 @@ from common.camera.factory import open_camera
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.boardprocess import board_process, free_port
+from phone_host.boardprocess import board_process
 from phone_host.film import Film
 from phone_host.formats.ply import write_ply
 from phone_host.formats.preview import write_preview
@@ -94,15 +94,16 @@ class DemoRun:
         film: what both cameras replay.
         rig: the cameras.
         out: folder for results.
+        sockets: folder of this user's alone, in which the two programs meet.
     """
 
-    def __init__(self, film: Film, rig: Rig, out: Path) -> None:
+    def __init__(self, film: Film, rig: Rig, out: Path, sockets: Path) -> None:
         self._film = film
         self._rectifier = Rectifier(rig)
         self._rig = rig
         self._checked: list[CheckedPair] = []
         self.ledgers: list[PairLedger] = []
-        self.address = f"tcp://127.0.0.1:{free_port()}"
+        self.address = f"ipc://{sockets}/board"
         near = disparities_for_near(self._rectifier.geometry, NEAR_M, self._rectifier.rectification.width_px)
         core = StereoCore(create_matcher(MatchSettings(disparities=near)), self._rectifier)
         camera = open_camera(film.replay_uri(film.right), HOST_CLOCK, now.monotonic_ns())

@@ -29,7 +29,7 @@ def demo_page(facts: RunFacts, errors: DepthErrors, last: CheckedPair | None, le
     return page(
         PageData(
             title="tandemscan demo",
-            subtitle=f"two rendered cameras, two processes, one link over loopback; {now.wall_time()}",
+            subtitle=f"two rendered cameras, two processes, one ipc link between them; {now.wall_time()}",
             verdict=verdict,
             sentence=sentence,
             figures=_figures(facts, errors),

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Final
 
 from common import now
-from common.errors import UnavailableError
+from common.errors import TandemError, UnavailableError
+from common.files import opened_folder, read_file, replacing_in
 
 SERVICE: Final = "_tandemscan._tcp.local."
 """As deploy/board/tandemscan.service.xml announces it."""
@@ -26,6 +27,7 @@ GADGET: Final = "tcp://192.168.7.2:5555"
 THIS_MACHINE: Final = "tcp://127.0.0.1:5555"
 
 _LAST_FILE: Final = "last-board"
+_MOST_BYTES: Final = 4096
 _ANSWER_S: Final = 0.7
 """A board on a cable or in the same house answers within a few ms; a lost first packet of TCP is repeated after a second, and met next time."""
 
@@ -90,9 +92,12 @@ def find_aloud(state: Path, wait_s: float | None) -> str:
 
 def remember(state: Path, link: str) -> None:
     """Remember a board for the next time; a disk that does not take it is no matter."""
-    with suppress(OSError):
-        state.mkdir(mode=0o700, parents=True, exist_ok=True)
-        (state / _LAST_FILE).write_text(link + "\n", encoding="utf-8")
+    with (
+        suppress(OSError, UnavailableError),
+        opened_folder(state, make=True) as folder,
+        replacing_in(folder, _LAST_FILE, mode=0o600, durable=False) as file,
+    ):
+        file.write(f"{link}\n".encode())
 
 
 def answering(links: Sequence[str]) -> list[str]:
@@ -105,8 +110,9 @@ def answering(links: Sequence[str]) -> list[str]:
 
 def _last(state: Path) -> list[str]:
     try:
-        text = (state / _LAST_FILE).read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError):
+        with opened_folder(state) as folder:
+            text = read_file(folder, state / _LAST_FILE, _MOST_BYTES)[0].decode().strip()
+    except (OSError, UnicodeDecodeError, TandemError):
         return []
     host, _, port = text.removeprefix("tcp://").rpartition(":")
     return [text] if text.startswith("tcp://") and host and port.isascii() and port.isdigit() else []

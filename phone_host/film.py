@@ -1,5 +1,6 @@
 """A rendered scene as two folders of JPEGs, one for each camera of a rig, to be replayed in a loop; it knows which image shows when."""
 
+import errno
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -126,6 +127,8 @@ def _render(
 ) -> None:
     for target in targets.values():
         target.mkdir(parents=True, exist_ok=True)
+        if target.is_symlink():
+            raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(target))
     digits = len(str(len(times_s)))
     for index, time_s in enumerate(times_s):
         image = renderer.frame(time_s)

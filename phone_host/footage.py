@@ -17,6 +17,7 @@ from common.frame import Frame, PixelFormat
 from common.link.base import Link
 from common.protocol.message import FrameMessage, Pacing
 from phone_host.formats.atomic import write_bytes
+from phone_host.formats.listed import ListedFolder
 from phone_host.model import BoardFrame
 from phone_host.pairqueue import PairQueue
 from phone_host.receiver import Receiver
@@ -151,15 +152,17 @@ def keep(footage: Footage, folder: Path) -> None:
 
     Raises:
         OSError: the folder cannot be written to.
+        UnavailableError: images that an earlier call did not write are there.
     """
     for side, shots in (("board", footage.board), ("host", footage.host)):
-        (folder / side).mkdir(parents=True, exist_ok=True)
-        for old in (folder / side).iterdir():
-            old.unlink()
-        for shot in shots:
-            suffix = {PixelFormat.MJPEG: ".jpg", PixelFormat.PNG: ".png"}.get(shot.image.pixel_format)
-            if suffix is not None:
-                write_bytes(folder / side / f"{shot.exposed_ns}{suffix}", bytes(shot.image.payload))
+        suffixes = {PixelFormat.MJPEG: ".jpg", PixelFormat.PNG: ".png"}
+        named = [(shot, f"{shot.exposed_ns}{suffixes.get(shot.image.pixel_format, '')}") for shot in shots]
+        files = {name: shot for shot, name in named if "." in name}
+        listed = ListedFolder(folder / side, r"-?[0-9]+\.(jpg|png)")
+        listed.add(*files)
+        listed.close()
+        for name, shot in files.items():
+            write_bytes(folder / side / name, bytes(shot.image.payload))
 
 
 def read(folder: Path) -> Footage:

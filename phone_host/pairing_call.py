@@ -103,7 +103,7 @@ class PairingCall:
         except OSError as error:
             raise _HungUpError(
                 f"{where} takes in no new host ({error.strerror or error})",
-                "start board-agent there; if it knows a host already: sudo board-agent pair",
+                "start board-agent there, and run sudo board-agent pair",
             ) from None
         with connected:
             yield _Line(connected, where)
@@ -145,7 +145,7 @@ class _Line:
             if not received:
                 raise _HungUpError(
                     f"{self._where} hangs up",
-                    "start board-agent there; if it knows a host already: sudo board-agent pair",
+                    "start board-agent there, and run sudo board-agent pair",
                 )
 
 

@@ -2,6 +2,9 @@
 
 While writing fails, lines of delays.jsonl wait in memory (bounded) and pairs are counted as unsaved; when there is room again the lines
 follow in order. What is still missing at the end is said with the exit code.
+
+Of an earlier run in the same folder what it listed there as its own is removed (`formats/listed.py`); anything else in the way ends the run
+before it begins. report.json and the page survive a power cut; saved pairs do not wait for the disk, since the pipeline would wait with them.
 """
 
 import errno
@@ -17,7 +20,7 @@ from common import now
 from common.errors import UnavailableError
 from common.ledger import PairLedger
 from common.logs import event
-from phone_host.formats.atomic import write_text
+from phone_host.formats.listed import ListedFolder
 from phone_host.formats.pfm import write_pfm
 from phone_host.formats.ply import write_ply
 from phone_host.formats.preview import write_png
@@ -30,6 +33,12 @@ _RETRY_NS: Final = 1_000_000_000
 
 _PENDING_BYTES: Final = 16 * 1024 * 1024
 """Lines kept while the disk is full: about ten minutes at 30 pairs per second."""
+
+NAMES: Final = r"delays\.jsonl|report\.json|index\.html|pair-[0-9]{6,}"
+"""What a run writes into its folder."""
+
+PAIR_FILES: Final = r"(left|right)\.png|disparity\.pfm|cloud\.ply"
+"""What it writes into the folder of a saved pair."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +64,7 @@ class Results:
         save_every: every which pair is saved, from the first on; 0 for none.
 
     Raises:
-        UnavailableError: the folder cannot be made or written to.
+        UnavailableError: the folder cannot be made or written to, or something that is not ours is in the way.
     """
 
     def __init__(self, folder: Path | None, save_every: int) -> None:
@@ -68,13 +77,12 @@ class Results:
         self._tried_ns = 0
         self._file = -1
         self._written_bytes = 0
+        self._own: ListedFolder | None = None
         if folder is not None:
             try:
-                folder.mkdir(parents=True, exist_ok=True)
-                _remove_earlier(folder)
-                self._file = os.open(
-                    folder / "delays.jsonl", os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644
-                )
+                self._own = ListedFolder(folder, NAMES, inner=PAIR_FILES)
+                self._own.add("report.json", "index.html")
+                self._file = self._own.create("delays.jsonl")
             except OSError as error:
                 raise UnavailableError(
                     f"results folder {folder} cannot be used ({error.strerror})", "give another with --out"
@@ -97,12 +105,12 @@ class Results:
             number: the pair's number in this run, from 0.
             processed: its images and depth.
         """
-        if self._folder is None or not self._save_every or number % self._save_every:
+        if self._folder is None or self._own is None or not self._save_every or number % self._save_every:
             return
         final = self._folder / f"pair-{number:06d}"
         part = final.with_suffix(".part")
         try:
-            shutil.rmtree(part, ignore_errors=True)
+            self._own.add(final.name)
             part.mkdir()
             write_png(part / "left.png", processed.pair.left)
             write_png(part / "right.png", processed.pair.right)
@@ -110,10 +118,10 @@ class Results:
                 write_pfm(part / "disparity.pfm", processed.disparity)
             if processed.cloud is not None:
                 write_ply(part / "cloud.ply", processed.cloud, processed.pair.left)
-            shutil.rmtree(final, ignore_errors=True)
             part.rename(final)
         except OSError as error:
-            shutil.rmtree(part, ignore_errors=True)
+            if not isinstance(error, FileExistsError):  # what is there is not ours
+                shutil.rmtree(part, ignore_errors=True)
             self._unsaved_pairs += 1
             self._failed(error)
 
@@ -137,16 +145,19 @@ class Results:
             report: the JSON object to write.
             page: the HTML document to write beside it as index.html; empty: none.
         """
-        if self._folder is None:
+        if self._own is None:
             return
         self.flush()
         try:
-            write_text(self._folder / "report.json", json.dumps(report, indent=1) + "\n")
+            os.fsync(self._file)
+            self._own.write_text("report.json", json.dumps(report, indent=1) + "\n")
             if page:
-                write_text(self._folder / "index.html", page)
+                self._own.write_text("index.html", page)
+            self._own.sync()
         except OSError as error:
             self._failed(error)
         os.close(self._file)
+        self._own.close()
 
     def flush(self) -> None:
         """Write the lines that wait; what cannot be written goes on waiting."""
@@ -181,11 +192,3 @@ class Results:
                 )
             )
         self._cause = self._last_cause = error.strerror or str(error)
-
-
-def _remove_earlier(folder: Path) -> None:
-    """Remove what an earlier run left in the folder, or it would be taken for this one's; nothing else is touched."""
-    for name in ("report.json", "index.html"):
-        (folder / name).unlink(missing_ok=True)
-    for pair in folder.glob("pair-[0-9][0-9][0-9][0-9][0-9][0-9]*"):
-        shutil.rmtree(pair)

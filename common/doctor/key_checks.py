@@ -1,5 +1,7 @@
 """The folder of keys of links that other machines reach: may its user read it, and does it know anybody. Nothing is made or changed."""
 
+import stat
+
 from common.doctor.access import Account
 from common.doctor.finding import Finding, fail, ok, warn
 from common.errors import TandemError
@@ -18,7 +20,8 @@ def check_keys(folder: KeyFolder, account: Account) -> Finding:  # noqa: PLR0911
         if not path.exists():
             return warn("keys", f"{path} is not there yet, so nobody is known", "start the agent, then pair a host")
         # Files of keys are for their owner only, so whoever is to read them must own them; root may read all.
-        owners = {item.name: item.stat().st_uid for item in path.iterdir() if item.is_file()}
+        states = {item.name: item.lstat() for item in path.iterdir()}
+        owners = {name: state.st_uid for name, state in states.items() if stat.S_ISREG(state.st_mode)}
         if folder.has_key:
             folder.own()
         peers = folder.peers()
@@ -33,5 +36,9 @@ def check_keys(folder: KeyFolder, account: Account) -> Finding:  # noqa: PLR0911
         problem = f"{', '.join(foreign)} in {path} may not be read by user {account.name}"
         return fail("keys", problem, f"sudo chown -R {account.name}: {path}")
     if not peers:
-        return warn("keys", f"{path} knows no host yet", "run phone-host pair on the host; the journal shows the code")
+        return warn(
+            "keys",
+            f"{path} knows no host yet",
+            "run phone-host pair on the host, and board-agent pair here: it shows the code",
+        )
     return ok("keys", f"{path} knows {', '.join(peer.name for peer in peers)}")

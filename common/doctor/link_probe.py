@@ -36,13 +36,13 @@ def examine_link(uri: str, account: Account, unit: Unit, *, listens_by_default: 
             return findings
     if address.startswith("serial:") and (node := machine.read_node(Path(address.removeprefix("serial:")))) is not None:
         findings.append(check_access("permission", node, account))
-    readings = _readings(uri, address, listens=parsed.listens)
+    readings = _readings(uri, address, account, listens=parsed.listens)
     if not (readings.holders or readings.terminals or readings.console):
-        readings = _tried(readings, listens_by_default=listens_by_default)
+        readings = _tried(readings, account, listens_by_default=listens_by_default)
     return [*findings, check_link(readings, unit.pid)]
 
 
-def _readings(uri: str, address: str, *, listens: bool) -> LinkReadings:
+def _readings(uri: str, address: str, account: Account, *, listens: bool) -> LinkReadings:
     """What can be told without opening anything."""
     if address.startswith("serial:"):
         device = Path(address.removeprefix("serial:")).resolve()
@@ -66,19 +66,20 @@ def _readings(uri: str, address: str, *, listens: bool) -> LinkReadings:
         seen_all &= all_seen
         found.update(dict.fromkeys(holders))
     # The same port of another address is none of ours, so a holder counts only where opening fails, too.
-    return LinkReadings(uri, all_seen=seen_all) if not found else _blamed(uri, tuple(found), all_seen=seen_all)
+    return LinkReadings(uri, all_seen=seen_all) if not found else _blamed(uri, tuple(found), account, all_seen=seen_all)
 
 
-def _blamed(uri: str, holders: tuple[Holder, ...], *, all_seen: bool) -> LinkReadings:
-    tried = _tried(LinkReadings(uri, all_seen=all_seen), listens_by_default=True)
+def _blamed(uri: str, holders: tuple[Holder, ...], account: Account, *, all_seen: bool) -> LinkReadings:
+    tried = _tried(LinkReadings(uri, all_seen=all_seen), account, listens_by_default=True)
     return LinkReadings(uri, holders, all_seen) if tried.taken else tried
 
 
-def _tried(readings: LinkReadings, *, listens_by_default: bool) -> LinkReadings:
+def _tried(readings: LinkReadings, account: Account, *, listens_by_default: bool) -> LinkReadings:
     """Open the link and close it again; without keys, of which none is to be made here."""
     try:
         parsed = parse_link(readings.uri, listens_by_default=listens_by_default)
-        open_link(replace(parsed, insecure=True)).close()
+        owner = parsed.owner or (str(account.uid) if parsed.address.startswith("ipc:") else "")
+        open_link(replace(parsed, insecure=True, owner=owner)).close()
     except TandemError as error:
         taken = isinstance(error, TakenError)
         return LinkReadings(

@@ -73,6 +73,16 @@ class Dialled:
             self.socket.disconnect(self._address)
         self.socket.connect(self._address)
 
+    def hang_up(self, now_ns: int) -> None:
+        """Want nothing of who answers; dial again later, when it may be somebody else.
+
+        Args:
+            now_ns: CLOCK_MONOTONIC now, ns.
+        """
+        self.due_ns = now_ns + REDIAL_NS
+        with suppress(zmq.ZMQError):
+            self.socket.disconnect(self._address)
+
     def broke(self, now_ns: int) -> bool:
         """Take one piece of news; whether it says that the connection broke.
 

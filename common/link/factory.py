@@ -19,7 +19,12 @@ _MAX_BAUD = 20_000_000
 _MAX_CHANNEL = 30
 """RFCOMM has channels 1 to 30."""
 
-_MORE_OPTIONS = {"serial": ", and baud=N", "rfcomm": ", and unpaired=1", "tcp": ", and insecure=1"}
+_MORE_OPTIONS = {
+    "serial": ", and baud=N",
+    "rfcomm": ", and unpaired=1",
+    "tcp": ", and insecure=1",
+    "ipc": ", and owner=USER",
+}
 
 _EXAMPLES = "give tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE"
 
@@ -34,6 +39,7 @@ class LinkUri:
         baud: speed of a serial port that has one; None: the usual.
         unpaired: whether Bluetooth devices will do that were never paired with.
         insecure: whether a tcp link is to be open to everybody on every network.
+        owner: user whose an ipc link's other end may be, beside this one and root; empty for nobody.
     """
 
     address: str
@@ -41,6 +47,7 @@ class LinkUri:
     baud: int | None = None
     unpaired: bool = False
     insecure: bool = False
+    owner: str = ""
 
 
 def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
@@ -49,7 +56,7 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
     Args:
         uri: `tcp://HOST:PORT`, `ipc://PATH`, `serial:DEVICE` or `rfcomm://DEVICE[/CHANNEL]`, with `?bind=1` or `?connect=1` to swap who
             listens; a serial port also takes `baud=N`, a Bluetooth device `unpaired=1`, tcp `insecure=1`: no keys, whoever reaches the
-            address sees the camera.
+            address sees the camera; ipc `owner=USER`: that user's end is trusted as one's own is.
         listens_by_default: true on the board, which binds; false on the host, which connects.
 
     Returns:
@@ -67,19 +74,24 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
         _check_port(uri, address)
     if scheme == "rfcomm":
         _check_channel(uri, rest)
+    if scheme == "ipc" and rest.startswith(
+        "@"
+    ):  # Linux's abstract names have no owner and no mode: whoever knows one connects
+        raise SettingsError(f"link {uri!r} names no path", "give one, for example ipc://$XDG_RUNTIME_DIR/board")
     options = dict(parse_qsl(query, keep_blank_values=True))
     baud = _baud(uri, options.pop("baud")) if is_serial and "baud" in options else None
     unpaired = scheme == "rfcomm" and options.get("unpaired") == "1"
     if unpaired:
         del options["unpaired"]
     insecure = scheme == "tcp" and options.get("insecure") == "1" and bool(options.pop("insecure"))
+    owner = options.pop("owner") if scheme == "ipc" and options.get("owner") else ""
     unknown = set(options) - {"bind", "connect"}
     if unknown or set(options.values()) - {"1"} or len(options) > 1:
         raise SettingsError(
             f"link {uri!r} has options {query!r}",
             "?bind=1 and ?connect=1 are the only ones, one at a time" + _MORE_OPTIONS.get(scheme, ""),
         )
-    return LinkUri(address, listens_by_default if not options else "bind" in options, baud, unpaired, insecure)
+    return LinkUri(address, listens_by_default if not options else "bind" in options, baud, unpaired, insecure, owner)
 
 
 def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = False, waits: bool = False) -> Link:
@@ -111,8 +123,8 @@ def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = Fals
         )
     if uri.listens:
         secured = _keys(uri, keys) if needs_keys(uri) else None
-        return ZeroMqListener(uri.address, secured, board=board)
-    return ZeroMqDialer(uri.address, keys, _peer(uri, keys), board=board)
+        return ZeroMqListener(uri.address, secured, owner=uri.owner, board=board)
+    return ZeroMqDialer(uri.address, keys, _peer(uri, keys), owner=uri.owner, board=board)
 
 
 def tell_insecure(uri: LinkUri) -> None:

@@ -3,6 +3,8 @@
 It is wanted while no host is known at all, and while the owner's `board-agent pair` asks for it over a socket in the folder of keys, which
 only the owner can reach. There is one door, one code and one account of tries for all links of a board. It understands nothing but the
 words of pairing; a stranger there gets one guess at a code, and costs a line in the log.
+
+Rule: a code is told to that command and to nobody else. No line of the log holds one: more people read logs than may let a host in.
 """
 
 import logging
@@ -19,7 +21,7 @@ import zmq
 from zmq.utils import z85
 
 from common import now
-from common.errors import SettingsError, TandemError
+from common.errors import ProtocolError, SettingsError, TandemError
 from common.keys import KeyFolder, Peer, clean_name
 from common.link.callers import Call, Callers, Left, Nonsense, Said
 from common.link.curve import Guard, Seldom
@@ -69,8 +71,21 @@ class DoorState:
 
     @staticmethod
     def decode(packed: bytes) -> "DoorState":
-        """Read it; from the own service only."""
-        return DoorState(*msgpack.unpackb(packed))
+        """Read it. The owner's terminal shows it, whose service may have been taken over: nothing in it commands a terminal.
+
+        Raises:
+            ProtocolError: it is none.
+        """
+        try:
+            fields = msgpack.unpackb(packed)
+        except (ValueError, msgpack.UnpackException):
+            fields = ()
+        kinds = [str, str, str, str, int, str]
+        if not isinstance(fields, list) or [type(value) for value in fields] not in (kinds, kinds[:-1]):
+            raise ProtocolError("that is no state of a door", "update the board's programs")
+        if not all(value.isprintable() for value in fields if isinstance(value, str)):
+            raise ProtocolError("a state of a door would command a terminal", "look at who runs the board's service")
+        return DoorState(*fields)
 
 
 class Door:
@@ -194,11 +209,11 @@ class Door:
                     assert_never(output)
 
     def _show(self, code: int, name: str, address: str, now_ns: int) -> None:
-        """Tell the code: at once when it is new, and seldom for who else asks."""
+        """Tell who asks: at once when the code is new, and seldom for who else asks."""
         if self._askers.now(now_ns) or code != self._told_code:
             self._told_code = code
             self._state = replace(self._state, code=code_text(code), asking=name)
-            _LOG.warning(event("pairing_code", code=code_text(code), host=name, address=address))
+            _LOG.warning(event("pairing_asked", host=name, address=address, code="shown by sudo board-agent pair"))
 
     def _take_in(self, host: Identity, address: str) -> bool:
         try:
@@ -214,7 +229,8 @@ class Door:
     def _bind_control(self, path: Path) -> None:
         before = os.umask(0o177)  # for its owner only
         try:
-            self._control.bind(f"ipc://{path}")
+            with self._keys.with_owners_rights():
+                self._control.bind(f"ipc://{path}")
         except zmq.ZMQError as error:
             _LOG.warning(event("pair_command_off", path=path, problem=error.strerror))
         finally:

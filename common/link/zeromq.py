@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any, Final
 import zmq
 
 from common import now
+from common.errors import UnavailableError
 from common.frame import Buffer
 from common.keys import KeyFolder, Peer
 from common.link import gate
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.dialled import Dialled
+from common.link.ipc import check_folder, check_peer, check_socket, trusted_users
 from common.link.wait import is_readable
 from common.link.zeromq_address import explained, free_path, plain_endpoint
 from common.protocol.message import Lane
@@ -144,20 +146,22 @@ class ZeroMqListener(_AlwaysReady):
     Args:
         address: `tcp://HOST:PORT` (`*` for every interface) or `ipc://PATH`.
         keys: holds this side's key and those that may connect; None: anybody may.
+        owner: of an ipc path's folder, beside this user and root; empty for nobody.
         board: whether this side is the board: it hears short messages only.
 
     Raises:
         SettingsError: the address makes no sense.
-        UnavailableError: the port or path is taken, or the folder of keys cannot be used.
+        UnavailableError: the port or path is taken, the path lies where others may exchange it, or the folder of keys cannot be used.
         DataError: the files of keys are bad.
     """
 
-    def __init__(self, address: str, keys: KeyFolder | None = None, *, board: bool = False) -> None:
+    def __init__(self, address: str, keys: KeyFolder | None = None, *, owner: str = "", board: bool = False) -> None:
         own = keys.own() if keys else None
-        self.kind = address.partition(":")[0]
+        self.kind, _, path = address.partition("://")
         self.dialled: dict[Lane, bytes] = {}
         if self.kind == "ipc":
-            free_path(address.removeprefix("ipc://"))
+            check_folder(path, trusted_users(owner))
+            free_path(path)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._guard = _guard(self._context, keys) if keys else None
         self._socket = self._context.socket(zmq.ROUTER)
@@ -243,19 +247,29 @@ class ZeroMqDialer(_AlwaysReady):
         address: `tcp://HOST:PORT` or `ipc://PATH`.
         keys: holds this side's key; None on an open link.
         peer: who must answer; None on an open link.
+        owner: user that may listen at an ipc path, beside this one and root; empty for nobody.
         board: whether this side is the board: it hears short messages only.
 
     Raises:
         SettingsError: the address makes no sense.
-        UnavailableError: the folder of keys cannot be used.
+        UnavailableError: the folder of keys cannot be used, or an ipc path is another user's.
         DataError: the files of keys are bad.
     """
 
     def __init__(
-        self, address: str, keys: KeyFolder | None = None, peer: Peer | None = None, *, board: bool = False
+        self,
+        address: str,
+        keys: KeyFolder | None = None,
+        peer: Peer | None = None,
+        *,
+        owner: str = "",
+        board: bool = False,
     ) -> None:
         own = keys.own() if keys and peer else None
-        self.kind = address.partition(":")[0]
+        self.kind, _, self._path = address.partition("://")
+        self._trusted = trusted_users(owner) if self.kind == "ipc" else frozenset[int]()
+        if self._trusted:
+            check_socket(self._path, self._trusted)
         self.dialled = {lane: lane.name.encode() for lane in Lane}
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._connections: dict[bytes, Dialled] = {}
@@ -287,7 +301,7 @@ class ZeroMqDialer(_AlwaysReady):
         """Give all packets that have come in, frames first, then the news of broken connections: a peer's last words come before its end.
 
         Raises:
-            UnavailableError: the peer does not talk to us, or only with keys; it is dialled again later.
+            UnavailableError: the peer does not talk to us, or only with keys, or is another user's; it is dialled again later.
         """
         now_ns = now.monotonic_ns()
         broken = []
@@ -299,13 +313,24 @@ class ZeroMqDialer(_AlwaysReady):
             for connection, known in self._connections.items():
                 if is_readable(known.socket):
                     going_on = True
-                    yield _receive(known.socket, connection)
+                    yield self._received(known, connection, now_ns)
             for connection, known in self._connections.items():
                 if is_readable(known.monitor):
                     going_on = True
                     if known.broke(now_ns):
                         broken.append(Broken(connection))
         yield from broken
+
+    def _received(self, known: Dialled, connection: bytes, now_ns: int) -> Incoming:
+        header = known.socket.recv(_NOW, copy=False)
+        packet = _complete(known.socket, connection, header)
+        if self._trusted:
+            try:
+                check_peer(self._path, header, self._trusted)
+            except UnavailableError:
+                known.hang_up(now_ns)
+                raise
+        return packet
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Hand a packet over; before the peer is there it is FULL (ZMQ_IMMEDIATE)."""

@@ -9,6 +9,7 @@ from typing import Final
 import zmq
 
 from common.errors import SettingsError, TakenError, UnavailableError
+from common.link.ipc import owner_of
 
 _UNIX_PATH_MAX: Final = 107
 """Bytes of a Unix socket's path, without its end (unix(7))."""
@@ -39,11 +40,13 @@ def _check_replaceable(path: str) -> None:
         UnavailableError: it does.
     """
     try:
-        mode = os.lstat(path).st_mode
+        status = os.lstat(path)
     except OSError:
         return
-    if not stat.S_ISSOCK(mode):
+    if not stat.S_ISSOCK(status.st_mode):
         raise UnavailableError(f"ipc://{path} is a file that is no socket", "choose another path with --link")
+    if os.geteuid() not in {0, status.st_uid}:
+        raise TakenError(f"ipc://{path} belongs to {owner_of(path)}", "choose another path with --link")
 
 
 def free_path(path: str) -> None:
@@ -57,11 +60,14 @@ def free_path(path: str) -> None:
     if len(os.fsencode(path)) > _UNIX_PATH_MAX:
         raise SettingsError(
             f"ipc path of {len(os.fsencode(path))} bytes",
-            f"use one of at most {_UNIX_PATH_MAX} bytes, for example ipc:///tmp/board",
+            f"use one of at most {_UNIX_PATH_MAX} bytes, for example ipc://$XDG_RUNTIME_DIR/board",
         )
     with socket.socket(socket.AF_UNIX) as probe:
+        probe.setblocking(False)  # noqa: FBT003 - who listens may never accept; then it is full, and taken
         try:
             probe.connect(path)
+        except BlockingIOError:
+            pass
         except (FileNotFoundError, ConnectionRefusedError):
             _check_replaceable(path)
             return  # ZeroMQ itself unlinks a dead socket
@@ -69,7 +75,9 @@ def free_path(path: str) -> None:
             raise UnavailableError(
                 f"ipc://{path} cannot be opened ({error.strerror})", "choose another path with --link"
             ) from None
-    raise TakenError(f"ipc://{path} is taken", "stop what listens there, or choose another path with --link")
+    raise TakenError(
+        f"ipc://{path} is taken by {owner_of(path)}", "stop what listens there, or choose another path with --link"
+    )
 
 
 def plain_endpoint(endpoint: str) -> str:

@@ -15,6 +15,7 @@ from common.signals import StopSignals
 from phone_host.bench.cases import Case, Interface, Size
 from phone_host.bench.links import ask_board
 from phone_host.bench.runs import PATIENCE_NS, WARM_UP_S, CaseResult, RunSettings, film_images, render, run_case
+from phone_host.boardprocess import socket_folder
 from phone_host.film import Film
 
 _RENDER_S: Final = 0.06
@@ -77,6 +78,7 @@ def measure(planned: Sequence[Case], settings: RunSettings, signals: StopSignals
     sizes = dict.fromkeys(case.size for case in planned)
     with (
         tempfile.TemporaryDirectory(prefix="delay-bench-") as name,
+        socket_folder() as sockets,
         _Bar(len(sizes) * render_s + len(planned) * run_s, signals) as bar,
     ):
         folder = Path(name)
@@ -90,7 +92,7 @@ def measure(planned: Sequence[Case], settings: RunSettings, signals: StopSignals
                 result = run_case(
                     case,
                     films[case.size, case.quality_percent],
-                    _fresh(folder / f"run{number}"),
+                    _fresh(sockets / f"run{number}"),
                     settings,
                     stop=bar.stopped,
                 )

@@ -1,24 +1,28 @@
 """Files appear whole or not at all.
 
-Rule: every writer of this package goes through `replacing`; none opens its target for writing itself.
+Rule: every writer of this package goes through `replacing`; none opens its target for writing itself. So a link under a result's name is
+replaced, never followed. What people keep and read (reports, rigs, pages: `write_text`) also survives a power cut; images and clouds, of which
+a live run writes many, do not wait for the disk.
 """
 
 import os
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
+from common.files import replacing_in
+
 
 @contextmanager
-def replacing(path: Path) -> Iterator[BinaryIO]:
+def replacing(path: Path, *, durable: bool = False) -> Iterator[BinaryIO]:
     """Open a temporary file beside `path` that takes its place when the block ends well.
 
-    The temporary name starts with a dot and carries process and thread, so that two writers never share it.
+    The temporary name is random and starts with a dot, so that two writers never share it and nobody foresees it.
 
     Args:
         path: the file to write; its folder exists.
+        durable: whether it must survive a power cut from then on; costs a disk some ms.
 
     Yields:
         The temporary file, open for binary writing.
@@ -26,15 +30,15 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     Raises:
         OSError: as the operating system gives it (ENOSPC, EACCES, ...); nothing of the partial file is left.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_native_id()}.part")
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
-        # Closed before the rename: a full disk may show only when the last buffer is flushed.
-        with temporary.open("wb") as file:
+        with replacing_in(folder, path.name, durable=durable) as file:
             yield file
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
+    except OSError as error:
+        error.filename = str(path)  # not the temporary one, which tells nobody anything
         raise
+    finally:
+        os.close(folder)
 
 
 def write_bytes(path: Path, *parts: bytes | memoryview) -> None:
@@ -49,9 +53,10 @@ def write_bytes(path: Path, *parts: bytes | memoryview) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write `text` as UTF-8 to `path`, whole or not at all.
+    """Write `text` as UTF-8 to `path`, whole or not at all; it survives a power cut.
 
     Raises:
         OSError: as `replacing`.
     """
-    write_bytes(path, text.encode())
+    with replacing(path, durable=True) as file:
+        file.write(text.encode())

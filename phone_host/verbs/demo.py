@@ -39,6 +39,7 @@ def run(options: argparse.Namespace) -> int:
     """Render, stream, measure, compare with the truth."""
     from rich.console import Console  # noqa: PLC0415 - OpenCV and rich, only now
 
+    from phone_host.boardprocess import socket_folder  # noqa: PLC0415 - as below
     from phone_host.demo import DemoRun, truth_json  # noqa: PLC0415
     from phone_host.demo_page import demo_page  # noqa: PLC0415
     from phone_host.formats.atomic import write_text  # noqa: PLC0415
@@ -58,17 +59,18 @@ def run(options: argparse.Namespace) -> int:
     rig, scene = unlike_rig(), demo_scene()
 
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        _clear(out)
         film = _render(scene, rig, out / "film", console, signals)
         write_rig(out / "rig.yaml", rig, rectify_rig(rig))
-        demo = DemoRun(film, rig, out)
-        live = LiveTable(demo.host, console, options.seconds) if console.is_terminal else None
-        try:
-            with live or nullcontext():
-                demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
-        except BaseException:
-            demo.host.results.finish(build(demo.host.facts("failed")))
-            raise
+        with socket_folder() as sockets:
+            demo = DemoRun(film, rig, out, sockets)
+            live = LiveTable(demo.host, console, options.seconds) if console.is_terminal else None
+            try:
+                with live or nullcontext():
+                    demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
+            except BaseException:
+                demo.host.results.finish(build(demo.host.facts("failed")))
+                raise
         facts = demo.host.facts("stopped" if signals.stop else "time_over")
         errors = demo.check(scene)
         report = build(facts) | {"truth": truth_json(errors)}
@@ -87,6 +89,22 @@ def run(options: argparse.Namespace) -> int:
     if signals.stop:
         return INTERRUPTED if signals.interrupted else 0
     return 0 if errors.pairs and not errors.wrong_pairs and demo.host.results.complete else _CHECK_FAILED
+
+
+def _clear(out: Path) -> None:
+    """Remove what an earlier demo left in the folder; said before the rendering, what is in the way.
+
+    Raises:
+        UnavailableError: something that is not ours is.
+        OSError: the folder cannot be used.
+    """
+    from phone_host.formats.listed import ListedFolder  # noqa: PLC0415 - as in run
+    from phone_host.results import NAMES, PAIR_FILES  # noqa: PLC0415
+
+    names = rf"{NAMES}|rig\.yaml|cloud\.ply|disparity\.png"
+    folder = ListedFolder(out, names, kept="film", inner=PAIR_FILES)
+    folder.add("film", "rig.yaml", "cloud.ply", "disparity.png")
+    folder.close()
 
 
 class _StoppedError(Exception):

@@ -1,7 +1,9 @@
-"""phone-host pair: learn a board's key, and let it learn ours, by a code that the board shows."""
+"""phone-host pair: learn a board's key, and let it learn ours, by a code that the board shows; or give a board on a USB cable its names."""
 
 import argparse
 import json
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -9,12 +11,14 @@ from common.errors import DataError, SettingsError, UnavailableError
 from common.keys import KeyFolder, Peer
 from common.link.factory import needs_keys, parse_link
 from common.protocol.pairing_code import CODE_DIGITS, read_code
+from phone_host.udev_rule import RULES, find_usb_board, write_rule
 
 EXAMPLES = """  phone-host pair
   phone-host pair --link tcp://192.168.7.2:5555
   phone-host pair --link tcp://raspberrypi.local:5555 --code 123456        (the code that `board-agent pair` shows)
+  sudo phone-host pair --udev                              (names the board on the USB cable: /dev/tandemscan-board)
 
-The board shows a code of six digits: in its journal (journalctl -u board-agent), or where `sudo board-agent pair` runs.
+`sudo board-agent pair` on the board shows a code of six digits; it stands in no log.
 """
 
 _TRIES = 3
@@ -24,10 +28,20 @@ _PATIENCE_S = 20.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
-    parser.add_argument("--link", metavar="URI", help="the board: tcp://HOST:PORT (default: the board is looked for)")
+    parser.add_argument(
+        "--link",
+        metavar="URI",
+        help="the board: tcp://HOST:PORT, or serial:DEVICE for --udev (default: it is looked for)",
+    )
     parser.add_argument("--code", metavar="DIGITS", help="the code, if the board shows it already")
     parser.add_argument(
         "--pairing-port", type=int, metavar="PORT", help="the board's door (default: the port behind the link's)"
+    )
+    parser.add_argument(
+        "--udev",
+        action="store_true",
+        help=f"write {RULES} for the board on the USB cable: by its vendor, product and serial number it gets the names"
+        " /dev/tandemscan-board and tandemscan0; this names the device and authenticates nobody; needs root",
     )
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
     parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
@@ -35,6 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Pair; asks for the code on the terminal."""
+    if options.udev:
+        return _name_device(options)
     from phone_host.discovery import find_aloud  # noqa: PLC0415
     from phone_host.settings import chosen_keys  # noqa: PLC0415
 
@@ -47,6 +63,28 @@ def run(options: argparse.Namespace) -> int:
     known = {"name": board.name, "key": board.key, "link": link.address}
     run_with = f"phone-host run --link {link.address}" if needs_keys(link) else "phone-host run"
     print(json.dumps(known) if options.json else f"paired with {board.name}; now: {run_with} --camera ...")
+    return 0
+
+
+def _name_device(options: argparse.Namespace) -> int:
+    """Write the rule, and have udev read it."""
+    if options.code is not None or options.pairing_port is not None:
+        raise SettingsError("--udev pairs nobody", "give it without --code and --pairing-port")
+    link = options.link and parse_link(options.link, listens_by_default=False)
+    if link and not link.address.startswith("serial:"):
+        raise SettingsError(f"link {options.link!r} is no USB cable", "give --link serial:DEVICE, or none")
+    board = find_usb_board(Path(link.address.removeprefix("serial:")) if link else None)
+    write_rule(board)
+    if udevadm := shutil.which("udevadm"):
+        subprocess.run([udevadm, "control", "--reload"], check=False)
+    if options.json:
+        print(
+            json.dumps({"file": str(RULES), "vendor": board.vendor, "product": board.product, "serial": board.serial})
+        )
+    else:
+        print(
+            f"written to {RULES}; plug the board in again, then: phone-host run --link serial:/dev/tandemscan-board --camera ..."
+        )
     return 0
 
 
@@ -80,7 +118,8 @@ def _door(address: str, port: int | None) -> tuple[str, int]:
 def _code(given: str | None, name: str) -> int:
     """Take the code from the option, or from whoever types it."""
     if given is None:
-        print(f"{name} shows a code of {CODE_DIGITS} digits now; type it: ", end="", file=sys.stderr, flush=True)
+        words = f"run `sudo board-agent pair` on {name} and type the {CODE_DIGITS} digits that it shows: "
+        print(words, end="", file=sys.stderr, flush=True)
         given = sys.stdin.readline()
         if not given:
             raise UnavailableError("no code was typed", "type what the board shows, or give --code")

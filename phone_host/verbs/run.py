@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from phone_host.sync.fifo import FifoSettings
 
 EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --calibration rig.yaml --out scan
-  phone-host run --link ipc:///tmp/board --camera 'replay:right?pace=demand' --rectified --disparities 64 --pairs 20 --out scan
+  phone-host run --link ipc://$XDG_RUNTIME_DIR/board --camera 'replay:right?pace=demand' --rectified --disparities 64 --pairs 20 --out scan
   phone-host run --link tcp://192.168.7.2:5555 --camera 'http://127.0.0.1:8080/video?latency_ms=120' --calibration rig.yaml --out scan
   phone-host run --link serial:/dev/ttyACM0 --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --out scan
   phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --align-phase        (both cameras expose together)
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--link",
         action="append",
         metavar="URI",
-        help="the board: tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE (default: the board is looked for); may be given again:"
+        help="the board: tcp://HOST:PORT, ipc://PATH[?owner=USER], serial:DEVICE or rfcomm://DEVICE (default: the board is looked for); may be given again:"
         " frames come over the best link that is up",
     )
     parser.add_argument("--camera", metavar="URI", help=f"the own camera: {EXAMPLE}")

@@ -58,6 +58,7 @@ def run(options: argparse.Namespace) -> int:
     core, _ = build_core(options, options.calibration or "", matcher, (left.shape[1], left.shape[0]))
     if core is None:  # cannot be: one of the two ways to a core was checked above
         raise SettingsError("no stereo core", "give --calibration or --rectified")
+    _clear(options.out)
     watch.lap("prepare")
     pair = core.rectify(left, right)
     watch.lap("rectify")
@@ -132,6 +133,18 @@ def _figures(options: argparse.Namespace, core: "StereoCore", disparity: "Dispar
     }
 
 
+def _clear(out: Path) -> None:
+    """Remove an earlier run's results, or they might be taken for this one's."""
+    from phone_host.formats.listed import ListedFolder  # noqa: PLC0415
+
+    try:
+        folder = ListedFolder(out, r"disparity\.(pfm|png)|cloud\.ply|report\.json")
+        folder.add("disparity.pfm", "disparity.png", "cloud.ply", "report.json")
+        folder.close()
+    except OSError as error:
+        raise unwritable(out, error) from error
+
+
 def _write(out: Path, pair: "RectifiedPair", disparity: "Disparity", cloud: "CloudImage | None") -> int | None:
     """Write all but the report; the number of points, or None without a cloud."""
     from phone_host.formats.pfm import write_pfm  # noqa: PLC0415
@@ -143,7 +156,6 @@ def _write(out: Path, pair: "RectifiedPair", disparity: "Disparity", cloud: "Clo
         write_pfm(out / "disparity.pfm", disparity)
         write_preview(out / "disparity.png", disparity)
         if cloud is None:
-            (out / "cloud.ply").unlink(missing_ok=True)  # one of an earlier run would be taken for this one's
             return None
         return write_ply(out / "cloud.ply", cloud, pair.left)
     except OSError as error:

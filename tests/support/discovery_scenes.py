@@ -16,7 +16,7 @@ from typing import Any
 from zeroconf import ServiceInfo, Zeroconf
 
 from phone_host.discovery import SERVICE
-from tests.support.programs import board, host, until
+from tests.support.programs import board, host, program, until
 
 PORT = 5555
 
@@ -39,15 +39,16 @@ def serve(stack: ExitStack, folder: Path, name: str, link: str, *more: str) -> A
     return agent
 
 
-def pair(folder: Path, agent: Any) -> dict[str, Any]:
-    """Pair with a board that nobody names, by the code in its log."""
+def pair(stack: ExitStack, folder: Path) -> dict[str, Any]:
+    """Pair with a board that nobody names, by the code that its owner is shown."""
+    command = ["pair", "--keys", str(folder / "board-keys")]
+    owner = stack.enter_context(program("board_agent.cli", command, folder, "owner"))
+    until(lambda: "type this code" in owner.out.read_text(), "the owner is shown a code")
     command = [sys.executable, "-P", "-m", "phone_host.cli", "pair", "--keys", str(folder / "keys")]
     pairing = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
-    until(lambda: "pairing_code code=" in agent.stderr or pairing.poll() is not None, "the board shows a code")
-    code = agent.stderr.partition("pairing_code code=")[2][:6]
-    err = pairing.communicate(f"{code}\n", timeout=60)[1]
+    err = pairing.communicate(f"{owner.out.read_text().split()[-1]}\n", timeout=60)[1]
     return {"code": pairing.returncode, "err": err}
 
 
@@ -115,8 +116,8 @@ def gadget(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
 def cable(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
     """A board at the gadget's address that is paired and used."""
     plug_cable()
-    agent = serve(stack, folder, "bone", f"tcp://192.168.7.2:{PORT}", "--keys", str(folder / "board-keys"))
-    return [pair(folder, agent), look(folder)]
+    serve(stack, folder, "bone", f"tcp://192.168.7.2:{PORT}", "--keys", str(folder / "board-keys"))
+    return [pair(stack, folder), look(folder)]
 
 
 def foreign(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:

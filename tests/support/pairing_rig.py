@@ -5,16 +5,20 @@ import re
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from common.protocol.pairing_code import CODE_DIGITS, code_text
 from tests.support.numbered import write_film
-from tests.support.programs import Program, board, host, until
+from tests.support.programs import Program, board, host, program, until
 
-_CODE = re.compile(r"pairing_code code=(\d{6}) host=(\S+)")
+_CODE = re.compile(r"type this code on the host: (\d{6})$", re.MULTILINE)
+
+_OWNER_S = 4.0
+"""So long after `board-agent pair` has gone the board has noticed it (pairing_door says 3 s)."""
 
 
 def ports() -> int:
@@ -35,6 +39,47 @@ def start_pairing(link: str, keys: str, *options: str) -> "subprocess.Popen[str]
     )
 
 
+class Owner:
+    """The board's owner with `sudo board-agent pair`, for as long as the block lasts; what was shown stays known.
+
+    Args:
+        keys: the board's folder of keys.
+        folder: for what the command prints.
+    """
+
+    def __init__(self, keys: str, folder: Path) -> None:
+        self._keys, self._folder = keys, folder
+        self._stack = ExitStack()
+        self._running: list[Program] = []
+
+    @property
+    def codes(self) -> list[str]:
+        """The codes that were shown so far, each once."""
+        return list(dict.fromkeys(code for run in self._running for code in _CODE.findall(run.out.read_text())))
+
+    @property
+    def has_gone(self) -> bool:
+        """Whether the command does not run."""
+        return not self._running or self._running[-1].process.poll() is not None
+
+    def comes(self) -> bool:
+        """Run the command, unless it runs; whether it did not."""
+        if not self.has_gone:
+            return False
+        name, command = f"owner{len(self._running)}", ["pair", "--keys", self._keys]
+        self._running.append(self._stack.enter_context(program("board_agent.cli", command, self._folder, name)))
+        return True
+
+    def leaves(self) -> None:
+        """End the command, and wait until the board has noticed."""
+        self._stack.close()
+        time.sleep(_OWNER_S)
+
+    def close(self) -> None:
+        """End the command."""
+        self._stack.close()
+
+
 @dataclass(frozen=True, slots=True)
 class Rig:
     """A board on every network, and where its host finds it.
@@ -43,11 +88,13 @@ class Rig:
         agent: the board.
         link: the host's link to it.
         folder: of everything.
+        owner: who reads the codes.
     """
 
     agent: Program
     link: str
     folder: Path
+    owner: Owner
 
     @property
     def board_keys(self) -> str:
@@ -60,29 +107,34 @@ class Rig:
         return str(self.folder / "h")
 
     def codes(self) -> list[str]:
-        """The codes that the board has shown in its log."""
-        return [code for code, _ in _CODE.findall(self.agent.stderr)]
+        """The codes that the owner was shown."""
+        return self.owner.codes
+
+    def code(self) -> str:
+        """Have the owner look at the board; the code of the moment."""
+        known = len(self.codes()) if self.owner.comes() else 0
+        until(lambda: len(self.codes()) > known, "the owner is shown a code")
+        return self.codes()[-1]
 
     def pair(self, *options: str) -> "subprocess.Popen[str]":
         """Start `phone-host pair`."""
         return start_pairing(self.link, self.host_keys, *options)
 
-    def pair_by_log(self) -> tuple[int, str, str]:
-        """Pair with the code that the board's log shows; exit code, stdout and stderr."""
-        known = len(self.codes())
+    def pair_by_code(self) -> tuple[int, str, str]:
+        """Pair with the code that `board-agent pair` shows; exit code, stdout and stderr."""
         pairing = self.pair("--json")
-        until(lambda: len(self.codes()) > known or pairing.poll() is not None, "the board shows a code")
-        said = pairing.communicate(f"{self.codes()[-1]}\n", timeout=60)
+        said = pairing.communicate(f"{self.code()}\n", timeout=60)
+        until(lambda: pairing.returncode != 0 or self.owner.has_gone, "the owner is told who came")
         return pairing.returncode, *said
 
     def pair_wrongly(self, *options: str) -> int:
         """Type a code that is not the board's; the exit code."""
-        known = len(self.codes())
         pairing = self.pair(*options)
-        until(lambda: len(self.codes()) > known or pairing.poll() is not None, "a code is shown")
-        wrong = code_text((int(self.codes()[-1]) + 1) % 10**CODE_DIGITS)
+        wrong = code_text((int(self.code()) + 1) % 10**CODE_DIGITS)
+        known = len(self.codes())
         _, err = pairing.communicate(f"{wrong}\n", timeout=60)
         assert "the code was" in err
+        until(lambda: len(self.codes()) > known, "the owner is shown the next code")
         return pairing.returncode
 
     def streams(self, name: str) -> None:
@@ -103,4 +155,6 @@ def on_every_network(folder: Path, *options: str) -> Iterator[Rig]:
     command = ["run", "--camera", f"replay:{folder / 'film'}?pace=demand&loop=1", "--link", f"tcp://*:{port}", *options]
     with board([*command, "--keys", str(folder / "b"), "--json"], folder) as agent:
         until(lambda: " serving " in agent.stderr or agent.process.poll() is not None, "the board serves")
-        yield Rig(agent, f"tcp://127.0.0.1:{port}", folder)
+        owner = Owner(str(folder / "b"), folder)
+        with closing(owner):
+            yield Rig(agent, f"tcp://127.0.0.1:{port}", folder, owner)

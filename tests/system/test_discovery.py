@@ -1,6 +1,7 @@
 """`phone-host run` without --link finds the board that is meant, in a network that this machine has to itself."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -135,3 +136,18 @@ def test_a_spoiled_memory_is_no_board(text: str, tmp_path: Path) -> None:
     assert _last(tmp_path) == []
     remember(tmp_path, "tcp://192.0.2.1:5555")
     assert _last(tmp_path) == ["tcp://192.0.2.1:5555"]
+
+
+def test_the_memory_leads_nowhere(tmp_path: Path) -> None:
+    """A link or a pipe in place of the file of the last board is neither followed nor waited for; the next board that is used replaces it."""
+    from phone_host.discovery import _last  # noqa: PLC0415
+
+    (tmp_path / "precious").write_text("tcp://192.0.2.7:5555")
+    (tmp_path / "state").mkdir()
+    for plant in (lambda path: path.symlink_to(tmp_path / "precious"), os.mkfifo):
+        plant(tmp_path / "state" / "last-board")
+        assert _last(tmp_path / "state") == []
+        remember(tmp_path / "state", "tcp://192.0.2.1:5555")
+        assert _last(tmp_path / "state") == ["tcp://192.0.2.1:5555"]
+        (tmp_path / "state" / "last-board").unlink()
+    assert (tmp_path / "precious").read_text() == "tcp://192.0.2.7:5555"

@@ -61,13 +61,17 @@ def test_a_rectified_pair_with_geometry_gives_all_four_files(shifted: Path, matc
     assert report["density"] == pytest.approx(np.isfinite(disparity).mean(), abs=1e-4)
     assert report["points"] == np.isfinite(disparity).sum()
     assert set(report["times_ms"]) == {"read", "prepare", "rectify", "match", "reproject", "write", "total"}
-    assert sorted(path.name for path in (shifted / "o").iterdir()) == sorted(report["files"])
+    assert sorted(path.name for path in (shifted / "o").iterdir()) == sorted([".tandemscan", *report["files"]])
 
 
 def test_without_focal_length_there_is_no_cloud_and_the_command_says_so(shifted: Path) -> None:
-    """No cloud.ply is written, one of an earlier run is gone, and stdout names the missing options."""
-    (shifted / "o").mkdir()
-    (shifted / "o" / "cloud.ply").write_bytes(b"old")
+    """No cloud.ply is written, one of an earlier run is gone, and stdout names the missing options; one of the user's own ends it with exit 3."""
+    arguments = [shifted / "left.png", shifted / "right.png", "--rectified", "--disparities", 32]
+    first = _phone_host(
+        "stereo", *arguments, "--focal", 500, "--baseline", 100, "--center", "99,59", "--out", shifted / "o"
+    )
+    assert first.returncode == 0, first.stderr
+    assert (shifted / "o" / "cloud.ply").exists()
     done = _phone_host(
         "stereo", shifted / "left.png", shifted / "right.png", "--rectified", "--disparities", 32, "--out", shifted / "o"
     )  # fmt: skip
@@ -75,6 +79,14 @@ def test_without_focal_length_there_is_no_cloud_and_the_command_says_so(shifted:
     assert not (shifted / "o" / "cloud.ply").exists()
     assert "no cloud.ply" in done.stdout
     assert "--focal" in done.stdout
+    (shifted / "mine").mkdir()
+    (shifted / "mine" / "cloud.ply").write_bytes(b"scanned for days")
+    refused = _phone_host("stereo", *arguments, "--out", shifted / "mine")
+    assert refused.returncode == 3
+    assert refused.stderr.count("\n") == 1
+    assert "mine/cloud.ply" in refused.stderr
+    assert "--out" in refused.stderr
+    assert [path.read_bytes() for path in (shifted / "mine").iterdir()] == [b"scanned for days"]
 
 
 def test_16_bit_colour_and_grey_give_the_same_disparity_as_8_bit(shifted: Path) -> None:

@@ -31,5 +31,5 @@ def test_its_values_and_examples_are_understood() -> None:
         parse_camera(uri, "")
     schemes = {parse_link(uri, listens_by_default=True).address.partition(":")[0] for uri in links}
     assert len(cameras) > 3
-    assert schemes == {"tcp", "serial", "rfcomm"}
+    assert schemes == {"tcp", "ipc", "serial", "rfcomm"}
     assert settings.wait_for_camera

@@ -1,5 +1,6 @@
 """One USB cable as network card and serial port: the package's gadget on the kernel's dummy controller, its host end in the same machine."""
 
+import hashlib
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from phone_host.udev_rule import RULES, UsbBoard, write_rule
 from tests.support.programs import ledgers, lines, until
-from tests.vm.conftest import CAMERA, ROOT
+from tests.vm.conftest import CAMERA
 from tests.vm.contract import run_contract
 from tests.vm.extension import extension
 from tests.vm.guest import NETWORK_CARD, OPEN_TO_ALL, Guest
@@ -26,11 +28,13 @@ OURS = f"{GADGETS}/tandemscan"
 
 
 @pytest.fixture(scope="module")
-def cabled(guest: Guest) -> Iterator[Guest]:
+def cabled(guest: Guest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guest]:
     """The board with its gadget up, and the host's end of the cable under its stable names."""
     guest.sh(f"systemctl start {GADGET}")
     assert guest.show("ConditionResult", GADGET) == "no", "without a controller there is nothing to do"
-    guest.put(ROOT / "deploy" / "host" / "70-tandemscan.rules", "/etc/udev/rules.d")
+    rules = tmp_path_factory.mktemp("rules") / RULES.name
+    write_rule(UsbBoard("ttyACM0", "1d6b", "0104", _serial_number(guest), "tandemscan"), rules)
+    guest.put(rules, "/etc/udev/rules.d")
     guest.sh("udevadm control --reload; modprobe -a dummy_hcd cdc_acm cdc_ncm")
     guest.sh(f"systemctl start {GADGET}")
     _await_ends(guest)
@@ -47,6 +51,11 @@ def serving(cabled: Guest, webcam: Webcam) -> Iterator[Guest]:
     cabled.until("StatusText", "waiting for a host", "the service has opened the port")
     yield cabled
     check_journal(cabled)
+
+
+def _serial_number(guest: Guest) -> str:
+    """The gadget's, as deploy/board/usb-gadget makes it of the machine's id."""
+    return hashlib.sha256(f"tandemscan-serial-{guest.sh('cat /etc/machine-id').strip()}".encode()).hexdigest()[:12]
 
 
 def _await_ends(guest: Guest) -> None:
@@ -72,6 +81,11 @@ def test_pairs_over_gadget_serial(serving: Guest, film: Film, skew: Skew, tmp_pa
         report = stream.finish(skew)
     assert {ledger["link"] for ledger in ledgers(tmp_path / "out")} == {"serial"}
     assert [session["tail"] for session in report["sessions"]] == ["known"]
+
+
+def test_the_port_is_the_services_alone(cabled: Guest) -> None:
+    """The board's end belongs to root and the service's group, and nobody else may read or write there."""
+    assert cabled.sh(f"stat -L -c '%U %G %a' {BOARD_END}").split() == ["root", "tandemscan", "660"]
 
 
 def test_a_cable_pulled_and_replugged(serving: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:

@@ -1,8 +1,7 @@
-"""A board and a host get to know each other as their owner would do it: over a network, with a code out of the board's journal."""
+"""A board and a host get to know each other as their owner would do it: over a network, with the code that the board's owner is shown."""
 
 import json
 import os
-import re
 import stat
 import subprocess
 import sys
@@ -28,10 +27,10 @@ def _own_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PHONE_HOST_KEYS", str(tmp_path / "keys"))
 
 
-def test_pairing_by_a_code_from_the_journal(
+def test_pairing_by_the_code_that_the_owner_is_shown(
     guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
 ) -> None:
-    """On a network the board refuses a host; the code in its journal pairs them; pairs of frames are right; a forgotten host is refused again."""
+    """On a network the board refuses a host; the code that `board-agent pair` shows pairs them, and stands in no journal; pairs of frames are right; a forgotten host is refused again."""
     assert webcam.plugged
     guest.configure(CAMERA, secured=True)
     try:
@@ -54,9 +53,13 @@ def test_pairing_by_a_code_from_the_journal(
             text=True,
             env=os.environ,
         )
-        until(lambda: "pairing_code" in guest.journal() or pairing.poll() is not None, "the journal shows a code")
-        shown = re.findall(r"pairing_code code=(\d{6})", guest.journal())
-        out, err = pairing.communicate(f"{shown[-1]}\n" if shown else None, timeout=60)
+        until(lambda: "pairing_asked" in guest.journal() or pairing.poll() is not None, "the journal tells who asks")
+        owner = guest.popen("board-agent pair --seconds 120")
+        assert owner.stdout is not None
+        code = owner.stdout.readline().decode().split()[-1]
+        out, err = pairing.communicate(f"{code}\n", timeout=60)
+        owner.communicate(timeout=60)
+        assert code not in guest.journal()
         assert pairing.returncode == 0, err + guest.journal()[-2000:]
         assert "paired with board" in out
         until(lambda: "pairing_closed" in guest.journal(), "the door is closed")

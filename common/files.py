@@ -1,0 +1,251 @@
+"""Files in folders into which others may write, too: links, pipes and folders may lie under the names that we use.
+
+Rules: a folder is opened once; what lies in it is reached by its plain name there (`dir_fd`), never by a path. A name that is a link is not
+followed, nothing waits for the other end of a pipe, nothing is read beyond a limit. A new file begins under a random name that nobody else
+has (O_EXCL) and takes its place when it is whole. Root acts in another user's folder with that user's rights, so that the kernel refuses
+whatever this user could not do himself; that holds however links and folders are exchanged meanwhile.
+
+The effective user is one for the whole process: glibc changes it in all threads. So one block at a time has other rights (`_TURN`), for
+milliseconds. Other threads of a root's process must not open files of root's meanwhile; ours (ZeroMQ's, D-Bus's) open none. A thread's own
+rights (setfsuid) would need ctypes, and would keep root's groups.
+"""
+
+import errno
+import os
+import pwd
+import stat
+import threading
+from collections import deque
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from common.errors import DataError, UnavailableError
+
+_TURN: Final = threading.RLock()
+
+_PASSED: Final = getattr(os, "O_PATH", 0) | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+_FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
+_READ: Final = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
+_NEW: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+
+_MOST_LINKS: Final = 40
+"""As in the kernel (path_resolution(7))."""
+
+
+@contextmanager
+def opened_folder(path: Path, *, make: bool = False) -> Iterator[int]:
+    """Open a folder for the length of a block.
+
+    Root goes along the path step by step. From the first folder or link on that belongs to another user it goes on with that user's rights,
+    to the block's end: he could have put there whatever comes behind it.
+
+    Args:
+        path: the folder.
+        make: whether to make it (mode 0700) and those above it where they are missing.
+
+    Yields:
+        Its descriptor.
+
+    Raises:
+        OSError: as the operating system gives it.
+        UnavailableError: root's way leads through a folder in which anybody may exchange what others have put there.
+    """
+    with ExitStack() as stack:
+        stack.enter_context(_TURN)
+        if os.geteuid() != 0:
+            if make:
+                path.mkdir(mode=0o700, parents=True, exist_ok=True)
+            folder = os.open(path, _FOLDER)
+            stack.callback(os.close, folder)
+        else:
+            folder = _walk(path, stack, make=make)
+        yield folder
+
+
+def become_owner(path: Path) -> None:
+    """Take on, for good, the rights that `opened_folder` gives root in a folder. Nothing happens in root's own, or for who is not root.
+
+    Raises:
+        OSError: as the operating system gives it.
+        UnavailableError: as `opened_folder`.
+    """
+    with opened_folder(path):
+        uid, gid = os.geteuid(), os.getegid()
+    if os.geteuid() == 0 and uid != 0:
+        os.setgroups([])
+        os.setresgid(gid, gid, gid)
+        os.setresuid(uid, uid, uid)
+
+
+def read_file(folder: int, path: Path, most_bytes: int) -> tuple[bytes, os.stat_result]:
+    """Read a file that is small.
+
+    Args:
+        folder: descriptor of the folder in which it lies.
+        path: the file, for its name and for messages.
+        most_bytes: of a longer one nothing is read.
+
+    Returns:
+        Its content and its status.
+
+    Raises:
+        DataError: it is a link, a pipe or something else that is no plain file, or too long.
+        OSError: as the operating system gives it; FileNotFoundError where there is none.
+    """
+    try:
+        descriptor = os.open(path.name, _READ, dir_fd=folder)
+    except OSError as error:
+        if error.errno in {errno.ELOOP, errno.ENXIO, errno.EMLINK}:  # a link (EMLINK: on BSD); a socket
+            raise _no_file(path) from None
+        raise
+    status = os.fstat(descriptor)
+    if not stat.S_ISREG(status.st_mode):
+        os.close(descriptor)
+        raise _no_file(path)
+    with os.fdopen(descriptor, "rb") as file:
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise DataError(f"{path} is longer than {most_bytes} bytes", "move it away: it is no file of ours")
+    return content, status
+
+
+@contextmanager
+def replacing_in(folder: int, name: str, *, mode: int = 0o666, durable: bool = True) -> Iterator[BinaryIO]:
+    """Open a new file that takes its place in a folder when the block ends well; a link of that name is replaced, not followed.
+
+    Args:
+        folder: descriptor of the folder.
+        name: of the file in it.
+        mode: permissions, which the process's umask narrows.
+        durable: whether a power cut afterwards must not take it away again; costs a disk some ms.
+
+    Yields:
+        The file, open for binary writing.
+
+    Raises:
+        OSError: as the operating system gives it; nothing of the partial file is left.
+    """
+    temporary = f".{name}.{os.urandom(8).hex()}.part"
+    descriptor = os.open(temporary, _NEW, mode, dir_fd=folder)
+    try:
+        # Closed before the rename: a full disk may show only when the last buffer is flushed.
+        with os.fdopen(descriptor, "wb") as file:
+            yield file
+            if durable:
+                file.flush()
+                os.fsync(descriptor)
+        os.replace(temporary, name, src_dir_fd=folder, dst_dir_fd=folder)
+        if durable:
+            sync_folder(folder)
+    except BaseException:
+        with suppress(FileNotFoundError):
+            os.unlink(temporary, dir_fd=folder)
+        raise
+
+
+def sync_folder(folder: int) -> None:
+    """Have the names in a folder survive a power cut, where the file system can do that.
+
+    Raises:
+        OSError: the disk fails.
+    """
+    try:
+        os.fsync(folder)
+    except OSError as error:
+        if error.errno not in {errno.EINVAL, errno.ENOTSUP}:  # some of FUSE know no such thing
+            raise
+
+
+def _no_file(path: Path) -> DataError:
+    return DataError(
+        f"{path} is no plain file (a link, a pipe or a folder)", "find out who put it there, and remove it"
+    )
+
+
+def _walk(path: Path, stack: ExitStack, *, make: bool) -> int:
+    """Go to a folder from the root, as `opened_folder` says."""
+    parts = deque(path.absolute().parts[1:])
+    here = root = _kept(os.open("/", _PASSED), stack)
+    links = 0
+    while parts:
+        part = parts.popleft()
+        try:
+            status = os.stat(part, dir_fd=here, follow_symlinks=False)
+        except FileNotFoundError:
+            if not make:
+                raise
+            with suppress(FileExistsError):
+                os.mkdir(part, 0o755 if parts else 0o700, dir_fd=here)
+            status = os.stat(part, dir_fd=here, follow_symlinks=False)
+        if not stat.S_ISLNK(status.st_mode):
+            here = _kept(os.open(part, _PASSED, dir_fd=here), stack)
+            _go_on_as(os.fstat(here), path, stack)
+            continue
+        links += 1
+        if links > _MOST_LINKS:
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+        _go_on_as(status, path, stack)
+        target = Path(os.readlink(part, dir_fd=here))
+        here = root if target.is_absolute() else here
+        parts.extendleft(reversed(target.parts[1:] if target.is_absolute() else target.parts))
+    return _kept(os.open(".", _FOLDER, dir_fd=here), stack)
+
+
+def _kept(descriptor: int, stack: ExitStack) -> int:
+    stack.callback(os.close, descriptor)
+    return descriptor
+
+
+def _go_on_as(status: os.stat_result, path: Path, stack: ExitStack) -> None:
+    """Root takes on the rights of whoever owns this step of the way."""
+    if os.geteuid() != 0:
+        return
+    if status.st_uid != 0:
+        stack.enter_context(_rights_of(status))
+    elif stat.S_ISDIR(status.st_mode) and is_open_to_others(status):
+        raise UnavailableError(
+            f"{path} lies in a folder of root's that others may write to", "take that right away with chmod go-w"
+        )
+
+
+def is_open_to_others(status: os.stat_result) -> bool:
+    """Whether others than a folder's owner may exchange what lies in it: they may write to it and it is not sticky.
+
+    Root's group counts as root, a group that is its owner's alone (by its name, as Debian makes one for each user) as the owner.
+    """
+    if status.st_mode & stat.S_ISVTX:
+        return False
+    if status.st_mode & stat.S_IWOTH:
+        return True
+    return bool(status.st_mode & stat.S_IWGRP) and status.st_gid != 0 and not _is_own_group(status)
+
+
+def _is_own_group(status: os.stat_result) -> bool:
+    import grp  # noqa: PLC0415 - seldom
+
+    try:
+        user, group = pwd.getpwuid(status.st_uid), grp.getgrgid(status.st_gid)
+    except KeyError:
+        return False
+    return user.pw_gid == group.gr_gid and user.pw_name == group.gr_name and set(group.gr_mem) <= {user.pw_name}
+
+
+@contextmanager
+def _rights_of(status: os.stat_result) -> Iterator[None]:
+    """Be another user for the length of a block; root alone can."""
+    gid, groups = os.getegid(), os.getgroups()
+    try:
+        own_gid = pwd.getpwuid(status.st_uid).pw_gid
+    except KeyError:  # a number without a name
+        own_gid = status.st_gid
+    try:
+        os.setgroups([])
+        os.setegid(own_gid)
+        os.seteuid(status.st_uid)
+        yield
+    finally:
+        os.seteuid(0)
+        os.setegid(gid)
+        os.setgroups(groups)

@@ -1,0 +1,155 @@
+"""Whose an ipc path is: the folder in which its socket lies, the socket, and the process behind it.
+
+What is kept: who listens does so only in a folder in which nobody else may put his socket in place of this one (it has mode 0600: others than
+its owner and root cannot connect). Who dials believes no packet of another user's process, whatever lies under the path by then: the kernel
+says whose process it is (SO_PEERCRED, which ZeroMQ gives with each message). What is not kept: in a folder such as /tmp anybody may take a free
+name first, which is told; processes of the same user, and root's, are not told apart; and a stranger who listens there hears that somebody
+greets a board, which holds no secret. Where the kernel does not say (not Linux) owner and folder of the socket at the start must do.
+"""
+
+import os
+import pwd
+import stat
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+import zmq
+
+from common.errors import SettingsError, UnavailableError
+from common.files import is_open_to_others
+
+
+def trusted_users(owner: str) -> frozenset[int]:
+    """Who may be at the other end of an ipc link, by number: this user, root, and whom the link's `owner=` names.
+
+    Args:
+        owner: name or number of a user; empty for none.
+
+    Raises:
+        SettingsError: there is no such user.
+    """
+    own = {os.geteuid(), 0}
+    if not owner:
+        return frozenset(own)
+    if owner.isascii() and owner.isdigit():
+        return frozenset({*own, int(owner)})
+    try:
+        return frozenset({*own, pwd.getpwnam(owner).pw_uid})
+    except (KeyError, ValueError):
+        raise SettingsError(f"owner={owner}: there is no such user", "give a user's name or number") from None
+
+
+def check_folder(path: str, trusted: frozenset[int]) -> None:
+    """Refuse a path in a folder in which somebody else may exchange what lies there.
+
+    Args:
+        path: of the socket, which need not be there.
+        trusted: who may.
+
+    Raises:
+        UnavailableError: the folder is another's, or others may write to it and it is not sticky.
+    """
+    folder = Path(path).parent
+    with suppress(OSError):  # one that is not there yet is another's error
+        status = folder.stat()
+        if status.st_uid not in trusted:
+            raise _refused(path, f"{folder} belongs to {_name(status.st_uid)}", status.st_uid)
+        if is_open_to_others(status):
+            raise UnavailableError(
+                f"ipc://{path} is not safe: others may write to {folder}, which belongs to {_name(status.st_uid)}",
+                f"chmod go-w {folder}, or choose a path in $XDG_RUNTIME_DIR",
+            )
+
+
+def check_socket(path: str, trusted: frozenset[int]) -> None:
+    """Refuse a socket that is another user's, or that lies where one may put his.
+
+    Args:
+        path: of the socket, which need not be there.
+        trusted: who may own it.
+
+    Raises:
+        UnavailableError: it is.
+    """
+    check_folder(path, trusted)
+    with suppress(OSError):
+        status = Path(path).stat()
+        if stat.S_ISSOCK(status.st_mode) and status.st_uid not in trusted:
+            raise _refused(path, f"it belongs to {_name(status.st_uid)}", status.st_uid)
+
+
+def check_peer(path: str, message: zmq.Frame, trusted: frozenset[int]) -> None:
+    """Refuse a message of another user's process.
+
+    Args:
+        path: of the socket.
+        message: any part of what has come in.
+        trusted: whose messages are believed.
+
+    Raises:
+        UnavailableError: it is a stranger's.
+    """
+    try:
+        # libzmq, stream_engine_base.cpp: the address, then ":uid:gid:pid" where the system has SO_PEERCRED. A peer's own properties come after it.
+        uid = int(str(message.get("Peer-Address")).split(":")[-3])
+    except (zmq.ZMQError, ValueError, IndexError):
+        return
+    if uid not in trusted:
+        raise _refused(path, f"a process of {_name(uid)} listens there", uid)
+
+
+def owner_of(path: str) -> str:
+    """Whose something is, for people."""
+    try:
+        return _name(os.lstat(path).st_uid)
+    except OSError:
+        return "somebody"
+
+
+def runtime_folder(environment: Mapping[str, str]) -> Path:
+    """A folder of this user's alone for sockets: $XDG_RUNTIME_DIR, else one in the folder of temporary files.
+
+    Args:
+        environment: of the process.
+
+    Raises:
+        UnavailableError: there is none, and somebody else's lies where it would be made.
+    """
+    given = Path(environment.get("XDG_RUNTIME_DIR", ""))
+    with suppress(OSError):
+        if given.is_absolute() and _is_own(given.stat()):
+            return given
+    import tempfile  # noqa: PLC0415 - slow to load, and no board needs it
+
+    folder = Path(tempfile.gettempdir()) / f"tandemscan-{os.geteuid()}"
+    try:
+        with suppress(FileExistsError):
+            folder.mkdir(mode=0o700)
+        if _is_own(folder.lstat()):
+            return folder
+    except OSError as error:
+        raise UnavailableError(f"{folder} cannot be made ({error.strerror})", "set XDG_RUNTIME_DIR or TMPDIR") from None
+    raise UnavailableError(
+        f"{folder} is not a folder of this user's alone (it belongs to {owner_of(str(folder))})",
+        "remove it, or set XDG_RUNTIME_DIR to a folder of your own with mode 0700",
+    )
+
+
+def _is_own(status: os.stat_result) -> bool:
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.geteuid() and not status.st_mode & 0o077
+
+
+def _refused(path: str, why: str, uid: int) -> UnavailableError:
+    owner = _name(uid).removeprefix("user ")
+    return UnavailableError(
+        f"ipc://{path} is not this user's: {why}",
+        f"choose a path in $XDG_RUNTIME_DIR, or add ?owner={owner} to the link if that user is meant",
+    )
+
+
+def _name(uid: int) -> str:
+    try:
+        return f"user {pwd.getpwuid(uid).pw_name}"
+    except KeyError:
+        return f"user {uid}"

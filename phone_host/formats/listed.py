@@ -1,0 +1,179 @@
+"""Folders of results, in which ours are told from everything else: what is ours is listed in the folder, in the file `.tandemscan`.
+
+Rules: a name is listed before anything is made under it, so that a run that was killed leaves nothing that the next one takes for foreign.
+A later run removes what is listed and what it would write itself, and nothing else; whatever else bears such a name ends it before it has
+changed anything. Links are never ours. A list of its own rather than one in report.json: that one is written at the end, which a killed run
+does not reach.
+"""
+
+import errno
+import os
+import re
+import stat
+from pathlib import Path
+from typing import Final
+
+from common.errors import DataError, UnavailableError
+from common.files import read_file, replacing_in, sync_folder
+
+LIST: Final = ".tandemscan"
+
+_HEAD: Final = "# What tandemscan has written here. A later run replaces this, and nothing else.\n"
+_MOST_BYTES: Final = 64 << 20
+"""Five million pairs."""
+
+_TEMPORARY: Final = re.compile(r"\.(.+)\.[0-9a-f]{16}\.part")
+_FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+
+
+class ListedFolder:
+    """A folder of results, cleared of those that an earlier run left under the names that this one uses.
+
+    Args:
+        path: made if missing.
+        names: which names in it are removed if they are ours, and written anew.
+        kept: which names are left as they are if they are ours, since they are replaced one by one.
+        inner: which files may lie in folders among `names`.
+
+    Raises:
+        UnavailableError: such a name belongs to somebody else's file, or to a link.
+        OSError: as the operating system gives it.
+    """
+
+    def __init__(self, path: Path, names: str, *, kept: str = "(?!)", inner: str = "(?!)") -> None:
+        self._path, self._inner = path, re.compile(inner)
+        path.mkdir(parents=True, exist_ok=True)
+        self.descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        self._list = -1
+        try:
+            listed = self._listed()
+            removed = self._ours(re.compile(names), listed)
+            self._ours(re.compile(kept), listed)
+            for name in removed:
+                self._check_inside(name)
+            for name in removed:
+                self._remove(name)
+            listed -= {plain_name(name) for name in removed}
+            self._size_bytes = self._write(listed)
+            self._list = os.open(LIST, os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW | os.O_CLOEXEC, dir_fd=self.descriptor)
+        except BaseException:
+            self.close()
+            raise
+
+    def add(self, *names: str) -> None:
+        """List names before they are written.
+
+        Raises:
+            OSError: as the operating system gives it; nothing is listed then.
+        """
+        lines = "".join(f"{name}\n" for name in names).encode()
+        if os.write(self._list, lines) < len(lines):
+            os.ftruncate(self._list, self._size_bytes)
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        self._size_bytes += len(lines)
+
+    def create(self, name: str) -> int:
+        """Make a file that is not there yet; gives its descriptor, for writing.
+
+        Raises:
+            OSError: as the operating system gives it.
+        """
+        self.add(name)
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+        return os.open(name, flags, 0o644, dir_fd=self.descriptor)
+
+    def write_text(self, name: str, text: str) -> None:
+        """Write a listed file, whole or not at all; it survives a power cut.
+
+        Raises:
+            OSError: as the operating system gives it.
+        """
+        with replacing_in(self.descriptor, name) as file:
+            file.write(text.encode())
+
+    def sync(self) -> None:
+        """Have the list and all names in the folder survive a power cut.
+
+        Raises:
+            OSError: the disk fails.
+        """
+        os.fsync(self._list)
+        sync_folder(self.descriptor)
+
+    def close(self) -> None:
+        """Let go of the folder."""
+        for descriptor in (self._list, self.descriptor):
+            if descriptor >= 0:
+                os.close(descriptor)
+        self._list = self.descriptor = -1
+
+    def _listed(self) -> set[str]:
+        path = self._path / LIST
+        try:
+            text = read_file(self.descriptor, path, _MOST_BYTES)[0].decode("utf-8", "replace")
+        except FileNotFoundError:
+            return set()
+        except DataError as error:
+            raise self._in_the_way(error.problem) from None
+        if not text.startswith(_HEAD):
+            raise self._in_the_way(f"{path} is none of ours")
+        # Of a last line without its end nothing was made yet.
+        return set(text.removeprefix(_HEAD).rpartition("\n")[0].splitlines())
+
+    def _write(self, names: set[str]) -> int:
+        lines = (_HEAD + "".join(f"{name}\n" for name in sorted(names))).encode()
+        with replacing_in(self.descriptor, LIST) as file:
+            file.write(lines)
+        return len(lines)
+
+    def _ours(self, wanted: re.Pattern[str], listed: set[str]) -> list[str]:
+        """The names of a kind in the folder, all of which must be ours."""
+        found = [name for name in _entries(self.descriptor) if wanted.fullmatch(plain_name(name))]
+        for name in found:
+            path, mode = self._path / name, os.lstat(name, dir_fd=self.descriptor).st_mode
+            if stat.S_ISLNK(mode):
+                raise self._in_the_way(f"{path} is a link")
+            if plain_name(name) not in listed or not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+                raise self._in_the_way(f"{path} is not from an earlier run")
+        return found
+
+    def _check_inside(self, name: str) -> None:
+        """Refuse a folder of ours into which somebody has put something else."""
+        if not stat.S_ISDIR(os.lstat(name, dir_fd=self.descriptor).st_mode):
+            return
+        folder = os.open(name, _FOLDER, dir_fd=self.descriptor)
+        try:
+            for entry in _entries(folder):
+                mode = os.lstat(entry, dir_fd=folder).st_mode
+                if not (self._inner.fullmatch(plain_name(entry)) and stat.S_ISREG(mode)):
+                    raise self._in_the_way(f"{self._path / name / entry} is not from an earlier run")
+        finally:
+            os.close(folder)
+
+    def _remove(self, name: str) -> None:
+        if not stat.S_ISDIR(os.lstat(name, dir_fd=self.descriptor).st_mode):
+            os.unlink(name, dir_fd=self.descriptor)
+            return
+        folder = os.open(name, _FOLDER, dir_fd=self.descriptor)
+        try:
+            for entry in _entries(folder):
+                if self._inner.fullmatch(plain_name(entry)):
+                    os.unlink(entry, dir_fd=folder)
+        finally:
+            os.close(folder)
+        os.rmdir(name, dir_fd=self.descriptor)
+
+    def _in_the_way(self, problem: str) -> UnavailableError:
+        return UnavailableError(problem, "move it away, or give another folder with --out")
+
+
+def _entries(folder: int) -> list[str]:
+    with os.scandir(folder) as entries:
+        return sorted(entry.name for entry in entries)
+
+
+def plain_name(name: str) -> str:
+    """The name under which something is listed: a file or folder that was begun and not finished counts as the finished one."""
+    if begun := _TEMPORARY.fullmatch(name):
+        return begun.group(1)
+    return name.removesuffix(".part")

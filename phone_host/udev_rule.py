@@ -1,0 +1,137 @@
+"""The host's udev rule for one board on a USB cable: made of what the kernel knows of the board that is plugged in now.
+
+The rule gives names (/dev/tandemscan-board, tandemscan0) to the device of one vendor, product and serial number. It authenticates nobody: any
+device can claim these three. They come from the device, so they go into the rule only as plain letters and digits.
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from common.errors import DataError, MissingDeviceError, SettingsError, UnavailableError
+from common.files import opened_folder, replacing_in
+
+RULES: Final = Path("/etc/udev/rules.d/70-tandemscan.rules")
+
+_OURS: Final = "tandemscan"
+"""The manufacturer's name of the board's gadget (deploy/board/usb-gadget)."""
+
+_ID: Final = re.compile(r"[0-9a-f]{4}")
+_SERIAL: Final = re.compile(r"[0-9A-Za-z._:-]{1,126}")
+"""126 characters are the most that a USB string descriptor holds. Without `*?[|"\\` and blanks, which udev understands in its own way (udev(7))."""
+
+
+@dataclass(frozen=True, slots=True)
+class UsbBoard:
+    """A board on a USB cable.
+
+    Attributes:
+        device: name of its serial port, for example ttyACM0.
+        vendor: four hexadecimal digits.
+        product: four hexadecimal digits.
+        serial: its serial number.
+        manufacturer: what it calls its maker.
+    """
+
+    device: str
+    vendor: str
+    product: str
+    serial: str
+    manufacturer: str
+
+
+def find_usb_board(port: Path | None, sysfs: Path = Path("/sys")) -> UsbBoard:
+    """Find the board that is plugged in.
+
+    Args:
+        port: its serial port; None: the only one that calls itself ours.
+        sysfs: where the kernel shows its devices.
+
+    Raises:
+        MissingDeviceError: there is none, or no USB device behind this port.
+        SettingsError: there are several to choose from.
+        DataError: what it says of itself cannot stand in a rule.
+    """
+    if port is not None:
+        found = _usb_device(sysfs / "class" / "tty" / port.resolve().name)
+        if found is None:
+            raise MissingDeviceError(
+                f"{port} is no port of a USB device", "plug the board in; ls /dev/serial/by-id shows what is there"
+            )
+        return _checked(found)
+    ports = sorted((sysfs / "class" / "tty").glob("tty*"))
+    ours = [board for board in map(_usb_device, ports) if board is not None and board.manufacturer == _OURS]
+    if not ours:
+        raise MissingDeviceError(
+            "no board is on a USB cable",
+            "plug it in (board-gadget.service runs there), or name its port: --link serial:/dev/ttyACM0",
+        )
+    if len({(board.vendor, board.product, board.serial) for board in ours}) > 1:
+        listed = ", ".join(f"/dev/{board.device}" for board in ours)
+        raise SettingsError(
+            f"{len(ours)} boards are on USB cables ({listed})", f"choose one: --link serial:/dev/{ours[0].device}"
+        )
+    return _checked(ours[0])
+
+
+def rule_text(board: UsbBoard) -> str:
+    """Write the rule.
+
+    Args:
+        board: as `find_usb_board` gives it.
+    """
+    known = (("idVendor", board.vendor), ("idProduct", board.product), ("serial", board.serial))
+    own, above = (", ".join(f'{key}{{{name}}}=="{value}"' for name, value in known) for key in ("ATTR", "ATTRS"))
+    return f"""# Written by `phone-host pair --udev` for the board on one USB cable; it gives names to its serial port and its network card.
+# It authenticates nobody: any device can claim these numbers. Another board: plug it in and run the command again.
+SUBSYSTEM=="usb", ENV{{DEVTYPE}}=="usb_device", {own}, ENV{{ID_MM_DEVICE_IGNORE}}="1"
+SUBSYSTEM=="tty", SUBSYSTEMS=="usb", {above}, SYMLINK+="tandemscan-board", TAG+="uaccess"
+SUBSYSTEM=="net", ACTION=="add", SUBSYSTEMS=="usb", {above}, NAME="tandemscan0"
+"""
+
+
+def write_rule(board: UsbBoard, rules: Path = RULES) -> None:
+    """Put the rule in place, whole; it takes the place of an earlier one.
+
+    Args:
+        board: as `find_usb_board` gives it.
+        rules: the file.
+
+    Raises:
+        UnavailableError: it cannot be written.
+    """
+    try:
+        with opened_folder(rules.parent) as folder, replacing_in(folder, rules.name, mode=0o644) as file:
+            file.write(rule_text(board).encode())
+    except PermissionError:
+        raise UnavailableError(
+            f"{rules} can be written by root alone", "run it with sudo: sudo phone-host pair --udev"
+        ) from None
+    except OSError as error:
+        raise UnavailableError(f"{rules} cannot be written ({error.strerror})", "install udev, and make room") from None
+
+
+def _usb_device(port: Path) -> UsbBoard | None:
+    """The USB device to which a port belongs; None where it belongs to none."""
+    for folder in (port / "device").resolve().parents:
+        if (folder / "idVendor").is_file():
+            names = ("idVendor", "idProduct", "serial", "manufacturer")
+            return UsbBoard(port.name, *(_attribute(folder / name) for name in names))
+    return None
+
+
+def _attribute(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace").strip()
+    except OSError:  # a device without a serial number has none
+        return ""
+
+
+def _checked(board: UsbBoard) -> UsbBoard:
+    if not (_ID.fullmatch(board.vendor) and _ID.fullmatch(board.product) and _SERIAL.fullmatch(board.serial)):
+        raise DataError(
+            f"/dev/{board.device} has the serial number {board.serial!r:.60}, which cannot stand in a rule",
+            "update the board's package, or name the device in a rule by hand",
+        )
+    return board

@@ -1,0 +1,220 @@
+"""Folders of results into which others have put things: links, pipes, folders of their own."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from common.errors import TandemError, UnavailableError
+from phone_host.formats.atomic import write_bytes, write_text
+from phone_host.formats.listed import LIST, ListedFolder
+from phone_host.results import NAMES, PAIR_FILES, Results
+
+FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
+
+
+def earlier_run(folder: Path) -> None:
+    """What a run of three pairs leaves, the last of them killed half-way."""
+    results = Results(folder, 1)
+    assert results._own is not None
+    for name in ("pair-000000", "pair-1000000"):
+        results._own.add(name)
+        (folder / name).mkdir()
+        for file in FILES:
+            (folder / name / file).write_bytes(b"x")
+    results._own.add("pair-000002")
+    (folder / "pair-000002.part").mkdir()
+    (folder / "pair-000002.part" / f".left.png.{'0' * 16}.part").write_bytes(b"x")
+    (folder / f".report.json.{'0' * 16}.part").write_bytes(b"x")
+    results.finish({"of": "an earlier run"}, "<html>")
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    """All files and links below a folder with their content."""
+    return {
+        str(path.relative_to(folder)): bytes(path.readlink()) if path.is_symlink() else path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_symlink() or path.is_file()
+    }
+
+
+def test_a_later_run_removes_what_an_earlier_one_left_and_nothing_else(tmp_path: Path) -> None:
+    """Delays, report, page and pairs of the earlier run are gone, half-made ones too; a user's files and folders of like names stay."""
+    earlier_run(tmp_path)
+    mine = {"pair-000123-my-notes/a.txt": b"a", "pair-12/b": b"b", "report.json.bak": b"c", "notes.txt": b"d"}
+    for name, content in mine.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    results = Results(tmp_path, 1)
+    left = tree(tmp_path)
+    assert left.pop(LIST)
+    assert left == {**mine, "delays.jsonl": b""}
+    results.finish({})
+
+
+def test_a_run_again_and_again_in_one_folder(tmp_path: Path) -> None:
+    """Each run takes the place of the one before, also after it was killed before its report."""
+    for number in range(3):
+        Results(tmp_path, 1).finish({"number": number})
+    Results(tmp_path, 1)
+    Results(tmp_path, 1).finish({})
+    assert sorted(path.name for path in tmp_path.iterdir()) == [LIST, "delays.jsonl", "report.json"]
+
+
+def plant_link(path: Path) -> None:
+    """A link to a file beside the folder."""
+    path.symlink_to(path.parent.parent / "precious")
+
+
+def plant_file(path: Path) -> None:
+    """A file of the user's."""
+    path.write_text("mine")
+
+
+def refused(out: Path, name: str) -> None:
+    """A run into this folder ends with one line that names what is in the way and the remedy; nothing is changed by then."""
+    before = tree(out.parent)
+    with pytest.raises(UnavailableError, match=name) as caught:
+        Results(out, 1)
+    assert "--out" in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert tree(out.parent) == before
+
+
+@pytest.mark.parametrize("name", ["delays.jsonl", "report.json", "index.html", "pair-000007", LIST])
+@pytest.mark.parametrize("plant", [plant_link, plant_file, os.mkfifo, Path.mkdir])
+@pytest.mark.timeout(30)
+def test_what_is_not_ours_ends_the_first_run(name: str, plant: Callable[[Path], None], tmp_path: Path) -> None:
+    """A link, file, pipe or folder under a name that the run needs is refused before anything is changed."""
+    (tmp_path / "precious").write_text("precious")
+    (tmp_path / "out").mkdir()
+    plant(tmp_path / "out" / name)
+    refused(tmp_path / "out", name)
+
+
+@pytest.mark.parametrize("name", ["delays.jsonl", "report.json", "index.html", "pair-000000", LIST])
+@pytest.mark.parametrize("plant", [plant_link, os.mkfifo])
+@pytest.mark.timeout(30)
+def test_a_link_or_pipe_in_place_of_ours_ends_a_later_run(
+    name: str, plant: Callable[[Path], None], tmp_path: Path
+) -> None:
+    """Also under a name that is listed as ours, a link is not: it is refused before anything is changed."""
+    (tmp_path / "precious").write_text("precious")
+    earlier_run(tmp_path / "out")
+    (tmp_path / "out" / name).rename(tmp_path / "moved")
+    plant(tmp_path / "out" / name)
+    refused(tmp_path / "out", name)
+
+
+@pytest.mark.parametrize("file", ["notes.txt", "left.png.bak", ".hidden"])
+def test_a_users_file_in_a_pair_of_ours_ends_the_run(file: str, tmp_path: Path) -> None:
+    """Notes that somebody has put into a saved pair stay, and so does the rest; so does what a link in it points at."""
+    earlier_run(tmp_path)
+    (tmp_path / "pair-000000" / file).write_text("mine")
+    before = tree(tmp_path)
+    with pytest.raises(UnavailableError, match=f"pair-000000/{file}"):
+        Results(tmp_path, 1)
+    assert tree(tmp_path) == before
+    (tmp_path / "pair-000000" / file).unlink()
+    (tmp_path / "pair-000000" / "left.png").unlink()
+    (tmp_path / "pair-000000" / "left.png").symlink_to(tmp_path / "report.json")
+    with pytest.raises(UnavailableError, match="pair-000000/left"):
+        Results(tmp_path, 1)
+    assert (tmp_path / "report.json").exists()
+
+
+def test_a_link_planted_while_the_run_goes_on_is_replaced(tmp_path: Path) -> None:
+    """A link under report.json or index.html that appears after the start is replaced by the report; its target stays as it is."""
+    precious, out = tmp_path / "precious", tmp_path / "out"
+    precious.write_text("precious")
+    results = Results(out, 1)
+    (out / "report.json").symlink_to(precious)
+    (out / "index.html").symlink_to(precious)
+    results.finish({"a": 1}, "<html>")
+    assert precious.read_text() == "precious"
+    assert not (out / "report.json").is_symlink()
+    assert (out / "index.html").read_text() == "<html>"
+
+
+@pytest.mark.parametrize("write", [lambda path: write_text(path, "new"), lambda path: write_bytes(path, b"new")])
+def test_every_writer_replaces_a_link(write: Callable[[Path], None], tmp_path: Path) -> None:
+    """What each verb writes with never goes through a link, and leaves nothing else behind."""
+    (tmp_path / "precious").write_text("precious")
+    (tmp_path / "result").symlink_to("precious")
+    write(tmp_path / "result")
+    assert tree(tmp_path) == {"precious": b"precious", "result": b"new"}
+
+
+def test_a_torn_last_line_of_the_list_counts_for_nothing(tmp_path: Path) -> None:
+    """A list whose last line was cut by a full disk names what stands before it; the next run mends it."""
+    Results(tmp_path, 1).finish({})
+    with (tmp_path / LIST).open("a") as list_file:
+        list_file.write("pair-0000")
+    Results(tmp_path, 1).finish({})
+    assert "pair-0000" not in (tmp_path / LIST).read_text()
+
+
+def test_what_another_verb_has_listed_stays(tmp_path: Path) -> None:
+    """A run leaves what it does not write itself, and it goes on being ours."""
+    other = ListedFolder(tmp_path, "disparity.pfm")
+    other.add("disparity.pfm", "report.json")
+    other.close()
+    for name in ("disparity.pfm", "report.json"):
+        (tmp_path / name).write_text("of stereo")
+    Results(tmp_path, 1).finish({})
+    assert (tmp_path / "disparity.pfm").read_text() == "of stereo"
+    ListedFolder(tmp_path, r"disparity\.pfm").close()
+    assert not (tmp_path / "disparity.pfm").exists()
+
+
+def test_a_list_with_ways_out_of_the_folder_leads_nowhere(tmp_path: Path) -> None:
+    """Whoever writes the list can have results removed, nothing above the folder and nothing of another name."""
+    out = tmp_path / "out"
+    Results(out, 1).finish({})
+    (tmp_path / "report.json").write_text("precious")
+    (out / "notes.txt").write_text("precious")
+    with (out / LIST).open("a") as list_file:
+        list_file.write("../report.json\nnotes.txt\n/etc/passwd\n..\n.\n")
+    ListedFolder(out, NAMES, inner=PAIR_FILES).close()
+    assert (tmp_path / "report.json").read_text() == "precious"
+    assert (out / "notes.txt").read_text() == "precious"
+
+
+_WRITER = """
+import sys
+from pathlib import Path
+from phone_host.formats.atomic import write_text
+print("ready", flush=True)
+while True:
+    for letter in "ab":
+        write_text(Path(sys.argv[1]), letter * 3_000_000)
+"""
+
+
+def test_a_process_that_is_killed_leaves_one_whole_report(tmp_path: Path) -> None:
+    """Killed at any moment while it writes one report over the other, a process leaves the old one or the new one."""
+    report = tmp_path / "report.json"
+    write_text(report, "b" * 3_000_000)
+    for number in range(12):
+        with subprocess.Popen([sys.executable, "-c", _WRITER, str(report)], stdout=subprocess.PIPE) as writer:
+            assert writer.stdout is not None
+            writer.stdout.readline()
+            threading.Event().wait(0.003 * number)
+            writer.send_signal(signal.SIGKILL)
+        text = report.read_text()
+        assert len(text) == 3_000_000
+        assert len(set(text)) == 1
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
+    """A file in the folder's place, or a link to nowhere, is named with the remedy."""
+    (tmp_path / "file").write_text("")
+    (tmp_path / "link").symlink_to("nowhere/at/all")
+    for name in ("file", "link"):
+        with pytest.raises(TandemError, match=rf"{name}.*--out"):
+            Results(tmp_path / name, 1)
