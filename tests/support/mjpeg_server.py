@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Final
 
 from common.camera.replay import find_images
+from tests.support.bombs import claiming
 
 USER: Final = "me"
 PASSWORD: Final = "a:b@c/%"
@@ -157,6 +158,20 @@ def truncated(on: Exchange) -> None:
         on.part(image[: len(image) // 2] if count % 4 == 3 else image)
 
 
+def bombs(on: Exchange) -> None:
+    """After a while every image claims 8000x8000."""
+    on.answer(f"{_TYPE}; boundary=frame")
+    for sent, image in enumerate(on.film()):
+        on.part(image if sent < _GOOD_IMAGES else claiming(image, 8000, 8000))
+
+
+def turning(on: Exchange) -> None:
+    """After a while every other image claims to be upright."""
+    on.answer(f"{_TYPE}; boundary=frame")
+    for sent, image in enumerate(on.film()):
+        on.part(image if sent < _GOOD_IMAGES or sent % 2 else claiming(image, 120, 160))
+
+
 def password(on: Exchange) -> None:
     """Basic authentication."""
     secret = base64.b64encode(f"{USER}:{PASSWORD}".encode()).decode()
@@ -288,7 +303,7 @@ def endless(on: Exchange) -> None:
 MANNERS: Final[dict[str, Callable[[Exchange], None]]] = {
     manner.__name__: manner
     for manner in (
-        plain, dashes, no_dashes, no_line_end, wrong_boundary, chunked, early_boundary, empty_parts, garbage, truncated, password, digest, page,
+        plain, dashes, no_dashes, no_line_end, wrong_boundary, chunked, early_boundary, empty_parts, garbage, truncated, bombs, turning, password, digest, page,
         snapshot, missing, moved, moved_here, busy, another_tongue, no_image, mute, drips_head, hangs, closes, resets, bad_chunks, last_chunk, drips, endless,
     )
 }  # fmt: skip
