@@ -14,7 +14,7 @@ from common.frame import PixelFormat
 from tests.support import bombs
 from tests.support.lying_board import Lie, LyingCamera, board_of
 from tests.support.pictures import jpeg
-from tests.support.programs import Program, host, lines, until
+from tests.support.programs import Program, board, host, lines, until
 
 FPS = 20
 SIZE = (640, 480)
@@ -162,3 +162,31 @@ def test_a_higher_limit_is_taken(tmp_path: Path) -> None:
     assert phone_host(*given, "--max-megapixels", 1).returncode == 4
     assert phone_host(*given, "--max-megapixels", 2).returncode == 0
     assert phone_host(*given, "--max-megapixels", 0).returncode == 2
+
+
+def test_honest_images_that_fit_no_rig_end_the_run(film: Path, tmp_path: Path) -> None:
+    """Two cameras of different size are no lie but no rectified pair either: after ten pairs the run ends with both sizes and the remedy."""
+    other = tmp_path / "other"
+    other.mkdir()
+    for number in range(4):
+        (other / f"{number}.jpg").write_bytes(jpeg(320, 240, number))
+    link = f"ipc://{tmp_path}/link"
+    receiving = [
+        "run",
+        "--link",
+        link,
+        "--camera",
+        f"replay:{film}?fps={FPS}&loop=1",
+        "--rectified",
+        "--disparities",
+        "16",
+    ]
+    with (
+        board(["run", "--camera", f"replay:{other}?fps={FPS}&loop=1", "--link", link], tmp_path),
+        host(receiving, tmp_path) as receiver,
+    ):
+        assert receiver.wait() == 4
+    [line] = [line for line in receiver.stderr.splitlines() if "error: " in line]
+    assert "320x240 px" in line
+    assert "640x480 px" in line
+    assert "--calibration" in line
