@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from common.errors import DataError
 from common.stamp import Stamp
 
 Buffer = bytes | bytearray | memoryview
@@ -20,7 +21,11 @@ class PixelFormat(Enum):
 
 
 class FrameFault(Enum):
-    """Why a frame's bytes are not the whole image that they claim to be (flagged: its driver says so; stale: older than the stream)."""
+    """Why a frame's bytes are not the whole image that they claim to be.
+
+    flagged: its driver says so; stale: older than the stream; other_size: their size is not the one that was told; too_large: nobody asked for
+    an image of that size; too_short: no image of that size has so few bytes; too_many_scans: more than any camera makes; corrupt: the decoder says so.
+    """
 
     EMPTY = "empty"
     NO_START = "no_start"
@@ -28,6 +33,29 @@ class FrameFault(Enum):
     WRONG_LENGTH = "wrong_length"
     FLAGGED = "flagged"
     STALE = "stale"
+    OTHER_SIZE = "other_size"
+    TOO_LARGE = "too_large"
+    TOO_SHORT = "too_short"
+    TOO_MANY_SCANS = "too_many_scans"
+    CORRUPT = "corrupt"
+
+
+class SpoiledImageError(DataError):
+    """Raised for bytes that are not the whole image that they claim to be. The fault of who made or carried them; a stream goes on without it.
+
+    Args:
+        fault: what is wrong with them, for counters.
+        problem: what is wrong, naming the image.
+        remedy: what to do about it.
+    """
+
+    def __init__(self, fault: FrameFault, problem: str, remedy: str) -> None:
+        super().__init__(problem, remedy)
+        self.fault = fault
+
+
+class ImageSizeError(SpoiledImageError):
+    """Raised for an image whose size is not believed or beyond the limit, before it is decoded. The fault of who made it, or the limit is too low."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,30 @@ class SleepWatch:
         return slept_ns
 
 
+class TimeOfDayWatch:
+    """Tells when the time of day has jumped against CLOCK_MONOTONIC since it was last asked: it was set, or this machine stood still and was told the time.
+
+    Only that it jumped is used, never its value. A machine that an emulator stops shows no sleep; where it is given the time again afterwards it shows this.
+    """
+
+    def __init__(self) -> None:
+        self._apart_ns = self._read() or 0
+
+    def jumped(self) -> bool:
+        """Whether it has."""
+        apart_ns = self._read()
+        if apart_ns is None:
+            return False
+        before_ns, self._apart_ns = self._apart_ns, apart_ns
+        return abs(apart_ns - before_ns) >= _LEAST_SLEEP_NS
+
+    @staticmethod
+    def _read() -> int | None:
+        """Time of day minus CLOCK_MONOTONIC; None where the process was held up between the readings."""
+        before_ns, wall_ns, after_ns = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
+        return wall_ns - before_ns if after_ns - before_ns < _LEAST_SLEEP_NS // 5 else None
+
+
 def wall_time() -> str:
     """Local wall time as ISO 8601 to the second, for reports only; nothing is ever computed from it."""
     return time.strftime("%Y-%m-%dT%H:%M:%S%z")

@@ -42,6 +42,7 @@ class RunFacts:
         motion_px_s: how fast the own camera's image moves, px/s; NaN where not measured.
         width_px: of that image; 0 where not measured.
         interpolated: whether the board's images were taken to the moment of the host's, so that their time skew did no harm.
+        spoiled_images: pairs one of whose images was not the whole image that it claimed to be, by reason; part of `undecodable`.
         stamps_exact: whether both cameras' stamps say by definition when their images were exposed.
     """
 
@@ -65,6 +66,7 @@ class RunFacts:
     own_future: int = 0
     interpolated: bool = False
     stamps_exact: bool = False
+    spoiled_images: tuple[tuple[str, int], ...] = ()
     time_offset: TimeOffset = field(default_factory=TimeOffset)
     phase: Phase | None = None
     alignment: Alignment | None = None

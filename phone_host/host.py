@@ -2,6 +2,7 @@
 
 import logging
 import threading
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -11,6 +12,8 @@ from typing import Final
 from common import now
 from common.camera.base import Camera
 from common.errors import DataError, UnavailableError
+from common.frame import FrameFault, SpoiledImageError
+from common.imagesize import MOST_PIXELS
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.logs import event
@@ -71,6 +74,7 @@ class HostSettings:
         time_offset: between the two cameras' stamps.
         interpolate: whether the board's image is taken to the moment of the host's before anything else is done with it.
         steered: the cameras that may be steered until both expose together; none: the phase stays as it is.
+        most_pixels: neither camera may have more.
     """
 
     board_side: Side = Side.LEFT
@@ -83,6 +87,7 @@ class HostSettings:
     time_offset: TimeOffset = field(default_factory=TimeOffset)
     interpolate: bool = False
     steered: frozenset[Whose] = frozenset()
+    most_pixels: int = MOST_PIXELS
 
 
 class Host:
@@ -120,9 +125,8 @@ class Host:
         )
         self.source = Source(camera, self.queue.add_host)
         self.receiver = Receiver(links, now.random_id(), self.queue, self)
-        self._pipeline = Pipeline(
-            core, settings.board_side, now.monotonic_ns, Interpolator() if settings.interpolate else None
-        )
+        interpolator = Interpolator() if settings.interpolate else None
+        self._pipeline = Pipeline(core, settings.board_side, now.monotonic_ns, interpolator, settings.most_pixels)
         self.motion = MotionMeter()
         self._own = own
         self._known_doubts: frozenset[Doubt] = frozenset()
@@ -135,6 +139,7 @@ class Host:
         self._failure: Exception | None = None
         self.processed = 0
         self.undecodable = 0
+        self._spoiled: Counter[FrameFault] = Counter()
         self.started_ns = now.monotonic_ns()
         self.first_done_ns = self.last_done_ns = 0
 
@@ -198,6 +203,7 @@ class Host:
             motion_px_s=self.motion.px_s,
             width_px=self.motion.width_px,
             interpolated=self.settings.interpolate,
+            spoiled_images=tuple((fault.value, count) for fault, count in list(self._spoiled.items())),
             stamps_exact=self._stamps_are_exact,
         )
 
@@ -334,11 +340,7 @@ class Host:
         try:
             processed = self._pipeline.process(pair)
         except DataError as error:
-            if self.processed == 0 and self.undecodable >= _HOPELESS:
-                raise  # not one pair fits: wrong rig, wrong camera
-            self.undecodable += 1
-            if self.undecodable.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: one bad camera must not fill the log
-                _LOG.warning(event("pair_failed", count=self.undecodable, problem=error.problem))
+            self._note_failed(error)
             return
         before_write_ns = now.monotonic_ns()
         self.results.save_pair(self.processed, processed)
@@ -358,6 +360,18 @@ class Host:
             self._on_pair(processed, ledger)
         if self.settings.pairs and self.processed >= self.settings.pairs:
             self._finished.set()
+
+    def _note_failed(self, error: DataError) -> None:
+        """Count a pair that could not be processed. Spoiled images never end a run: whoever sends them must not be able to; a rig that fits no pair does."""
+        self.undecodable += 1
+        if isinstance(error, SpoiledImageError):
+            self._spoiled[error.fault] += 1
+            if self.processed == 0 and self._spoiled.total() == _HOPELESS:
+                _LOG.error(event("no_sound_image", count=_HOPELESS, problem=error.problem, remedy=error.remedy))
+        elif self.processed == 0 and self.undecodable - self._spoiled.total() > _HOPELESS:
+            raise error  # not one pair fits: wrong rig, wrong camera
+        if self.undecodable.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: one bad camera must not fill the log
+            _LOG.warning(event("pair_failed", count=self.undecodable, problem=error.problem))
 
     def _ledger(
         self, pair: FramePair, processed: Processed, dequeued_ns: int, before_write_ns: int, done_ns: int

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from common.errors import DataError
 from common.frame import Frame
+from common.imagesize import MOST_PIXELS
 from common.ledger import StageTimes
 from common.protocol.message import FrameMessage
 from phone_host.model import BoardFrame, CloudImage, Disparity, FramePair, Image, RectifiedPair, Side
@@ -39,6 +40,7 @@ class Pipeline:
         board_side: which view the board's frame is.
         clock: gives ns of CLOCK_MONOTONIC.
         interpolator: takes the board's image to the moment of the host's; None to leave it as it is.
+        most_pixels: neither camera may have more.
     """
 
     def __init__(
@@ -47,7 +49,9 @@ class Pipeline:
         board_side: Side,
         clock: Callable[[], int],
         interpolator: Interpolator | None = None,
+        most_pixels: int = MOST_PIXELS,
     ) -> None:
+        self._most_pixels = most_pixels
         self._interpolator = interpolator
         self._core = core
         self._board_side = board_side
@@ -63,12 +67,14 @@ class Pipeline:
             Images, disparity, cloud and stage times.
 
         Raises:
-            DataError: a frame's bytes are no image, or its size does not fit the rig.
+            SpoiledImageError: a frame's bytes are no whole image, or its size is not believed.
+            DataError: the cameras' sizes do not fit the rig.
         """
-        board, host = _encoded(pair.board.message, "board"), _encoded(pair.host, "host")
+        board, host = _encoded(pair.board.message, "board", pair.board.asked_px), _encoded(pair.host, "host")
         first, second = (board, host) if self._board_side is Side.LEFT else (host, board)
         start_ns = self._clock()
-        left, right = decode_frames(first, second)
+        check = None if self._core is None else self._core.require_sizes
+        left, right = decode_frames(first, second, self._most_pixels, check)
         if self._board_side is Side.LEFT:
             left = _at_asked_size(left, pair.board)
         else:
@@ -105,7 +111,8 @@ class Pipeline:
         if abs(part) > LARGEST_PART:
             return image
         try:
-            earlier = _at_asked_size(decode_frame(_encoded(pair.before.message, "board")), pair.before)
+            before = _encoded(pair.before.message, "board", pair.before.asked_px)
+            earlier = _at_asked_size(decode_frame(before, self._most_pixels), pair.before)
         except DataError:
             return image
         return self._interpolator.back(earlier, image, part) if earlier.shape == image.shape else image
@@ -118,6 +125,6 @@ def _at_asked_size(image: Image, frame: BoardFrame) -> Image:
     return enlarged(image, frame.asked_px, f"board frame {frame.message.sequence}")
 
 
-def _encoded(frame: FrameMessage | Frame, whose: str) -> EncodedImage:
-    payload = memoryview(frame.payload)
-    return EncodedImage(payload, frame.pixel_format, frame.width_px, frame.height_px, f"{whose} frame {frame.sequence}")
+def _encoded(frame: FrameMessage | Frame, whose: str, asked_px: tuple[int, int] = (0, 0)) -> EncodedImage:
+    name = f"{whose} frame {frame.sequence}"
+    return EncodedImage(memoryview(frame.payload), frame.pixel_format, frame.width_px, frame.height_px, name, asked_px)

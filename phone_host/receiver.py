@@ -52,7 +52,7 @@ class Receiver:
         self._waiter = Waiter([*(item for link in links for item in link.pollables), self._wake_read])
         self._stopping = False
         self._later_ns = 0
-        self._sleep = now.SleepWatch()
+        self._sleep, self._time_of_day = now.SleepWatch(), now.TimeOfDayWatch()
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
         self.failure: Exception | None = None
 
@@ -147,8 +147,7 @@ class Receiver:
         due_ns = min(self._reception.due_ns, links_due_ns)
         wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
         ready = self._waiter.wait(wait_ms)
-        if slept_ns := self._sleep.slept_ns():
-            self._reception.slept(slept_ns, now.monotonic_ns())
+        self._watch_clock()
         if ready or now.monotonic_ns() >= links_due_ns:
             self._receive()
             if self._wake_read in ready:
@@ -158,6 +157,16 @@ class Receiver:
         if self._later_ns:
             later_ns, self._later_ns = self._later_ns, 0
             self._reception.steer(later_ns, now_ns)
+
+    def _watch_clock(self) -> None:
+        """Notice that this machine's clock has, or may have, stood still, before anything is taken that came meanwhile."""
+        jumped = self._time_of_day.jumped()
+        if slept_ns := self._sleep.slept_ns():
+            self._reception.slept(slept_ns, now.monotonic_ns())
+        elif jumped:
+            self._reception.doubt_clock(
+                "the time of day was set: this machine may have stood still", now.monotonic_ns()
+            )
 
     def _take(self, link: int, incoming: Incoming, now_ns: int) -> None:
         reception, connection = self._reception, connection_name(link, incoming.connection)

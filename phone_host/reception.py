@@ -182,6 +182,11 @@ class Reception:
         self._border.slept(slept_ns)
         self._handle(self._session.begin_clock(now_ns), now_ns)
 
+    def doubt_clock(self, why: str, now_ns: int) -> None:
+        """Take note that this machine's clock may have stood still; an echo that is asked for from now on tells."""
+        self._border.void(why)
+        self._handle(self._session.begin_clock(now_ns), now_ns)
+
     def leave(self, now_ns: int) -> bool:
         """Say goodbye; gives whether anybody hears it, who will answer with the last account (`tail_known`)."""
         farewell = self._session.leave()

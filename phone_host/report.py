@@ -69,6 +69,7 @@ def build(facts: RunFacts) -> dict[str, object]:
             "paired": facts.counts.paired,
             "processed": facts.processed,
             "undecodable": facts.undecodable,
+            "spoiled_images": dict(facts.spoiled_images),
             "dropped_fifo": facts.counts.dropped,
             "stopped": facts.stopped,
         },

@@ -92,6 +92,8 @@ def camera_table(health: CameraHealth) -> Table:
 
 
 def _verdict(facts: RunFacts, judgement: Judgement, found: Sequence[Concern]) -> tuple[Verdict, str]:
+    if not facts.processed and facts.spoiled_images:
+        return Verdict.BAD, "Not one pair had two sound images: look at the cameras."
     if not facts.processed:
         return Verdict.BAD, "Not one pair was processed: the two cameras or the programs did not meet."
     if found:
@@ -163,6 +165,7 @@ def drops_table(facts: RunFacts) -> Table:
             for reason, count in facts.counts.host_orphans
         ),
         ("pairs that gave way in a full FIFO", facts.counts.dropped),
+        *((f"pairs with a spoiled image: {reason.replace('_', ' ')}", count) for reason, count in facts.spoiled_images),
     ]
     counted = tuple((what, str(count)) for what, count in rows)
     return Table("Frames and pairs that were not used", ("what", "count"), counted)

@@ -4,14 +4,21 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from common.errors import SettingsError
+from common.imagesize import MEGAPIXEL, MOST_PIXELS
 from common.keys import KeyFolder, default_folder
 from common.link.factory import parse_link
 from common.settings import log_level, resolve, setting
 from phone_host.camera.factory import check_camera
 
 ENVIRONMENT_PREFIX = "PHONE_HOST"
+
+_USUAL_MEGAPIXELS: Final = MOST_PIXELS // MEGAPIXEL
+MAX_MEGAPIXELS_HELP: Final = (
+    f"an image that claims to be larger is refused before it is decoded (1 = 2^20 px; default {_USUAL_MEGAPIXELS})"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +40,13 @@ class PhoneHostSettings:
     )
     interpolate: bool = setting(default=False, doc="move the board's image to the host's moment along the optical flow")
     keys: str = setting("", "folder of this machine's key and the boards that it knows; empty: ~/.config/tandemscan")
+    max_megapixels: int = setting(_USUAL_MEGAPIXELS, MAX_MEGAPIXELS_HELP)
     log_level: str = setting("warning", "debug, info, warning or error")
+
+    @property
+    def most_pixels(self) -> int:
+        """The limit in pixels."""
+        return self.max_megapixels * MEGAPIXEL
 
 
 def check(settings: PhoneHostSettings) -> None:
@@ -56,6 +69,7 @@ def check(settings: PhoneHostSettings) -> None:
     matchers = [name.value for name in MatcherName]
     if settings.matcher not in matchers:
         raise SettingsError(f"matcher {settings.matcher!r} is unknown", f"give {' or '.join(matchers)}")
+    _check_megapixels(settings)
     if settings.align_phase not in {"", "either", "board", "host"}:
         raise SettingsError(f"align_phase is {settings.align_phase!r}", "give either, board or host, or nothing")
     if not (math.isfinite(settings.tolerance) and settings.tolerance >= 0):
@@ -82,3 +96,23 @@ def chosen_keys(file: Path | None, option: str | None) -> KeyFolder:
         SettingsError: the file or the environment makes no sense.
     """
     return key_folder(resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, {"keys": option}).values.keys)
+
+
+def most_pixels(file: Path | None, option: int | None) -> int:
+    """Give the most pixels of an image, for a verb that needs no other setting.
+
+    Args:
+        file: settings file, or None.
+        option: what --max-megapixels says, or None.
+
+    Raises:
+        SettingsError: it makes no sense.
+    """
+    values = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, {"max_megapixels": option}).values
+    _check_megapixels(values)
+    return values.most_pixels
+
+
+def _check_megapixels(settings: PhoneHostSettings) -> None:
+    if settings.max_megapixels < 1:
+        raise SettingsError(f"max_megapixels is {settings.max_megapixels}", "give 1 or more")

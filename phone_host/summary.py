@@ -127,6 +127,7 @@ def _losses(facts: RunFacts) -> list[str]:
         *([f"{facts.counts.dropped} pairs in a full FIFO"] if facts.counts.dropped else []),
         *([f"{facts.stopped} pairs by the run's end"] if facts.stopped else []),
         *([f"{facts.undecodable} pairs undecodable"] if facts.undecodable else []),
+        *(f"{n} of them with an image {reason}" for reason, n in facts.spoiled_images),
     ]
     lines = ["dropped: " + (", ".join(parts).replace("_", " ") or "nothing")]
     if facts.unwritten.lines or facts.unwritten.pairs:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import DataError
-from common.frame import PixelFormat
+from common.frame import PixelFormat, SpoiledImageError
+from common.imagesize import ImageHead, ImageKind, read_head
 from common.protocol.wire import MAX_PAYLOAD_BYTES, MAX_SIZE_PX
 
 
@@ -28,13 +29,13 @@ class ImageFile:
     payload: bytes
 
 
+_REMEDY = "use JPEG, PNG or binary PGM/PPM files, or remove it from the folder"
+
 SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".pgm", ".ppm", ".pnm"})
 """File names that a replay folder is searched for."""
 
-_PNM = re.compile(rb"P([56])(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})\s")
-"""Binary grey- and pixmap header (netpbm's pgm(5) and ppm(5)): magic, width, height, maximum value, one white space.
-
-Each blank can match in one way only: a nested quantifier took seconds for 30 blanks without a number behind them."""
+_MAXIMUM = re.compile(rb"(?:\s|#[^\n]*\n)+(\d{1,9})\s")
+"""Behind a binary map's size: its maximum value and one white space (pgm(5), ppm(5))."""
 
 
 def load(path: Path) -> ImageFile:
@@ -83,39 +84,28 @@ def read_image(path: Path, data: bytes) -> ImageFile:
 
 
 def _parse(path: Path, data: bytes) -> ImageFile:
-    if data[:2] == b"\xff\xd8":
-        return ImageFile(PixelFormat.MJPEG, *_jpeg_size(path, data), data)
-    if data[:8] == b"\x89PNG\r\n\x1a\n" and len(data) >= 24:
-        width_px, height_px = struct.unpack(">II", data[16:24])
-        return ImageFile(PixelFormat.PNG, width_px, height_px, data)
-    if header := _PNM.match(data):
-        return _from_pnm(path, header, data)
-    raise DataError(
-        f"{path} is no image that can be replayed",
-        "use JPEG, PNG or binary PGM/PPM files, or remove it from the folder",
-    )
+    try:
+        head = read_head(data, str(path))
+    except SpoiledImageError as error:
+        raise DataError(error.problem, _REMEDY) from None
+    match head.kind:
+        case ImageKind.JPEG:
+            return ImageFile(PixelFormat.MJPEG, *head.size_px, data)
+        case ImageKind.PNG:
+            return ImageFile(PixelFormat.PNG, *head.size_px, data)
+        case ImageKind.PNM if data[1:2] in b"56":
+            return _from_pnm(path, head, data)
+        case _:
+            raise DataError(f"{path} is no image that can be replayed", _REMEDY)
 
 
-def _jpeg_size(path: Path, data: bytes) -> tuple[int, int]:
-    """Width and height from the frame header (ITU-T T.81, B.2.2)."""
-    at = 2
-    while at + 9 <= len(data) and data[at] == 0xFF:
-        if data[at + 1] == 0xFF:  # a fill byte before a marker (B.1.1.2)
-            at += 1
-            continue
-        marker, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4], "big")
-        if 0xC0 <= marker <= 0xCF and marker not in {0xC4, 0xC8, 0xCC}:  # SOF0..15 without DHT, JPG, DAC
-            height_px, width_px = struct.unpack(">HH", data[at + 5 : at + 9])
-            return width_px, height_px
-        at += 2 + length
-    raise DataError(f"{path} is a JPEG without a frame header", "replace the file or remove it from the folder")
-
-
-def _from_pnm(path: Path, header: re.Match[bytes], data: bytes) -> ImageFile:
-    kind, width_px, height_px, maximum = (int(group) for group in header.groups())
-    channels, depth = (1 if kind == 5 else 3), (1 if maximum < 256 else 2)
+def _from_pnm(path: Path, head: ImageHead, data: bytes) -> ImageFile:
+    found = _MAXIMUM.match(data, head.body_at)
+    maximum, body_at = (int(found[1]), found.end()) if found else (0, len(data))
+    width_px, height_px = head.size_px
+    channels, depth = (1 if data[1:2] == b"5" else 3), (1 if maximum < 256 else 2)
     row = width_px * channels * depth
-    body = data[header.end() : header.end() + row * height_px]
+    body = data[body_at : body_at + row * height_px]
     if maximum not in {255, 65535} or len(body) < row * height_px:
         raise DataError(
             f"{path} is cut short or has maximum value {maximum}", "write it again with 8 or 16 bit, or remove it"

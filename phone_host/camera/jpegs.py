@@ -15,6 +15,7 @@ from enum import Enum
 from typing import Final
 
 from common.frame import FrameFault
+from common.imagesize import JPEG_FRAME_HEADERS
 from common.protocol.wire import MAX_PAYLOAD_BYTES, MAX_SIZE_PX
 
 MAX_IMAGE_BYTES: Final = MAX_PAYLOAD_BYTES
@@ -26,9 +27,6 @@ _MARKER: Final = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]", re.DOTALL)
 """What ends entropy-coded data: neither a stuffed byte nor a restart marker nor a fill byte."""
 
 _SOI, _EOI, _SOS = 0xD8, 0xD9, 0xDA
-_FRAME_HEADERS: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
-"""SOF0 to SOF15: the codes between them that are DHT, JPG and DAC are left out (Table B.1)."""
-
 _LEAST_CODE: Final = 0xC0
 """Codes below are reserved (Table B.1)."""
 
@@ -147,7 +145,7 @@ class JpegStream:
         length = int.from_bytes(data[at + 2 : at + 4], "big")
         if length < 2:
             return self._give_up(at, events)
-        if code in _FRAME_HEADERS:
+        if code in JPEG_FRAME_HEADERS:
             if len(data) < at + 9:
                 return False
             self._size_px = (int.from_bytes(data[at + 7 : at + 9], "big"), int.from_bytes(data[at + 5 : at + 7], "big"))

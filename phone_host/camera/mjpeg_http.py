@@ -16,6 +16,7 @@ from common.camera.base import CameraHealth, CameraState, Grab, Mode, Offers, Sk
 from common.camera.v4l2_stamps import RateMeter
 from common.errors import TandemError, UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat
+from common.imagesize import size_text
 from common.logs import event
 from common.protocol.message import CameraDescription, Pacing
 from common.stamp import Stamp
@@ -68,10 +69,10 @@ class HttpCamera:
         self._failure: Exception | None = None
         self._sequence = 0
         self._first_ns = self._heard_ns = 0
-        self._size_px = (0, 0)
+        self._size_px = self._asked_px = (0, 0)
         self._rate, self._arrivals = RateMeter(), Arrivals()
         self._faults: dict[FrameFault, int] = {}
-        self._stalls = self._failures = self._returned = 0
+        self._stalls = self._failures = self._returned = self._turns = 0
         self._state = CameraState.GONE
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._thread = threading.Thread(target=self._run, name="mjpeg", daemon=True)
@@ -82,9 +83,9 @@ class HttpCamera:
             self.close()
             raise
         self.description = CameraDescription(
-            f"mjpeg {settings.host}", *self._size_px, PixelFormat.MJPEG, period_ns, Pacing.CLOCK
+            f"mjpeg {settings.host}", *self._asked_px, PixelFormat.MJPEG, period_ns, Pacing.CLOCK
         )
-        size = f"{self._size_px[0]}x{self._size_px[1]}"
+        size = size_text(self._asked_px)
         latency = "unknown" if settings.latency_ns is None else f"{settings.latency_ns / 1e6:g}"
         _LOG.info(
             event(
@@ -190,6 +191,7 @@ class HttpCamera:
                 slow = self._sequence >= 2 and now_ns - self._first_ns >= _MEASURE_NS
                 if self._sequence >= _MEASURE_FRAMES or slow:
                     period_ns = self._rate.period_ns or (self._heard_ns - self._first_ns) // (self._sequence - 1)
+                    self._asked_px = self._size_px
                     self._sequence = 0
                     self._pending.clear()
                     self._faults.clear()
@@ -289,6 +291,11 @@ class HttpCamera:
         with self._lock:
             if self._closing or self._resting:
                 return
+            size_px = image.width_px, image.height_px
+            self._note_size(size_px)
+            if self._asked_px not in {size_px, (0, 0)}:
+                self._spoil(FrameFault.OTHER_SIZE)
+                return
             sequence, self._sequence = self._sequence, self._sequence + 1
             if self._state is not CameraState.RUNNING:
                 self._returned += self._heard_ns > 0
@@ -296,12 +303,6 @@ class HttpCamera:
                     _LOG.info(event("camera_back", camera=self._settings.shown))
                 self._state = CameraState.RUNNING
             self._first_ns, self._heard_ns = self._first_ns or image.began_ns, image.began_ns
-            size_px = image.width_px, image.height_px
-            if self._size_px not in {size_px, (0, 0)}:
-                _LOG.warning(
-                    event("camera_size_changed", camera=self._settings.shown, size=f"{size_px[0]}x{size_px[1]}")
-                )
-            self._size_px = size_px
             self._rate.add(image.began_ns, sequence)
             self._arrivals.add(sequence, image.began_ns)
             clock = self._settings.clock
@@ -310,6 +311,14 @@ class HttpCamera:
             frame = Frame(sequence, exposed, grabbed, *size_px, PixelFormat.MJPEG, None, image.payload)
             self._replace_waiting()
             self._add(frame)
+
+    def _note_size(self, size_px: tuple[int, int]) -> None:
+        """Tell of a phone that was turned: what is paired and calibrated has the size of the beginning, and comes again when it is turned back."""
+        self._turns += self._size_px not in {size_px, (0, 0)}
+        if self._size_px not in {size_px, (0, 0)} and self._turns.bit_count() == 1:  # the 1st, 2nd, 4th …
+            sizes = {"size": size_text(size_px), "first": size_text(self._asked_px)}
+            _LOG.warning(event("camera_size_changed", camera=self._settings.shown, **sizes))
+        self._size_px = size_px
 
     def _spoil(self, fault: FrameFault) -> None:
         with self._lock:

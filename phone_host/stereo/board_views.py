@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import DataError
+from common.imagesize import MOST_PIXELS
 from phone_host.model import Image
 from phone_host.stereo.calibration import BoardPair, Reason, Rejected
 from phone_host.stereo.images import read_image
@@ -38,13 +39,16 @@ class _Seen:
     right: Corners
 
 
-def look_for_boards(files: ViewFiles, board: Board, advance: Callable[[], None]) -> BoardViews:
+def look_for_boards(
+    files: ViewFiles, board: Board, advance: Callable[[], None], most_pixels: int = MOST_PIXELS
+) -> BoardViews:
     """Read all pairs and find the board in them.
 
     Args:
         files: the pairs of files.
         board: what to look for.
         advance: called after each pair, for a progress bar.
+        most_pixels: an image that claims more is refused.
 
     Returns:
         The corners, and the pairs rejected.
@@ -56,10 +60,12 @@ def look_for_boards(files: ViewFiles, board: Board, advance: Callable[[], None])
         _alone(path, "right") for path in files.right_alone
     ]
     seen: list[_Seen] = []
+    first_problem = ""
     for name, left, right in files.pairs:
         try:
-            images = read_image(left), read_image(right)
+            images = read_image(left, most_pixels), read_image(right, most_pixels)
         except DataError as error:
+            first_problem = first_problem or error.problem
             rejected.append(Rejected(name, Reason.UNREADABLE, error.problem))
         else:
             sizes = _size(images[0]), _size(images[1])
@@ -67,7 +73,10 @@ def look_for_boards(files: ViewFiles, board: Board, advance: Callable[[], None])
         advance()
     if not seen:
         raise DataError(
-            "no pair of images could be read", f"look at {files.pairs[0][1]}" if files.pairs else "check names"
+            f"no pair of images could be read ({first_problem})"
+            if first_problem
+            else "no pair of images could be read",
+            f"look at {files.pairs[0][1]}" if files.pairs else "check names",
         )
     sizes_px = (_usual([each.sizes[0] for each in seen]), _usual([each.sizes[1] for each in seen]))
     pairs = []

@@ -4,7 +4,7 @@ No I/O and no clocks here: the caller times the stages.
 """
 
 from phone_host.model import CloudImage, Disparity, Image, RectifiedPair, StereoGeometry
-from phone_host.stereo.images import require_same_size
+from phone_host.stereo.images import require_same_size, size_px
 from phone_host.stereo.match import Matcher
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import reproject
@@ -33,6 +33,21 @@ class StereoCore:
         self._rectifier = rectifier
         self.geometry = geometry if rectifier is None else rectifier.geometry
 
+    def require_sizes(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> None:
+        """Check that images of these sizes can be rectified, before they are decoded.
+
+        Args:
+            left_px: width and height of the left image, px.
+            right_px: width and height of the right image, px.
+
+        Raises:
+            DataError: a size that does not fit the rig, or two sizes without a rig.
+        """
+        if self._rectifier is not None:
+            self._rectifier.require_sizes(left_px, right_px)
+        else:
+            require_same_size(left_px, right_px, "the left image", "the right image")
+
     def rectify(self, left: Image, right: Image) -> RectifiedPair:
         """Rectify, or pass images that come rectified.
 
@@ -48,7 +63,7 @@ class StereoCore:
         """
         if self._rectifier is not None:
             return self._rectifier.rectify(left, right)
-        require_same_size(left, right, "the left image", "the right image")
+        self.require_sizes(size_px(left), size_px(right))
         return RectifiedPair(left, right)
 
     def match(self, pair: RectifiedPair) -> Disparity:

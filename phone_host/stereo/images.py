@@ -1,27 +1,49 @@
-"""Images from files and from encoded bytes: anything OpenCV reads, brought to 8-bit grey or BGR.
+"""Images from files and from encoded bytes, decoded by OpenCV and brought to 8-bit grey or BGR.
 
 Rules:
 - one path for files and for streamed frames, so that both give the same bits;
+- nothing is decoded before its header was read: what claims more pixels than the limit is refused (see `common/imagesize.py`);
 - EXIF rotation is ignored: a calibration belongs to the sensor's own rows and columns;
 - deeper than 8 bit: both images of a pair get the same scale, or the matcher would see two brightnesses (see `to_8_bit`).
 """
 
+import logging
+import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from common.frame import FrameFault, ImageSizeError, SpoiledImageError
+from common.imagesize import MOST_PIXELS, ImageHead, ImageKind, read_head, require_believable, whole_image
+from common.imagesize import size_text as px_text
+from common.logs import event
 from phone_host.model import Image
+from phone_host.stereo.overheard import overhear
+
+_LOG = logging.getLogger(__name__)
 
 AnyImage = NDArray[Any]
 """(H, W) or (H, W, 3) BGR, any depth."""
 
-_JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
-_PNG_START, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
-_START_OF_SCAN = 0xDA
+_REPLACE: Final = "copy or record the image again"
+
+_CORRUPT: Final = ("Corrupt JPEG data", "Premature end of JPEG file", "Inconsistent progression sequence")
+"""How libjpeg's warnings begin that mean wrong pixels (jerror.h)."""
+
+_TALK: Final = ("Corrupt JPEG data", "Warning: unknown JFIF", "Unknown Adobe color", "Invalid SOS parameters", "libpng")
+"""How the harmless words of image libraries begin."""
+
+_EXTRA_BYTES: Final = re.compile(r"(\d+) extraneous bytes before marker 0x([0-9a-f]{2})")
+_BEHIND_DATA: Final = frozenset({0xC4, 0xD9, 0xDA, 0xDD, *range(0xD0, 0xD8)})
+_HARMLESS_BYTES: Final = 8
+"""Webcams are known for 1 to 4. Of 1500 images with one flipped bit each the decoder was left with 64 bytes and more, with restart markers
+with at most 8 in 1 of 23 (decision 0021)."""
+
 # Sensors of 10, 12 and 14 bit are stored in 16-bit files with the upper bits 0 as often as shifted up.
 _SENSOR_BITS = (8, 10, 12, 14, 16)
 # Hot pixels must not set the scale: 1 per mille at each end is left out.
@@ -30,20 +52,42 @@ _LOW_PERCENT, _HIGH_PERCENT = 0.1, 99.9
 _NARROW_SHARE = 1 / 8
 
 
-def decode(payload: bytes | memoryview, name: str = "the image") -> Image:
+@dataclass(frozen=True, slots=True)
+class EncodedFile:
+    """An image file's bytes, its header read and within the limit.
+
+    Attributes:
+        payload: all bytes of the file.
+        head: what they say of themselves.
+        name: how errors call it.
+    """
+
+    payload: bytes
+    head: ImageHead
+    name: str
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height, px."""
+        return self.head.size_px
+
+
+def decode(payload: bytes | memoryview, name: str = "the image", most_pixels: int = MOST_PIXELS) -> Image:
     """Decode one encoded image (JPEG, PNG, ...) to 8 bit.
 
     Args:
         payload: the encoded bytes.
         name: how errors call it.
+        most_pixels: an image that claims more is refused.
 
     Returns:
         (H, W) grey or (H, W, 3) BGR, uint8.
 
     Raises:
-        DataError: the bytes are spoiled or of no known format.
+        ImageSizeError: it claims more pixels than that.
+        SpoiledImageError: the bytes are spoiled or of no known kind.
     """
-    return to_8_bit((_decode_any(payload, name),))[0]
+    return decode_file(examine(payload, name, most_pixels))
 
 
 def decode_pair(
@@ -51,6 +95,7 @@ def decode_pair(
     right: bytes | memoryview,
     left_name: str = "the left image",
     right_name: str = "the right image",
+    most_pixels: int = MOST_PIXELS,
 ) -> tuple[Image, Image]:
     """Decode the two images of a pair, with one common scale where they are deeper than 8 bit.
 
@@ -59,70 +104,124 @@ def decode_pair(
         right: encoded bytes of the right image.
         left_name: how errors call the left image.
         right_name: how errors call the right image.
+        most_pixels: an image that claims more is refused.
 
     Returns:
         Left and right, each (H, W) grey or (H, W, 3) BGR, uint8.
 
     Raises:
-        DataError: one of the two is spoiled or of no known format.
+        ImageSizeError: one of the two claims more pixels than that.
+        SpoiledImageError: one of the two is spoiled or of no known kind.
     """
-    first, second = to_8_bit((_decode_any(left, left_name), _decode_any(right, right_name)))
+    return decode_files(examine(left, left_name, most_pixels), examine(right, right_name, most_pixels))
+
+
+def decode_file(image: EncodedFile) -> Image:
+    """Decode one image that was examined, as `decode`."""
+    return to_8_bit((_decoded(image),))[0]
+
+
+def decode_files(left: EncodedFile, right: EncodedFile) -> tuple[Image, Image]:
+    """Decode the two images of a pair that were examined, as `decode_pair`."""
+    first, second = to_8_bit((_decoded(left), _decoded(right)))
     return first, second
 
 
-def read_image(path: Path) -> Image:
+def examine(payload: bytes | memoryview, name: str, most_pixels: int = MOST_PIXELS) -> EncodedFile:
+    """Read what an encoded image says of itself; nothing is decoded.
+
+    Args:
+        payload: the encoded bytes.
+        name: how errors call it.
+        most_pixels: an image that claims more is refused.
+
+    Raises:
+        ImageSizeError: it claims more pixels than that.
+        SpoiledImageError: it is of no known kind, or its header cannot be believed.
+    """
+    content = bytes(payload)
+    head = read_head(content, name)
+    require_believable(head, most_pixels, name)
+    return EncodedFile(content, head, name)
+
+
+def open_image(path: Path, most_pixels: int = MOST_PIXELS) -> EncodedFile:
+    """Read an image file's bytes and header; nothing is decoded.
+
+    Args:
+        path: the file.
+        most_pixels: an image that claims more is refused.
+
+    Raises:
+        DataError: the file is missing; see also `examine`.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{path} cannot be read ({error.strerror})", "give an image file that exists") from error
+    return examine(content, str(path), most_pixels)
+
+
+def read_image(path: Path, most_pixels: int = MOST_PIXELS) -> Image:
     """Read an image file as 8-bit grey or BGR.
 
     Args:
         path: the file.
+        most_pixels: an image that claims more is refused.
 
     Returns:
         (H, W) grey or (H, W, 3) BGR, uint8; alpha is dropped.
 
     Raises:
-        DataError: the file is missing, empty, spoiled or of no known format.
+        DataError: the file is missing, empty, spoiled, of no known kind or beyond the limit.
     """
-    return decode(_read_bytes(path), str(path))
+    return decode_file(open_image(path, most_pixels))
 
 
-def read_pair(left: Path, right: Path) -> tuple[Image, Image]:
+def read_pair(left: Path, right: Path, most_pixels: int = MOST_PIXELS) -> tuple[Image, Image]:
     """Read the two image files of a pair, with one common scale where they are deeper than 8 bit.
 
     Args:
         left: the left image's file.
         right: the right image's file.
+        most_pixels: an image that claims more is refused.
 
     Returns:
         Left and right, each (H, W) grey or (H, W, 3) BGR, uint8.
 
     Raises:
-        DataError: a file is missing, empty, spoiled or of no known format.
+        DataError: a file is missing, empty, spoiled, of no known kind or beyond the limit.
     """
-    return decode_pair(_read_bytes(left), _read_bytes(right), str(left), str(right))
+    return decode_files(open_image(left, most_pixels), open_image(right, most_pixels))
 
 
-def require_same_size(left: Image, right: Image, left_name: str, right_name: str) -> None:
+def require_same_size(left_px: tuple[int, int], right_px: tuple[int, int], left_name: str, right_name: str) -> None:
     """Check that two images can be a rectified pair.
 
     Args:
-        left: (H, W[, 3]) image.
-        right: (H, W[, 3]) image.
+        left_px: width and height of the left image, px.
+        right_px: width and height of the right image, px.
         left_name: how errors call the left image.
         right_name: how errors call the right image.
 
     Raises:
         DataError: their sizes differ.
     """
-    if left.shape[:2] != right.shape[:2]:
+    if left_px != right_px:
         raise DataError(
-            f"{left_name} is {size_text(left)} px, {right_name} is {size_text(right)} px",
+            f"{left_name} is {px_text(left_px)} px, {right_name} is {px_text(right_px)} px",
             "a rectified pair has one size; for two unlike cameras give --calibration rig.yaml",
         )
 
 
+def size_px(image: AnyImage) -> tuple[int, int]:
+    """Width and height of an image, px."""
+    return image.shape[1], image.shape[0]
+
+
 def size_text(image: AnyImage) -> str:
     """Width and height of an image as people write it, such as 640x480."""
-    return f"{image.shape[1]}x{image.shape[0]}"
+    return px_text(size_px(image))
 
 
 def to_grey(image: Image) -> Image:
@@ -156,9 +255,10 @@ def to_8_bit(images: tuple[AnyImage, ...]) -> tuple[Image, ...]:
     deep = [image for image in images if image.dtype != np.uint8]
     if not deep:
         return images
-    values = np.concatenate([image.ravel() for image in deep]).astype(np.float32)
-    values = values[np.isfinite(values)]
-    low, high = (float(v) for v in np.percentile(values, (_LOW_PERCENT, _HIGH_PERCENT))) if values.size else (0.0, 1.0)
+    values = np.concatenate([image.ravel() for image in deep], dtype=np.float32, casting="unsafe")
+    if any(image.dtype.kind == "f" for image in deep):
+        values = values[np.isfinite(values)]
+    low, high = _ends(values) if values.size else (0.0, 1.0)
     if all(image.dtype == np.uint16 for image in deep):
         full = next(2**bits - 1 for bits in _SENSOR_BITS if high <= 2**bits - 1)
         if high - low >= full * _NARROW_SHARE or high <= 255:
@@ -167,89 +267,109 @@ def to_8_bit(images: tuple[AnyImage, ...]) -> tuple[Image, ...]:
     return tuple(image if image.dtype == np.uint8 else _scaled(image, low, scale) for image in images)
 
 
+def _ends(values: NDArray[np.float32]) -> tuple[float, float]:
+    """Where the darkest and the brightest hot pixels begin; puts the values in another order."""
+    low, high = np.percentile(values, (_LOW_PERCENT, _HIGH_PERCENT), overwrite_input=True)
+    return float(low), float(high)
+
+
 def _scaled(image: AnyImage, low: float, scale: float) -> Image:
-    values = (np.nan_to_num(image.astype(np.float32), nan=low) - low) * scale
-    levels: Image = np.clip(np.rint(values), 0, 255).astype(np.uint8)
+    # In place: a copy for each step would take five times the memory of the image.
+    values = image.astype(np.float32)
+    np.nan_to_num(values, copy=False, nan=low)
+    values -= low
+    values *= scale
+    np.rint(values, out=values)
+    levels: Image = np.clip(values, 0, 255, out=values).astype(np.uint8)
     return levels
 
 
-def _read_bytes(path: Path) -> bytes:
+def _decoded(image: EncodedFile) -> AnyImage:
+    name, kind = image.name, image.head.kind
+    payload = np.frombuffer(whole_image(image.payload, image.head, name), dtype=np.uint8)
+    found: list[AnyImage | None] = []
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path} cannot be read ({error.strerror})", "give an image file that exists") from error
-    if not content:
-        raise DataError(f"{path} is empty", "copy or record the image again")
-    return content
-
-
-def _decode_any(payload: bytes | memoryview, name: str) -> AnyImage:
-    if _cut_short(payload):
-        raise DataError(f"{name} is cut short: its end marker is missing", "copy or record the image again")
-    remedy = "give an image that OpenCV reads (PNG, JPEG, TIFF, BMP, PGM, ...)"
-    if len(payload) == 0:
-        raise DataError(f"{name} is empty", remedy)
-    try:
-        decoded = cv2.imdecode(np.frombuffer(payload, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+        said = overhear(lambda: found.append(cv2.imdecode(payload, cv2.IMREAD_UNCHANGED)))
     except cv2.error as error:
-        raise DataError(f"{name} cannot be decoded ({error.err})", remedy) from error
+        raise SpoiledImageError(FrameFault.CORRUPT, f"{name} cannot be decoded ({error.err})", _REPLACE) from error
+    [decoded] = found
     if decoded is None:
-        raise DataError(f"{name} is no image or spoiled", remedy)
-    image: AnyImage = decoded
-    if image.ndim == 3:
+        raise SpoiledImageError(FrameFault.CORRUPT, f"{name} is no {kind.value} image or spoiled", _REPLACE)
+    complaint = _complaint(said.splitlines())
+    if kind is ImageKind.JPEG and complaint:
+        raise SpoiledImageError(FrameFault.CORRUPT, f"{name} is spoiled ({complaint})", _REPLACE)
+    if size_px(decoded) != image.size_px:
+        raise ImageSizeError(
+            FrameFault.OTHER_SIZE,
+            f"{name} is {size_text(decoded)} px, its header says {px_text(image.size_px)}",
+            _REPLACE,
+        )
+    if decoded.ndim == 3:
         # One or two channels in three dimensions: grey (and alpha); four: BGR and alpha.
-        return image[..., 0] if image.shape[2] < 3 else np.ascontiguousarray(image[..., :3])
-    return image
+        return decoded[..., 0] if decoded.shape[2] < 3 else np.ascontiguousarray(decoded[..., :3])
+    return decoded
 
 
-def _cut_short(payload: bytes | memoryview) -> bool:
-    """Whether a JPEG or PNG lacks its end: OpenCV would give half an image with grey below."""
-    content = bytes(payload)
-    if content.startswith(_JPEG_START):
-        return content.find(_JPEG_END, _scan_start(content)) < 0
-    if content.startswith(_PNG_START):
-        return content.rfind(_PNG_END) < 0
-    return False
+def _complaint(said: list[str]) -> str:
+    """What a JPEG decoder said that means wrong pixels; empty: nothing, or only what does no harm.
 
-
-def _scan_start(jpeg: bytes) -> int:
-    """Offset of the compressed data of a JPEG (its length when there are none): ITU T.81, annex B.
-
-    The end marker counts only behind this: the thumbnail in an EXIF segment has one of its own. Bytes after the end marker
-    are legal and common (webcams pad with zeros, phones append depth maps and films).
+    libjpeg prints the first warning of an image only. Harmless are odd version numbers and scan parameters, and bytes before a marker that belong to nothing:
+    between segments any number, behind compressed data a few, as webcams leave there. A decoder that has lost its way leaves more.
     """
-    offset = len(_JPEG_START)
-    while offset + 4 <= len(jpeg) and jpeg[offset] == 0xFF:
-        marker, length = jpeg[offset + 1], int.from_bytes(jpeg[offset + 2 : offset + 4], "big")
-        if marker == 0xFF:  # fill byte
-            offset += 1
-        elif marker == _START_OF_SCAN:
-            return offset + 2 + length
-        else:
-            offset += 2 + length
-    return len(jpeg)
+    for line in said:
+        if line.startswith(_CORRUPT) and not _is_harmless(line):
+            return line
+        tell = _LOG.debug if line.startswith(_TALK) else _LOG.warning  # another library, in another thread
+        tell(event("library_said", text=line))
+    return ""
 
 
-def enlarged(image: Image, size_px: tuple[int, int], name: str) -> Image:
+def _is_harmless(warning: str) -> bool:
+    found = _EXTRA_BYTES.search(warning)
+    return found is not None and (int(found[2], 16) not in _BEHIND_DATA or int(found[1]) <= _HARMLESS_BYTES)
+
+
+def require_same_shape(image_px: tuple[int, int], asked_px: tuple[int, int], name: str) -> None:
+    """Check that a camera's image can be the whole view at the size that was asked for, or the same view with fewer pixels.
+
+    Args:
+        image_px: its width and height, px.
+        asked_px: width and height that the camera was asked for, px.
+        name: how errors call it.
+
+    Raises:
+        ImageSizeError: it is larger, or of another shape, so that it can only show a part of the view.
+    """
+    (width, height), (asked_width, asked_height) = image_px, asked_px
+    if width > asked_width or height > asked_height:
+        raise ImageSizeError(
+            FrameFault.TOO_LARGE,
+            f"{name} is {px_text(image_px)} px, its camera was asked for {px_text(asked_px)}",
+            "look at the camera that sends it",
+        )
+    if width * asked_height != height * asked_width:
+        raise ImageSizeError(
+            FrameFault.OTHER_SIZE,
+            f"{name} is {px_text(image_px)} px, its camera was asked for {px_text(asked_px)}, another shape",
+            "leave size out of the board's setting adapt",
+        )
+
+
+def enlarged(image: Image, asked_px: tuple[int, int], name: str) -> Image:
     """Enlarge an image that a camera made smaller: it shows the same view, each of its pixels the mean of some of the larger one.
 
     Args:
         image: (H, W) or (H, W, 3), uint8.
-        size_px: (width, height) that it shall have, px; edges of pixels coincide, not centres, as with `cv2.resize`.
+        asked_px: (width, height) that it shall have, px; edges of pixels coincide, not centres, as with `cv2.resize`.
         name: how errors call it.
 
     Returns:
         The image itself if it has that size.
 
     Raises:
-        DataError: its shape is another one, so that it can only show a part of the view.
+        ImageSizeError: it is larger or its shape is another one.
     """
-    height, width = image.shape[:2]
-    if (width, height) == size_px:
+    if size_px(image) == asked_px:
         return image
-    if width * size_px[1] != height * size_px[0]:
-        raise DataError(
-            f"{name} is {width}x{height} px, its camera was asked for {size_px[0]}x{size_px[1]}, another shape",
-            "leave size out of the board's setting adapt",
-        )
-    return np.asarray(cv2.resize(image, size_px, interpolation=cv2.INTER_LINEAR), dtype=np.uint8)
+    require_same_shape(size_px(image), asked_px, name)
+    return np.asarray(cv2.resize(image, asked_px, interpolation=cv2.INTER_LINEAR), dtype=np.uint8)

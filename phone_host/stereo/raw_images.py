@@ -1,14 +1,19 @@
 """Raw camera images (YUYV, grey, NV12) to grey or BGR, and frames of any encoding to images."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import cv2
 import numpy as np
 
-from common.errors import DataError
-from common.frame import PixelFormat, raw_bytes
+from common.frame import FrameFault, ImageSizeError, PixelFormat, SpoiledImageError, raw_bytes
+from common.imagesize import MOST_PIXELS, ImageKind, require_pixels, size_text
 from phone_host.model import Image
-from phone_host.stereo.images import decode, decode_pair
+from phone_host.stereo.images import EncodedFile, decode_file, decode_files, examine, require_same_shape
+
+_KINDS: Final = {PixelFormat.MJPEG: ImageKind.JPEG, PixelFormat.PNG: ImageKind.PNG}
+_LOOK: Final = "look at the camera that sends it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +26,7 @@ class EncodedImage:
         width_px: image width, px.
         height_px: image height, px.
         name: how errors call it.
+        asked_px: (width, height) that its camera was asked for, px; the image may be smaller. Zeros: as the header says.
     """
 
     payload: bytes | memoryview
@@ -28,39 +34,94 @@ class EncodedImage:
     width_px: int
     height_px: int
     name: str
+    asked_px: tuple[int, int] = (0, 0)
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height as the header says, px."""
+        return self.width_px, self.height_px
+
+    @property
+    def whole_px(self) -> tuple[int, int]:
+        """Width and height that it has at the size that was asked for, px."""
+        return self.asked_px if any(self.asked_px) else self.size_px
 
 
-def decode_frames(left: EncodedImage, right: EncodedImage) -> tuple[Image, Image]:
+def decode_frames(
+    left: EncodedImage,
+    right: EncodedImage,
+    most_pixels: int = MOST_PIXELS,
+    check: Callable[[tuple[int, int], tuple[int, int]], None] | None = None,
+) -> tuple[Image, Image]:
     """Decode the two frames of a pair.
 
     Args:
         left: the left frame.
         right: the right frame, of the same encoding or another one.
+        most_pixels: what neither a camera nor a frame may exceed.
+        check: told the whole sizes of both, px, before either is decoded; raises where they are of no use.
 
     Returns:
         Left and right, each (H, W) grey or (H, W, 3) BGR, uint8.
 
     Raises:
-        DataError: one of the two is spoiled.
+        SpoiledImageError: one of the two is spoiled, or its size is not believed.
     """
-    if _is_raw(left) or _is_raw(right):
-        return decode_frame(left), decode_frame(right)
-    return decode_pair(left.payload, right.payload, left.name, right.name)
+    first, second = _examined(left, most_pixels), _examined(right, most_pixels)
+    if check is not None:
+        check(left.whole_px, right.whole_px)
+    if isinstance(first, EncodedFile) and isinstance(second, EncodedFile):
+        return decode_files(first, second)
+    return _decoded(first), _decoded(second)
 
 
-def decode_frame(image: EncodedImage) -> Image:
+def decode_frame(image: EncodedImage, most_pixels: int = MOST_PIXELS) -> Image:
     """Decode one frame.
 
     Args:
         image: of any encoding.
+        most_pixels: what neither its camera nor it may exceed.
 
     Returns:
         (H, W) grey or (H, W, 3) BGR, uint8.
 
     Raises:
-        DataError: it is spoiled.
+        SpoiledImageError: it is spoiled, or its size is not believed.
     """
-    return decode_raw(image) if _is_raw(image) else decode(image.payload, image.name)
+    return _decoded(_examined(image, most_pixels))
+
+
+def _decoded(image: EncodedImage | EncodedFile) -> Image:
+    return decode_raw(image) if isinstance(image, EncodedImage) else decode_file(image)
+
+
+def _examined(image: EncodedImage, most_pixels: int) -> EncodedImage | EncodedFile:
+    """Check a frame's size before anything is done with its bytes; gives a raw frame as it is, another one with its header read.
+
+    Raises:
+        ImageSizeError: the camera's or the frame's size is beyond the limit, the frame is larger than its camera or of another shape, or its bytes hold
+            another size than its header says.
+        SpoiledImageError: its bytes are of another encoding, or have no sound header.
+    """
+    if any(image.asked_px):
+        require_pixels(image.asked_px, most_pixels, f"the camera of {image.name}")
+        require_same_shape(image.size_px, image.asked_px, image.name)
+    require_pixels(image.size_px, most_pixels, image.name)
+    kind = _KINDS.get(image.pixel_format)
+    if kind is None:
+        return image  # the number of raw bytes is checked against the size when they are used
+    file = examine(image.payload, image.name, most_pixels)
+    if file.head.kind is not kind:
+        raise SpoiledImageError(
+            FrameFault.NO_START, f"{image.name} is {file.head.kind.value}, its header says {kind.value}", _LOOK
+        )
+    if file.size_px != image.size_px:
+        raise ImageSizeError(
+            FrameFault.OTHER_SIZE,
+            f"{image.name} is {size_text(file.size_px)} px, its header says {size_text(image.size_px)}",
+            _LOOK,
+        )
+    return file
 
 
 def decode_raw(image: EncodedImage) -> Image:
@@ -73,12 +134,13 @@ def decode_raw(image: EncodedImage) -> Image:
         (H, W) uint8 for grey; (H, W, 3) BGR, uint8, else (ITU-R BT.601, limited range, as OpenCV converts).
 
     Raises:
-        DataError: its length is not that of its size.
+        SpoiledImageError: its length is not that of its size.
     """
     width, height = image.width_px, image.height_px
     expected = raw_bytes(image.pixel_format, width, height)
     if len(image.payload) != expected:
-        raise DataError(
+        raise SpoiledImageError(
+            FrameFault.WRONG_LENGTH,
             f"{image.name} has {len(image.payload)} bytes, a {width}x{height} {image.pixel_format.value} image has {expected}",
             "check the camera's format and size",
         )
@@ -86,15 +148,13 @@ def decode_raw(image: EncodedImage) -> Image:
     if image.pixel_format is PixelFormat.GREY:
         return content.reshape(height, width).copy()  # a view of the message could not be written to
     if width % 2 or (image.pixel_format is PixelFormat.NV12 and height % 2):
-        raise DataError(
-            f"{image.name} is {width}x{height}, which {image.pixel_format.value} cannot be", "use an even size"
+        raise SpoiledImageError(
+            FrameFault.OTHER_SIZE,
+            f"{image.name} is {width}x{height}, which {image.pixel_format.value} cannot be",
+            "use an even size",
         )
     if image.pixel_format is PixelFormat.YUYV:
         converted = cv2.cvtColor(content.reshape(height, width, 2), cv2.COLOR_YUV2BGR_YUYV)
     else:
         converted = cv2.cvtColor(content.reshape(height * 3 // 2, width), cv2.COLOR_YUV2BGR_NV12)
     return np.asarray(converted, dtype=np.uint8)
-
-
-def _is_raw(image: EncodedImage) -> bool:
-    return raw_bytes(image.pixel_format, image.width_px, image.height_px) is not None

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from common.imagesize import size_text
 from phone_host.model import Camera, Image, Rectification, RectifiedPair, Rig, Side, StereoGeometry
-from phone_host.stereo.images import size_text
+from phone_host.stereo.images import size_px
 
 Matrix = NDArray[np.float64]
 
@@ -128,6 +129,24 @@ class Rectifier:
         self._left = _Remap(rig.left, self.rectification.R_left, self.rectification)
         self._right = _Remap(rig.right, self.rectification.R_right, self.rectification)
 
+    def require_sizes(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> None:
+        """Check that images have the sizes of their cameras.
+
+        Args:
+            left_px: width and height of the left image, px.
+            right_px: width and height of the right image, px.
+
+        Raises:
+            DataError: an image has another size than its camera in the rig.
+        """
+        for found_px, camera, side in ((left_px, self.rig.left, Side.LEFT), (right_px, self.rig.right, Side.RIGHT)):
+            if found_px != (camera.width_px, camera.height_px):
+                raise DataError(
+                    f"the {side.value} image is {size_text(found_px)} px, rig.yaml was calibrated for"
+                    f" {camera.width_px}x{camera.height_px}",
+                    "use the resolution of the calibration, or calibrate again at this one",
+                )
+
     def rectify(self, left: Image, right: Image) -> RectifiedPair:
         """Rectify a pair of images as the cameras gave them.
 
@@ -141,8 +160,7 @@ class Rectifier:
         Raises:
             DataError: an image has another size than its camera in the rig.
         """
-        _check_size(left, self.rig.left, Side.LEFT)
-        _check_size(right, self.rig.right, Side.RIGHT)
+        self.require_sizes(size_px(left), size_px(right))
         return RectifiedPair(self._left.apply(left), self._right.apply(right))
 
 
@@ -255,12 +273,3 @@ def _round_trip_error_px(
     back, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)
     error = np.abs(np.asarray(back).reshape(-1, 2) - points_px).max()
     return float(error) if math.isfinite(error) else math.inf
-
-
-def _check_size(image: Image, camera: Camera, side: Side) -> None:
-    if image.shape[:2] != (camera.height_px, camera.width_px):
-        raise DataError(
-            f"the {side.value} image is {size_text(image)} px, rig.yaml was calibrated for"
-            f" {camera.width_px}x{camera.height_px}",
-            "use the resolution of the calibration, or calibrate again at this one",
-        )

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from common.frame import SpoiledImageError
 from phone_host.model import UNMEASURED_NS, Image, Side, TimeOffset
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
@@ -142,8 +143,11 @@ def _rows(
         late_s = right_s[nearest] - left_s[middle]
         if abs(late_s - offset_s) > seconds:
             continue  # frames were lost
-        other = look(right[nearest])
-        pairs = [rectifier.rectify(look(left[at]), other) for at in (middle - 1, middle, middle + 1)]
+        try:
+            other = look(right[nearest])
+            pairs = [rectifier.rectify(look(left[at]), other) for at in (middle - 1, middle, middle + 1)]
+        except SpoiledImageError:
+            continue  # as good as lost
         before, now, after = (_grey(pair.left) for pair in pairs)
         found = _compare(before, now, after, _grey(pairs[1].right), seconds=seconds, reach_px=reach_px)
         rest = np.broadcast_to([late_s, middle], (len(found), 2))

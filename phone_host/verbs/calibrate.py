@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from common.errors import DataError
 from phone_host.formats.json_text import json_text
+from phone_host.settings import MAX_MEGAPIXELS_HELP
 from phone_host.verbs.outputs import require_file, unwritable
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--board-side", choices=("left", "right"), default="left", help="which camera hangs on the board (default left)"
     )
+    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
     parser.add_argument(
         "--out", type=Path, required=True, metavar="rig.yaml", help="the calibration; report.json goes beside it"
     )
@@ -41,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Find the board in all pairs, calibrate, judge, write."""
     from phone_host.model import Side  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.settings import most_pixels  # noqa: PLC0415
     from phone_host.stereo.calibrate import calibrate  # noqa: PLC0415
     from phone_host.stereo.target import parse_board  # noqa: PLC0415
     from phone_host.stereo.verdict import Verdict, judge  # noqa: PLC0415
@@ -49,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     board = parse_board(options.board, options.square)
     require_file(options.out)
     files = pair_files(options.left, options.right)
-    views = _look(files, board)
+    views = _look(files, board, most_pixels(None, options.max_megapixels))
     try:
         calibration = calibrate(list(views.pairs), board, views.sizes_px, Side(options.board_side))
     except DataError as error:
@@ -75,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
 
 
-def _look(files: "ViewFiles", board: "Board") -> "BoardViews":
+def _look(files: "ViewFiles", board: "Board", limit: int) -> "BoardViews":
     """Search all images, with a progress bar when someone watches."""
     from rich.console import Console  # noqa: PLC0415
     from rich.progress import Progress  # noqa: PLC0415
@@ -85,7 +88,7 @@ def _look(files: "ViewFiles", board: "Board") -> "BoardViews":
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("looking for the board", total=len(files.pairs))
-        return look_for_boards(files, board, lambda: progress.advance(task))
+        return look_for_boards(files, board, lambda: progress.advance(task), limit)
 
 
 def _pairs(files: "ViewFiles", rejected: tuple["Rejected", ...], used: int) -> dict[str, Any]:

@@ -3,12 +3,14 @@
 import argparse
 import math
 import sys
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from common import logs, now
 from common.commandline import INTERRUPTED
 from common.errors import SettingsError
+from common.frame import SpoiledImageError
 from common.link.factory import open_links, parse_link, tell_insecure
 from common.settings import log_level
 from common.signals import StopSignals
@@ -22,8 +24,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from phone_host.footage import Footage
-    from phone_host.model import Rig
-    from phone_host.timing.shots import Measured, Shot, Times
+    from phone_host.model import Image, Rig
+    from phone_host.timing.shots import Measured, Times
+
+_Reading = TypeVar("_Reading")
 
 EXAMPLES = """  phone-host calibrate-time --pattern pattern.html     (open it full screen in a browser, in view of both cameras)
   phone-host calibrate-time --by screen --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
@@ -155,37 +159,49 @@ def _measure(by: str, footage: "Footage", rig: "Rig | None") -> "Measured":
             look = lambda shot: decode_frame(shot.image)  # noqa: E731 - shorter than a function of one line
             return measure_scene(footage.board, footage.host, Rectifier(rig), look, advance)
         board_s, host_s, _ = to_seconds(*([shot.exposed_ns for shot in side] for side in (footage.board, footage.host)))
-        total = len(footage.board) + len(footage.host)
-        if by == "lamp":
-            return _by_lamp(footage, board_s, host_s, lambda done: advance(done / total))
-        return _by_screen(footage, board_s, host_s, lambda done: advance(done / total))
+        return (_by_lamp if by == "lamp" else _by_screen)(footage, board_s, host_s, advance)
 
 
-def _by_lamp(footage: "Footage", board_s: "Times", host_s: "Times", done: "Callable[[int], None]") -> "Measured":
+def _by_lamp(footage: "Footage", board_s: "Times", host_s: "Times", advance: "Callable[[float], None]") -> "Measured":
     import numpy as np  # noqa: PLC0415
 
     from phone_host.timing.lamp import Brightness, brightness, measure_lamp  # noqa: PLC0415
 
-    levels = [brightness(image) for image in _images((*footage.board, *footage.host), done)]
-    split = len(footage.board)
-    return measure_lamp(Brightness(board_s, np.array(levels[:split])), Brightness(host_s, np.array(levels[split:])))
+    board, host = _seen(footage, board_s, host_s, brightness, advance)
+    return measure_lamp(*(Brightness(seconds, np.array(levels)) for seconds, levels in (board, host)))
 
 
-def _by_screen(footage: "Footage", board_s: "Times", host_s: "Times", done: "Callable[[int], None]") -> "Measured":
+def _by_screen(footage: "Footage", board_s: "Times", host_s: "Times", advance: "Callable[[float], None]") -> "Measured":
     from phone_host.timing.screen import PatternReader, counted, measure_screen  # noqa: PLC0415
 
-    reader = PatternReader()
-    readings = [reader.read(image) for image in _images((*footage.board, *footage.host), done)]
-    split = len(footage.board)
-    return measure_screen(counted(board_s, readings[:split]), counted(host_s, readings[split:]))
+    board, host = _seen(footage, board_s, host_s, PatternReader().read, advance)
+    return measure_screen(counted(*board), counted(*host))
 
 
-def _images(shots: "tuple[Shot, ...]", done: "Callable[[int], None]") -> Any:  # noqa: ANN401 - an iterator of images
+def _seen(
+    footage: "Footage",
+    board_s: "Times",
+    host_s: "Times",
+    read: "Callable[[Image], _Reading]",
+    advance: "Callable[[float], None]",
+) -> "list[tuple[Times, list[_Reading]]]":
+    """What was read in each camera's images, with their times; a spoiled image is left out as if it had been lost."""
     from phone_host.stereo.raw_images import decode_frame  # noqa: PLC0415
+    from phone_host.timing.shots import require_shots  # noqa: PLC0415
 
-    for index, shot in enumerate(shots):
-        yield decode_frame(shot.image)
-        done(index + 1)
+    done, sides = 0, []
+    for shots, seconds in ((footage.board, board_s), (footage.host, host_s)):
+        whole: list[int] = []
+        readings: list[_Reading] = []
+        for at, shot in enumerate(shots):
+            with suppress(SpoiledImageError):
+                readings.append(read(decode_frame(shot.image)))
+                whole.append(at)
+            done += 1
+            advance(done / (len(board_s) + len(host_s)))
+        sides.append((seconds[whole], readings))
+    require_shots(len(sides[0][0]), len(sides[1][0]))
+    return sides
 
 
 def _report(options: argparse.Namespace, measured: "Measured", footage: "Footage") -> dict[str, Any]:

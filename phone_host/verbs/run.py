@@ -16,7 +16,7 @@ from common.settings import Resolved, log_level, resolve
 from common.signals import StopSignals
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import EXAMPLE, open_camera
-from phone_host.settings import ENVIRONMENT_PREFIX, PhoneHostSettings, check, key_folder
+from phone_host.settings import ENVIRONMENT_PREFIX, MAX_MEGAPIXELS_HELP, PhoneHostSettings, check, key_folder
 
 if TYPE_CHECKING:
     from phone_host.host import HostSettings
@@ -91,6 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="save every Nth pair from the first on; 0: none (default 30)",
     )
     parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
+    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
     parser.add_argument("--log-level", choices=("debug", "info", "warning", "error"), help="how much to log to stderr")
 
 
@@ -106,6 +107,7 @@ def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]
         "align_phase",
         "interpolate",
         "keys",
+        "max_megapixels",
         "log_level",
     )
     given = {name: getattr(options, name, None) for name in names}
@@ -130,7 +132,7 @@ def run(options: argparse.Namespace) -> int:
         raise SettingsError("no own camera is given", f"use --camera {EXAMPLE}")
     _check_numbers(options)
     fifo = FifoSettings.parse(settings.fifo)
-    camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns())
+    camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
     core, board_side = _core(options, settings, (camera.description.width_px, camera.description.height_px))
     keys = key_folder(settings.keys)
     named = settings.link or (find_aloud(keys.path, options.wait),)
@@ -201,6 +203,7 @@ def _host_settings(
         save_every=options.save_every,
         time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
         interpolate=settings.interpolate,
+        most_pixels=settings.most_pixels,
         steered=frozenset(whose for whose in Whose if settings.align_phase in {"either", whose.value}),
     )
 

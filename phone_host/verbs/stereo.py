@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from common import now
 from common.errors import SettingsError
 from phone_host.formats.json_text import json_text
+from phone_host.settings import MAX_MEGAPIXELS_HELP
 from phone_host.verbs.outputs import require_folder, unwritable
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("left", type=Path, metavar="LEFT", help="image of the left camera, any format, 8 or 16 bit")
     parser.add_argument("right", type=Path, metavar="RIGHT", help="image of the right camera")
     add_stereo_arguments(parser)
+    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
     parser.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="folder for the results, made if missing"
     )
@@ -40,7 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Read, rectify or pass, match, reproject, write."""
-    from phone_host.stereo.images import read_pair, require_same_size, size_text  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.settings import most_pixels  # noqa: PLC0415
+    from phone_host.stereo.images import decode_files, open_image, require_same_size, size_text  # noqa: PLC0415 - OpenCV, only now
     from phone_host.verbs.stereo_options import build_core  # noqa: PLC0415
 
     if not options.calibration and not options.rectified:
@@ -50,16 +53,19 @@ def run(options: argparse.Namespace) -> int:
         )
     require_folder(options.out)
     watch = _StopWatch()
-    left, right = read_pair(options.left, options.right)
+    limit = most_pixels(None, options.max_megapixels)
+    files = open_image(options.left, limit), open_image(options.right, limit)
     if options.rectified:
-        require_same_size(left, right, str(options.left), str(options.right))
-    watch.lap("read")
+        require_same_size(files[0].size_px, files[1].size_px, files[0].name, files[1].name)
     matcher = options.matcher or _DEFAULT_MATCHER
-    core, _ = build_core(options, options.calibration or "", matcher, (left.shape[1], left.shape[0]))
+    core, _ = build_core(options, options.calibration or "", matcher, files[0].size_px)
     if core is None:  # cannot be: one of the two ways to a core was checked above
         raise SettingsError("no stereo core", "give --calibration or --rectified")
+    core.require_sizes(files[0].size_px, files[1].size_px)
     _clear(options.out)
     watch.lap("prepare")
+    left, right = decode_files(*files)
+    watch.lap("read")
     pair = core.rectify(left, right)
     watch.lap("rectify")
     disparity = core.match(pair)

@@ -8,7 +8,8 @@ from common.camera.imagefile import read_image
 from common.camera.v4l2_controls import Axis, Control, ControlPlan, ControlWishes
 from common.camera.v4l2_stamps import RateMeter, Timing, exposure_midpoint_ns, is_trusted, stamp_clock, stamp_source
 from common.errors import DataError, SettingsError
-from common.frame import find_fault
+from common.frame import ImageSizeError, SpoiledImageError, find_fault
+from common.imagesize import MEGAPIXEL
 from common.keys import KeyFolder
 from common.link.factory import parse_link
 from common.protocol.wire import MAX_PAYLOAD_BYTES
@@ -20,7 +21,9 @@ from phone_host.formats.pfm import read_pfm
 from phone_host.formats.ply import read_ply
 from phone_host.formats.rig_yaml import read_rig
 from phone_host.settings import PhoneHostSettings, check
+from phone_host.stereo.images import decode_file, examine
 from tests.fuzz.target import is_one_line
+from tests.support.bombs import SMALL_BOMB, black_png, progressive
 from tests.support.pictures import encoded, jpeg, picture
 
 
@@ -113,6 +116,30 @@ def image_seeds() -> list[bytes]:
     small = picture(8, 6)
     kinds = [encoded(suffix, small) for suffix in (".png", ".ppm")] + [jpeg(16, 8)]
     return [*kinds, b"P5\n# comment\n3 2\n255\nabcdef", b"P6 1 1 65535 abcdef", b"P5 4 4 255 "]
+
+
+def decoding(data: bytes) -> None:
+    """Images of every kind: a SpoiledImageError before or by the decoder, or an image of the size that was read and judged before."""
+    try:
+        file = examine(data, "image", MEGAPIXEL)
+    except SpoiledImageError as error:
+        is_one_line(error)
+        return
+    try:
+        shape = decode_file(file).shape
+    except ImageSizeError as error:
+        raise AssertionError("an image of a size that nobody had judged") from error
+    except SpoiledImageError as error:
+        is_one_line(error)
+        return
+    assert (shape[1], shape[0]) == file.size_px, "another size"
+
+
+def decoding_seeds() -> list[bytes]:
+    """One of each kind, small."""
+    small = picture(24, 16)
+    kinds = [encoded(suffix, small) for suffix in (".jpg", ".png", ".bmp", ".ppm", ".tiff", ".webp")]
+    return [*kinds, progressive(24, 16), black_png(9, 7, bits=16, interlaced=True), SMALL_BOMB]
 
 
 def mjpeg(data: bytes) -> None:

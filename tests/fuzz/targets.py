@@ -19,6 +19,7 @@ TARGETS: dict[str, Target] = {
     "uri": Target("link and camera URIs", inputs.uri, inputs.uri_seeds, 300, 0.01),
     "v4l2": Target("a driver's controls and stamps", inputs.v4l2, inputs.v4l2_seeds, 2048, 0.005),
     "image": Target("JPEG, PNG and PNM headers", inputs.image, inputs.image_seeds, 4096, 0.005),
+    "decode": Target("sizes of images, and decoding them", inputs.decoding, inputs.decoding_seeds, 4096, 0.005),
     "mjpeg": Target("images in a server's stream", inputs.mjpeg, inputs.mjpeg_seeds, 8192, 0.01),
     "rig": Target("rig.yaml", inputs.rig, inputs.rig_seeds, 4096, 0.005),
     "settings": Target("settings files", inputs.settings, inputs.settings_seeds, 2048, 0.005),

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Final
 
 from common.camera.replay import find_images
-from tests.support.bombs import jpeg_bomb
+from tests.support.bombs import claiming, jpeg_bomb
 
 USER: Final = "me"
 PASSWORD: Final = "a:b@c/%"
@@ -161,6 +161,20 @@ def truncated(on: Exchange) -> None:
         on.part(image[: len(image) // 2] if count % 4 == 3 else image)
 
 
+def bombs(on: Exchange) -> None:
+    """After a while every image claims 8000x8000."""
+    on.answer(f"{_TYPE}; boundary=frame")
+    for sent, image in enumerate(on.film()):
+        on.part(image if sent < _GOOD_IMAGES else claiming(image, 8000, 8000))
+
+
+def turning(on: Exchange) -> None:
+    """After a while every other image claims to be upright."""
+    on.answer(f"{_TYPE}; boundary=frame")
+    for sent, image in enumerate(on.film()):
+        on.part(image if sent < _GOOD_IMAGES or sent % 2 else claiming(image, 120, 160))
+
+
 def password(on: Exchange) -> None:
     """Basic authentication."""
     secret = base64.b64encode(f"{USER}:{PASSWORD}".encode()).decode()
@@ -289,7 +303,7 @@ def endless(on: Exchange) -> None:
             on.sock.sendall(bytes(1 << 18))
 
 
-def bombs(on: Exchange) -> None:
+def bomb_burst(on: Exchange) -> None:
     """Ten small images that claim to be huge, then sound ones again."""
     for count, image in enumerate(on.first_parts()):
         on.part(jpeg_bomb() if count in _BOMBS else image)
@@ -298,8 +312,8 @@ def bombs(on: Exchange) -> None:
 MANNERS: Final[dict[str, Callable[[Exchange], None]]] = {
     manner.__name__: manner
     for manner in (
-        plain, dashes, no_dashes, no_line_end, wrong_boundary, chunked, early_boundary, empty_parts, garbage, truncated, password, digest, page,
-        snapshot, missing, moved, moved_here, busy, another_tongue, no_image, mute, drips_head, hangs, closes, resets, bad_chunks, last_chunk, drips, endless, bombs,
+        plain, dashes, no_dashes, no_line_end, wrong_boundary, chunked, early_boundary, empty_parts, garbage, truncated, bombs, turning, password, digest, page,
+        snapshot, missing, moved, moved_here, busy, another_tongue, no_image, mute, drips_head, hangs, closes, resets, bad_chunks, last_chunk, drips, endless, bomb_burst,
     )
 }  # fmt: skip
 

@@ -17,7 +17,7 @@ import pytest
 from common import now
 from common.camera.base import CameraState, Grab, Skipped, Spoiled
 from common.errors import UnavailableError
-from common.frame import Frame, FrameFault
+from common.frame import Frame, FrameFault, ImageSizeError
 from phone_host.camera.factory import open_camera
 from phone_host.camera.mjpeg_http import HttpCamera
 from tests.support.mjpeg_server import PASSWORD, USER, MjpegServer
@@ -193,19 +193,36 @@ def test_what_is_no_stream_is_told_with_its_remedy(film: Path, manner: str) -> N
 
 
 def test_a_phone_that_is_turned(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """Images of another size in the middle of the stream come as they are, with their own size, and the change is told."""
+    """Images of another size than at the beginning are spoiled and counted by name, the change is told, and those of the first size come on."""
     mixed = write_film(tmp_path / "mixed", 20)
     upright = cv2.rotate(np.asarray(cv2.imread(str(mixed / "0.jpg"))), cv2.ROTATE_90_CLOCKWISE)
     for number in range(10, 20):
         assert cv2.imwrite(str(mixed / f"{number}.jpg"), upright)
     with serving(mixed, "plain") as server, camera_of(server.uri) as camera:
-        sizes = {(160, 120), (120, 160)}
-        came = grabs(camera, lambda came: {(f.width_px, f.height_px) for f in frames(came)} == sizes)
-        assert camera.health.faults == ()
-    for frame in frames(came):
-        image = np.asarray(cv2.imdecode(np.frombuffer(frame.payload, np.uint8), cv2.IMREAD_COLOR))
-        assert (frame.height_px, frame.width_px) == image.shape[:2]
+        first_px = camera.description.width_px, camera.description.height_px
+        came = grabs(camera, lambda came: Spoiled in map(type, came) and isinstance(came[-1], Frame))
+        assert set(dict(camera.health.faults)) == {FrameFault.OTHER_SIZE}
+    assert first_px in {(160, 120), (120, 160)}
+    assert {(frame.width_px, frame.height_px) for frame in frames(came)} == {first_px}
+    assert {grab.fault for grab in came if isinstance(grab, Spoiled)} == {FrameFault.OTHER_SIZE}
     assert "camera_size_changed" in caplog.text
+
+
+@pytest.mark.parametrize("manner", ["bombs", "turning"])
+def test_images_that_claim_another_size(film: Path, manner: str, caplog: pytest.LogCaptureFixture) -> None:
+    """Images whose header claims a size that nobody asked for are spoiled by name and never handed on; the log gets a few lines, however many they are."""
+    with serving(film, manner) as server, camera_of(server.uri) as camera:
+        came = grabs(camera, lambda came: sum(isinstance(grab, Spoiled) for grab in came) >= 40)
+        assert dict(camera.health.faults)[FrameFault.OTHER_SIZE] >= 40
+    assert {(frame.width_px, frame.height_px) for frame in frames(came)} == {(160, 120)}
+    assert caplog.text.count("camera_size_changed") <= 7
+
+
+def test_a_phone_beyond_the_limit(tmp_path: Path) -> None:
+    """A server whose images have more pixels than the limit is refused at once, with both."""
+    film = write_film(tmp_path / "film", 20)
+    with serving(film, "plain") as server, pytest.raises(ImageSizeError, match=r"160x120 px.*limit is 0.0"):
+        open_camera(server.uri, "host", now.monotonic_ns(), 10_000)
 
 
 def test_nobody_there_is_told(film: Path) -> None:

@@ -150,4 +150,4 @@ def test_missing_and_empty_files_are_named(tmp_path: Path) -> None:
 def test_two_sizes_are_no_rectified_pair() -> None:
     """The message names both files with their sizes, width first."""
     with pytest.raises(DataError, match=r"a\.png is 4x3 px, b\.png is 5x3 px.*--calibration"):
-        require_same_size(np.zeros((3, 4), np.uint8), np.zeros((3, 5), np.uint8), "a.png", "b.png")
+        require_same_size((4, 3), (5, 3), "a.png", "b.png")

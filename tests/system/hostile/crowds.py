@@ -81,7 +81,7 @@ def _http(folder: Path, rounds: Rounds) -> Outcome:
     for number in rounds:
         within = folder / str(number)
         within.mkdir()
-        server = MjpegServer(film(), FPS, "bombs")
+        server = MjpegServer(film(), FPS, "bomb_burst")
         try:
             with board_and_host(within, own=f"{server.uri}?latency_ms=0") as (_, watched):
                 resource.prlimit(watched.receiver.process.pid, resource.RLIMIT_AS, (6 * 2**30, 6 * 2**30))

@@ -1,0 +1,99 @@
+"""What image libraries say while they decode: libjpeg and libpng print it to the C library's `stderr`, and nobody else is told.
+
+A decoder whose data run out or make no sense fills the rest of the image with something, prints one line and calls it done; OpenCV does not look. So that line
+is the only word of a spoiled image, and it must not reach the terminal past the log.
+
+`stderr` is a variable of the C library that holds a stream, not the descriptor 2: "normal variables which you can set just like any others" (GNU C Library manual,
+Standard Streams); Android's Bionic declares it the same way. While an image is decoded it holds a stream in memory. Descriptor 2 stays what it is: Python's own
+stderr, the log, progress bars, child processes, faulthandler and C++'s std::cerr are not concerned. OpenCV's own log is silenced meanwhile: what it has to say
+comes as an exception or as no image.
+
+Rules: one decoding at a time (a lock), since the variable belongs to the process; where the C library is another one, nothing is overheard and the lines go
+where they went before.
+"""
+
+import ctypes
+import platform
+import sys
+import threading
+from collections.abc import Callable
+from functools import cache
+from typing import Final
+
+import cv2
+
+_LOCK: Final = threading.Lock()
+"""Guards the process's `stderr`; there is only one."""
+
+_FROM_START: Final = 0
+
+
+class _Ear:
+    """A stream in memory that can take the place of `stderr`: open_memstream of POSIX.1-2008. Lives as long as the process: a library may still hold it."""
+
+    def __init__(self, c_library: ctypes.CDLL) -> None:
+        self._flush, self._seek = c_library.fflush, c_library.fseek
+        self._flush.argtypes, self._flush.restype = [ctypes.c_void_p], ctypes.c_int
+        self._seek.argtypes, self._seek.restype = [ctypes.c_void_p, ctypes.c_long, ctypes.c_int], ctypes.c_int
+        make = c_library.open_memstream
+        make.argtypes = [ctypes.POINTER(ctypes.c_void_p), ctypes.POINTER(ctypes.c_size_t)]
+        make.restype = ctypes.c_void_p
+        self._text, self._length = ctypes.c_void_p(), ctypes.c_size_t()
+        self._stream = make(ctypes.byref(self._text), ctypes.byref(self._length))
+        self._stderr = ctypes.c_void_p.in_dll(c_library, "stderr")
+
+    def listen(self, work: Callable[[], object]) -> str:
+        """Do some work; gives what was printed to `stderr` meanwhile."""
+        usual = self._stderr.value
+        self._stderr.value = self._stream
+        try:
+            work()
+        finally:
+            self._stderr.value = usual
+            said = self._take()
+        return said
+
+    def _take(self) -> str:
+        self._flush(self._stream)
+        if not self._length.value or not self._text.value:
+            return ""
+        said = ctypes.string_at(self._text.value, self._length.value)
+        self._seek(self._stream, 0, _FROM_START)
+        self._flush(self._stream)
+        return said.decode("utf-8", "replace")
+
+
+def overhear(work: Callable[[], object]) -> str:
+    """Do some work, one thread at a time.
+
+    Args:
+        work: decodes something.
+
+    Returns:
+        What C libraries printed to their `stderr` meanwhile; empty where that cannot be known.
+
+    Raises:
+        Exception: whatever the work raises.
+    """
+    with _LOCK:
+        log_level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        try:
+            ear = _ear()
+            if ear is not None:
+                return ear.listen(work)
+            work()
+            return ""
+        finally:
+            cv2.utils.logging.setLogLevel(log_level)
+
+
+@cache
+def _ear() -> _Ear | None:
+    """None where `stderr` may be a constant, as in musl: setting it would end the process."""
+    if platform.libc_ver()[0] != "glibc" and not _is_android():
+        return None
+    return _Ear(ctypes.CDLL(None))
+
+
+def _is_android() -> bool:
+    return sys.platform == "android" or hasattr(sys, "getandroidapilevel")
