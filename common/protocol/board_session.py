@@ -31,9 +31,12 @@ from common.protocol.message import (
     Status,
     Steer,
 )
-from common.protocol.session import HELLO_RETRY_NS, SILENCE_NS, STATUS_NS, STATUS_SLOW_NS, TAKEOVER_NS, Outgoing
+from common.protocol.session import HELLO_RETRY_NS, MS, SILENCE_NS, STATUS_NS, STATUS_SLOW_NS, TAKEOVER_NS, Outgoing
 
 _NEVER = 2**63 - 1
+
+STEER_REST_NS = 500 * MS
+"""A camera is steered no more often than this: a host has to see what came of it first, which takes longer."""
 
 
 @dataclass(slots=True)
@@ -122,6 +125,7 @@ class BoardSession:
         self._status_ns = STATUS_NS
         self._ended = False
         self._later_ns = 0
+        self._steered_ns = -STEER_REST_NS
 
     @property
     def carrier(self) -> int | None:
@@ -190,7 +194,10 @@ class BoardSession:
                 host.below_index = max(host.below_index, below_index)
                 return []
             case Steer(later_ns):
-                self._later_ns = later_ns % self._camera.period_ns
+                if (
+                    now_ns - self._steered_ns >= STEER_REST_NS
+                ):  # else a host that never stops steering would leave the camera no time to expose
+                    self._later_ns, self._steered_ns = later_ns % self._camera.period_ns, now_ns
                 return []
             case Bye():
                 # The last account goes behind the last frame, so that what it tells of and has not come is lost.

@@ -171,7 +171,7 @@ class HostSession:
         path = self._paths[connection[0]]
         match message:
             case Knock():
-                return self._answer_knock(path, connection, message, now_ns)
+                return [] if self._leaving else self._answer_knock(path, connection, message, now_ns)
             case Refusal(reason):
                 if connection not in path.dialled.values():
                     return []  # whoever called here may be anybody
