@@ -58,6 +58,12 @@ class ImageSizeError(SpoiledImageError):
     """Raised for an image whose size is not believed or beyond the limit, before it is decoded. The fault of who made it, or the limit is too low."""
 
 
+NOT_AS_SAID = frozenset(
+    {FrameFault.OTHER_SIZE, FrameFault.TOO_LARGE, FrameFault.TOO_SHORT, FrameFault.TOO_MANY_SCANS, FrameFault.CORRUPT}
+)
+"""Faults of images that are not what their headers say: no camera or cable makes them by losing an end."""
+
+
 @dataclass(frozen=True, slots=True)
 class Frame:
     """One image and what the camera says of it.

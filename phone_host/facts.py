@@ -1,8 +1,10 @@
 """What a run was, in one object, and what others judge it by. Pure."""
 
+from collections import Counter
 from dataclasses import dataclass, field
 
 from common.camera.base import CameraHealth
+from common.frame import NOT_AS_SAID
 from phone_host.accounts import LinkAccount
 from phone_host.delays import DelayStatistics
 from phone_host.model import TimeOffset
@@ -160,8 +162,16 @@ def concerns(facts: RunFacts, last: int | None = None) -> tuple[Concern, ...]:
         suspect_frames=sum(suspects.frames for suspects in link.suspects),
         disbelieved=disbelieved(facts),
         received=sum(account.received for account in link.sessions),
+        spoiled_images=spoiled(facts),
     )
     return border_concerns(border) + timing_concerns(time_and_motion(facts, last))
+
+
+def spoiled(facts: RunFacts) -> dict[str, int]:
+    """Images of either camera that were not what their headers said, by what was wrong; those that a camera drops as cut short are told with it."""
+    found = Counter(dict(facts.spoiled_images))
+    found.update({fault.value: count for fault, count in facts.camera.faults if fault in NOT_AS_SAID})
+    return {reason: count for reason, count in found.items() if count}
 
 
 def disbelieved(facts: RunFacts) -> dict[str, int]:

@@ -33,6 +33,7 @@ class Doubt(Enum):
     AGE = "age"
     CLOCK_STEPPED = "clock_stepped"
     DISBELIEVED = "disbelieved"
+    SPOILED_IMAGES = "spoiled_images"
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,12 +130,14 @@ class Border:
         suspect_frames: frames that had passed between a step and the echo that told of it.
         disbelieved: frames that came and were dropped, by reason.
         received: frames that came.
+        spoiled_images: images of either camera that were not what their headers said, by what was wrong.
     """
 
     clock_steps: int
     suspect_frames: int
     disbelieved: dict[str, int]
     received: int
+    spoiled_images: dict[str, int]
 
 
 def border_concerns(border: Border) -> tuple[Concern, ...]:
@@ -153,8 +156,16 @@ def border_concerns(border: Border) -> tuple[Concern, ...]:
                 "do not let the board or the host sleep during a run; leave the suspect pairs out (report.json names them)",
             )
         )
+    if border.spoiled_images:
+        found.append(
+            Concern(
+                Doubt.SPOILED_IMAGES,
+                f"{sum(border.spoiled_images.values())} images were spoiled and not used ({_reasons(border.spoiled_images)})",
+                "check the cable, the camera and its format; one now and then does no harm",
+            )
+        )
     if border.disbelieved:
-        reasons = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in border.disbelieved.items())
+        reasons = _reasons(border.disbelieved)
         found.append(
             Concern(
                 Doubt.DISBELIEVED,
@@ -163,6 +174,10 @@ def border_concerns(border: Border) -> tuple[Concern, ...]:
             )
         )
     return tuple(found)
+
+
+def _reasons(counts: dict[str, int]) -> str:
+    return ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in counts.items())
 
 
 def timing_concerns(timing: Timing) -> tuple[Concern, ...]:
