@@ -142,6 +142,12 @@ class SteppingWorld:
         if wire:
             wire.popleft()
 
+    def repeat(self, lane: Lane, to: str) -> None:
+        """The oldest message under way comes twice."""
+        wire = self._wire(lane, to)
+        if wire:
+            wire.appendleft(wire[0])
+
     def break_lane(self, lane: Lane) -> None:
         """A connection breaks: both sides are told, what was under way is gone."""
         self._wire(lane, "board").clear()

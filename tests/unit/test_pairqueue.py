@@ -51,7 +51,7 @@ def check(counts: PairCounts) -> None:
 @given(
     st.integers(1, 4),
     st.sampled_from(Overflow),
-    st.lists(st.tuples(st.sampled_from("bhhbbttrB"), st.integers(-1, 3)), max_size=60),
+    st.lists(st.tuples(st.sampled_from("bhhbbttrBv"), st.integers(-1, 3)), max_size=60),
 )
 @settings(deadline=None, max_examples=100)
 def test_account_holds_after_every_call(depth: int, overflow: Overflow, acts: list[tuple[str, int]]) -> None:
@@ -69,6 +69,8 @@ def test_account_holds_after_every_call(depth: int, overflow: Overflow, acts: li
                 queue.add_host(host_frame(host, start_ns + host * PERIOD_NS, b"x" * 100))
             case "t":
                 queue.tick()
+            case "v":
+                queue.void()
             case "r":
                 queue.change_period(PERIOD_NS * (2 + step))
             case _:
@@ -83,6 +85,40 @@ def test_account_holds_after_every_call(depth: int, overflow: Overflow, acts: li
     while queue.take() is not None:
         check(queue.counts)
     assert queue.counts.waiting == 0
+
+
+@pytest.mark.parametrize("side", ["board", "host"])
+def test_tiny_frames_are_bounded_in_number(side: str) -> None:
+    """Ten thousand frames of no bytes find no partner: of each side 4096 are held, the older ones are given up by name."""
+    queue = queue_of()
+    start_ns = now.monotonic_ns()
+    for number in range(10_000):
+        if side == "board":
+            queue.add_board(board_frame(number, start_ns + number))
+        else:
+            queue.add_host(host_frame(number, start_ns + number))
+    counts = queue.counts
+    check(counts)
+    assert (counts.held_board if side == "board" else counts.held_host) == 4096
+    assert dict(counts.board_orphans if side == "board" else counts.host_orphans) == {"evicted": 10_000 - 4096}
+
+
+def test_no_frame_from_before_a_doubt_meets_one_from_after() -> None:
+    """Frames of both sides that wait when the clock is in doubt are given up by name, and the next two are paired."""
+    queue = queue_of()
+    start_ns = now.monotonic_ns()
+    queue.add_host(host_frame(0, start_ns))
+    queue.void()
+    queue.add_board(board_frame(0, start_ns))
+    queue.void()
+    queue.add_host(host_frame(1, start_ns))
+    assert queue.counts.paired == 0
+    assert dict(queue.counts.host_orphans) == {"clock_in_doubt": 1, "out_of_order": 1}
+    assert dict(queue.counts.board_orphans) == {"clock_in_doubt": 1}
+    queue.add_board(board_frame(1, start_ns + PERIOD_NS))
+    queue.add_host(host_frame(2, start_ns + PERIOD_NS))
+    assert queue.counts.paired == 1
+    check(queue.counts)
 
 
 def in_threads(*works: Callable[[], None]) -> Callable[[], None]:

@@ -78,6 +78,11 @@ class Happenings(RuleBasedStateMachine):
         """Without a sound."""
         self.world.lose(lane, to)
 
+    @rule(lane=st.sampled_from(Lane), to=st.sampled_from(["board", "host"]))
+    def a_message_comes_twice(self, lane: Lane, to: str) -> None:
+        """As from a transport that delivers again."""
+        self.world.repeat(lane, to)
+
     @rule(lane=st.sampled_from(Lane))
     def a_connection_breaks(self, lane: Lane) -> None:
         """Both sides are told."""

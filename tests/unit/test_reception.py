@@ -1,0 +1,175 @@
+"""What the host knows of a board over its lives: nothing of one is believed of the next."""
+
+from dataclasses import replace
+
+import pytest
+
+from common.frame import PixelFormat
+from common.ledger import BoardMarks
+from common.protocol.board_session import BoardSession
+from common.protocol.message import (
+    BoardCounts,
+    Bye,
+    FrameMessage,
+    HostHello,
+    Knock,
+    Lane,
+    Message,
+    Ping,
+    Pong,
+    Refusal,
+    RefusalReason,
+)
+from common.protocol.session import MS, Outgoing, connection_name
+from phone_host.pairqueue import PairQueue
+from phone_host.reception import LinkFacts, Reception
+from phone_host.sync.fifo import FifoSettings
+from phone_host.sync.quarantine import Disbelief
+from tests.support.session_world import CAMERA
+from tests.support.unheard import Unheard
+
+NAMES = {lane: connection_name(0, lane.name.encode()) for lane in Lane}
+
+
+class Talk:
+    """A host's reception and a board's session that answer each other at once; board and host share a clock.
+
+    Args:
+        dialled: whether the host called the board.
+    """
+
+    def __init__(self, *, dialled: bool = True) -> None:
+        self.now_ns = 10**12
+        self.said: list[Outgoing] = []
+        self.queue = PairQueue(FifoSettings(8), None, CAMERA.period_ns, clock=lambda: self.now_ns)
+        facts = [LinkFacts("tcp", dict(NAMES) if dialled else {}, self_paced=False)]
+        self.reception = Reception(facts, "host", self.queue, Unheard(), self.said.append)
+        self.begin("first")
+
+    def begin(self, session: str) -> None:
+        """A new life of the board."""
+        self.board = BoardSession(session, "boot", CAMERA)
+        self.sent = 0
+
+    def run(self, ticks: int = 20) -> None:
+        """Let both talk for a while, without frames."""
+        for _ in range(ticks):
+            self.now_ns += 10 * MS
+            self.reception.tick(self.now_ns)
+            self.answer()
+
+    def answer(self) -> None:
+        """Let everything that was said be answered."""
+        while self.said:
+            outgoing = self.said.pop(0)
+            message: Message = outgoing.message
+            if isinstance(message, Ping):
+                message = replace(message, t0_ns=self.now_ns - MS)
+            for reply in self.board.receive(
+                outgoing.connection, message, self.now_ns, BoardCounts(self.sent, self.sent)
+            ):
+                self.reception.receive(reply.connection, reply.message, self.now_ns)
+
+    def frame(self, **changes: object) -> FrameMessage:
+        """The board's next frame, exposed 5 ms ago."""
+        marks = BoardMarks(self.now_ns - 5 * MS, self.now_ns - 2 * MS, self.now_ns - MS)
+        size = (CAMERA.width_px, CAMERA.height_px, PixelFormat.MJPEG)
+        made = FrameMessage(self.board.session, self.sent, self.sent, *size, None, marks, b"image")
+        self.sent += 1
+        return replace(made, **changes)  # type: ignore[arg-type]
+
+    def show(self, frame: FrameMessage) -> None:
+        """A frame comes."""
+        self.reception.receive(NAMES[Lane.FRAMES], frame, self.now_ns)
+
+
+def test_a_goodbye_says_nothing_of_the_next_life() -> None:
+    """After a board's orderly goodbye its next life's tail is unknown until that has said goodbye, too."""
+    talk = Talk()
+    talk.run()
+    talk.reception.receive(NAMES[Lane.FRAMES], Bye(BoardCounts()), talk.now_ns)
+    before = talk.reception.tail_known
+    talk.said.clear()
+    talk.begin("second")
+    talk.run(60)
+    assert talk.reception.connected
+    assert (before, talk.reception.tail_known) == (True, False)
+    assert talk.reception.leave(talk.now_ns)
+    talk.reception.lose_tail()
+    assert talk.reception.account.sessions[-1].vanished
+    assert not talk.reception.account.sessions[0].vanished
+
+
+def test_a_leaving_host_greets_nobody() -> None:
+    """Once it has said goodbye a host answers no knock: a new hello would keep the board from the next host."""
+    talk = Talk()
+    talk.run()
+    talk.reception.leave(talk.now_ns)
+    talk.said.clear()
+    talk.reception.receive(NAMES[Lane.CONTROL], Knock(Lane.CONTROL, "first"), talk.now_ns)
+    assert not any(isinstance(outgoing.message, HostHello) for outgoing in talk.said)
+
+
+@pytest.mark.parametrize("dialled", [True, False])
+def test_a_strangers_refusal_ends_no_waiting(*, dialled: bool) -> None:
+    """Three bytes of another version, or a refusal, count from the board that was called, and from no caller."""
+    talk = Talk(dialled=dialled)
+    talk.reception.refuse_version(NAMES[Lane.CONTROL], "another version", talk.now_ns)
+    assert talk.reception.refused(talk.now_ns) is (RefusalReason.VERSION if dialled else None)
+    talk = Talk(dialled=dialled)
+    talk.reception.receive(NAMES[Lane.CONTROL], Refusal(RefusalReason.BUSY), talk.now_ns)
+    assert talk.reception.refused(talk.now_ns) is (RefusalReason.BUSY if dialled else None)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"sent_index": 2**53 - 1}, Disbelief.CREDIT),
+        ({"width_px": CAMERA.width_px + 1}, Disbelief.SIZE),
+        ({"height_px": 16384}, Disbelief.SIZE),
+        ({"marks": BoardMarks(2**62, 2**62, 2**62)}, Disbelief.FUTURE),
+        ({"marks": BoardMarks(-(2**62), -(2**62), -(2**62))}, Disbelief.PAST),
+        ({"marks": BoardMarks(2**62, 0, -(2**62))}, Disbelief.FUTURE),
+        ({"marks": BoardMarks(10**12 - MS, 10**12 - 2 * MS, 10**12 - 3 * MS)}, Disbelief.MARKS),
+    ],
+)
+def test_a_frame_that_cannot_be_is_dropped_by_name(changes: dict[str, object], reason: Disbelief) -> None:
+    """One false frame is counted by its reason, and the honest ones after it are taken as ever."""
+    talk = Talk()
+    talk.run()
+    for _ in range(2):
+        talk.show(talk.frame())
+        talk.run(6)
+    taken = talk.queue.counts.received
+    assert taken == 2
+    talk.show(talk.frame(**changes))
+    assert dict(talk.reception.account.disbelieved) == {reason: 1}
+    talk.sent -= reason is Disbelief.CREDIT
+    for _ in range(3):
+        talk.run(6)
+        talk.show(talk.frame())
+    talk.run(6)
+    assert talk.queue.counts.received == taken + 3
+    assert dict(talk.reception.account.disbelieved) == {reason: 1}
+    assert talk.reception.account.sessions[-1].lost == 0
+
+
+def test_frames_wait_while_an_echo_lies_and_come_back_by_themselves() -> None:
+    """A whole wave an hour off costs the frames until the next one, by name; no step is told."""
+    talk = Talk()
+    talk.run(40)
+    talk.show(talk.frame())
+    talk.run(10)
+    wave = talk.reception._session._paths[0].waves._wave
+    told_ns = talk.now_ns + 3_600_000_000_000
+    talk.reception.receive(NAMES[Lane.CONTROL], Pong(wave, talk.now_ns - MS, told_ns, told_ns), talk.now_ns)
+    talk.show(talk.frame())
+    assert dict(talk.reception.account.disbelieved) == {Disbelief.CLOCK: 1}
+    talk.said.clear()
+    talk.run(60)
+    assert talk.reception.estimate is not None
+    talk.show(talk.frame())
+    talk.run(10)
+    assert talk.queue.counts.received == 2
+    assert talk.reception.account.clock_steps == 0
+    assert talk.reception.account.clock_doubts == 1
