@@ -33,6 +33,7 @@ from common.protocol.message import (
 NUMBERS = st.integers(0, 2**53)
 TIMES_NS = st.integers(-(2**62), 2**62)
 SIZES_PX = st.integers(1, 16384)
+PERIODS_NS = st.integers(1, 3600 * 10**9)
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=96)
 
 COUNTS = st.builds(
@@ -47,7 +48,7 @@ CAMERAS = st.builds(
     SIZES_PX,
     SIZES_PX,
     st.sampled_from(PixelFormat),
-    st.integers(1, 2**62),
+    PERIODS_NS,
     st.sampled_from(Pacing),
     st.sampled_from(Steering),
 )
@@ -65,7 +66,7 @@ FRAMES = st.builds(
 )
 LANES = st.sampled_from(Lane)
 RUNGS = st.builds(
-    Rung, NUMBERS, NUMBERS, NUMBERS, st.integers(1, 2**62), NUMBERS, st.integers(0, 16384), st.integers(0, 16384)
+    Rung, NUMBERS, NUMBERS, NUMBERS, PERIODS_NS, NUMBERS, st.integers(0, 16384), st.integers(0, 16384)
 )
 
 MESSAGES: st.SearchStrategy[Message] = st.one_of(

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.ledger import BoardMarks
-from common.protocol.board_session import BoardSession
+from common.protocol.board_session import STEER_REST_NS, BoardSession
 from common.protocol.message import (
     BoardCounts,
     BoardHello,
@@ -422,7 +422,7 @@ def test_swift_echoes_are_learnt_from_when_their_wave_has_ended() -> None:
 
 
 def test_a_wish_to_steer_is_given_once() -> None:
-    """What the host asks for reaches the board's camera once, and never more than a period, whoever asks."""
+    """What the host asks for reaches the board's camera once, never more than a period, and not again before half a second has passed."""
     world = World(board_dials=False)
     world.settle()
     host = world.hosts[0]
@@ -433,6 +433,10 @@ def test_a_wish_to_steer_is_given_once() -> None:
         world.board.receive(connection, message, world.now_ns, BoardCounts())
         assert world.board.take_steering() == given_ns
         assert world.board.take_steering() == 0
+        world.now_ns += STEER_REST_NS - 1
+        world.board.receive(connection, Steer(5 * MS), world.now_ns, BoardCounts())
+        assert world.board.take_steering() == 0
+        world.now_ns += 1
 
 
 @pytest.mark.parametrize(("apart_ns", "accounts"), [(33 * MS, 20), (900 * MS, 20), (1500 * MS, 10)])
