@@ -34,6 +34,7 @@ delay-bench.json, delay-bench.html (plots, the queueing model beside the measure
 """
 
 _NOTHING_MEASURED = 4
+_FILES = ("delay-bench.json", "delay-bench.html", "trace.json", "delay-bench.svg")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -192,8 +193,10 @@ def _settings(options: argparse.Namespace) -> "RunSettings":
 
 
 def _make_folder(folder: Path) -> None:
+    from phone_host.formats.listed import claim  # noqa: PLC0415
+
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        claim(folder, *_FILES)
     except OSError as error:
         raise UnavailableError(
             f"results folder {folder} cannot be used ({error.strerror})", "give another with --out"

@@ -167,6 +167,24 @@ class ListedFolder:
         return UnavailableError(problem, "move it away, or give another folder with --out")
 
 
+def claim(path: Path, *names: str) -> None:
+    """Make names in a folder ours before they are written: those that are free, or left by an earlier run.
+
+    Args:
+        path: the folder, made if missing.
+        names: what is to be written there.
+
+    Raises:
+        UnavailableError: such a name belongs to somebody else's file, or to a link.
+        OSError: as the operating system gives it.
+    """
+    folder = ListedFolder(path, "(?!)", kept="|".join(re.escape(name) for name in names))
+    try:
+        folder.add(*names)
+    finally:
+        folder.close()
+
+
 def _entries(folder: int) -> list[str]:
     with os.scandir(folder) as entries:
         return sorted(entry.name for entry in entries)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from common.errors import DataError
 from phone_host.formats.json_text import json_text
 from phone_host.settings import MAX_MEGAPIXELS_HELP
-from phone_host.verbs.outputs import require_file, unwritable
+from phone_host.verbs.outputs import claim_names, require_file, unwritable
 
 if TYPE_CHECKING:
     from phone_host.stereo.board_views import BoardViews
@@ -52,6 +52,7 @@ def run(options: argparse.Namespace) -> int:
     board = parse_board(options.board, options.square)
     require_file(options.out)
     files = pair_files(options.left, options.right)
+    claim_names(options.out.parent, options.out, "report.json")
     views = _look(files, board, most_pixels(None, options.max_megapixels))
     try:
         calibration = calibrate(list(views.pairs), board, views.sizes_px, Side(options.board_side))
@@ -175,7 +176,6 @@ def _write_report(out: Path, report: dict[str, Any]) -> None:
     from phone_host.formats.atomic import write_text  # noqa: PLC0415
 
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
         write_text(out.with_name("report.json"), json_text(report, indent=2) + "\n")
     except OSError as error:
         raise unwritable(out, error) from error

@@ -18,7 +18,7 @@ from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import EXAMPLE, open_camera
 from phone_host.formats.json_text import json_text
 from phone_host.settings import key_folder
-from phone_host.verbs.outputs import require_file, require_folder, unwritable
+from phone_host.verbs.outputs import claim_names, require_file, require_folder, unwritable
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -68,6 +68,7 @@ def run(options: argparse.Namespace) -> int:
     rig = None if options.calibration is None else read_rig(options.calibration)
     if options.out is not None:
         require_folder(options.out)
+        claim_names(options.out, options.out, "report.json", "time-offset.svg")
     signals = StopSignals()
     footage = _footage(options, signals)
     if signals.interrupted:
@@ -224,7 +225,6 @@ def _store(options: argparse.Namespace, measured: "Measured", report: dict[str, 
     where, option = options.out, "--out"
     try:
         if options.out is not None:
-            options.out.mkdir(parents=True, exist_ok=True)
             write_text(options.out / "report.json", json_text(report, indent=2) + "\n")
             write_text(options.out / "time-offset.svg", misfit_svg(measured))
         if options.calibration is not None:

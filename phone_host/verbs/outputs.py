@@ -14,6 +14,25 @@ def require_folder(out: Path) -> None:
     _require_folder(out, out, "--out")
 
 
+def claim_names(folder: Path, out: Path, *names: str) -> None:
+    """Have the names that a verb will write in a folder, or say now that somebody else's files bear them.
+
+    Args:
+        folder: where they will be.
+        out: what the user gave.
+        names: of the files.
+
+    Raises:
+        UnavailableError: such a file is not from an earlier run, or the folder cannot be written to.
+    """
+    from phone_host.formats.listed import claim  # noqa: PLC0415 - most verbs end before they write
+
+    try:
+        claim(folder, *names)
+    except OSError as error:
+        raise unwritable(out, error) from error
+
+
 def require_file(out: Path, option: str = "--out") -> None:
     """Refuse an output that is there and is no regular file: replacing it would take a folder, a device or a pipe away.
 

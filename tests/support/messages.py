@@ -65,9 +65,7 @@ FRAMES = st.builds(
     st.binary(max_size=40),
 )
 LANES = st.sampled_from(Lane)
-RUNGS = st.builds(
-    Rung, NUMBERS, NUMBERS, NUMBERS, PERIODS_NS, NUMBERS, st.integers(0, 16384), st.integers(0, 16384)
-)
+RUNGS = st.builds(Rung, NUMBERS, NUMBERS, NUMBERS, PERIODS_NS, NUMBERS, st.integers(0, 16384), st.integers(0, 16384))
 
 MESSAGES: st.SearchStrategy[Message] = st.one_of(
     st.builds(HostHello, TEXTS, LANES),

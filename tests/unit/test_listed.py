@@ -12,7 +12,7 @@ import pytest
 
 from common.errors import TandemError, UnavailableError
 from phone_host.formats.atomic import write_bytes, write_text
-from phone_host.formats.listed import LIST, ListedFolder
+from phone_host.formats.listed import ListedFolder, claim
 from phone_host.results import NAMES, PAIR_FILES, Results
 
 FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
@@ -218,3 +218,16 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
     for name in ("file", "link"):
         with pytest.raises(TandemError, match=rf"{name}.*--out"):
             Results(tmp_path / name, 1)
+
+
+def test_names_are_claimed_before_they_are_written(tmp_path: Path) -> None:
+    """A verb that writes single files refuses those of others before its work, replaces those of earlier runs, and is replaced itself."""
+    (tmp_path / "report.json").write_text("mine")
+    with pytest.raises(UnavailableError, match=r"report\.json is not from an earlier run"):
+        claim(tmp_path, "report.json", "plot.svg")
+    (tmp_path / "report.json").unlink()
+    for _ in range(2):
+        claim(tmp_path, "report.json", "plot.svg")
+        (tmp_path / "report.json").write_text("ours")
+    ListedFolder(tmp_path, r"report\.json|disparity\.pfm").close()
+    assert not (tmp_path / "report.json").exists()
