@@ -35,6 +35,12 @@ class Arrival:
     received_ns: int
 
 
+_TIGHT_NS: Final = 10_000_000
+"""An echo is tight that takes no longer than twice the least of late and this."""
+
+_WAIT_NS: Final = 500_000_000
+"""So long a frame waits for a tight echo, several of which are asked for in that time; where a queue keeps all echoes slow there are none."""
+
 Admitted = tuple[int, BoardFrame]
 """A frame that may pass, and the link that it came over."""
 
@@ -45,10 +51,12 @@ class Border:
     Args:
         account: of the links; doubts, steps and what was not believed are counted there.
         on_doubt: told when nothing from before this moment may be paired any more.
+        on_demand: whether the own camera shows images on demand; else a board whose stamps are mere labels has no part in the run.
     """
 
-    def __init__(self, account: LinkAccount, on_doubt: Callable[[], None]) -> None:
+    def __init__(self, account: LinkAccount, on_doubt: Callable[[], None], *, on_demand: bool = False) -> None:
         self._account = account
+        self._on_demand = on_demand
         self._on_doubt = on_doubt
         self._clock = LinkClocks(len(account.links))
         self._quarantine: Quarantine[Arrival] = Quarantine()
@@ -74,7 +82,9 @@ class Border:
         return self._clock.round_trip_ns(link)
 
     def other_clock(self) -> None:
-        """The board has booted anew, or slept: another clock."""
+        """The board has booted anew, or slept: another clock. A doubt of the old one is never decided."""
+        if self._clock.in_doubt:
+            self._note_suspects()
         self._clock = LinkClocks(len(self._account.links))
         self._unproven = Unproven()
         self.close()
@@ -115,13 +125,25 @@ class Border:
             case Heard.STEPPED:
                 self._note_step()
             case Heard.AGREED:
-                if was_in_doubt and not self._clock.in_doubt:
+                if was_in_doubt and not self._clock.in_doubt and self._account.clock_doubts.bit_count() == 1:
                     _LOG.info(event("clock_confirmed"))
-                self._unproven.confirmed(echo.t1_ns)
-                return [known for arrival in self._quarantine.confirmed(echo.t1_ns) for known in self._examine(arrival)]
+                return self._confirm(echo)
             case _:
                 pass
         return []
+
+    def _confirm(self, echo: Echo) -> list[Admitted]:
+        """Take an echo that agreed. One that took long leaves room for a step: it proves nothing, and lets only those pass that have waited for a better one."""
+        estimate = self._clock.estimate
+        if estimate is None:
+            return []
+        round_trip_ns = (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns)
+        if round_trip_ns <= 2 * estimate.round_trip_ns + _TIGHT_NS:
+            self._unproven.confirmed(echo.t1_ns)
+            passed = self._quarantine.confirmed(echo.t1_ns, echo.t3_ns)
+        else:
+            passed = self._quarantine.confirmed(echo.t1_ns, echo.t3_ns - _WAIT_NS)
+        return [known for arrival in passed for known in self._examine(arrival)]
 
     def admit(self, arrival: Arrival) -> list[Admitted]:
         """Take a frame that has come.
@@ -140,7 +162,16 @@ class Border:
             return known
         transit_ns = arrival.received_ns - known[0][1].marks.sent_ns
         sent_ns, period_ns = arrival.frame.marks.sent_ns, arrival.camera.period_ns
-        return known if self._quarantine.arrived(arrival, sent_ns, transit_ns, period_ns) else []
+        passes = self._quarantine.arrived(arrival, sent_ns, transit_ns, period_ns, arrival.received_ns)
+        return known if passes else []
+
+    def tick(self, now_ns: int) -> None:
+        """Let time pass: frames that no echo proves are given up by name."""
+        for arrival in self._quarantine.expired(now_ns):
+            arrival.account.disbelieved[Disbelief.UNPROVEN] += 1
+            self._warn(
+                "frame_unproven", arrival.account.disbelieved[Disbelief.UNPROVEN], why="the board answers no echo"
+            )
 
     def _examine(self, arrival: Arrival) -> list[Admitted]:
         """Map a frame's marks to the host's clock; nothing where they cannot be, which is counted."""
@@ -167,6 +198,8 @@ class Border:
         if frame.width_px > camera.width_px or frame.height_px > camera.height_px:
             return Disbelief.SIZE
         labelled, since_ns = camera.pacing is Pacing.DEMAND, self._clock.since_ns
+        if labelled and not self._on_demand:
+            return Disbelief.PACING
         if since_ns is not None and frame.marks.exposed_ns < since_ns and not labelled:
             return Disbelief.CLOCK
         arrived_ns = arrival.received_ns - estimate.offset_at(arrival.received_ns - estimate.offset_ns)
@@ -180,13 +213,23 @@ class Border:
         self._account.clock_doubts += 1
         self.close()
         self._on_doubt()
-        _LOG.warning(event("clock_in_doubt", count=self._account.clock_doubts, why=why))
+        self._warn("clock_in_doubt", self._account.clock_doubts, why=why)
 
     def _note_step(self) -> None:
         """A clock has stepped: what passed since the last echo before may be paired wrongly."""
         self._account.clock_steps += 1
+        frames = self._note_suspects()
+        self._warn("clock_stepped", self._account.clock_steps, suspect_frames=frames)
+
+    def _note_suspects(self) -> int:
+        """Name the frames that no echo has proven since; gives how many."""
         suspects = self._unproven.stepped()
-        if suspects is not None:
-            self._account.suspects.append(suspects)
-        frames = 0 if suspects is None else suspects.frames
-        _LOG.warning(event("clock_stepped", count=self._account.clock_steps, suspect_frames=frames))
+        if suspects is None:
+            return 0
+        self._account.suspects.append(suspects)
+        return suspects.frames
+
+    @staticmethod
+    def _warn(name: str, count: int, **facts: object) -> None:
+        if count.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: a board that steps on purpose must not fill the log
+            _LOG.warning(event(name, count=count, **facts))

@@ -14,7 +14,8 @@ from phone_host.results import Unwritten
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.phase import Alignment, Phase
-from phone_host.trust import NO_DOUBT, Border, Concern, Timing, border_concerns, stamp_doubt, timing_concerns
+from phone_host.sync.quarantine import Disbelief
+from phone_host.trust import NO_DOUBT, Concern, Timing, Unbelieved, stamp_doubt, timing_concerns, unbelieved_concerns
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,14 +158,14 @@ def concerns(facts: RunFacts, last: int | None = None) -> tuple[Concern, ...]:
         last: how many of the newest pairs time and motion are judged by; None: all.
     """
     link = facts.link
-    border = Border(
+    unbelieved = Unbelieved(
         clock_steps=link.clock_steps,
         suspect_frames=sum(suspects.frames for suspects in link.suspects),
         disbelieved=disbelieved(facts),
-        received=sum(account.received for account in link.sessions),
+        received=sum(account.received + account.disbelieved[Disbelief.CREDIT] for account in link.sessions),
         spoiled_images=spoiled(facts),
     )
-    return border_concerns(border) + timing_concerns(time_and_motion(facts, last))
+    return unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(facts, last))
 
 
 def spoiled(facts: RunFacts) -> dict[str, int]:

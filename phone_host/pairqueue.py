@@ -93,7 +93,7 @@ class PairQueue:
         self._pairing: Pairing[BoardFrame, Frame] | None = None
         self._changed = threading.Condition()
         self._closed = False
-        self._timeless = on_demand
+        self._timeless = self.shows_on_demand = on_demand
         self._time_offset_ns = time_offset_ns
         self._labelled = False
         self._label_offset_ns: int | None = None
@@ -200,7 +200,7 @@ class PairQueue:
             if self._closed:
                 self._count(self._board_orphans, OrphanReason.STREAM_ENDED.value)
                 return exposed_ns
-            delay_ns = frame.received_ns - frame.marks.exposed_ns
+            delay_ns = self._clock() - frame.marks.exposed_ns  # the wait for an echo included
             # Where bytes take the time a frame that is a fifth larger comes as much later; the slow decay follows a link that gets faster.
             self._delay_ns = min(_SLOWEST_NS, max(delay_ns * 5 // 4, self._delay_ns * 63 // 64))
             self._board_bytes += len(frame.message.payload)

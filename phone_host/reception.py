@@ -101,7 +101,7 @@ class Reception:
         self._turned_away: set[int] = set()
         self.tail_known = False
         self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
-        self._border = Border(self.account, queue.void)
+        self._border = Border(self.account, queue.void, on_demand=queue.shows_on_demand)
 
     def refused(self, now_ns: int) -> RefusalReason | None:
         """Why the board that was last heard does not talk to us; None when it does, or is silent now."""
@@ -164,6 +164,7 @@ class Reception:
 
     def tick(self, now_ns: int) -> None:
         """Do what time demands, and let frames come where there is room for them."""
+        self._border.tick(now_ns)
         if self._border.waits_for_echo:
             self._session.probe(now_ns)
         if now_ns >= self._session.due_ns:
@@ -254,7 +255,7 @@ class Reception:
 
     def _note_account(self, counted: Counted, now_ns: int) -> None:
         """Take the board's account of the running session."""
-        self.tail_known = counted.last
+        self.tail_known |= counted.last  # an older account on the other lane may come behind it
         account = self._current
         account.lost += counted.lost
         account.latest = max(counted.counts, account.latest, key=lambda counts: counts.grabbed)

@@ -122,8 +122,8 @@ class Concern:
 
 
 @dataclass(frozen=True, slots=True)
-class Border:
-    """What was not believed at the border.
+class Unbelieved:
+    """What was not believed of what arrived.
 
     Attributes:
         clock_steps: how often a clock was found to have stepped.
@@ -140,36 +140,36 @@ class Border:
     spoiled_images: dict[str, int]
 
 
-def border_concerns(border: Border) -> tuple[Concern, ...]:
+def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
     """Say what was not believed, and what that means; nothing where all was."""
     found = []
-    if border.clock_steps:
+    if unbelieved.clock_steps:
         suspect = (
-            f"; up to {border.suspect_frames} pairs before that was noticed are suspect"
-            if border.suspect_frames
+            f"; up to {unbelieved.suspect_frames} pairs before that was noticed are suspect"
+            if unbelieved.suspect_frames
             else ""
         )
         found.append(
             Concern(
                 Doubt.CLOCK_STEPPED,
-                f"one of the two clocks stepped {border.clock_steps} times{suspect}",
+                f"one of the two clocks stepped {unbelieved.clock_steps} times{suspect}",
                 "do not let the board or the host sleep during a run; leave the suspect pairs out (report.json names them)",
             )
         )
-    if border.spoiled_images:
+    if unbelieved.spoiled_images:
         found.append(
             Concern(
                 Doubt.SPOILED_IMAGES,
-                f"{sum(border.spoiled_images.values())} images were spoiled and not used ({_reasons(border.spoiled_images)})",
+                f"{sum(unbelieved.spoiled_images.values())} images were spoiled and not used ({_reasons(unbelieved.spoiled_images)})",
                 "check the cable, the camera and its format; one now and then does no harm",
             )
         )
-    if border.disbelieved:
-        reasons = _reasons(border.disbelieved)
+    if unbelieved.disbelieved:
+        reasons = _reasons(unbelieved.disbelieved)
         found.append(
             Concern(
                 Doubt.DISBELIEVED,
-                f"{sum(border.disbelieved.values())} frames of {border.received} were not believed and dropped ({reasons})",
+                f"{sum(unbelieved.disbelieved.values())} frames of {unbelieved.received} were not believed and dropped ({reasons})",
                 "none of them was used; if it goes on, update the board's software and check its camera and who else uses the link",
             )
         )

@@ -10,7 +10,7 @@ from typing import assert_never
 
 from common.frame import Frame
 from common.ledger import BoardMarks
-from common.protocol.absence import absent_ns
+from common.protocol.absence import Presence
 from common.protocol.message import (
     BoardCounts,
     BoardHello,
@@ -69,10 +69,10 @@ class _Host:
         beside = None if self.frames is None else self.controls.get(self.frames[0])
         return beside if beside is not None else next(iter(self.controls.values()), None)
 
-    def excuse(self, absent: int, now_ns: int) -> None:
-        """Take out of its silence the time, ns, in which this process did not run."""
-        self.heard_ns = min(now_ns, self.heard_ns + absent)
-        self.heard_by = {link: min(now_ns, heard_ns + absent) for link, heard_ns in self.heard_by.items()}
+    def excuse(self, absent_ns: int, now_ns: int) -> None:
+        """Take out of its silence the time in which this process did not run."""
+        self.heard_ns = min(now_ns, self.heard_ns + absent_ns)
+        self.heard_by = {link: min(now_ns, heard_ns + absent_ns) for link, heard_ns in self.heard_by.items()}
         self.silence_due_ns = min(self.heard_by.values(), default=now_ns) + SILENCE_NS
 
     def knows(self, connection: bytes) -> bool:
@@ -126,6 +126,7 @@ class BoardSession:
         self._ended = False
         self._later_ns = 0
         self._steered_ns = -STEER_REST_NS
+        self._presence = Presence()
 
     @property
     def carrier(self) -> int | None:
@@ -284,8 +285,9 @@ class BoardSession:
 
     def _notice_absence(self, now_ns: int) -> None:
         """Time in which this process did not run is not its host's silence."""
-        if self._host is not None and (absent := absent_ns(self.due_ns, now_ns)):
-            self._host.excuse(absent, now_ns)
+        absent_ns = self._presence.absent_ns(self.due_ns, now_ns)
+        if self._host is not None and absent_ns:
+            self._host.excuse(absent_ns, now_ns)
 
     def _ask_for_frames_lane(self, host: _Host) -> list[Outgoing]:
         """Say where the host is known that its frames' lane is not; a knock for the control lane would say that the host is not known either."""

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final, assert_never
 
-from common.protocol.absence import absent_ns
+from common.protocol.absence import Presence
 from common.protocol.host_path import HostPath
 from common.protocol.message import (
     BoardCounts,
@@ -131,6 +131,7 @@ class HostSession:
         self._leaving = False
         self._stream: _Stream | None = None
         self._boot_id = ""
+        self._presence = Presence()
 
     @property
     def is_open(self) -> bool:
@@ -287,12 +288,12 @@ class HostSession:
 
     def _notice_absence(self, now_ns: int) -> None:
         """Take out of all silence the time in which this process did not run."""
-        absent = absent_ns(self.due_ns, now_ns)
-        if not absent:
+        absent_ns = self._presence.absent_ns(self.due_ns, now_ns)
+        if not absent_ns:
             return
         for path in self._paths:
-            path.heard_ns = min(now_ns, path.heard_ns + absent)
-        self._pending_since_ns = min(now_ns, self._pending_since_ns + absent)
+            path.heard_ns = min(now_ns, path.heard_ns + absent_ns)
+        self._pending_since_ns = min(now_ns, self._pending_since_ns + absent_ns)
 
     def _open(self, path: HostPath, hello: BoardHello, now_ns: int) -> list[Output]:
         """Take a board's hello on a control lane."""

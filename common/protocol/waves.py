@@ -49,7 +49,7 @@ class Waves:
         self._link = link
         self._opened_ns = 0
         self._due_ns = 0
-        self._wave = 0
+        self._wave = self._first_wave = 0
         self._wave_ns = 0
         self._echoes_left = 0
         self._repeats_left = 0
@@ -64,6 +64,7 @@ class Waves:
     def open(self, now_ns: int) -> None:
         """The link came up: echoes under way are of an earlier connection, perhaps of another clock."""
         self._wave += 1
+        self._first_wave = self._wave
         self._echoes_left = 0
         self._kept.clear()
         self._unanswered = False
@@ -98,7 +99,9 @@ class Waves:
         return self._given(), self._ping()
 
     def answered(self, pong: Pong, now_ns: int) -> tuple[list[Echo], Ping | None]:
-        """Take an answer; one of an older wave tells nothing.
+        """Take an answer; one from before the link came up tells nothing, as it may be of another clock.
+
+        One of an older wave is a fact like any other, but no further question follows it: where a round trip takes longer than a wave is waited for, all are.
 
         A swift echo is kept until its wave has ended. To learn from it takes longer than the echo did; the board's processor would rest meanwhile and wake
         late, so that every question travelled longer than its answer (decision 0009).
@@ -110,6 +113,8 @@ class Waves:
         Returns:
             Echoes to learn from, and the wave's next question, if there is one.
         """
+        if self._first_wave < pong.wave < self._wave:
+            return [self._echo(pong, now_ns)], None
         if pong.wave != self._wave:
             return [], None
         self._unanswered = False
@@ -121,10 +126,13 @@ class Waves:
             rest = WAVE_REST_YOUNG if age_ns < YOUNG_NS else WAVE_REST
             rest_ns = min(WAVE_PATIENCE_NS, rest * (now_ns - self._wave_ns))
             self._due_ns = max(self._due_ns, now_ns + rest_ns)
-        self._kept.append(Echo(pong.wave, pong.t0_ns, pong.t1_ns, pong.t2_ns, now_ns, self._link))
+        self._kept.append(self._echo(pong, now_ns))
         ping = self._ping()
         swift = now_ns - pong.t0_ns < SLOW_ECHO_NS
         return [] if swift and ping is not None else self._given(), ping
+
+    def _echo(self, pong: Pong, now_ns: int) -> Echo:
+        return Echo(pong.wave, pong.t0_ns, pong.t1_ns, pong.t2_ns, now_ns, self._link)
 
     def _given(self) -> list[Echo]:
         echoes, self._kept = self._kept, []

@@ -7,6 +7,7 @@ does not reach.
 """
 
 import errno
+import fcntl
 import os
 import re
 import stat
@@ -46,6 +47,7 @@ class ListedFolder:
         self.descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
         self._list = -1
         try:
+            self._lock()
             listed = self._listed()
             removed = self._ours(re.compile(names), listed)
             self._ours(re.compile(kept), listed)
@@ -107,6 +109,17 @@ class ListedFolder:
                 os.close(descriptor)
         self._list = self.descriptor = -1
 
+    def _lock(self) -> None:
+        """Keep other runs out until this one has closed the folder; where the file system has no locks, nobody is kept out."""
+        try:
+            fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise UnavailableError(
+                f"{self._path} is being written by another run", "wait for its end, or give another folder with --out"
+            ) from None
+        except OSError:
+            return
+
     def _listed(self) -> set[str]:
         path = self._path / LIST
         try:
@@ -134,7 +147,7 @@ class ListedFolder:
             if stat.S_ISLNK(mode):
                 raise self._in_the_way(f"{path} is a link")
             if plain_name(name) not in listed or not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-                raise self._in_the_way(f"{path} is not from an earlier run")
+                raise self._in_the_way(f"{path} is not known to be from an earlier run")
         return found
 
     def _check_inside(self, name: str) -> None:
@@ -146,7 +159,7 @@ class ListedFolder:
             for entry in _entries(folder):
                 mode = os.lstat(entry, dir_fd=folder).st_mode
                 if not (self._inner.fullmatch(plain_name(entry)) and stat.S_ISREG(mode)):
-                    raise self._in_the_way(f"{self._path / name / entry} is not from an earlier run")
+                    raise self._in_the_way(f"{self._path / name / entry} is not known to be from an earlier run")
         finally:
             os.close(folder)
 
@@ -164,7 +177,7 @@ class ListedFolder:
         os.rmdir(name, dir_fd=self.descriptor)
 
     def _in_the_way(self, problem: str) -> UnavailableError:
-        return UnavailableError(problem, "move it away, or give another folder with --out")
+        return UnavailableError(problem, "move or delete it, or give another folder with --out")
 
 
 def claim(path: Path, *names: str) -> None:

@@ -40,9 +40,11 @@ _TALK: Final = ("Corrupt JPEG data", "Warning: unknown JFIF", "Unknown Adobe col
 
 _EXTRA_BYTES: Final = re.compile(r"(\d+) extraneous bytes before marker 0x([0-9a-f]{2})")
 _BEHIND_DATA: Final = frozenset({0xC4, 0xD9, 0xDA, 0xDD, *range(0xD0, 0xD8)})
-_HARMLESS_BYTES: Final = 8
-"""Webcams are known for 1 to 4. Of 1500 images with one flipped bit each the decoder was left with 64 bytes and more, with restart markers
-with at most 8 in 1 of 23 (decision 0021)."""
+_END: Final = 0xD9
+_HARMLESS_BYTES: Final = 16
+_HARMLESS_BEFORE_END: Final = 48
+"""Webcams are known for 1 to 10 before restart markers (pupil-labs/pupil, issue 1816) and for padding before the end. Of 1500 images with one flipped
+bit each the decoder was left with 64 bytes and more before the end, with restart markers with at most 8 in 1 of 23 (decision 0021)."""
 
 # Sensors of 10, 12 and 14 bit are stored in 16-bit files with the upper bits 0 as often as shifted up.
 _SENSOR_BITS = (8, 10, 12, 14, 16)
@@ -326,7 +328,10 @@ def _complaint(said: list[str]) -> str:
 
 def _is_harmless(warning: str) -> bool:
     found = _EXTRA_BYTES.search(warning)
-    return found is not None and (int(found[2], 16) not in _BEHIND_DATA or int(found[1]) <= _HARMLESS_BYTES)
+    if found is None:
+        return False
+    count, marker = int(found[1]), int(found[2], 16)
+    return marker not in _BEHIND_DATA or count <= (_HARMLESS_BEFORE_END if marker == _END else _HARMLESS_BYTES)
 
 
 def require_same_shape(image_px: tuple[int, int], asked_px: tuple[int, int], name: str) -> None:

@@ -42,9 +42,9 @@ _LEAST_SPACING_NS: Final = 500.0
 CONFIRMED_WAVES: Final = 3
 """After so many waves on the new side of a jump it was no lie and no accident: 100 ms, as waves follow each other early (`Waves.hasten`)."""
 
-_HARMLESS_NS: Final = 2_000_000
-"""Two sides of a jump that cannot be further apart are as good as each other: no camera's frames are so close that a wrong pair could come of it. So a
-clock that is being steered (NTP slews by 500 ppm) interrupts nothing."""
+_HARMLESS_NS: Final = 4_000_000
+"""Two sides of a jump that cannot be further apart are as good as each other: half of the tolerance of cameras at 60 frames a second. So a clock that is
+being steered (NTP slews by 500 ppm) interrupts nothing where a round trip takes less; elsewhere it is a doubt of three waves now and then."""
 
 
 class Heard(Enum):
@@ -161,15 +161,15 @@ class _Learned:
     def agrees_with(self, echo: Echo) -> bool:
         """Whether an echo can be of these clocks: its facts leave something of what the earlier ones left."""
         estimate = self.estimate
-        if estimate is None or echo.t1_ns < estimate.reference_ns:
-            return False
-        return (
+        return estimate is not None and (
             echo.t0_ns - echo.t1_ns <= estimate.limits_at(echo.t1_ns)[1]
             and echo.t3_ns - echo.t2_ns >= estimate.limits_at(echo.t2_ns)[0]
         )
 
     def add(self, echo: Echo) -> bool:
-        """Learn from an echo; gives whether all facts still agree."""
+        """Learn from an echo; gives whether all facts still agree. One that is older than the newest has been overtaken and adds nothing."""
+        if echo.t1_ns < self._newest.t2_ns:
+            return True
         new_wave = self.waves[-1].number != echo.wave
         tight = self._is_tight(echo)
         self._store(echo)
@@ -269,8 +269,8 @@ class ClockEstimator:
     """Learns one board clock; a new boot of the board needs a new estimator.
 
     An echo that contradicts what is known begins a rival: a second state that knows of this echo and its like only. While the two may be further
-    apart than is harmless there is no estimate. The rival falls with the first echo that agrees with the old state alone, and takes its place when
-    CONFIRMED_WAVES have agreed with it.
+    apart than is harmless there is no estimate. The rival falls with the first echo that agrees with the old state alone. Else further waves speak for the
+    one or the other: the rival takes the old state's place when it and those that follow make CONFIRMED_WAVES, and falls when as many waves speak against it.
 
     Args:
         prior_skew: what the skew was before, where it is known.
@@ -280,6 +280,8 @@ class ClockEstimator:
         self._prior_skew = prior_skew
         self._learned: _Learned | None = None
         self._rival: _Learned | None = None
+        self._rival_wave = 0
+        self._votes: dict[int, tuple[int, bool]] = {}
 
     @property
     def estimate(self) -> ClockEstimate | None:
@@ -326,17 +328,39 @@ class ClockEstimator:
         if self._learned is None:
             self._learned = _Learned(echo, self._prior_skew)
             return Heard.AGREED
-        # The rival is asked first: an echo that fits both, having taken long, speaks for the newer one, which rests on a hard fact.
+        fits = self._learned.agrees_with(echo)
         if self._rival is not None and self._rival.agrees_with(echo) and self._rival.add(echo):
-            if len(self._rival.waves) < CONFIRMED_WAVES:
-                return Heard.DOUBTED if self.in_doubt else Heard.AGREED
-            was_harmless = not self.in_doubt
-            self._learned, self._rival = self._rival, None
-            return Heard.AGREED if was_harmless else Heard.STEPPED
-        if self._learned.agrees_with(echo):
+            return self._weigh(self._rival, echo, fits_both=fits)
+        if fits:
             self._rival = None
             if not self._learned.add(echo):  # within the bound, but the premise of its drift is broken
                 self._learned = _Learned(echo, self.skew)
             return Heard.AGREED
-        self._rival = _Learned(echo, self.skew)
+        self._rival, self._rival_wave, self._votes = _Learned(echo, self.skew), echo.wave, {}
         return Heard.DOUBTED if self.in_doubt else Heard.AGREED
+
+    def _weigh(self, rival: _Learned, echo: Echo, *, fits_both: bool) -> Heard:
+        """Take an echo that agrees with the rival: which of the two its wave speaks for, and whether that decides.
+
+        One that fits both took long; the ways there and back are alike on the whole, so that it speaks for the side nearer to its middle.
+        """
+        known, new = (self._learned.estimate if self._learned is not None else None), rival.estimate
+        assert known is not None
+        assert new is not None
+        middle_ns = ((echo.t0_ns - echo.t1_ns) + (echo.t3_ns - echo.t2_ns)) / 2
+        nearer = abs(middle_ns - new.offset_at(echo.t1_ns)) < abs(middle_ns - known.offset_at(echo.t1_ns))
+        round_trip_ns = (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns)
+        if echo.wave != self._rival_wave:
+            self._votes[echo.wave] = min(
+                self._votes.get(echo.wave, (round_trip_ns, True)), (round_trip_ns, nearer or not fits_both)
+            )
+        votes = [for_rival for _, for_rival in self._votes.values()]
+        enough = CONFIRMED_WAVES - 1
+        if votes.count(False) >= enough:
+            self._rival = None
+            return Heard.AGREED
+        if votes.count(True) < enough:
+            return Heard.DOUBTED if self.in_doubt else Heard.AGREED
+        was_harmless = not self.in_doubt
+        self._learned, self._rival = rival, None
+        return Heard.AGREED if was_harmless else Heard.STEPPED

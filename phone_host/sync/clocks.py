@@ -87,10 +87,10 @@ class LinkClocks:
         self._estimate = None
 
     def down(self, link: int) -> None:
-        """Take note that a link is gone: a doubt that only its echoes could have settled goes with it."""
-        if self.in_doubt:
+        """Take note that a link is gone: a doubt that only its echoes could have settled is left to the next echo of any."""
+        if self._contested or self._estimators[link].in_doubt:
             self._estimators[link] = ClockEstimator(self._estimators[link].skew)
-            self._contested = False
+            self._void, self._contested = self._void or self._believed is not None, False
 
     def _forget(self, keep: int | None) -> None:
         self._estimators = [

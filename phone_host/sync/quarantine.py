@@ -25,10 +25,13 @@ STEP_PERIODS: Final = 1.5
 """A step of two periods stays visible though a frame is half a period swifter or slower than any of late."""
 
 _RECENT: Final = 32
-"""A second of frames: a hitch of the machine makes the frames of so long wait for an echo, which takes a millisecond."""
+"""A second of frames: a hitch makes the frames of so long wait for an echo, which takes a round trip of the link."""
 
 _HISTORY_NS: Final = 60_000_000_000
 """No frame of the host's own camera is kept for longer (`pairqueue`)."""
+
+PATIENCE_NS: Final = 10_000_000_000
+"""So long a frame waits for an echo: three times the round trip of the slowest link on which anything can be done."""
 
 LABELS_NS: Final = 2**60
 """Stamps of images shown on demand are labels and may lie anywhere, but for differences that do not fit into 64 bits."""
@@ -41,6 +44,8 @@ class Disbelief(Enum):
     PAST = "older_than_any_partner"
     MARKS = "marks_out_of_order"
     CLOCK = "clock_in_doubt"
+    UNPROVEN = "proven_by_no_echo"
+    PACING = "on_demand_beside_a_live_camera"
     CREDIT = "beyond_credit"
     SIZE = "larger_than_its_camera"
 
@@ -57,24 +62,24 @@ def disbelief(marks: BoardMarks, received_ns: int, bound_ns: int, *, labelled: b
     Returns:
         The reason; None for a frame that can be.
     """
-    if labelled:
-        return None if abs(received_ns - marks.exposed_ns) < LABELS_NS else Disbelief.PAST
-    if max(marks.exposed_ns, marks.sent_ns) > received_ns + bound_ns:
+    exposed_ns = marks.grabbed_ns if labelled else marks.exposed_ns
+    if max(exposed_ns, marks.sent_ns) > received_ns + bound_ns:
         return Disbelief.FUTURE
-    if not marks.exposed_ns <= marks.grabbed_ns <= marks.sent_ns:
+    if not exposed_ns <= marks.grabbed_ns <= marks.sent_ns:
         return Disbelief.MARKS
-    if received_ns - marks.exposed_ns > _HISTORY_NS:
+    if received_ns - exposed_ns > _HISTORY_NS or abs(received_ns - marks.exposed_ns) >= LABELS_NS:
         return Disbelief.PAST
     return None
 
 
 @dataclass(frozen=True, slots=True)
 class _Held(Generic[F]):
-    """A frame that waits: when it was sent (board's clock) and how long it took, ns."""
+    """A frame that waits: when it was sent (board's clock), how long it took, and since when it waits (host's clock), ns."""
 
     frame: F
     sent_ns: int
     transit_ns: int
+    since_ns: int
 
 
 class Quarantine(Generic[F]):
@@ -89,7 +94,7 @@ class Quarantine(Generic[F]):
         """Frames that wait for an echo."""
         return len(self._held)
 
-    def arrived(self, frame: F, sent_ns: int, transit_ns: int, period_ns: int) -> bool:
+    def arrived(self, frame: F, sent_ns: int, transit_ns: int, period_ns: int, now_ns: int) -> bool:
         """Take a frame.
 
         Args:
@@ -97,28 +102,37 @@ class Quarantine(Generic[F]):
             sent_ns: its sending, board's clock, ns.
             transit_ns: how long it was under way by the present estimate.
             period_ns: between two frames of its camera.
+            now_ns: host's clock, ns.
 
         Returns:
-            Whether it may pass now; else it is kept until `confirmed` or `void`.
+            Whether it may pass now; else it is kept until `confirmed`, `expired` or `void`.
         """
         if not self._held and self._is_usual(transit_ns, period_ns):
             self._recent.append(transit_ns)
             return True
-        self._held.append(_Held(frame, sent_ns, transit_ns))
+        self._held.append(_Held(frame, sent_ns, transit_ns, now_ns))
         return False
 
-    def confirmed(self, board_ns: int) -> list[F]:
+    def confirmed(self, board_ns: int, before_ns: int) -> list[F]:
         """Take note of an echo that agreed; gives the frames that may pass now.
 
         Args:
             board_ns: when the board heard it, board's clock, ns: what it sent before is proven.
+            before_ns: only frames that have waited since before this moment, host's clock, ns.
         """
         passed = []
-        while self._held and self._held[0].sent_ns <= board_ns:
+        while self._held and self._held[0].sent_ns <= board_ns and self._held[0].since_ns <= before_ns:
             held = self._held.popleft()
             self._recent.append(held.transit_ns)
             passed.append(held.frame)
         return passed
+
+    def expired(self, now_ns: int) -> list[F]:
+        """Give up the frames that have waited for too long: a board that does not answer cannot be believed."""
+        dropped = []
+        while self._held and now_ns - self._held[0].since_ns > PATIENCE_NS:
+            dropped.append(self._held.popleft().frame)
+        return dropped
 
     def void(self) -> list[F]:
         """Take note that the clock is in doubt, or begins anew; gives the frames that will not pass."""
@@ -151,11 +165,15 @@ class Suspects:
     frames: int
 
 
+_MOST_UNPROVEN: Final = 4096
+"""More frames than come between two echoes on any link."""
+
+
 class Unproven:
     """Frames that have passed and that no echo has confirmed yet."""
 
     def __init__(self) -> None:
-        self._frames: deque[tuple[int, str, int]] = deque()
+        self._frames: deque[tuple[int, str, int]] = deque(maxlen=_MOST_UNPROVEN)
 
     def passed(self, sent_ns: int, session: str, sequence: int) -> None:
         """Take note of a frame: its sending (board's clock, ns), its session and its number."""

@@ -62,9 +62,9 @@ def run(options: argparse.Namespace) -> int:
     if core is None:  # cannot be: one of the two ways to a core was checked above
         raise SettingsError("no stereo core", "give --calibration or --rectified")
     core.require_sizes(files[0].size_px, files[1].size_px)
-    _clear(options.out)
     watch.lap("prepare")
     left, right = decode_files(*files)
+    _clear(options.out)  # not before the images are known to be sound: else an earlier result is lost for nothing
     watch.lap("read")
     pair = core.rectify(left, right)
     watch.lap("rectify")

@@ -69,13 +69,14 @@ class SteppingWorld:
 
     Args:
         latency_ns: of the wires.
-        jitter: frames take up to this part of the latency longer.
+        jitter: frames take up to this part of the latency longer, all else up to a quarter of that.
         seed: of everything that is left to chance.
     """
 
     def __init__(self, latency_ns: int, jitter: float, seed: int) -> None:
         self._chance = random.Random(seed)
-        self._latency_ns, self._jitter = latency_ns, jitter
+        self.latency_ns, self._jitter = latency_ns, jitter
+        self.answers_echoes = True
         self.true_ns = 10**13
         self.host = Machine(-(10**12))
         self.board = Machine(7 * 10**12)
@@ -95,7 +96,7 @@ class SteppingWorld:
         self._new_board()
         self.pairs = 0
         self.wrong: list[WrongPair] = []
-        self._asked_ns = self._stepped_ns = 0
+        self._asked_ns = self._stepped_ns = self._untold_ns = 0
         self._asked: dict[int, tuple[int, int]] = {}
         self._settled_ns = self._apart_ns
 
@@ -123,12 +124,20 @@ class SteppingWorld:
             self._judge()
 
     def step(self, which: Machine, by_ns: int) -> None:
-        """A clock steps while everything runs."""
+        """A clock steps while everything runs. A frame that waits in the board's outbox meanwhile has marks of both clocks, which nobody can tell: it is lost here."""
         which.shift_ns += by_ns
+        if which is self.board:
+            self._outbox = None
         self._stepped_ns = self.true_ns
 
     def sleep(self, which: Machine, duration_ns: int, *, told: bool) -> None:
-        """A machine sleeps: it is not run, and its clock stands still. When it wakes its kernel tells, or does not."""
+        """A machine sleeps: it is not run, and its clock stands still. When it wakes its kernel tells, or does not.
+
+        What is under way to a host that is not told looks as if it had just come, and nothing can tell (decision 0009, 11): it is lost here, and what
+        had come before is not judged.
+        """
+        if which is self.host and not told:
+            self._untold_ns = self.host_clock()
         which.asleep_until_ns = self.true_ns + duration_ns
         which.told |= told
 
@@ -231,8 +240,11 @@ class SteppingWorld:
                 self._stepped_ns = self.true_ns
             elif machine.told and machine.slept_ns and self._is_there(machine):
                 self._tell_sleep(machine)
-            elif self._is_there(machine):
+            elif self._is_there(machine) and machine.slept_ns:
                 machine.slept_ns = 0
+                if machine is self.host:
+                    for lane in Lane:
+                        self._wire(lane, "host").clear()
 
     def _tell_sleep(self, machine: Machine) -> None:
         if machine is self.host:
@@ -254,9 +266,8 @@ class SteppingWorld:
         return self._wires.setdefault((lane, to), deque())
 
     def _put(self, lane: Lane, to: str, message: Message) -> None:
-        took_ns = self._latency_ns
-        if isinstance(message, FrameMessage):
-            took_ns += round(self._latency_ns * self._jitter * self._chance.random())
+        part = self._jitter if isinstance(message, FrameMessage) else self._jitter / 4
+        took_ns = self.latency_ns + round(self.latency_ns * part * self._chance.random())
         wire = self._wire(lane, to)
         wire.append((max(self.true_ns + took_ns, wire[-1][0] if wire else 0), message))
 
@@ -324,6 +335,8 @@ class SteppingWorld:
             self._apart_at_sending[message.session, message.sequence] = self._apart_ns
             message = replace(message, marks=replace(message.marks, sent_ns=self.board_clock()))
         elif isinstance(message, Pong):
+            if not self.answers_echoes:
+                return
             message = replace(message, t2_ns=self.board_clock())
         self._put(_lane(outgoing.connection), "host", message)
 
@@ -335,8 +348,10 @@ class SteppingWorld:
         self._put(_lane(outgoing.connection), "board", message)
 
     def _note_answer(self, wave: int) -> None:
+        """An answer that waited while a program was stopped bounds nothing by which a step could be seen."""
         asked_ns, apart_ns = self._asked.get(wave, (0, 0))
-        if asked_ns > self._asked_ns:
+        swift = self.true_ns - asked_ns <= 2 * self.latency_ns * (1 + self._jitter / 4) + 4 * _STEP_NS
+        if asked_ns > self._asked_ns and swift:
             self._asked_ns, self._settled_ns = asked_ns, apart_ns
 
     def _judge(self) -> None:
@@ -347,7 +362,7 @@ class SteppingWorld:
             message = pair.board.message
             apart_ns = abs(self._exposed[message.session, message.sequence] - self._host_exposed[pair.host.sequence])
             allowed_ns = self.queue.tolerance_ns + self._bound_ns
-            if apart_ns > allowed_ns:
+            if apart_ns > allowed_ns and pair.board.received_ns > self._untold_ns:
                 stepped_ns = self._apart_at_sending[message.session, message.sequence] - self._settled_ns
                 excusable = self.unsettled and abs(stepped_ns) < 2 * PERIOD_NS
                 self.wrong.append(WrongPair(message.session, message.sequence, apart_ns, allowed_ns, excusable))

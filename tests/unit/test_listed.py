@@ -12,7 +12,7 @@ import pytest
 
 from common.errors import TandemError, UnavailableError
 from phone_host.formats.atomic import write_bytes, write_text
-from phone_host.formats.listed import ListedFolder, claim
+from phone_host.formats.listed import LIST, ListedFolder, claim
 from phone_host.results import NAMES, PAIR_FILES, Results
 
 FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
@@ -61,7 +61,11 @@ def test_a_run_again_and_again_in_one_folder(tmp_path: Path) -> None:
     """Each run takes the place of the one before, also after it was killed before its report."""
     for number in range(3):
         Results(tmp_path, 1).finish({"number": number})
-    Results(tmp_path, 1)
+    killed = Results(tmp_path, 1)
+    assert killed._own is not None
+    with pytest.raises(UnavailableError, match="is being written by another run"):
+        Results(tmp_path, 1)
+    killed._own.close()
     Results(tmp_path, 1).finish({})
     assert sorted(path.name for path in tmp_path.iterdir()) == [LIST, "delays.jsonl", "report.json"]
 
@@ -223,7 +227,7 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
 def test_names_are_claimed_before_they_are_written(tmp_path: Path) -> None:
     """A verb that writes single files refuses those of others before its work, replaces those of earlier runs, and is replaced itself."""
     (tmp_path / "report.json").write_text("mine")
-    with pytest.raises(UnavailableError, match=r"report\.json is not from an earlier run"):
+    with pytest.raises(UnavailableError, match=r"report\.json is not known to be from an earlier run"):
         claim(tmp_path, "report.json", "plot.svg")
     (tmp_path / "report.json").unlink()
     for _ in range(2):

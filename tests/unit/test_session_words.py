@@ -294,8 +294,8 @@ def test_the_end_is_said_until_it_is_heard() -> None:
     assert End(world.board.session, world.counts) in heard
 
 
-def test_echoes_of_an_old_wave_are_ignored() -> None:
-    """Only answers to the wave that is under way are clock echoes; late ones and those of another life are not."""
+def test_echoes_of_another_life_are_ignored() -> None:
+    """Answers to any wave since the link came up are clock echoes, late ones too, as a round trip may take longer than a wave; those of another life are not."""
     world = World()
     world.settle(300 * MS)
     host = world.hosts[0]
@@ -307,7 +307,10 @@ def test_echoes_of_an_old_wave_are_ignored() -> None:
     ]
     sound = Pong(ping.wave, 1, 2, 3)
     assert Echo(ping.wave, 1, 2, 3, world.now_ns) in host.session.receive(control, sound, world.now_ns)
-    assert host.session.receive(control, Pong(ping.wave - 1, 1, 2, 3), world.now_ns) == []
+    assert host.session.receive(control, Pong(ping.wave - 1, 1, 2, 3), world.now_ns) == [
+        Echo(ping.wave - 1, 1, 2, 3, world.now_ns)
+    ]
+    assert host.session.receive(control, Pong(0, 1, 2, 3), world.now_ns) == []
     world.restart_board()
     world.settle(20 * MS)
     assert host.session.is_open
