@@ -19,6 +19,7 @@ from phone_host.run_page import run_page
 from phone_host.summary import phase_lines, summary
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Phase
+from phone_host.sync.quarantine import Disbelief, Suspects
 
 NAN = float("nan")
 MS = 1_000_000
@@ -80,3 +81,23 @@ def test_only_stamps_that_nobody_knows_are_called_unmeasured() -> None:
     assert told not in summary(replace(facts(31), stamps_exact=True))
     measured = TimeOffset(offset_ns=3 * MS, uncertainty_ns=MS // 2)
     assert f"{told} differ by +3.00 +-0.50 ms" in summary(replace(facts(31), time_offset=measured))
+
+
+def test_what_was_not_believed_is_told_everywhere() -> None:
+    """A step with its suspect frames, frames that were not believed and spoiled images stand by name in JSON, summary and page, and each raises a doubt."""
+    account = SessionAccount("s", BoardCounts(), BoardCounts(), received=40)
+    account.disbelieved[Disbelief.FUTURE] = 3
+    account.disbelieved[Disbelief.CREDIT] = 2
+    link = LinkAccount([account], clock_doubts=2, clock_steps=1)
+    link.suspects.append(Suspects("s", 11, 17, 7))
+    seen = replace(facts(30), link=link, own_future=4, spoiled_images=(("too_large", 5),))
+    told: Any = build(seen)
+    assert told["clock"]["steps"] == 1
+    assert told["clock"]["doubts"] == 2
+    assert told["clock"]["suspects"] == [{"session": "s", "first": 11, "last": 17, "frames": 7}]
+    dropped = {"from_the_future": 3, "beyond_credit": 2, "own_from_the_future": 4}
+    assert told["frames"]["disbelieved"] == dropped
+    assert {item["doubt"] for item in told["warnings"]} == {"clock_stepped", "disbelieved", "spoiled_images"}
+    for text in (summary(seen), run_page(seen, None, Side.LEFT, ())):
+        for words in ("stepped 1 times", "7 pairs", "from the future", "beyond credit", "too large"):
+            assert words in text

@@ -282,6 +282,10 @@ def judge_account(report: Any, outcome: Outcome) -> None:
         frames["received"] == frames["paired"] + orphaned + frames["held"], "received is not paired + orphaned + held"
     )
     used = sum(count for name, count in pairs.items() if name not in {"paired", "spoiled_images"})
+    received = sum(session["received"] for session in report["sessions"])
+    beyond = frames["disbelieved"].get("beyond_credit", 0) + frames["disbelieved"].get("own_from_the_future", 0)
+    dropped = sum(frames["disbelieved"].values()) - beyond + frames["before_clock"]
+    outcome.expect(received == frames["received"] + dropped, "what came is not what was taken in + dropped by name")
     outcome.expect(pairs["paired"] == used, "paired is not processed + dropped + stopped")
     for session in report["sessions"]:
         if session["tail"] == "known" and session["session"]:
