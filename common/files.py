@@ -111,6 +111,32 @@ def read_file(folder: int, path: Path, most_bytes: int) -> tuple[bytes, os.stat_
     return content, status
 
 
+def read_whole(path: Path, most_bytes: int) -> bytes:
+    """Read a file that somebody names, whatever that name leads to.
+
+    Args:
+        path: the file; links are followed.
+        most_bytes: of a longer one nothing is read.
+
+    Returns:
+        Its content.
+
+    Raises:
+        DataError: it is no plain file (a pipe or a device might never end), or too long.
+        OSError: as the operating system gives it.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(descriptor, "rb") as file:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise DataError(f"{path} is no plain file", "give a file")
+        content = file.read(most_bytes + 1) if status.st_size <= most_bytes else b""
+    if status.st_size > most_bytes or len(content) > most_bytes:
+        size = max(status.st_size, len(content))
+        raise DataError(f"{path} has {size} bytes, {most_bytes} are the most", "give another file")
+    return content
+
+
 @contextmanager
 def replacing_in(folder: int, name: str, *, mode: int = 0o666, durable: bool = True) -> Iterator[BinaryIO]:
     """Open a new file that takes its place in a folder when the block ends well; a link of that name is replaced, not followed.

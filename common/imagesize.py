@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
+from common.errors import DataError
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
 
 MEGAPIXEL: Final = 2**20
@@ -337,6 +338,7 @@ _TIFF_KINDS: Final = {b"II*\0": ("<", False), b"MM\0*": (">", False), b"II+\0": 
 """First bytes to byte order and whether it is a BigTIFF."""
 
 _WIDTH, _HEIGHT, _TILE_WIDTH, _TILE_HEIGHT = 256, 257, 322, 323
+_ORIENTATION: Final = 274
 _TIFF_NUMBERS: Final = {1: "B", 3: "H", 4: "I", 16: "Q"}
 """BYTE, SHORT, LONG (TIFF 6.0, section 2) and LONG8."""
 
@@ -353,7 +355,7 @@ def _tiff_head(data: bytes, name: str) -> ImageHead:
     entry, entry_bytes, count_code = ("HHQ", 20, "Q") if is_big else ("HHI", 12, "H")
     count = min(struct.unpack_from(f"{order}{count_code}", data, directory)[0], _MOST_ENTRIES)
     first = directory + struct.calcsize(f"={count_code}")
-    values = dict.fromkeys((_WIDTH, _HEIGHT, _TILE_WIDTH, _TILE_HEIGHT), 0)
+    values = dict.fromkeys((_WIDTH, _HEIGHT, _TILE_WIDTH, _TILE_HEIGHT, _ORIENTATION), 0)
     for at in range(first, min(first + count * entry_bytes, len(data)), entry_bytes):
         tag, kind, _ = struct.unpack_from(f"{order}{entry}", data, at)
         if tag not in values:
@@ -362,6 +364,11 @@ def _tiff_head(data: bytes, name: str) -> ImageHead:
             raise SpoiledImageError(FrameFault.NO_START, f"{name} is a TIFF whose size is no whole number", _COPY)
         (value,) = struct.unpack_from(f"{order}{_TIFF_NUMBERS[kind]}", data, at + entry_bytes - (8 if is_big else 4))
         values[tag] = max(values[tag], value)
+    if values[_ORIENTATION] not in {0, 1}:  # decoders turn a TIFF by it, and by no other format's
+        raise DataError(
+            f"{name} is to be turned or mirrored (TIFF orientation {values[_ORIENTATION]})",
+            "save it upright, without that tag",
+        )
     block_pixels = values[_TILE_WIDTH] * values[_TILE_HEIGHT]
     return ImageHead(ImageKind.TIFF, values[_WIDTH], values[_HEIGHT], block_pixels=block_pixels)
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Generic, TypeVar, get_args, get_origin, get_type_hints
 
-from common.errors import SettingsError
+from common.errors import DataError, SettingsError
+from common.files import read_whole
 
 T = TypeVar("T")
 
@@ -106,11 +107,17 @@ def log_level(name: str) -> int:
     return levels[name.lower()]
 
 
+_MOST_BYTES = 1 << 20
+"""Of a settings file, which has a page."""
+
+
 def _read(file: Path, known: set[str]) -> dict[str, Any]:
     try:
-        content = tomllib.loads(file.read_text(encoding="utf-8"))
+        content = tomllib.loads(read_whole(file, _MOST_BYTES).decode("utf-8"))
     except OSError as error:
         raise SettingsError(f"settings file {file} cannot be read ({error.strerror})", "check --config") from None
+    except DataError as error:
+        raise SettingsError(f"settings file {error.problem}", "check --config") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SettingsError(f"settings file {file} is not TOML ({error})", "mend that line") from None
     if unknown := set(content) - known:

@@ -247,7 +247,7 @@ class Reception:
     def _note_clock(self, echo: Echo | ClockVoid, now_ns: int) -> None:
         """Take an echo to the clock, and let frames pass that it has proven; or begin anew."""
         if isinstance(echo, ClockVoid):
-            self._border.void("the board had forgotten this host")
+            self._border.void("the board had not heard this host for a while")
             return
         for passed in self._border.learn(echo):
             self._pass(*passed)

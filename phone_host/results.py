@@ -81,7 +81,7 @@ class Results:
         if folder is not None:
             try:
                 self._own = ListedFolder(folder, NAMES, inner=PAIR_FILES)
-                self._own.add("report.json", "index.html")
+                self._own.add("report.json")
                 self._file = self._own.create("delays.jsonl")
             except OSError as error:
                 raise UnavailableError(
@@ -152,6 +152,7 @@ class Results:
             os.fsync(self._file)
             self._own.write_text("report.json", json.dumps(report, indent=1) + "\n")
             if page:
+                self._own.add("index.html")
                 self._own.write_text("index.html", page)
             self._own.sync()
         except OSError as error:

@@ -140,6 +140,13 @@ class Unbelieved:
     spoiled_images: dict[str, int]
 
 
+_OF_THE_CLOCK: Final = frozenset({"clock_in_doubt", "proven_by_no_echo"})
+_STOOD_STILL: Final = "none of them was used; if it goes on, see what stops one of the two programs or machines"
+_LIES: Final = (
+    "none of them was used; if it goes on, update the board's software and check its camera and who else uses the link"
+)
+
+
 def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
     """Say what was not believed, and what that means; nothing where all was."""
     found = []
@@ -170,7 +177,7 @@ def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
             Concern(
                 Doubt.DISBELIEVED,
                 f"{sum(unbelieved.disbelieved.values())} frames of {unbelieved.received} were not believed and dropped ({reasons})",
-                "none of them was used; if it goes on, update the board's software and check its camera and who else uses the link",
+                _STOOD_STILL if _OF_THE_CLOCK.issuperset(unbelieved.disbelieved) else _LIES,
             )
         )
     return tuple(found)

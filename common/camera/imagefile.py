@@ -5,8 +5,10 @@ import struct
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from common.errors import DataError
+from common.files import read_whole
 from common.frame import PixelFormat, SpoiledImageError
 from common.imagesize import ImageHead, ImageKind, read_head
 from common.protocol.wire import MAX_PAYLOAD_BYTES, MAX_SIZE_PX
@@ -38,6 +40,10 @@ _MAXIMUM = re.compile(rb"(?:\s|#[^\n]*\n)+(\d{1,9})\s")
 """Behind a binary map's size: its maximum value and one white space (pgm(5), ppm(5))."""
 
 
+_MOST_BYTES: Final = 4 * MAX_PAYLOAD_BYTES
+"""Of a file that is packed before it is sent; a link takes a quarter of that."""
+
+
 def load(path: Path) -> ImageFile:
     """Read an image file as it is sent over a link.
 
@@ -51,7 +57,7 @@ def load(path: Path) -> ImageFile:
         DataError: the file cannot be read, its header is none of these, or no link takes an image of that size.
     """
     try:
-        data = path.read_bytes()
+        data = read_whole(path, _MOST_BYTES)
     except OSError as error:
         raise DataError(f"{path} cannot be read ({error.strerror})", "check the file and its permissions") from None
     return read_image(path, data)

@@ -77,6 +77,11 @@ def check_socket(path: str, trusted: frozenset[int]) -> None:
         status = Path(path).stat()
         if stat.S_ISSOCK(status.st_mode) and status.st_uid not in trusted:
             raise _refused(path, f"it belongs to {_name(status.st_uid)}", status.st_uid)
+        if not os.access(path, os.R_OK | os.W_OK):
+            raise UnavailableError(
+                f"ipc://{path} lets this user not in: it belongs to {_name(status.st_uid)}",
+                f"add ?owner={os.geteuid()} to the link of the side that listens, as root",
+            )
 
 
 def check_peer(path: str, message: zmq.Frame, trusted: frozenset[int]) -> None:
@@ -97,6 +102,27 @@ def check_peer(path: str, message: zmq.Frame, trusted: frozenset[int]) -> None:
         return
     if uid not in trusted:
         raise _refused(path, f"a process of {_name(uid)} listens there", uid)
+
+
+def let_in(path: str, owner: str) -> None:
+    """Give a socket that was just bound to the user who is to connect to it; it stays closed to all others but root.
+
+    Args:
+        path: of the socket.
+        owner: name or number of the user.
+
+    Raises:
+        UnavailableError: this user may not give it away.
+        SettingsError: there is no such user.
+    """
+    (uid,) = trusted_users(owner) - {os.geteuid(), 0} or {os.geteuid()}
+    try:
+        os.chown(path, uid, -1, follow_symlinks=False)
+    except OSError:
+        raise UnavailableError(
+            f"ipc://{path} cannot be opened to user {owner}: only root may give a socket away",
+            "let that user's side listen (?bind=1), and give owner= on this side",
+        ) from None
 
 
 def owner_of(path: str) -> str:

@@ -17,7 +17,7 @@ from common.keys import KeyFolder, Peer
 from common.link import gate
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.dialled import Dialled
-from common.link.ipc import check_folder, check_peer, check_socket, trusted_users
+from common.link.ipc import check_folder, check_peer, check_socket, let_in, trusted_users
 from common.link.wait import is_readable
 from common.link.zeromq_address import explained, free_path, plain_endpoint
 from common.protocol.message import Lane
@@ -179,6 +179,12 @@ class ZeroMqListener(_AlwaysReady):
             raise explained(address, error, "stop what listens there, or choose another with --link") from None
         finally:
             os.umask(before)
+        if self.kind == "ipc" and owner:
+            try:
+                let_in(path, owner)
+            except UnavailableError:
+                self._context.destroy(linger=0)
+                raise
         self.endpoint = plain_endpoint(self._socket.getsockopt_string(zmq.LAST_ENDPOINT))
         self._door: Door | None = None
 

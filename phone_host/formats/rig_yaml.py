@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from common.files import read_whole
 from phone_host.formats.atomic import write_text
 from phone_host.model import Camera, Rectification, Rig, Side, TimeOffset
 
@@ -118,13 +119,17 @@ def read_rig(path: Path) -> Rig:
     )
 
 
+_MOST_BYTES = 1 << 20
+"""Of a rig.yaml, which has two pages."""
+
+
 class _Reader:
     """A FileStorage whose values are checked one by one; every error names file and key."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         try:
-            text = path.read_text(encoding="utf-8")
+            text = read_whole(path, _MOST_BYTES).decode("utf-8")
         except OSError as error:
             raise DataError(
                 f"{path} cannot be read ({error.strerror})", "give the rig.yaml of `phone-host calibrate`"

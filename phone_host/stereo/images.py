@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from common.files import read_whole
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
 from common.imagesize import MOST_PIXELS, ImageHead, ImageKind, read_head, require_believable, whole_image
 from common.imagesize import size_text as px_text
@@ -40,6 +41,10 @@ _TALK: Final = ("Corrupt JPEG data", "Warning: unknown JFIF", "Unknown Adobe col
 
 _EXTRA_BYTES: Final = re.compile(r"(\d+) extraneous bytes before marker 0x([0-9a-f]{2})")
 _BEHIND_DATA: Final = frozenset({0xC4, 0xD9, 0xDA, 0xDD, *range(0xD0, 0xD8)})
+_BYTES_A_PIXEL: Final = 8
+_MORE_BYTES: Final = 64 << 20
+"""No image file is longer than four channels of 16 bit; phones put films and depth maps behind a JPEG."""
+
 _END: Final = 0xD9
 _HARMLESS_BYTES: Final = 16
 _HARMLESS_BEFORE_END: Final = 48
@@ -158,7 +163,7 @@ def open_image(path: Path, most_pixels: int = MOST_PIXELS) -> EncodedFile:
         DataError: the file is missing; see also `examine`.
     """
     try:
-        content = path.read_bytes()
+        content = read_whole(path, _BYTES_A_PIXEL * most_pixels + _MORE_BYTES)
     except OSError as error:
         raise DataError(f"{path} cannot be read ({error.strerror})", "give an image file that exists") from error
     return examine(content, str(path), most_pixels)

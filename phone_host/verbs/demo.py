@@ -103,7 +103,7 @@ def _clear(out: Path) -> None:
 
     names = rf"{NAMES}|rig\.yaml|cloud\.ply|disparity\.png"
     folder = ListedFolder(out, names, kept="film", inner=PAIR_FILES)
-    folder.add("film", "rig.yaml", "cloud.ply", "disparity.png")
+    folder.add("film", "rig.yaml", "cloud.ply", "disparity.png", "index.html")
     folder.close()
 
 

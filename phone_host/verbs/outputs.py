@@ -1,8 +1,10 @@
 """Where a verb's results go: what cannot be is said before the work, what fails while writing with its remedy."""
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
 
-from common.errors import UnavailableError
+from common.errors import SettingsError, UnavailableError
 
 
 def require_folder(out: Path) -> None:
@@ -31,6 +33,26 @@ def claim_names(folder: Path, out: Path, *names: str) -> None:
         claim(folder, *names)
     except OSError as error:
         raise unwritable(out, error) from error
+
+
+def spare_inputs(out: Path, names: str, inputs: Mapping[str, Path]) -> None:
+    """Refuse results that would take the place of what is read.
+
+    Args:
+        out: folder for the results.
+        names: which names in it are replaced, as a pattern.
+        inputs: what is read, by the words that name it in an error.
+
+    Raises:
+        SettingsError: one of them lies under such a name.
+    """
+    folder = out.resolve()
+    for what, path in inputs.items():
+        inside = path.resolve()
+        if folder in inside.parents and re.fullmatch(names, inside.relative_to(folder).parts[0]):
+            raise SettingsError(
+                f"{what} {path} lies in what --out {out} would replace", "give another folder with --out"
+            )
 
 
 def require_file(out: Path, option: str = "--out") -> None:

@@ -17,6 +17,7 @@ from common.signals import StopSignals
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import EXAMPLE, open_camera
 from phone_host.settings import ENVIRONMENT_PREFIX, MAX_MEGAPIXELS_HELP, PhoneHostSettings, check, key_folder
+from phone_host.verbs.outputs import spare_inputs
 
 if TYPE_CHECKING:
     from phone_host.host import HostSettings
@@ -33,6 +34,11 @@ EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:ri
 """
 
 _CHECK_FAILED = 4
+
+
+def replayed(uri: str) -> str:
+    """The path of a camera that replays images; empty for any other."""
+    return uri.removeprefix("replay:").partition("?")[0] if uri.startswith("replay:") else ""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -121,6 +127,7 @@ def run(options: argparse.Namespace) -> int:
     from phone_host.host import EndReason, Host  # noqa: PLC0415 - OpenCV, only now
     from phone_host.live import LiveTable  # noqa: PLC0415
     from phone_host.report import build  # noqa: PLC0415
+    from phone_host.results import NAMES  # noqa: PLC0415
     from phone_host.run_page import run_page  # noqa: PLC0415
     from phone_host.summary import summary  # noqa: PLC0415
     from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
@@ -131,6 +138,9 @@ def run(options: argparse.Namespace) -> int:
     if not settings.camera:
         raise SettingsError("no own camera is given", f"use --camera {EXAMPLE}")
     _check_numbers(options)
+    if options.out is not None:
+        inputs = {"--camera": replayed(settings.camera), "--calibration": settings.calibration}
+        spare_inputs(options.out, NAMES, {what: Path(path) for what, path in inputs.items() if path})
     fifo = FifoSettings.parse(settings.fifo)
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
     core, board_side = _core(options, settings, (camera.description.width_px, camera.description.height_px))

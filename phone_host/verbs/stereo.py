@@ -64,7 +64,9 @@ def run(options: argparse.Namespace) -> int:
     core.require_sizes(files[0].size_px, files[1].size_px)
     watch.lap("prepare")
     left, right = decode_files(*files)
-    _clear(options.out)  # not before the images are known to be sound: else an earlier result is lost for nothing
+    _clear(
+        options.out, has_cloud=core.geometry is not None
+    )  # not before the images are known to be sound: else an earlier result is lost for nothing
     watch.lap("read")
     pair = core.rectify(left, right)
     watch.lap("rectify")
@@ -139,13 +141,13 @@ def _figures(options: argparse.Namespace, core: "StereoCore", disparity: "Dispar
     }
 
 
-def _clear(out: Path) -> None:
+def _clear(out: Path, *, has_cloud: bool) -> None:
     """Remove an earlier run's results, or they might be taken for this one's."""
     from phone_host.formats.listed import ListedFolder  # noqa: PLC0415
 
     try:
         folder = ListedFolder(out, r"disparity\.(pfm|png)|cloud\.ply|report\.json")
-        folder.add("disparity.pfm", "disparity.png", "cloud.ply", "report.json")
+        folder.add("disparity.pfm", "disparity.png", *(["cloud.ply"] if has_cloud else []), "report.json")
         folder.close()
     except OSError as error:
         raise unwritable(out, error) from error

@@ -258,3 +258,14 @@ def test_the_doctor_asks_as_the_user_who_serves(shared: Path) -> None:
     unit = Unit("board-agent.service")
     findings = examine_link(f"ipc://{place}/link", account, unit, listens_by_default=True)
     assert [finding.verdict for finding in findings] == [Verdict.OK]
+
+
+@needs_root
+def test_a_listener_lets_in_whom_it_names(tmp_path: Path) -> None:
+    """The socket of a link with `owner=` belongs to that user, and is closed to all others but root."""
+    tmp_path.chmod(0o755)
+    path = tmp_path / "board"
+    with closing(listen(f"ipc://{path}?owner=65534")):
+        status = path.lstat()
+        assert status.st_uid == 65534
+        assert stat.S_IMODE(status.st_mode) == 0o600

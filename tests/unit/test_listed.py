@@ -10,10 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from common.errors import TandemError, UnavailableError
+from common.errors import DataError, SettingsError, TandemError, UnavailableError
+from common.files import read_whole
 from phone_host.formats.atomic import write_bytes, write_text
 from phone_host.formats.listed import LIST, ListedFolder, claim
 from phone_host.results import NAMES, PAIR_FILES, Results
+from phone_host.verbs.outputs import spare_inputs
 
 FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
 
@@ -235,3 +237,29 @@ def test_names_are_claimed_before_they_are_written(tmp_path: Path) -> None:
         (tmp_path / "report.json").write_text("ours")
     ListedFolder(tmp_path, r"report\.json|disparity\.pfm").close()
     assert not (tmp_path / "report.json").exists()
+
+
+def test_what_is_read_is_not_replaced(tmp_path: Path) -> None:
+    """Images or a rig that lie under a name which the results would take end the run before anything has changed; beside them they do no harm."""
+    names = NAMES
+    with pytest.raises(SettingsError, match=r"--camera .*pair-000003 lies in what --out"):
+        spare_inputs(tmp_path, names, {"--camera": tmp_path / "pair-000003"})
+    with pytest.raises(SettingsError, match="--calibration"):
+        spare_inputs(tmp_path, names, {"--calibration": tmp_path / "pair-000003" / "rig.yaml"})
+    spare_inputs(tmp_path, names, {"--camera": tmp_path / "left", "--calibration": tmp_path / "rig.yaml"})
+    spare_inputs(tmp_path, names, {"--camera": tmp_path.parent / "pair-000003"})
+
+
+def test_a_file_without_end_is_not_read(tmp_path: Path) -> None:
+    """A device, a pipe or a file longer than anything it could be is one line, at once and without memory."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "sparse").touch()
+    os.truncate(tmp_path / "sparse", 1 << 40)
+    for path in (Path("/dev/zero"), tmp_path / "pipe", tmp_path / "sparse", tmp_path):
+        with pytest.raises((DataError, IsADirectoryError)):
+            read_whole(path, 1 << 20)
+    (tmp_path / "link").symlink_to("plain")
+    (tmp_path / "plain").write_bytes(b"content")
+    assert read_whole(tmp_path / "link", 7) == b"content"
+    with pytest.raises(DataError, match="has 7 bytes, 6 are the most"):
+        read_whole(tmp_path / "link", 6)
