@@ -28,6 +28,9 @@ WAVE_EARLY_NS: Final = 50 * MS
 EARLY_NS: Final = 1000 * MS
 """In its first second there is no estimate worth the name."""
 
+WAVE_HASTE_NS: Final = 10 * MS
+"""Between the beginnings of two waves where something waits for an echo: a frame, or the end of a doubt."""
+
 WAVE_PATIENCE_NS: Final = 1000 * MS
 """An echo under way is waited for this long before another wave: on a slow line a wave takes longer than the time between two."""
 
@@ -71,9 +74,9 @@ class Waves:
         self._opened_ns = self._due_ns = now_ns
 
     def hasten(self, now_ns: int) -> None:
-        """Let the next wave begin as soon as one that is under way has ended, though not sooner than the first ones of a link follow each other."""
+        """Let the next wave begin as soon as one that is under way has ended."""
         if not self._unanswered:
-            self._due_ns = min(self._due_ns, max(now_ns, self._wave_ns + WAVE_EARLY_NS))
+            self._due_ns = min(self._due_ns, max(now_ns, self._wave_ns + WAVE_HASTE_NS))
 
     def begin_wave(self, now_ns: int, *, standby: bool) -> tuple[list[Echo], Ping | None]:
         """Begin a wave that is due.

@@ -40,7 +40,7 @@ _LEAST_SPACING_NS: Final = 500.0
 """Nobody takes a stamp more exactly than this in an interpreter."""
 
 CONFIRMED_WAVES: Final = 3
-"""After so many waves on the new side of a jump it was no lie and no accident: 100 ms, as waves follow each other early (`Waves.hasten`)."""
+"""After so many waves on the new side of a jump it was no lie and no accident; they follow each other at once (`Waves.hasten`)."""
 
 _HARMLESS_NS: Final = 4_000_000
 """Two sides of a jump that cannot be further apart are as good as each other: half of the tolerance of cameras at 60 frames a second. So a clock that is
