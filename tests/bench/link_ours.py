@@ -15,7 +15,7 @@ from common.link.base import Link
 from common.link.factory import open_link, parse_link
 from common.link.stream import StreamLink
 from common.protocol.framing import Side
-from common.protocol.message import Pacing
+from common.protocol.message import FrameMessage, Pacing
 from phone_host.model import BoardFrame
 from phone_host.pairqueue import PairQueue
 from phone_host.receiver import Receiver
@@ -85,15 +85,21 @@ def receive_tandemscan(job: Job) -> Tally:
     tally = job.tally()
 
     class NoPairing(PairQueue):
-        """Ends the frames' way when they have passed the border: pairing is no part of a link."""
+        """Ends the frames' way: pairing is no part of a link."""
 
         def add_board(self, frame: BoardFrame) -> int:
-            message = frame.message
-            tally.arrived(message.sequence, message.marks.sent_ns, len(message.payload))
             return frame.marks.exposed_ns
 
-    queue = NoPairing(FifoSettings(_SLOTS), None, 1_000_000_000 // (job.fps or 30))
+    queue = NoPairing(FifoSettings(_SLOTS), None, 1_000_000_000 // (job.fps or 30), on_demand=not job.fps)
     receiver = Receiver([_open(job.address)], now.random_id(), queue, Unheard())
+    take_in = receiver._reception._accept_frame
+
+    def stamped(frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
+        """Stamps a frame when it is decoded and the session has taken it, before the host decides whether to believe it."""
+        tally.arrived(frame.sequence, frame.marks.sent_ns, len(frame.payload))
+        take_in(frame, lost, link, now_ns)
+
+    receiver._reception._accept_frame = stamped  # type: ignore[method-assign]
     receiver.start()
     while not receiver.ended and receiver.failure is None:
         time.sleep(0.1)
