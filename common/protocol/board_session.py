@@ -285,7 +285,7 @@ class BoardSession:
 
     def _notice_absence(self, now_ns: int) -> None:
         """Time in which this process did not run is not its host's silence."""
-        absent_ns = self._presence.absent_ns(self.due_ns, now_ns)
+        absent_ns = self._presence.absent_ns(lambda: self.due_ns, now_ns)
         if self._host is not None and absent_ns:
             self._host.excuse(absent_ns, now_ns)
 

@@ -288,7 +288,7 @@ class HostSession:
 
     def _notice_absence(self, now_ns: int) -> None:
         """Take out of all silence the time in which this process did not run."""
-        absent_ns = self._presence.absent_ns(self.due_ns, now_ns)
+        absent_ns = self._presence.absent_ns(lambda: self.due_ns, now_ns)
         if not absent_ns:
             return
         for path in self._paths:
