@@ -187,6 +187,18 @@ class PairQueue:
             if not self._closed:
                 self._settle(self._pairing.change(changed, self._clock()))
 
+    @property
+    def history_ns(self) -> int:
+        """How far back own frames are kept now, ns: an older board frame finds no partner."""
+        return max(_LEAST_WAIT_NS, self._delay_ns) + 2 * max(self._board_period_ns, self._host_period_ns)
+
+    def note_age(self, age_ns: int) -> None:
+        """Keep own frames for as long as a board frame of this age needs.
+
+        Where bytes take the time a frame that is a fifth larger comes as much later; the slow decay follows a link that gets faster.
+        """
+        self._delay_ns = min(_SLOWEST_NS, max(age_ns * 5 // 4, self._delay_ns * 63 // 64))
+
     def add_board(self, frame: BoardFrame) -> int:
         """Take a frame of the board.
 
@@ -200,9 +212,7 @@ class PairQueue:
             if self._closed:
                 self._count(self._board_orphans, OrphanReason.STREAM_ENDED.value)
                 return exposed_ns
-            delay_ns = self._clock() - frame.marks.exposed_ns  # the wait for an echo included
-            # Where bytes take the time a frame that is a fifth larger comes as much later; the slow decay follows a link that gets faster.
-            self._delay_ns = min(_SLOWEST_NS, max(delay_ns * 5 // 4, self._delay_ns * 63 // 64))
+            self.note_age(self._clock() - frame.marks.exposed_ns)  # the wait for an echo included
             self._board_bytes += len(frame.message.payload)
             self._newest.append(frame)
             if self._meter is not None:

@@ -36,6 +36,7 @@ from phone_host.pairqueue import PairQueue
 from phone_host.sync.choice import LinkChoice
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.flow import Flow
+from phone_host.sync.quarantine import Disbelief
 
 _LOG = logging.getLogger(__name__)
 
@@ -376,10 +377,15 @@ class Reception:
         """Give a frame that is believed to the pair queue."""
         assert self._hello is not None
         camera, message, marks = self._hello.camera, frame.message, frame.marks
+        age_ns = frame.received_ns - marks.exposed_ns
+        if camera.pacing is Pacing.CLOCK and age_ns > self._queue.history_ns:
+            self._current.disbelieved[Disbelief.PAST] += 1
+            self._queue.note_age(age_ns)  # if the link has become so slow the next one finds its partner
+            return
         transit_ns = frame.received_ns - marks.sent_ns
         self._choice.frame(link, transit_ns, frame.received_ns)
         self._flow.arrived(transit_ns, marks.sent_ns - marks.grabbed_ns, camera.period_ns, frame.received_ns)
-        self.account.links[link].age.add(frame.received_ns - marks.exposed_ns)
+        self.account.links[link].age.add(age_ns)
         self._border.passed(message)
         stamp_ns = self._queue.add_board(frame)
         on_demand = camera.pacing is Pacing.DEMAND
