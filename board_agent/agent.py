@@ -18,8 +18,8 @@ from common.errors import ProtocolError, UnavailableError
 from common.frame import Frame
 from common.link.base import Broken, Garbage, Link, Packet, SendResult
 from common.link.several import SeveralLinks
-from common.link.wait import Waiter
-from common.logs import event
+from common.link.waiter import Waiter
+from common.program.logs import event
 from common.protocol.board_session import BoardSession
 from common.protocol.message import (
     PROTOCOL_VERSION,

@@ -14,17 +14,18 @@ from board_agent.rate_control import RateControl, ladder, ways
 from board_agent.sd_notify import Notifier
 from board_agent.settings import ENVIRONMENT_PREFIX, SERVICE_SETTINGS, BoardSettings, key_folder
 from board_agent.status import StatusLine
-from common import logs, now
+from common import now
 from common.camera.base import CameraHealth, health_values
 from common.camera.factory import EXAMPLE, open_camera, parse_camera
-from common.commandline import INTERRUPTED, ExamplesFirstParser, run_command
 from common.errors import SettingsError
 from common.keys import KeyFolder, change
 from common.keys import listing as keys_listing
 from common.link.factory import open_links, parse_link, tell_insecure
+from common.program import logs
+from common.program.commandline import INTERRUPTED, ExamplesFirstParser, run_command
+from common.program.settings import Resolved, listing, log_level, resolve
+from common.program.signals import StopSignals
 from common.protocol.message import BoardCounts
-from common.settings import Resolved, listing, log_level, resolve
-from common.signals import StopSignals
 from common.stamp import board_clock
 
 if TYPE_CHECKING:
@@ -126,7 +127,7 @@ def _keys(options: argparse.Namespace) -> int:
 
 
 def _pair(options: argparse.Namespace) -> int:
-    from board_agent.pair import NOBODY, absence, follow  # noqa: PLC0415 - needed by this verb alone
+    from board_agent.enrolment import NOBODY, absence, follow  # noqa: PLC0415 - needed by this verb alone
 
     if not 0 < options.seconds < _LONGEST_IDLE_S:
         raise SettingsError(f"--seconds {options.seconds:g}", "give seconds, more than 0")
@@ -197,7 +198,7 @@ def _cameras(options: argparse.Namespace) -> int:
 
 def _doctor(options: argparse.Namespace) -> int:
     """Check what `run` would use; without any choice that is what the service uses, where it is installed."""
-    from board_agent.doctor import examine  # noqa: PLC0415 - needed by this verb alone
+    from board_agent.doctor.board_doctor import examine  # noqa: PLC0415 - needed by this verb alone
     from common.doctor.finding import exit_code, table, values  # noqa: PLC0415
 
     if not (options.config or options.camera or options.link) and SERVICE_SETTINGS.is_file():

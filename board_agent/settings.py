@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from common.keys import KeyFolder, default_folder
-from common.settings import setting
+from common.program.settings import setting
 
 ENVIRONMENT_PREFIX = "BOARD_AGENT"
 

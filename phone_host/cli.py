@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from common.commandline import ExamplesFirstParser, run_command
+from common.program.commandline import ExamplesFirstParser, run_command
 
 _VERBS = {
     "demo": "both programs on this machine, a rendered scene with known truth, a full report",

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.frame import Frame
-from common.ledger import BoardMarks
+from common.ledger import BoardMarks, StageTimes
 from common.protocol.message import FrameMessage
 
 Image = NDArray[np.uint8]
@@ -194,3 +194,64 @@ class FramePair:
     paired_ns: int
     queued_ns: int
     before: BoardFrame | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Processed:
+    """What became of a pair.
+
+    Attributes:
+        pair: the rectified images (as they came when there is no core).
+        disparity: px; None without a core.
+        cloud: metres; None without a core or geometry.
+        stages: time of each stage, `write` still 0.
+    """
+
+    pair: RectifiedPair
+    disparity: Disparity | None
+    cloud: CloudImage | None
+    stages: StageTimes
+
+
+@dataclass(frozen=True, slots=True)
+class PairCounts:
+    """What became of the frames that reached the host, and of the pairs.
+
+    Attributes:
+        received: board frames.
+        host_frames: own frames.
+        paired: pairs formed.
+        dropped: pairs that gave way in a full FIFO.
+        taken: pairs given to the worker.
+        waiting: pairs in the FIFO now.
+        held_board: board frames without partner yet.
+        held_host: own frames without partner yet.
+        board_orphans: board frames that found none, by reason.
+        host_orphans: own frames that found none, by reason.
+    """
+
+    received: int = 0
+    host_frames: int = 0
+    paired: int = 0
+    dropped: int = 0
+    taken: int = 0
+    waiting: int = 0
+    held_board: int = 0
+    held_host: int = 0
+    board_orphans: tuple[tuple[str, int], ...] = ()
+    host_orphans: tuple[tuple[str, int], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Unwritten:
+    """What could not be written.
+
+    Attributes:
+        lines: lines of delays.jsonl that are lost.
+        pairs: pair folders that were due and could not be written.
+        cause: the operating system's word for it; empty when all was written.
+    """
+
+    lines: int = 0
+    pairs: int = 0
+    cause: str = ""

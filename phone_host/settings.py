@@ -10,7 +10,7 @@ from common.errors import SettingsError
 from common.imagesize import MEGAPIXEL, MOST_PIXELS
 from common.keys import KeyFolder, default_folder
 from common.link.factory import parse_link
-from common.settings import log_level, resolve, setting
+from common.program.settings import log_level, resolve, setting
 from phone_host.camera.factory import check_camera
 
 ENVIRONMENT_PREFIX = "PHONE_HOST"

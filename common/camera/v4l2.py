@@ -19,7 +19,7 @@ from common.camera.v4l2_stream import Stream, V4l2Settings
 from common.camera.v4l2_tally import Tally
 from common.errors import TandemError, UnavailableError
 from common.frame import Frame
-from common.logs import event
+from common.program.logs import event
 from common.protocol.message import CameraDescription, Pacing, Steering
 
 _LOG = logging.getLogger(__name__)

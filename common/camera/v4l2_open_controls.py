@@ -7,7 +7,7 @@ from common.camera import v4l2_abi as abi
 from common.camera.v4l2_controls import Axis, ControlPlan, ControlWishes, Step, lower_qualities
 from common.camera.v4l2_device import Device
 from common.camera.v4l2_tally import Tally
-from common.logs import event
+from common.program.logs import event
 
 _LOG = logging.getLogger(__name__)
 

@@ -38,7 +38,7 @@ from common.camera.v4l2_stamps import (
 from common.camera.v4l2_tally import Tally
 from common.errors import UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat, find_fault
-from common.logs import event
+from common.program.logs import event
 from common.stamp import Stamp
 
 _LOG = logging.getLogger(__name__)

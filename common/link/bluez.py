@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from common.errors import UnavailableError
 from common.link.sdp import SERVICE_UUID, record_xml
-from common.logs import event
+from common.program.logs import event
 
 try:
     from dbus_fast import AuthError, BusType, InvalidAddressError, Message, MessageType, Variant

@@ -14,8 +14,8 @@ from itertools import count
 from typing import Final
 
 from common.errors import ProtocolError
-from common.protocol.pairing_wire import MAX_WORD_BYTES, WordReader, frame_word
-from common.protocol.pairing_words import Word
+from common.protocol.enrolment_wire import MAX_WORD_BYTES, WordReader, frame_word
+from common.protocol.enrolment_words import Word
 from common.protocol.zap import plain_address
 
 _MOST: Final = 16

@@ -14,8 +14,8 @@ from zmq.utils import z85
 from common import now
 from common.errors import TandemError
 from common.keys import KeyFolder, OwnKey, Peer
-from common.link.wait import is_readable
-from common.logs import event
+from common.link.waiter import is_readable
+from common.program.logs import event
 from common.protocol import zap
 
 _LOG = logging.getLogger(__name__)

@@ -12,7 +12,7 @@ from typing import Final
 import zmq
 
 from common.errors import UnavailableError
-from common.logs import event
+from common.program.logs import event
 
 _LOG = logging.getLogger(__name__)
 

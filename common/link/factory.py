@@ -9,7 +9,7 @@ from urllib.parse import parse_qsl, unquote, urlsplit
 from common.errors import MissingDeviceError, SettingsError, TandemError, UnavailableError
 from common.keys import KeyFolder, Peer, peer_at
 from common.link.base import Link
-from common.logs import event
+from common.program.logs import event
 
 _LOG = logging.getLogger(__name__)
 

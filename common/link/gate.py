@@ -19,7 +19,7 @@ from typing import Final
 import zmq
 
 from common import now
-from common.logs import event
+from common.program.logs import event
 
 _LOG = logging.getLogger(__name__)
 

@@ -23,7 +23,7 @@ from common.frame import Buffer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.sdp import PSM, channel_in, query
 from common.link.stream import Opening, StreamLink
-from common.logs import event
+from common.program.logs import event
 from common.protocol.framing import Side
 from common.protocol.message import Lane
 

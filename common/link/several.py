@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from common.errors import UnavailableError
 from common.link.base import Broken, Incoming, Link, Packet
-from common.logs import event
+from common.program.logs import event
 
 _LOG = logging.getLogger(__name__)
 

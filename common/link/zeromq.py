@@ -18,14 +18,14 @@ from common.link import gate
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.dialled import Dialled
 from common.link.ipc import check_folder, check_peer, check_socket, let_in, trusted_users
-from common.link.wait import is_readable
+from common.link.waiter import is_readable
 from common.link.zeromq_address import explained, free_path, plain_endpoint
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
 
 if TYPE_CHECKING:
     from common.link.curve import Guard
-    from common.link.pairing_door import Door
+    from common.link.enrolment_door import Door
 
 _SOCKET_BUFFER_BYTES: Final = 256 * 1024
 """About five 50 KB JPEGs in the kernel at most, so that a frame is not sent long before it can leave."""
@@ -200,7 +200,7 @@ class ZeroMqListener(_AlwaysReady):
             DataError: the files of keys are bad.
             UnavailableError: they cannot be used.
         """
-        from common.link.pairing_door import Door  # noqa: PLC0415 - as in _guard
+        from common.link.enrolment_door import Door  # noqa: PLC0415 - as in _guard
 
         assert self._guard is not None, "an open link has no door"
         self._door = Door(self._context, links, keys, self._guard)

@@ -9,12 +9,8 @@ import numpy as np
 from common.ledger import PairLedger
 from phone_host.bench.cases import Case, Interface
 from phone_host.bench.changes import Change
-from phone_host.bench.runs import CaseResult
-from phone_host.delays import DelayStatistics
-from phone_host.emulate import PROFILES, Profile
-from phone_host.facts import figures_of
-from phone_host.fits import DelayFit
-from phone_host.prediction import (
+from phone_host.bench.emulate import PROFILES, Profile
+from phone_host.bench.prediction import (
     Cell,
     Figures,
     Images,
@@ -29,8 +25,12 @@ from phone_host.prediction import (
     values_of,
     with_own_delays,
 )
-from phone_host.queue_model import LinkModel
-from phone_host.regime import Judgement, judge
+from phone_host.bench.queue_model import LinkModel
+from phone_host.bench.runs import CaseResult
+from phone_host.measure.delay_fit import DelayFit
+from phone_host.measure.delays import DelayStatistics
+from phone_host.measure.regime import Judgement, judge
+from phone_host.measure.run_facts import figures_of
 from phone_host.sync.fifo import FifoSettings, Overflow
 
 _SELF_PACED: Final = ("serial", "rfcomm")

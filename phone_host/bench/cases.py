@@ -7,7 +7,7 @@ from typing import Final, TypeVar
 
 from common.errors import SettingsError
 from common.link.factory import parse_link
-from phone_host.emulate import Profile
+from phone_host.bench.emulate import Profile
 
 T = TypeVar("T")
 

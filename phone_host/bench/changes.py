@@ -7,8 +7,8 @@ from typing import Final
 
 from common.errors import SettingsError
 from phone_host.bench.cases import Size, parse_rates, parse_sizes
-from phone_host.emulate import Profile, parse_profiles
-from phone_host.prediction import Target, nominal_link
+from phone_host.bench.emulate import Profile, parse_profiles
+from phone_host.bench.prediction import Target, nominal_link
 from phone_host.sync.fifo import FifoSettings
 
 _HELP: Final = (

@@ -8,10 +8,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from common import logs
-from common.commandline import INTERRUPTED, ExamplesFirstParser, run_command
 from common.errors import SettingsError, UnavailableError
-from common.signals import StopSignals
+from common.program import logs
+from common.program.commandline import INTERRUPTED, ExamplesFirstParser, run_command
+from common.program.signals import StopSignals
 
 if TYPE_CHECKING:
     from phone_host.bench.analysis import Analysis
@@ -130,7 +130,7 @@ def _run(options: argparse.Namespace) -> int:
 def _interfaces(options: argparse.Namespace) -> "tuple[Interface, ...]":
     """What the options ask for."""
     from phone_host.bench.cases import interfaces, parse_links  # noqa: PLC0415 - OpenCV, only now
-    from phone_host.emulate import parse_profiles  # noqa: PLC0415
+    from phone_host.bench.emulate import parse_profiles  # noqa: PLC0415
 
     links = parse_links(options.links) if options.links else ()
     return interfaces(links, parse_profiles(options.emulate) if options.emulate else ())
@@ -159,7 +159,7 @@ def _tell(
     """Print the table or the object, and write the files."""
     from phone_host.bench.page import figure, page  # noqa: PLC0415 - OpenCV, only now
     from phone_host.bench.report import as_json  # noqa: PLC0415
-    from phone_host.trace import TracedRun, trace_json  # noqa: PLC0415
+    from phone_host.bench.trace import TracedRun, trace_json  # noqa: PLC0415
 
     report = as_json(results, under, analysis)
     if options.json:
@@ -193,7 +193,7 @@ def _settings(options: argparse.Namespace) -> "RunSettings":
 
 
 def _make_folder(folder: Path) -> None:
-    from phone_host.formats.listed import claim  # noqa: PLC0415
+    from phone_host.output.listed import claim  # noqa: PLC0415
 
     try:
         claim(folder, *_FILES)
@@ -204,7 +204,7 @@ def _make_folder(folder: Path) -> None:
 
 
 def _write(out: Path, files: dict[str, str]) -> None:
-    from phone_host.formats.atomic import write_text  # noqa: PLC0415
+    from phone_host.output.atomic import write_text  # noqa: PLC0415
 
     try:
         for name, text in files.items():
@@ -245,7 +245,7 @@ def _print(results: "Sequence[CaseResult]", under: "Conditions", analysis: "Anal
 
 def _print_profiles(*, as_json: bool) -> None:
     """What `--emulate` knows."""
-    from phone_host.emulate import PROFILES  # noqa: PLC0415
+    from phone_host.bench.emulate import PROFILES  # noqa: PLC0415
 
     if as_json:
         print(json.dumps({"profiles": [asdict(profile) for profile in PROFILES]}))

@@ -18,14 +18,14 @@ from common.errors import UnavailableError
 from common.keys import usual_keys
 from common.link.factory import open_link, parse_link
 from common.protocol.message import BoardHello, Pacing
-from phone_host.accounts import LinkAccount
 from phone_host.bench.cases import BOARD_SETS, Case, Interface, Size
-from phone_host.boardprocess import BoardAccount, BoardProcess, board_process, free_port
-from phone_host.emulate import NOTHING
-from phone_host.pairqueue import PairQueue
-from phone_host.receiver import Receiver
-from phone_host.reception import refusal_text
-from phone_host.relay import RelayAccount, RelayProcess, relay_process
+from phone_host.bench.emulate import NOTHING
+from phone_host.bench.relay import RelayAccount, RelayProcess, relay_process
+from phone_host.children.board_process import BoardAccount, BoardProcess, board_process, free_port
+from phone_host.measure.accounts import LinkAccount
+from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.receiver import Receiver
+from phone_host.stream.reception import refusal_text
 from phone_host.sync.fifo import FifoSettings
 
 _CHANNEL: Final = 22

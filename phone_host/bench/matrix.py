@@ -11,12 +11,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from common import now
 from common.errors import TandemError, UnavailableError
-from common.signals import StopSignals
+from common.program.signals import StopSignals
 from phone_host.bench.cases import Case, Interface, Size
 from phone_host.bench.links import ask_board
 from phone_host.bench.runs import PATIENCE_NS, WARM_UP_S, CaseResult, RunSettings, film_images, render, run_case
-from phone_host.boardprocess import socket_folder
-from phone_host.film import Film
+from phone_host.children.board_process import socket_folder
+from phone_host.scene.film import Film
 
 _RENDER_S: Final = 0.06
 """An image takes about this long to render, for the progress bar's idea of the time that remains."""

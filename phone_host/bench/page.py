@@ -6,6 +6,7 @@ from html import escape
 from typing import Final
 
 from phone_host.bench.analysis import Analysis, InterfaceFit, typical_and_slow
+from phone_host.bench.prediction import Figures, values_of
 from phone_host.bench.report import Conditions, grouped
 from phone_host.bench.runs import WARM_UP_S, CaseResult
 from phone_host.bench.tables import (
@@ -20,12 +21,11 @@ from phone_host.bench.tables import (
     summary_line,
     what_if_rows,
 )
-from phone_host.page_frame import HALF_PX, document, section, table, two_widths
-from phone_host.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
-from phone_host.plot_parts import STYLE, legend, point_legend
-from phone_host.plots import Budget, Part, Quantity, Strips, budgets, distributions
-from phone_host.prediction import Figures, values_of
-from phone_host.report_page import DelaySeries, delay_series
+from phone_host.report.page_frame import HALF_PX, document, section, table, two_widths
+from phone_host.report.report_page import DelaySeries, delay_series
+from phone_host.svg.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
+from phone_host.svg.plot_parts import STYLE, legend, point_legend
+from phone_host.svg.plots import Budget, Part, Quantity, Strips, budgets, distributions
 
 _FIGURE_PX: Final = 760
 _LETTER_PX: Final = 8

@@ -11,10 +11,10 @@ import zmq
 from common import now
 from phone_host.bench.analysis import Analysis, Checked, Errors, InterfaceFit, WhatIf, regime_of, statistics_of
 from phone_host.bench.cases import BOARD_SETS, Interface
+from phone_host.bench.prediction import Figures, Unknown
 from phone_host.bench.runs import WARM_UP_S, CaseResult, RunSettings
-from phone_host.delays import DELAYS, STAGES, Spread
-from phone_host.fits import DelayFit
-from phone_host.prediction import Figures, Unknown
+from phone_host.measure.delay_fit import DelayFit
+from phone_host.measure.delays import DELAYS, STAGES, Spread
 from phone_host.sync.fifo import FifoSettings
 
 PERCENTILES: Final = ("p50", "p95", "p99", "max")

@@ -19,21 +19,19 @@ from common.keys import usual_keys
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.accounts import LinkAccount
 from phone_host.bench.cases import Case, Size
 from phone_host.bench.links import Ends, ends_of
-from phone_host.boardprocess import BoardAccount
-from phone_host.demo import NEAR_M
-from phone_host.film import JPEG_QUALITY, Film, render_films
-from phone_host.host import Host, HostSettings
-from phone_host.model import Camera, Rig, StereoGeometry
-from phone_host.pairqueue import PairCounts
-from phone_host.pipeline import Processed
-from phone_host.relay import RelayAccount
+from phone_host.bench.relay import RelayAccount
+from phone_host.children.board_process import BoardAccount
+from phone_host.demo.demonstration import NEAR_M
+from phone_host.measure.accounts import LinkAccount
+from phone_host.model import Camera, PairCounts, Processed, Rig, StereoGeometry
+from phone_host.run.host import Host, HostSettings
+from phone_host.scene.film import JPEG_QUALITY, Film, render_films
+from phone_host.scene.scene import DEMO_PERIOD_S, WEBCAM_LOOK, demo_scene, matched_rig
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatcherName, MatchSettings, create_matcher
 from phone_host.stereo.reproject import disparities_for_near
-from phone_host.stereo.scene import DEMO_PERIOD_S, WEBCAM_LOOK, demo_scene, matched_rig
 from phone_host.sync.fifo import FifoSettings
 
 WARM_UP_S: Final = 1.0

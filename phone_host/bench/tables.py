@@ -6,12 +6,12 @@ from dataclasses import replace
 from typing import Final
 
 from phone_host.bench.analysis import Analysis, regime_of, statistics_of
+from phone_host.bench.prediction import Figures, Unknown
 from phone_host.bench.report import PERCENTILES, losses, percentiles
 from phone_host.bench.runs import CaseResult
-from phone_host.delays import DELAYS, STAGES
-from phone_host.fits import DelayFit
-from phone_host.plot_scale import duration_text
-from phone_host.prediction import Figures, Unknown
+from phone_host.measure.delay_fit import DelayFit
+from phone_host.measure.delays import DELAYS, STAGES
+from phone_host.svg.plot_scale import duration_text
 from phone_host.sync.fifo import FifoSettings
 
 _RATES: Final = ((1e9, "GB/s"), (1e6, "MB/s"), (1e3, "kB/s"))

@@ -22,7 +22,7 @@ from common.files import read_whole
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
 from common.imagesize import MOST_PIXELS, ImageHead, ImageKind, read_head, require_believable, whole_image
 from common.imagesize import size_text as px_text
-from common.logs import event
+from common.program.logs import event
 from phone_host.model import Image
 from phone_host.stereo.overheard import overhear
 

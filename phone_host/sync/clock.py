@@ -22,8 +22,8 @@ from enum import Enum
 from typing import Final
 
 from common.protocol.session import Echo
+from phone_host.sync.allowed_lines import MAX_SKEW, Allowed, Belief, Spacing, allowed_lines, believe
 from phone_host.sync.hull import SKEW_CHANGE, Hull, widening_ns
-from phone_host.sync.strip import MAX_SKEW, Allowed, Belief, Spacing, allowed_lines, believe
 
 __all__ = ["ASYMMETRY", "CONFIRMED_WAVES", "MAX_SKEW", "ClockEstimate", "ClockEstimator", "Heard", "HostTime"]
 

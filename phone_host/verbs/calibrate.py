@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from common.errors import DataError
-from phone_host.formats.json_text import json_text
+from phone_host.output.json_text import json_text
 from phone_host.settings import MAX_MEGAPIXELS_HELP
-from phone_host.verbs.outputs import claim_names, require_file, unwritable
+from phone_host.verbs.output_folders import claim_names, require_file, unwritable
 
 if TYPE_CHECKING:
-    from phone_host.stereo.board_views import BoardViews
-    from phone_host.stereo.calibration import Calibration, Rejected
-    from phone_host.stereo.target import Board
-    from phone_host.stereo.view_files import ViewFiles
+    from phone_host.calibration.board_pairs import Calibration, Rejected
+    from phone_host.calibration.board_views import BoardViews
+    from phone_host.calibration.target import Board
+    from phone_host.calibration.view_files import ViewFiles
 
 EXAMPLES = """  phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml
   phone-host calibrate 'views/left*.png' 'views/right*.png' --board 9x6 --square 25mm --out rig.yaml --json
@@ -42,12 +42,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Find the board in all pairs, calibrate, judge, write."""
+    from phone_host.calibration.calibrate import calibrate  # noqa: PLC0415
+    from phone_host.calibration.target import parse_board  # noqa: PLC0415
+    from phone_host.calibration.verdict import Verdict, judge  # noqa: PLC0415
+    from phone_host.calibration.view_files import pair_files  # noqa: PLC0415
     from phone_host.model import Side  # noqa: PLC0415 - OpenCV, only now
     from phone_host.settings import most_pixels  # noqa: PLC0415
-    from phone_host.stereo.calibrate import calibrate  # noqa: PLC0415
-    from phone_host.stereo.target import parse_board  # noqa: PLC0415
-    from phone_host.stereo.verdict import Verdict, judge  # noqa: PLC0415
-    from phone_host.stereo.view_files import pair_files  # noqa: PLC0415
 
     board = parse_board(options.board, options.square)
     require_file(options.out)
@@ -84,7 +84,7 @@ def _look(files: "ViewFiles", board: "Board", limit: int) -> "BoardViews":
     from rich.console import Console  # noqa: PLC0415
     from rich.progress import Progress  # noqa: PLC0415
 
-    from phone_host.stereo.board_views import look_for_boards  # noqa: PLC0415
+    from phone_host.calibration.board_views import look_for_boards  # noqa: PLC0415
 
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
@@ -160,7 +160,7 @@ def _figures(calibration: "Calibration") -> dict[str, Any]:
 
 def _write_rig(out: Path, calibration: "Calibration | None") -> None:
     """Write rig.yaml; where there is no rig, or none that can be rectified, one of an earlier run must not be taken for it."""
-    from phone_host.formats.rig_yaml import write_rig  # noqa: PLC0415
+    from phone_host.output.rig_yaml import write_rig  # noqa: PLC0415
 
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -173,7 +173,7 @@ def _write_rig(out: Path, calibration: "Calibration | None") -> None:
 
 
 def _write_report(out: Path, report: dict[str, Any]) -> None:
-    from phone_host.formats.atomic import write_text  # noqa: PLC0415
+    from phone_host.output.atomic import write_text  # noqa: PLC0415
 
     try:
         write_text(out.with_name("report.json"), json_text(report, indent=2) + "\n")

@@ -7,25 +7,26 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from common import logs, now
-from common.commandline import INTERRUPTED
+from common import now
 from common.errors import SettingsError
 from common.frame import SpoiledImageError
 from common.link.factory import open_links, parse_link, tell_insecure
-from common.settings import log_level
-from common.signals import StopSignals
+from common.program import logs
+from common.program.commandline import INTERRUPTED
+from common.program.settings import log_level
+from common.program.signals import StopSignals
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import EXAMPLE, open_camera
-from phone_host.formats.json_text import json_text
+from phone_host.output.json_text import json_text
 from phone_host.settings import key_folder
-from phone_host.verbs.outputs import claim_names, require_file, require_folder, unwritable
+from phone_host.verbs.output_folders import claim_names, require_file, require_folder, unwritable
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from phone_host.footage import Footage
+    from phone_host.calibration.timing.shots import Measured, Times
     from phone_host.model import Image, Rig
-    from phone_host.timing.shots import Measured, Times
+    from phone_host.recording.footage import Footage
 
 _Reading = TypeVar("_Reading")
 
@@ -62,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     if options.pattern is not None:
         return _write_pattern(options)
     _check(options)
-    from phone_host.formats.rig_yaml import read_rig  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.output.rig_yaml import read_rig  # noqa: PLC0415 - OpenCV, only now
 
     logs.set_up(log_level("warning"))
     rig = None if options.calibration is None else read_rig(options.calibration)
@@ -98,8 +99,8 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _write_pattern(options: argparse.Namespace) -> int:
-    from phone_host.formats.atomic import write_text  # noqa: PLC0415
-    from phone_host.timing.screen_page import pattern_page  # noqa: PLC0415
+    from phone_host.calibration.timing.screen_page import pattern_page  # noqa: PLC0415
+    from phone_host.output.atomic import write_text  # noqa: PLC0415
 
     require_file(options.pattern, "--pattern")
     try:
@@ -123,8 +124,8 @@ def _progress(text: str) -> "tuple[Any, Callable[[float], None]]":
 
 
 def _footage(options: argparse.Namespace, signals: StopSignals) -> "Footage":
-    from phone_host.discovery import find_aloud  # noqa: PLC0415
-    from phone_host.footage import film, keep, read  # noqa: PLC0415
+    from phone_host.boards.discovery import find_aloud  # noqa: PLC0415
+    from phone_host.recording.footage import film, keep, read  # noqa: PLC0415
 
     if options.frames is not None:
         return read(options.frames)
@@ -146,15 +147,15 @@ def _footage(options: argparse.Namespace, signals: StopSignals) -> "Footage":
 
 
 def _measure(by: str, footage: "Footage", rig: "Rig | None") -> "Measured":
+    from phone_host.calibration.timing.shots import require_shots, to_seconds  # noqa: PLC0415
     from phone_host.stereo.raw_images import decode_frame  # noqa: PLC0415
-    from phone_host.timing.shots import require_shots, to_seconds  # noqa: PLC0415
 
     require_shots(len(footage.board), len(footage.host))
     progress, advance = _progress("measuring")
     with progress:
         if by == "scene":
+            from phone_host.calibration.timing.scene import measure_scene  # noqa: PLC0415
             from phone_host.stereo.rectify import Rectifier  # noqa: PLC0415
-            from phone_host.timing.scene import measure_scene  # noqa: PLC0415
 
             assert rig is not None
             look = lambda shot: decode_frame(shot.image)  # noqa: E731 - shorter than a function of one line
@@ -166,14 +167,14 @@ def _measure(by: str, footage: "Footage", rig: "Rig | None") -> "Measured":
 def _by_lamp(footage: "Footage", board_s: "Times", host_s: "Times", advance: "Callable[[float], None]") -> "Measured":
     import numpy as np  # noqa: PLC0415
 
-    from phone_host.timing.lamp import Brightness, brightness, measure_lamp  # noqa: PLC0415
+    from phone_host.calibration.timing.lamp import Brightness, brightness, measure_lamp  # noqa: PLC0415
 
     board, host = _seen(footage, board_s, host_s, brightness, advance)
     return measure_lamp(*(Brightness(seconds, np.array(levels)) for seconds, levels in (board, host)))
 
 
 def _by_screen(footage: "Footage", board_s: "Times", host_s: "Times", advance: "Callable[[float], None]") -> "Measured":
-    from phone_host.timing.screen import PatternReader, counted, measure_screen  # noqa: PLC0415
+    from phone_host.calibration.timing.screen import PatternReader, counted, measure_screen  # noqa: PLC0415
 
     board, host = _seen(footage, board_s, host_s, PatternReader().read, advance)
     return measure_screen(counted(*board), counted(*host))
@@ -187,8 +188,8 @@ def _seen(
     advance: "Callable[[float], None]",
 ) -> "list[tuple[Times, list[_Reading]]]":
     """What was read in each camera's images, with their times; a spoiled image is left out as if it had been lost."""
+    from phone_host.calibration.timing.shots import require_shots  # noqa: PLC0415
     from phone_host.stereo.raw_images import decode_frame  # noqa: PLC0415
-    from phone_host.timing.shots import require_shots  # noqa: PLC0415
 
     done, sides = 0, []
     for shots, seconds in ((footage.board, board_s), (footage.host, host_s)):
@@ -218,9 +219,9 @@ def _report(options: argparse.Namespace, measured: "Measured", footage: "Footage
 
 
 def _store(options: argparse.Namespace, measured: "Measured", report: dict[str, Any]) -> None:
-    from phone_host.formats.atomic import write_text  # noqa: PLC0415
-    from phone_host.formats.rig_yaml import write_time_offset  # noqa: PLC0415
-    from phone_host.misfit_plot import misfit_svg  # noqa: PLC0415
+    from phone_host.calibration.misfit_plot import misfit_svg  # noqa: PLC0415
+    from phone_host.output.atomic import write_text  # noqa: PLC0415
+    from phone_host.output.rig_yaml import write_time_offset  # noqa: PLC0415
 
     where, option = options.out, "--out"
     try:

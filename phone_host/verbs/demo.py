@@ -7,18 +7,18 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from common import logs
-from common.commandline import INTERRUPTED
 from common.errors import SettingsError, UnavailableError
-from common.signals import StopSignals
+from common.program import logs
+from common.program.commandline import INTERRUPTED
+from common.program.signals import StopSignals
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from phone_host.demo import DepthErrors
-    from phone_host.film import Film
+    from phone_host.demo.demonstration import DepthErrors
     from phone_host.model import Rig
-    from phone_host.stereo.scene import Scene
+    from phone_host.scene.film import Film
+    from phone_host.scene.scene import Scene
 
 EXAMPLES = """  phone-host demo
   phone-host demo --seconds 30 --out scan-demo
@@ -39,16 +39,16 @@ def run(options: argparse.Namespace) -> int:
     """Render, stream, measure, compare with the truth."""
     from rich.console import Console  # noqa: PLC0415 - OpenCV and rich, only now
 
-    from phone_host.boardprocess import socket_folder  # noqa: PLC0415 - as below
-    from phone_host.demo import DemoRun, truth_json  # noqa: PLC0415
-    from phone_host.demo_page import demo_page  # noqa: PLC0415
-    from phone_host.formats.atomic import write_text  # noqa: PLC0415
-    from phone_host.formats.rig_yaml import write_rig  # noqa: PLC0415
-    from phone_host.live import LiveTable  # noqa: PLC0415
-    from phone_host.report import build  # noqa: PLC0415
+    from phone_host.children.board_process import socket_folder  # noqa: PLC0415 - as below
+    from phone_host.demo.demo_page import demo_page  # noqa: PLC0415
+    from phone_host.demo.demonstration import DemoRun, truth_json  # noqa: PLC0415
+    from phone_host.output.atomic import write_text  # noqa: PLC0415
+    from phone_host.output.rig_yaml import write_rig  # noqa: PLC0415
+    from phone_host.report.run_json import build  # noqa: PLC0415
+    from phone_host.report.summary import summary  # noqa: PLC0415
+    from phone_host.run.terminal_view import LiveTable  # noqa: PLC0415
+    from phone_host.scene.scene import demo_scene, unlike_rig  # noqa: PLC0415
     from phone_host.stereo.rectify import rectify_rig  # noqa: PLC0415
-    from phone_host.stereo.scene import demo_scene, unlike_rig  # noqa: PLC0415
-    from phone_host.summary import summary  # noqa: PLC0415
 
     if not 1 <= options.seconds <= 3600:
         raise SettingsError(f"--seconds {options.seconds:g}", "give 1 to 3600")
@@ -98,8 +98,8 @@ def _clear(out: Path) -> None:
         UnavailableError: something that is not ours is.
         OSError: the folder cannot be used.
     """
-    from phone_host.formats.listed import ListedFolder  # noqa: PLC0415 - as in run
-    from phone_host.results import NAMES, PAIR_FILES  # noqa: PLC0415
+    from phone_host.output.listed import ListedFolder  # noqa: PLC0415 - as in run
+    from phone_host.run.results import NAMES, PAIR_FILES  # noqa: PLC0415
 
     names = rf"{NAMES}|rig\.yaml|cloud\.ply|disparity\.png"
     folder = ListedFolder(out, names, kept="film", inner=PAIR_FILES)
@@ -120,9 +120,9 @@ def _render(scene: "Scene", rig: "Rig", folder: Path, console: "Console", signal
     """
     from rich.progress import Progress  # noqa: PLC0415
 
-    from phone_host.demo import FPS  # noqa: PLC0415
-    from phone_host.film import render_film  # noqa: PLC0415
-    from phone_host.stereo.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK  # noqa: PLC0415
+    from phone_host.demo.demonstration import FPS  # noqa: PLC0415
+    from phone_host.scene.film import render_film  # noqa: PLC0415
+    from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK  # noqa: PLC0415
 
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("rendering a moving scene for two cameras", total=2 * FPS * DEMO_PERIOD_S)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from common.doctor.finding import exit_code, table, values
 from common.errors import SettingsError
-from phone_host.doctor import Question, examine
+from phone_host.doctor.host_doctor import Question, examine
 from phone_host.settings import key_folder
 from phone_host.verbs.run import resolve_settings
 

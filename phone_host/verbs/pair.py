@@ -10,8 +10,8 @@ from pathlib import Path
 from common.errors import DataError, SettingsError, UnavailableError
 from common.keys import KeyFolder, Peer
 from common.link.factory import needs_keys, parse_link
-from common.protocol.pairing_code import CODE_DIGITS, read_code
-from phone_host.udev_rule import RULES, find_usb_board, write_rule
+from common.protocol.enrolment_code import CODE_DIGITS, read_code
+from phone_host.boards.udev_rule import RULES, find_usb_board, write_rule
 
 EXAMPLES = """  phone-host pair
   phone-host pair --link tcp://192.168.7.2:5555
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     """Pair; asks for the code on the terminal."""
     if options.udev:
         return _name_device(options)
-    from phone_host.discovery import find_aloud  # noqa: PLC0415
+    from phone_host.boards.discovery import find_aloud  # noqa: PLC0415
     from phone_host.settings import chosen_keys  # noqa: PLC0415
 
     keys = chosen_keys(options.config, options.keys)
@@ -90,7 +90,7 @@ def _name_device(options: argparse.Namespace) -> int:
 
 def _paired(keys: KeyFolder, door: tuple[str, int], link: str, given: str | None) -> Peer:
     """Pair; who mistypes on a terminal is asked again."""
-    from phone_host.pairing_call import PairingCall  # noqa: PLC0415 - slow to load
+    from phone_host.boards.enrolment import PairingCall  # noqa: PLC0415 - slow to load
 
     tries = 1
     while True:
@@ -106,7 +106,7 @@ def _paired(keys: KeyFolder, door: tuple[str, int], link: str, given: str | None
 
 
 def _door(address: str, port: int | None) -> tuple[str, int]:
-    from common.link.pairing_door import pairing_address  # noqa: PLC0415 - ZeroMQ, only now
+    from common.link.enrolment_door import pairing_address  # noqa: PLC0415 - ZeroMQ, only now
 
     if port is None:
         return pairing_address(address)

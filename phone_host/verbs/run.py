@@ -8,20 +8,21 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from common import logs, now
-from common.commandline import INTERRUPTED
+from common import now
 from common.errors import SettingsError
 from common.link.factory import open_links, parse_link, tell_insecure
-from common.settings import Resolved, log_level, resolve
-from common.signals import StopSignals
+from common.program import logs
+from common.program.commandline import INTERRUPTED
+from common.program.settings import Resolved, log_level, resolve
+from common.program.signals import StopSignals
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import EXAMPLE, open_camera
 from phone_host.settings import ENVIRONMENT_PREFIX, MAX_MEGAPIXELS_HELP, PhoneHostSettings, check, key_folder
-from phone_host.verbs.outputs import spare_inputs
+from phone_host.verbs.output_folders import spare_inputs
 
 if TYPE_CHECKING:
-    from phone_host.host import HostSettings
     from phone_host.model import Side
+    from phone_host.run.host import HostSettings
     from phone_host.stereo.core import StereoCore
     from phone_host.sync.fifo import FifoSettings
 
@@ -123,13 +124,13 @@ def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]
 
 def run(options: argparse.Namespace) -> int:
     """Run until stopped, the pairs are reached or a stream ends."""
-    from phone_host.discovery import find_aloud, remember  # noqa: PLC0415
-    from phone_host.host import EndReason, Host  # noqa: PLC0415 - OpenCV, only now
-    from phone_host.live import LiveTable  # noqa: PLC0415
-    from phone_host.report import build  # noqa: PLC0415
-    from phone_host.results import NAMES  # noqa: PLC0415
-    from phone_host.run_page import run_page  # noqa: PLC0415
-    from phone_host.summary import summary  # noqa: PLC0415
+    from phone_host.boards.discovery import find_aloud, remember  # noqa: PLC0415
+    from phone_host.report.run_json import build  # noqa: PLC0415
+    from phone_host.report.run_page import run_page  # noqa: PLC0415
+    from phone_host.report.summary import summary  # noqa: PLC0415
+    from phone_host.run.host import EndReason, Host  # noqa: PLC0415 - OpenCV, only now
+    from phone_host.run.results import NAMES  # noqa: PLC0415
+    from phone_host.run.terminal_view import LiveTable  # noqa: PLC0415
     from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
 
     settings = resolve_settings(options).values
@@ -199,8 +200,8 @@ def _host_settings(
     board_side: "Side",
     core: "StereoCore | None",
 ) -> "HostSettings":
-    from phone_host.host import HostSettings  # noqa: PLC0415 - OpenCV, only now
     from phone_host.model import TimeOffset  # noqa: PLC0415
+    from phone_host.run.host import HostSettings  # noqa: PLC0415 - OpenCV, only now
     from phone_host.sync.phase import Whose  # noqa: PLC0415
 
     return HostSettings(

@@ -4,7 +4,7 @@ import argparse
 from dataclasses import fields
 from pathlib import Path
 
-from common.settings import listing
+from common.program.settings import listing
 from phone_host.settings import PhoneHostSettings, check
 from phone_host.verbs.run import resolve_settings
 

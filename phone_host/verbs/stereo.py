@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from common import now
 from common.errors import SettingsError
-from phone_host.formats.json_text import json_text
+from phone_host.output.json_text import json_text
 from phone_host.settings import MAX_MEGAPIXELS_HELP
-from phone_host.verbs.outputs import require_folder, unwritable
+from phone_host.verbs.output_folders import require_folder, unwritable
 
 if TYPE_CHECKING:
     from phone_host.model import CloudImage, Disparity, RectifiedPair
@@ -143,7 +143,7 @@ def _figures(options: argparse.Namespace, core: "StereoCore", disparity: "Dispar
 
 def _clear(out: Path, *, has_cloud: bool) -> None:
     """Remove an earlier run's results, or they might be taken for this one's."""
-    from phone_host.formats.listed import ListedFolder  # noqa: PLC0415
+    from phone_host.output.listed import ListedFolder  # noqa: PLC0415
 
     try:
         folder = ListedFolder(out, r"disparity\.(pfm|png)|cloud\.ply|report\.json")
@@ -155,9 +155,9 @@ def _clear(out: Path, *, has_cloud: bool) -> None:
 
 def _write(out: Path, pair: "RectifiedPair", disparity: "Disparity", cloud: "CloudImage | None") -> int | None:
     """Write all but the report; the number of points, or None without a cloud."""
-    from phone_host.formats.pfm import write_pfm  # noqa: PLC0415
-    from phone_host.formats.ply import write_ply  # noqa: PLC0415
-    from phone_host.formats.preview import write_preview  # noqa: PLC0415
+    from phone_host.output.pfm import write_pfm  # noqa: PLC0415
+    from phone_host.output.ply import write_ply  # noqa: PLC0415
+    from phone_host.output.preview import write_preview  # noqa: PLC0415
 
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -171,7 +171,7 @@ def _write(out: Path, pair: "RectifiedPair", disparity: "Disparity", cloud: "Clo
 
 
 def _write_report(out: Path, report: dict[str, Any]) -> None:
-    from phone_host.formats.atomic import write_text  # noqa: PLC0415
+    from phone_host.output.atomic import write_text  # noqa: PLC0415
 
     try:
         write_text(out / "report.json", json_text(report, indent=2) + "\n")

@@ -5,8 +5,8 @@ import math
 from pathlib import Path
 
 from common.errors import SettingsError
-from phone_host.formats.rig_yaml import read_rig
 from phone_host.model import Side, StereoGeometry
+from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatcherName, MatchSettings, create_matcher
 from phone_host.stereo.rectify import Rectifier

@@ -27,10 +27,9 @@ from common.camera.factory import open_camera
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.boardprocess import board_process, free_port
-from phone_host.host import Host, HostSettings
-from phone_host.model import Disparity, RectifiedPair
-from phone_host.pipeline import Processed
+from phone_host.children.board_process import board_process, free_port
+from phone_host.model import Disparity, Processed, RectifiedPair
+from phone_host.run.host import Host, HostSettings
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
 from tests.bench.machine import machine

@@ -27,7 +27,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from phone_host.boardprocess import free_port
+from phone_host.children.board_process import free_port
 from tests.bench.link_worker import receives
 from tests.bench.machine import machine, may_use_fifo
 from tests.bench.payloads import write_jpegs, write_raw

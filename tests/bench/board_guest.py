@@ -24,10 +24,10 @@ import zmq
 from common import now
 from common.errors import UnavailableError
 from common.link.factory import open_link, parse_link
-from phone_host.accounts import SessionAccount
+from phone_host.measure.accounts import SessionAccount
 from phone_host.model import BoardFrame
-from phone_host.pairqueue import PairQueue
-from phone_host.receiver import Receiver
+from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.receiver import Receiver
 from phone_host.sync.fifo import FifoSettings
 from tests.support.unheard import Unheard
 from tests.vm.guest import LINK_PORT, UNIT, Architecture, Guest, image_of

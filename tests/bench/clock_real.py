@@ -12,9 +12,9 @@ import numpy as np
 
 from common import now
 from common.link.factory import open_link, parse_link
-from phone_host.boardprocess import board_process, free_port
-from phone_host.pairqueue import PairQueue
-from phone_host.receiver import Receiver
+from phone_host.children.board_process import board_process, free_port
+from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.receiver import Receiver
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings
 from tests.bench.machine import Busyness, be_quiet, may_use_fifo

@@ -17,8 +17,8 @@ from common.link.stream import StreamLink
 from common.protocol.framing import Side
 from common.protocol.message import FrameMessage, Pacing
 from phone_host.model import BoardFrame
-from phone_host.pairqueue import PairQueue
-from phone_host.receiver import Receiver
+from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.receiver import Receiver
 from phone_host.sync.fifo import FifoSettings
 from tests.bench.link_job import Job, Tally
 from tests.support.unheard import Unheard

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import cv2
 
-from phone_host.stereo.scene import WEBCAM_LOOK, Renderer, demo_scene, matched_rig, rig_poses
+from phone_host.scene.scene import WEBCAM_LOOK, Renderer, demo_scene, matched_rig, rig_poses
 
 FRAMES = 30
 _JPEG_BYTES = 50_000

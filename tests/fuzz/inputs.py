@@ -12,14 +12,14 @@ from common.frame import ImageSizeError, SpoiledImageError, find_fault
 from common.imagesize import MEGAPIXEL
 from common.keys import KeyFolder
 from common.link.factory import parse_link
+from common.program.settings import resolve
 from common.protocol.wire import MAX_PAYLOAD_BYTES
-from common.settings import resolve
 from phone_host.camera.factory import check_camera
 from phone_host.camera.jpegs import MAX_IMAGE_BYTES, JpegStream
 from phone_host.camera.jpegs import Whole as WholeImage
-from phone_host.formats.pfm import read_pfm
-from phone_host.formats.ply import read_ply
-from phone_host.formats.rig_yaml import read_rig
+from phone_host.output.pfm import read_pfm
+from phone_host.output.ply import read_ply
+from phone_host.output.rig_yaml import read_rig
 from phone_host.settings import PhoneHostSettings, check
 from phone_host.stereo.images import decode_file, examine
 from tests.fuzz.target import is_one_line

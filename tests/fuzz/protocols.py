@@ -13,6 +13,21 @@ from common.link.sdp import channel_in
 from common.protocol.board_session import BoardSession
 from common.protocol.chunking import Whole
 from common.protocol.duplex import GAP_NS, Duplex
+from common.protocol.enrolment_code import Asking, Desk, Paired, Say
+from common.protocol.enrolment_wire import MAX_WORD_BYTES, WordReader, decode_word, encode_word
+from common.protocol.enrolment_words import (
+    COMMITMENT_BYTES,
+    NONCE_BYTES,
+    Ask,
+    Begin,
+    Commit,
+    Identity,
+    Open,
+    Refuse,
+    Refused,
+    Shown,
+    Word,
+)
 from common.protocol.framing import MAX_BODY_BYTES, Deframer, Side, Unit, UnitKind, unit_parts
 from common.protocol.host_session import HostSession
 from common.protocol.message import (
@@ -32,21 +47,6 @@ from common.protocol.message import (
     Pong,
     Rung,
     Status,
-)
-from common.protocol.pairing_code import Asking, Desk, Paired, Say
-from common.protocol.pairing_wire import MAX_WORD_BYTES, WordReader, decode_word, encode_word
-from common.protocol.pairing_words import (
-    COMMITMENT_BYTES,
-    NONCE_BYTES,
-    Ask,
-    Begin,
-    Commit,
-    Identity,
-    Open,
-    Refuse,
-    Refused,
-    Shown,
-    Word,
 )
 from common.protocol.session import Arrived, Echo, Outgoing
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES, decode, encode

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from phone_host.calibration.board_pairs import BoardPair
+from phone_host.calibration.target import Board
 from phone_host.model import Camera, Image, Rig
-from phone_host.stereo.calibration import BoardPair
-from phone_host.stereo.target import Board
 from tests.support.rigs import project_points
 
 BOARD = Board(9, 6, 0.025)

@@ -11,7 +11,7 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from common.protocol.pairing_code import CODE_DIGITS, code_text
+from common.protocol.enrolment_code import CODE_DIGITS, code_text
 from tests.support.numbered import write_film
 from tests.support.programs import Program, board, host, program, until
 

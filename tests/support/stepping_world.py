@@ -25,8 +25,8 @@ from common.protocol.message import (
 )
 from common.protocol.session import MS, Outgoing, connection_name
 from common.stamp import HOST_CLOCK, Stamp
-from phone_host.pairqueue import PairQueue
-from phone_host.reception import LinkFacts, Reception
+from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.reception import LinkFacts, Reception
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.quarantine import Disbelief
 

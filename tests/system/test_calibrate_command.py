@@ -11,12 +11,12 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.formats.ply import read_ply
-from phone_host.formats.rig_yaml import read_rig
+from phone_host.calibration.target import Board, find_corners
+from phone_host.output.ply import read_ply
+from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.images import read_image
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import project
-from phone_host.stereo.target import Board, find_corners
 from tests.support.boards import poses, render_pair
 from tests.support.rigs import unlike_rig
 

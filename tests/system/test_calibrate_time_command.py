@@ -11,13 +11,13 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.film import Film, render_film
-from phone_host.formats.rig_yaml import read_rig, write_rig
+from phone_host.calibration.timing.screen import COUNT, PatternReader
 from phone_host.model import UNMEASURED_NS, TimeOffset
+from phone_host.output.rig_yaml import read_rig, write_rig
+from phone_host.scene.film import Film, render_film
+from phone_host.scene.scene import PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
+from phone_host.scene.scene import Path as Motion
 from phone_host.stereo.rectify import rectify_rig
-from phone_host.stereo.scene import PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
-from phone_host.stereo.scene import Path as Motion
-from phone_host.timing.screen import COUNT, PatternReader
 from tests.support.programs import board, free_port, host
 
 OFFSET_MS = 13.0

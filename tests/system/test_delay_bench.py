@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from phone_host.boardprocess import board_process
+from phone_host.children.board_process import board_process
 from tests.support.numbered import write_film
 from tests.support.programs import Program, board, free_port, program, until
 from tests.support.trace_format import checked

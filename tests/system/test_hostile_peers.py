@@ -14,9 +14,9 @@ import zmq
 
 from common.keys import KeyFolder, Peer
 from common.link.curve import secure_dialler
+from common.protocol.enrolment_wire import frame_word
+from common.protocol.enrolment_words import Ask, Identity
 from common.protocol.message import PROTOCOL_VERSION
-from common.protocol.pairing_wire import frame_word
-from common.protocol.pairing_words import Ask, Identity
 from tests.support.numbered import write_film
 from tests.support.pairing_rig import ports
 from tests.support.programs import Program, board, host, lines, until

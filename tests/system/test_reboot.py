@@ -10,8 +10,8 @@ from board_agent.agent import Agent
 from common import now
 from common.camera.factory import open_camera
 from common.link.factory import open_link, parse_link
-from phone_host.pairqueue import PairQueue
-from phone_host.receiver import Receiver
+from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.receiver import Receiver
 from phone_host.sync.fifo import FifoSettings
 from tests.support.pictures import jpeg
 from tests.support.programs import until

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from phone_host.emulate import NOTHING, PROFILES, Profile
-from phone_host.relay import RelayProcess, relay_process
+from phone_host.bench.emulate import NOTHING, PROFILES, Profile
+from phone_host.bench.relay import RelayProcess, relay_process
 
 PATIENCE_S = 60.0
 NAMED = {profile.name: profile for profile in PROFILES}

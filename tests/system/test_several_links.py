@@ -15,8 +15,8 @@ from common.camera.factory import open_camera
 from common.frame import Buffer
 from common.link.base import SendResult
 from common.link.zeromq import ZeroMqListener
-from phone_host.emulate import Profile
-from phone_host.relay import relay_process
+from phone_host.bench.emulate import Profile
+from phone_host.bench.relay import relay_process
 from tests.support.keys import acquainted
 from tests.support.numbered import saved_numbers, write_film
 from tests.support.programs import board, free_port, host, ledgers, lines, until

@@ -9,10 +9,10 @@ from common.camera.factory import open_camera
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.facts import figures
-from phone_host.host import EndReason, Host, HostSettings
-from phone_host.pipeline import Processed
-from phone_host.regime import Regime, judge
+from phone_host.measure.regime import Regime, judge
+from phone_host.measure.run_facts import figures
+from phone_host.model import Processed
+from phone_host.run.host import EndReason, Host, HostSettings
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
 from tests.support.numbered import write_film

@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.formats.pfm import read_pfm
-from phone_host.formats.ply import read_ply
-from phone_host.formats.rig_yaml import write_rig
 from phone_host.model import Image
+from phone_host.output.pfm import read_pfm
+from phone_host.output.ply import read_ply
+from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.rigs import unlike_rig
 

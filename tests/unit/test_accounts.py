@@ -1,7 +1,7 @@
 """What reports say of what the board told."""
 
 from common.protocol.message import BoardCounts, Rung
-from phone_host.accounts import LinkAccount, SessionAccount, rung_lines, rung_values
+from phone_host.measure.accounts import LinkAccount, SessionAccount, rung_lines, rung_values
 
 
 def account(rung: Rung) -> LinkAccount:

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 from common.errors import SettingsError
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts
-from phone_host.accounts import LinkAccount, SessionAccount
 from phone_host.bench.analysis import Analysis, analyse
 from phone_host.bench.cases import (
     LOCAL_LINKS,
@@ -32,14 +31,15 @@ from phone_host.bench.cases import (
     parse_sizes,
 )
 from phone_host.bench.changes import parse_changes
+from phone_host.bench.emulate import PROFILES
 from phone_host.bench.page import figure, page
 from phone_host.bench.report import Conditions, as_json, losses
 from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up, rig_of
 from phone_host.bench.tables import fit_lines, fit_rows, rate_text, regime_lines, rows, summary_line
-from phone_host.boardprocess import BoardAccount
-from phone_host.delays import DELAYS, STAGES
-from phone_host.emulate import PROFILES
-from phone_host.pairqueue import PairCounts
+from phone_host.children.board_process import BoardAccount
+from phone_host.measure.accounts import LinkAccount, SessionAccount
+from phone_host.measure.delays import DELAYS, STAGES
+from phone_host.model import PairCounts
 from phone_host.sync.fifo import FifoSettings
 
 UNDER = Conditions("a machine", "a date", "sgbm", FifoSettings(), 4.0, ((Interface("rfcomm"), "no radio"),))

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from common.errors import SettingsError
 from phone_host.bench.changes import parse_changes
-from phone_host.prediction import Images, Target
-from phone_host.queue_model import LinkModel
+from phone_host.bench.prediction import Images, Target
+from phone_host.bench.queue_model import LinkModel
 from phone_host.sync.fifo import FifoSettings, Overflow
 
 LINK = LinkModel(1e6, 10.0, np.zeros(1), self_paced=False)

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
+from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
+from phone_host.calibration.calibrate import calibrate
+from phone_host.calibration.verdict import Verdict, judge, vertical_p95_px
 from phone_host.model import Rig
-from phone_host.stereo.calibrate import calibrate
-from phone_host.stereo.calibration import BoardPair, Calibration, Reason
-from phone_host.stereo.verdict import Verdict, judge, vertical_p95_px
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
 

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.protocol.session import Echo
+from phone_host.sync.allowed_lines import MAX_SKEW, allowed_lines
 from phone_host.sync.clock import ClockEstimator
 from phone_host.sync.hull import MOST_POINTS, SKEW_CHANGE, Hull, widening_ns
-from phone_host.sync.strip import MAX_SKEW, allowed_lines
 from tests.support.clock_sim import (
     MS,
     PPM_PER_MINUTE,

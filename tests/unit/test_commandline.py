@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from common.commandline import ExamplesFirstParser, run_command
 from common.errors import DataError, SettingsError, UnavailableError
+from common.program.commandline import ExamplesFirstParser, run_command
 
 
 def sample() -> ExamplesFirstParser:

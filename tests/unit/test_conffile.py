@@ -7,7 +7,7 @@ from pathlib import Path
 from board_agent.settings import ENVIRONMENT_PREFIX, BoardSettings
 from common.camera.factory import parse_camera
 from common.link.factory import needs_keys, parse_link
-from common.settings import resolve
+from common.program.settings import resolve
 
 CONFFILE = Path(__file__).resolve().parents[2] / "deploy" / "board" / "board-agent.toml"
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.ledger import BoardMarks, PairLedger, StageTimes
-from phone_host.delays import DELAYS, EXACT, STAGES, DelayStatistics, Series
+from phone_host.measure.delays import DELAYS, EXACT, STAGES, DelayStatistics, Series
 
 
 def series(values: list[int]) -> Series:

@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from board_agent.doctor.key_checks import check_keys
+from board_agent.doctor.link_checks import LinkReadings, check_link
 from common.camera.v4l2_formats import FormatOffer, Rates, Wanted
 from common.camera.v4l2_stamps import StampClock
 from common.doctor.access import Account, Holder, Node, check_access, may_open
@@ -24,8 +26,6 @@ from common.doctor.camera_checks import (
     check_taken,
 )
 from common.doctor.finding import Finding, Verdict, exit_code, fail, ok, table, values, warn
-from common.doctor.key_checks import check_keys
-from common.doctor.link_checks import LinkReadings, check_link
 from common.doctor.machine_checks import (
     Bluetooth,
     Clocks,

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import SettingsError
-from phone_host.emulate import NOTHING, PROFILES, SEGMENT_BYTES, Profile, Way, parse_profiles
+from phone_host.bench.emulate import NOTHING, PROFILES, SEGMENT_BYTES, Profile, Way, parse_profiles
 
 MS = 1_000_000
 PLAIN = Profile("plain", "tcp", 1_000_000, 3 * MS)

@@ -16,7 +16,7 @@ from common.ledger import BoardMarks
 from common.protocol.message import FrameMessage
 from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, Image, Side
-from phone_host.pipeline import Pipeline
+from phone_host.run.pipeline import Pipeline
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import enlarged
 from phone_host.stereo.match import MatcherName, MatchSettings, create_matcher

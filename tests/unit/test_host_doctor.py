@@ -3,7 +3,7 @@
 import pytest
 
 from common.doctor.finding import Verdict
-from phone_host.doctor_checks import (
+from phone_host.doctor.host_checks import (
     Answer,
     BoardReadings,
     Package,

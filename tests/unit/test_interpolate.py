@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from phone_host.model import Image, RectifiedPair
-from phone_host.stereo.interpolate import Interpolator
-from phone_host.stereo.match import MatchSettings, create_matcher
-from phone_host.stereo.scene import (
+from phone_host.scene.scene import (
     Body,
     Path,
     Renderer,
@@ -22,6 +20,8 @@ from phone_host.stereo.scene import (
     rig_poses,
     truth,
 )
+from phone_host.stereo.interpolate import Interpolator
+from phone_host.stereo.match import MatchSettings, create_matcher
 
 PERIOD_S = 1 / 30
 MOMENT_S = 0.4

@@ -246,9 +246,9 @@ def test_a_folder_for_sockets_that_somebody_has_planted_is_refused(
 @needs_root
 def test_the_doctor_asks_as_the_user_who_serves(shared: Path) -> None:
     """Root's doctor finds nothing wrong with a path in the service's own folder."""
+    from board_agent.doctor.link_probe import examine_link  # noqa: PLC0415
     from common.doctor.access import Account  # noqa: PLC0415
     from common.doctor.finding import Verdict  # noqa: PLC0415
-    from common.doctor.link_probe import examine_link  # noqa: PLC0415
     from common.doctor.unit_check import Unit  # noqa: PLC0415
 
     place = shared / "run"

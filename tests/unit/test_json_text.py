@@ -3,7 +3,7 @@
 import json
 import math
 
-from phone_host.formats.json_text import json_text
+from phone_host.output.json_text import json_text
 
 
 def test_what_is_no_number_is_null_at_every_depth() -> None:

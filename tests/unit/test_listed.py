@@ -12,10 +12,10 @@ import pytest
 
 from common.errors import DataError, SettingsError, TandemError, UnavailableError
 from common.files import read_whole
-from phone_host.formats.atomic import write_bytes, write_text
-from phone_host.formats.listed import LIST, ListedFolder, claim
-from phone_host.results import NAMES, PAIR_FILES, Results
-from phone_host.verbs.outputs import spare_inputs
+from phone_host.output.atomic import write_bytes, write_text
+from phone_host.output.listed import LIST, ListedFolder, claim
+from phone_host.run.results import NAMES, PAIR_FILES, Results
+from phone_host.verbs.output_folders import spare_inputs
 
 FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
 
@@ -194,7 +194,7 @@ def test_a_list_with_ways_out_of_the_folder_leads_nowhere(tmp_path: Path) -> Non
 _WRITER = """
 import sys
 from pathlib import Path
-from phone_host.formats.atomic import write_text
+from phone_host.output.atomic import write_text
 print("ready", flush=True)
 while True:
     for letter in "ab":

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
+from phone_host.measure.image_motion import MotionMeter, fast_shift_px
 from phone_host.model import Image
-from phone_host.motion import MotionMeter, fast_shift_px
 
 MS = 1_000_000
 

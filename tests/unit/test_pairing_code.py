@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import ProtocolError, SettingsError
-from common.protocol.pairing_code import (
+from common.protocol.enrolment_code import (
     CODE_LIFE_NS,
     FIRST_PAUSE_NS,
     LONGEST_PAUSE_NS,
@@ -27,8 +27,8 @@ from common.protocol.pairing_code import (
     new_code,
     read_code,
 )
-from common.protocol.pairing_wire import MAX_WORD_BYTES, WordReader, decode_word, encode_word, frame_word
-from common.protocol.pairing_words import Ask, Begin, Commit, Identity, Open, Refuse, Refused, Shown, Word
+from common.protocol.enrolment_wire import MAX_WORD_BYTES, WordReader, decode_word, encode_word, frame_word
+from common.protocol.enrolment_words import Ask, Begin, Commit, Identity, Open, Refuse, Refused, Shown, Word
 
 BOARD = Identity(bytes(range(32)), "bone")
 HOST = Identity(bytes(range(32, 64)), "phone")

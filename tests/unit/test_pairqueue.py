@@ -13,8 +13,8 @@ from common.frame import Frame, PixelFormat
 from common.ledger import BoardMarks
 from common.protocol.message import FrameMessage
 from common.stamp import HOST_CLOCK, Stamp
-from phone_host.model import BoardFrame, FramePair
-from phone_host.pairqueue import PairCounts, PairQueue
+from phone_host.model import BoardFrame, FramePair, PairCounts
+from phone_host.stream.pair_queue import PairQueue
 from phone_host.sync.fifo import FifoSettings, Overflow
 
 MS = 1_000_000

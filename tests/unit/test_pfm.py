@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
-from phone_host.formats.pfm import read_pfm, write_pfm
 from phone_host.model import Disparity
+from phone_host.output.pfm import read_pfm, write_pfm
 
 
 def test_file_holds_header_bottom_row_first_little_endian_and_infinity(tmp_path: Path) -> None:

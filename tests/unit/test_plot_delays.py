@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from common.ledger import BoardMarks, PairLedger, StageTimes
-from phone_host.fits import fit_delay
-from phone_host.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
-from phone_host.plot_parts import point_legend
+from phone_host.measure.delay_fit import fit_delay
+from phone_host.svg.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
+from phone_host.svg.plot_parts import point_legend
 
 MS = 1_000_000
 

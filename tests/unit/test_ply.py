@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
-from phone_host.formats.ply import read_ply, write_ply
-from phone_host.formats.preview import colour_disparity, write_preview
+from phone_host.output.ply import read_ply, write_ply
+from phone_host.output.preview import colour_disparity, write_preview
 from phone_host.stereo.images import read_image
 
 _CLOUD = np.array([[[0.1, -0.2, 1.5], [np.nan, np.nan, np.nan]], [[1, 2, np.inf], [4, 5, 6]]], dtype=np.float32)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from common.ledger import BoardMarks, PairLedger, StageTimes
-from phone_host.emulate import PROFILES
-from phone_host.prediction import (
+from phone_host.bench.emulate import PROFILES
+from phone_host.bench.prediction import (
     Cell,
     Figures,
     Images,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phone_host.queue_model import LinkModel, Setting, predict, serve
+from phone_host.bench.queue_model import LinkModel, Setting, predict, serve
 from phone_host.sync.fifo import FifoSettings, Overflow
 
 MS = 1e6

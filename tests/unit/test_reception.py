@@ -21,8 +21,8 @@ from common.protocol.message import (
     RefusalReason,
 )
 from common.protocol.session import MS, Outgoing, connection_name
-from phone_host.pairqueue import PairQueue
-from phone_host.reception import LinkFacts, Reception
+from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.reception import LinkFacts, Reception
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.quarantine import Disbelief
 from tests.support.session_world import CAMERA

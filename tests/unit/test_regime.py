@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phone_host.regime import Judgement, Regime, RunFigures, judge
+from phone_host.measure.regime import Judgement, Regime, RunFigures, judge
 from phone_host.sync.fifo import Overflow
 
 MS = 1_000_000

@@ -14,20 +14,8 @@ from hypothesis import strategies as st
 
 from common.errors import DataError
 from common.ledger import BoardMarks, PairLedger, StageTimes
-from phone_host.page_frame import document
-from phone_host.plot_parts import legend
-from phone_host.plot_scale import Linear, Log, duration_text, log_scale, span, ticks
-from phone_host.plots import (
-    Budget,
-    Part,
-    Quantity,
-    Strips,
-    budgets,
-    distributions,
-    over_time,
-    stacked_over_time,
-)
-from phone_host.report_page import (
+from phone_host.report.page_frame import document
+from phone_host.report.report_page import (
     DelaySeries,
     Figure,
     PageData,
@@ -36,6 +24,18 @@ from phone_host.report_page import (
     Verdict,
     delay_series,
     page,
+)
+from phone_host.svg.plot_parts import legend
+from phone_host.svg.plot_scale import Linear, Log, duration_text, log_scale, span, ticks
+from phone_host.svg.plots import (
+    Budget,
+    Part,
+    Quantity,
+    Strips,
+    budgets,
+    distributions,
+    over_time,
+    stacked_over_time,
 )
 
 VOID = {"meta", "img", "br", "path", "rect", "circle", "hr"}

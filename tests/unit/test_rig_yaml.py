@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
-from phone_host.formats.rig_yaml import read_rig, write_rig, write_time_offset
 from phone_host.model import UNMEASURED_NS, Rig, Side, TimeOffset
+from phone_host.output.rig_yaml import read_rig, write_rig, write_time_offset
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.rigs import unlike_rig
 

@@ -8,15 +8,13 @@ import pytest
 from common.camera.base import CameraHealth, CameraState
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts
-from phone_host.accounts import LinkAccount, SessionAccount
-from phone_host.delays import DelayStatistics
-from phone_host.facts import RunFacts
-from phone_host.model import Side, TimeOffset
-from phone_host.pairqueue import PairCounts
-from phone_host.report import build
-from phone_host.results import Unwritten
-from phone_host.run_page import run_page
-from phone_host.summary import phase_lines, summary
+from phone_host.measure.accounts import LinkAccount, SessionAccount
+from phone_host.measure.delays import DelayStatistics
+from phone_host.measure.run_facts import RunFacts
+from phone_host.model import PairCounts, Side, TimeOffset, Unwritten
+from phone_host.report.run_json import build
+from phone_host.report.run_page import run_page
+from phone_host.report.summary import phase_lines, summary
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Phase
 from phone_host.sync.quarantine import Disbelief, Suspects

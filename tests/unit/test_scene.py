@@ -11,9 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from phone_host.model import RectifiedPair, StereoGeometry
-from phone_host.stereo.match import MatchSettings, create_matcher
-from phone_host.stereo.rectify import Rectifier
-from phone_host.stereo.scene import (
+from phone_host.scene.scene import (
     DEMO_PERIOD_S,
     PHONE_LOOK,
     WEBCAM_LOOK,
@@ -40,6 +38,8 @@ from phone_host.stereo.scene import (
     truth,
     unlike_rig,
 )
+from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.rectify import Rectifier
 
 SMALL_VIEW = RectifiedView(StereoGeometry(200.0, 0.1, 79.5, 59.5), 160, 120)
 FOCAL_PX, BASELINE_M = 525.0, 0.1

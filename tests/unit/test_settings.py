@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import SettingsError
-from common.settings import listing, log_level, resolve, setting
+from common.program.settings import listing, log_level, resolve, setting
 
 
 @dataclass(frozen=True, slots=True)

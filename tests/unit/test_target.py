@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from common.errors import SettingsError
-from phone_host.stereo.target import Board, agree, find_corners, parse_board
+from phone_host.calibration.target import Board, agree, find_corners, parse_board
 from tests.support.boards import BOARD, poses, render_pair
 from tests.support.rigs import project_points, unlike_rig
 

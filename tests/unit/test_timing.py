@@ -10,11 +10,22 @@ import pytest
 
 from common.errors import DataError
 from common.frame import PixelFormat
-from phone_host.misfit_plot import misfit_svg
+from phone_host.calibration.misfit_plot import misfit_svg
+from phone_host.calibration.timing.lamp import Brightness, brightness, measure_lamp
+from phone_host.calibration.timing.scene import measure_scene
+from phone_host.calibration.timing.screen import (
+    COUNT,
+    HEIGHT,
+    WIDTH,
+    PatternReader,
+    Reading,
+    counted,
+    draw,
+    measure_screen,
+)
+from phone_host.calibration.timing.shots import Measured, Method, Shot, Times
 from phone_host.model import Image, Side
-from phone_host.stereo.raw_images import EncodedImage
-from phone_host.stereo.rectify import Rectifier
-from phone_host.stereo.scene import (
+from phone_host.scene.scene import (
     PHONE_LOOK,
     WEBCAM_LOOK,
     Path,
@@ -24,10 +35,8 @@ from phone_host.stereo.scene import (
     rig_poses,
     unlike_rig,
 )
-from phone_host.timing.lamp import Brightness, brightness, measure_lamp
-from phone_host.timing.scene import measure_scene
-from phone_host.timing.screen import COUNT, HEIGHT, WIDTH, PatternReader, Reading, counted, draw, measure_screen
-from phone_host.timing.shots import Measured, Method, Shot, Times
+from phone_host.stereo.raw_images import EncodedImage
+from phone_host.stereo.rectify import Rectifier
 
 REFRESH_S = 1 / 59.94
 START_S = 12.3

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.ledger import BoardMarks, PairLedger, StageTimes
-from phone_host.trace import TracedRun, trace_json
+from phone_host.bench.trace import TracedRun, trace_json
 from tests.support.trace_format import checked
 
 PARTS = ("capture", "outbox", "propagation", "pairing", "queuing", "processing")

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.camera.base import CameraHealth, CameraState
+from phone_host.measure.trust import Doubt, Timing, stamp_doubt, timing_concerns
 from phone_host.model import UNMEASURED_NS, TimeOffset
-from phone_host.trust import Doubt, Timing, stamp_doubt, timing_concerns
 
 MS = 1_000_000
 STILL = Timing(time_skew_ns=16 * MS, uncertainty_ns=0.1 * MS, end_to_end_ns=80 * MS, motion_px_s=0.0, width_px=640)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import DataError, SettingsError
-from phone_host.stereo.view_files import pair_files
+from phone_host.calibration.view_files import pair_files
 
 
 def _touch(folder: Path, *names: str) -> Path:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from common.link.wait import Waiter
+from common.link.waiter import Waiter
 
 _TURN_NS = 10_000
 

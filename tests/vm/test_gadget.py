@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from phone_host.udev_rule import RULES, UsbBoard, write_rule
+from phone_host.boards.udev_rule import RULES, UsbBoard, write_rule
 from tests.support.programs import ledgers, lines, until
 from tests.vm.conftest import CAMERA
 from tests.vm.contract import run_contract

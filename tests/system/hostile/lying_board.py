@@ -17,7 +17,7 @@ from common.errors import ProtocolError
 from common.frame import Frame, PixelFormat
 from common.ledger import BoardMarks
 from common.link.base import Packet, SendResult
-from common.link.wait import Waiter
+from common.link.waiter import Waiter
 from common.link.zeromq import ZeroMqListener
 from common.protocol.board_session import BoardSession
 from common.protocol.message import (

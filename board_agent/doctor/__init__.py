@@ -1,0 +1,1 @@
+"""board-agent doctor: what keeps a board from streaming."""

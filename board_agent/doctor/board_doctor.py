@@ -1,0 +1,55 @@
+"""board-agent doctor: everything that keeps a board from streaming, each with its remedy. Checks live in common/doctor."""
+
+from pathlib import Path
+from typing import Final
+
+from board_agent.doctor.key_checks import check_keys
+from board_agent.doctor.link_probe import examine_link
+from board_agent.settings import BoardSettings, key_folder
+from common.doctor import machine
+from common.doctor.camera_probe import examine_camera
+from common.doctor.finding import Finding, fail, ok
+from common.doctor.machine_checks import check_clocks, check_disk, check_power, check_usb_log
+from common.doctor.unit_check import check_unit
+from common.keys import SERVICE_FOLDER, KeyFolder
+from common.link.factory import needs_keys, parse_link
+
+UNIT: Final = "board-agent"
+_LOG_FOLDERS: Final = (Path("/var/log/journal"), Path("/run/log/journal"))
+
+
+def examine(settings: BoardSettings, file: Path | None) -> list[Finding]:
+    """Check this machine for a run with the given settings.
+
+    Args:
+        settings: what would be run.
+        file: where they were read from; None: no file.
+
+    Returns:
+        The findings, in the order in which things go wrong.
+
+    Raises:
+        SettingsError: the camera's or a link's URI makes no sense.
+    """
+    unit = machine.read_unit(UNIT)
+    account = machine.account_of(unit.user) if unit.installed and unit.user else None
+    user = account or machine.own_account()
+    findings = [ok("settings", str(file) if file else "no file: defaults, environment and options"), check_unit(unit)]
+    if settings.camera:
+        findings += examine_camera(settings.camera, user, unit)
+    else:
+        findings.append(
+            fail("camera", "none is configured", "give --camera v4l2:auto, or set camera in the settings file")
+        )
+    for uri in settings.link:
+        findings += examine_link(uri, user, unit, listens_by_default=True)
+    if any(needs_keys(parse_link(uri, listens_by_default=True)) for uri in settings.link):
+        is_service = account is not None and not settings.keys
+        findings.append(check_keys(KeyFolder(SERVICE_FOLDER) if is_service else key_folder(settings.keys), user))
+    log = machine.read_kernel_log()
+    findings += check_clocks(machine.read_clocks(Path(__file__).parent))
+    folders = [Path("/"), *(folder for folder in _LOG_FOLDERS if folder.is_dir())]
+    devices = {folder.stat().st_dev: folder for folder in reversed(folders)}
+    findings += [check_disk(machine.read_disk(folder)) for folder in reversed(devices.values())]
+    findings += [check_power(log, machine.read_supply()), check_usb_log(log)]
+    return findings

@@ -1,0 +1,260 @@
+"""Where a board takes in hosts that it does not know yet: the ports behind its secured links' own, open only while that is wanted.
+
+It is wanted while no host is known at all, and while the owner's `board-agent pair` asks for it over a socket in the folder of keys, which
+only the owner can reach. There is one door, one code and one account of tries for all links of a board. It understands nothing but the
+words of pairing; a stranger there gets one guess at a code, and costs a line in the log.
+
+Rule: a code is told to that command and to nobody else. No line of the log holds one: more people read logs than may let a host in.
+"""
+
+import logging
+import os
+import socket
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import astuple, dataclass, replace
+from pathlib import Path
+from typing import Final, assert_never
+
+import msgpack
+import zmq
+from zmq.utils import z85
+
+from common import now
+from common.errors import ProtocolError, SettingsError, TandemError
+from common.keys import KeyFolder, Peer, clean_name
+from common.link.callers import Call, Callers, Left, Nonsense, Said
+from common.link.curve import Guard, Seldom
+from common.link.waiter import is_readable
+from common.program.logs import event
+from common.protocol.enrolment_code import Desk, Failed, Output, Paired, Say, ShowCode, code_text
+from common.protocol.enrolment_words import Identity, Refuse, Refused
+
+_LOG = logging.getLogger(__name__)
+
+_NOW: Final = int(zmq.DONTWAIT)
+_LOOK_NS: Final = 1_000_000_000
+"""Between two looks at whether the door should be open."""
+
+_OWNER_NS: Final = 3_000_000_000
+"""`board-agent pair` says that it is still there every half second; a moment after it has gone the door closes."""
+
+_LAST_PORT: Final = 65535
+
+CONTROL_PREFIX: Final = "pairing-"
+
+
+@dataclass(frozen=True, slots=True)
+class DoorState:
+    """What `board-agent pair` is told.
+
+    Attributes:
+        address: the links that this is the door of.
+        code: what to type on the host now.
+        asking: name of the host that has asked last; empty if none.
+        paired: name of the host that was taken in last since the command began; empty if none.
+        failed: attempts that came to nothing since then.
+        problem: why the door cannot be opened; empty if it is open.
+    """
+
+    address: str
+    code: str
+    asking: str
+    paired: str
+    failed: int
+    problem: str = ""
+
+    def encode(self) -> bytes:
+        """Its bytes."""
+        packed: bytes = msgpack.packb(astuple(self))
+        return packed
+
+    @staticmethod
+    def decode(packed: bytes) -> "DoorState":
+        """Read it. The owner's terminal shows it, whose service may have been taken over: nothing in it commands a terminal.
+
+        Raises:
+            ProtocolError: it is none.
+        """
+        try:
+            fields = msgpack.unpackb(packed)
+        except (ValueError, msgpack.UnpackException):
+            fields = ()
+        kinds = [str, str, str, str, int, str]
+        if not isinstance(fields, list) or [type(value) for value in fields] not in (kinds, kinds[:-1]):
+            raise ProtocolError("that is no state of a door", "update the board's programs")
+        if not all(value.isprintable() for value in fields if isinstance(value, str)):
+            raise ProtocolError("a state of a door would command a terminal", "look at who runs the board's service")
+        return DoorState(*fields)
+
+
+class Door:
+    """Takes in hosts.
+
+    Args:
+        context: of a link's sockets.
+        links: the secured links' addresses as they are bound, `tcp://ADDRESS:PORT`.
+        keys: the board's key; a host that has proved the code is added there.
+        guard: knows whether any host is known; it lets in the one that is added.
+
+    Raises:
+        SettingsError: there is no port behind a link's own.
+        DataError: the files of keys are bad.
+        UnavailableError: they cannot be used.
+    """
+
+    def __init__(
+        self, context: "zmq.Context[zmq.Socket[bytes]]", links: Sequence[str], keys: KeyFolder, guard: Guard
+    ) -> None:
+        self._keys, self._guard = keys, guard
+        self._addresses = [pairing_address(link) for link in links]
+        name = clean_name(socket.gethostname())
+        self._desk = Desk(Identity(z85.decode(keys.own().public.encode()), name), os.urandom)
+        self._callers = Callers(self._desk.is_proving)
+        self._control = context.socket(zmq.ROUTER)
+        self._control.setsockopt(zmq.LINGER, 0)
+        self._bind_control(keys.path / f"{CONTROL_PREFIX}{clean_name(_as_given(links[0]).removeprefix('tcp://'))}")
+        self._is_open = False
+        self._owner_until_ns = 0
+        self._state = self._before = DoorState(", ".join(map(_as_given, links)), "", "", "", 0)
+        self._told_code = -1
+        self._askers, self._strangers, self._troubles = Seldom(), Seldom(), Seldom()
+        self.due_ns = 0
+
+    @property
+    def pollables(self) -> "tuple[Callers, zmq.Socket[bytes]]":
+        """What to wait on."""
+        return self._callers, self._control
+
+    def answer(self) -> None:
+        """Do all that is to be done now."""
+        now_ns = now.monotonic_ns()
+        if is_readable(self._control):
+            self._hear_owner(now_ns)
+        for call in self._callers.receive(now_ns):
+            self._hear(call, now_ns)
+        if now_ns >= self.due_ns:
+            self.due_ns = now_ns + _LOOK_NS
+            for call in self._callers.tick(now_ns):
+                self._hear(call, now_ns)
+            self._do(self._desk.tick(now_ns), "", now_ns)
+            self._open_or_close(now_ns)
+
+    def close(self) -> None:
+        """Hang up on everybody."""
+        self._callers.close()
+
+    def _hear_owner(self, now_ns: int) -> None:
+        """Answer `board-agent pair`; it opens the door, and ends a pause when it comes."""
+        if now_ns >= self._owner_until_ns:
+            self._desk.pardon()
+            self._state = self._before
+        self._owner_until_ns = now_ns + _OWNER_NS
+        self._open_or_close(now_ns)
+        self._state = replace(self._state, code=code_text(self._desk.code(now_ns)) if self._is_open else "")
+        while self._control.poll(0):
+            connection = self._control.recv_multipart(_NOW)[0]
+            with suppress(zmq.ZMQError):  # gone already
+                self._control.send_multipart([connection, self._state.encode()], _NOW)
+
+    def _open_or_close(self, now_ns: int) -> None:
+        wanted = now_ns < self._owner_until_ns or self._guard.knows_nobody()
+        if wanted == self._is_open:
+            return
+        addresses = ", ".join(
+            _as_given(f"tcp://{f'[{host}]' if ':' in host else host}:{port}") for host, port in self._addresses
+        )
+        try:
+            if wanted:
+                self._callers.listen(self._addresses)
+            else:
+                self._callers.shut()
+        except OSError as error:
+            self._state = replace(self._state, problem=f"{addresses} cannot be had ({os.strerror(error.errno or 0)})")
+            if self._troubles.now(now_ns):
+                _LOG.warning(event("pairing_impossible", address=addresses, problem=os.strerror(error.errno or 0)))
+            return
+        self._is_open = wanted
+        self._state = replace(self._state, problem="")
+        _LOG.info(event("pairing_open" if wanted else "pairing_closed", address=addresses))
+
+    def _hear(self, call: Call, now_ns: int) -> None:
+        match call:
+            case Said(connection, address, word):
+                self._do(self._desk.receive(connection, word, now_ns), address, now_ns)
+            case Left(connection):
+                self._do(self._desk.receive(connection, Refuse(Refused.CLOSED), now_ns), "", now_ns)
+            case Nonsense(_, address, problem):
+                if self._strangers.now(now_ns):
+                    count = self._strangers.count
+                    _LOG.warning(event("pairing_garbage", address=address, count=count, problem=problem))
+            case _:
+                assert_never(call)
+
+    def _do(self, outputs: list[Output], address: str, now_ns: int) -> None:
+        for output in outputs:
+            match output:
+                case Say(connection, word):
+                    self._callers.say(connection, word)
+                case ShowCode(code, name):
+                    self._show(code, clean_name(name), address, now_ns)
+                case Failed(name, pause_ns):
+                    self._state = replace(self._state, code="", asking="", failed=self._state.failed + 1)
+                    pause_s = pause_ns // 1_000_000_000
+                    _LOG.warning(event("pairing_failed", host=clean_name(name), pause_s=pause_s))
+                case Paired(host):
+                    if not self._take_in(host, address):
+                        return
+                case _:
+                    assert_never(output)
+
+    def _show(self, code: int, name: str, address: str, now_ns: int) -> None:
+        """Tell who asks: at once when the code is new, and seldom for who else asks."""
+        if self._askers.now(now_ns) or code != self._told_code:
+            self._told_code = code
+            self._state = replace(self._state, code=code_text(code), asking=name)
+            _LOG.warning(event("pairing_asked", host=name, address=address, code="shown by sudo board-agent pair"))
+
+    def _take_in(self, host: Identity, address: str) -> bool:
+        try:
+            peer = self._keys.add(Peer(host.name, z85.encode(host.key).decode(), now.wall_time()))
+        except TandemError as error:
+            _LOG.error(event("pairing_not_kept", host=clean_name(host.name), problem=error))
+            return False
+        self._state = replace(self._state, code="", asking="", paired=peer.name)
+        self.due_ns = now.monotonic_ns() + _LOOK_NS  # the last word leaves first
+        _LOG.info(event("paired", host=peer.name, address=address))
+        return True
+
+    def _bind_control(self, path: Path) -> None:
+        before = os.umask(0o177)  # for its owner only
+        try:
+            with self._keys.with_owners_rights():
+                self._control.bind(f"ipc://{path}")
+        except zmq.ZMQError as error:
+            _LOG.warning(event("pair_command_off", path=path, problem=error.strerror))
+        finally:
+            os.umask(before)
+
+
+def pairing_address(link: str) -> tuple[str, int]:
+    """Where a secured link's board takes in new hosts: the port behind the link's own.
+
+    Args:
+        link: its address, `tcp://HOST:PORT`.
+
+    Returns:
+        Host and port.
+
+    Raises:
+        SettingsError: there is no such port.
+    """
+    host, _, port = link.removeprefix("tcp://").rpartition(":")
+    if int(port) >= _LAST_PORT:
+        raise SettingsError(f"{link} leaves no port for pairing", f"choose one below {_LAST_PORT}")
+    return host.strip("[]"), int(port) + 1
+
+
+def _as_given(link: str) -> str:
+    """A bound link as people write it: every interface is a star."""
+    return link.replace("[::]", "*").replace("0.0.0.0", "*")  # noqa: S104 - only to show it

@@ -1,0 +1,1 @@
+"""What both programs need of a command line, a settings file, a log and signals."""

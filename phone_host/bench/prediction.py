@@ -1,0 +1,308 @@
+"""From measured cells of a matrix to settings that were not run: what to draw from, and how near the prediction comes. Pure.
+
+A cell that is compared with its own prediction (`held_out`) gives nothing to it but what is known without running it: which frames are shown, how
+large, how often. What a cell cannot know from the others it says so instead of guessing.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from common.ledger import PairLedger
+from phone_host.bench.emulate import Profile
+from phone_host.bench.queue_model import LinkModel, Predicted, Setting, predict
+from phone_host.measure.delay_fit import LIKE_SIZES, DelayFit, Values, fit_delay
+from phone_host.sync.fifo import FifoSettings
+
+_FRAMES: Final = 3000
+"""Frames that a prediction runs: the p95 of 3000 values is known to 0.4 percentage points of rank."""
+
+_SEED: Final = 1
+
+_SLOWER: Final = 1.15
+"""Frames that begin this much more seldom than the camera shows them, while the processor waits, wait for the line."""
+
+_LEAST_GAPS: Final = 10
+"""Fewer tell no median that a single hitch would not move."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Images:
+    """What the board's camera shows.
+
+    Attributes:
+        width_px: of an image.
+        height_px: of an image.
+        period_ns: time between two.
+        size_bytes: (N,) of the frames in their order.
+    """
+
+    width_px: int
+    height_px: int
+    period_ns: float
+    size_bytes: Values
+
+    @property
+    def work(self) -> float:
+        """What a pair costs in matching, up to a factor: pixels times disparities, which grow with the width."""
+        return float(self.width_px) ** 2 * self.height_px
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cell:
+    """One measured combination, as far as the model needs it.
+
+    Attributes:
+        interface: its name.
+        self_paced: whether its link gives a frame to the line only when the one before has left.
+        images: what was shown.
+        fifo: the queue before the worker.
+        ledgers: of its pairs, at least one.
+        pairs_per_s: rate of results.
+        lost_share: of the frames that the board grabbed, those that a newer one replaced or the FIFO dropped.
+    """
+
+    interface: str
+    self_paced: bool
+    images: Images
+    fifo: FifoSettings
+    ledgers: tuple[PairLedger, ...]
+    pairs_per_s: float
+    lost_share: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """A setting to be predicted.
+
+    Attributes:
+        interface: its name.
+        link: what it does to a frame.
+        images: what the board's camera shows.
+        fifo: depth and policy.
+        processing_factor: how many times as long as what was measured processing takes.
+    """
+
+    interface: str
+    link: LinkModel
+    images: Images
+    fifo: FifoSettings
+    processing_factor: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """No prediction, and why."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What is compared, predicted or measured; delays in ns.
+
+    Attributes:
+        pairs_per_s: rate of results.
+        lost_share: of the frames that the board grabbed, those that a newer one replaced or the FIFO dropped, 0 to 1.
+        propagation_p50_ns: on the link.
+        queuing_p95_ns: waiting for the worker.
+        starvation_p50_ns: how long the worker had nothing to do.
+        end_to_end_p50_ns: from exposure to results.
+        end_to_end_p95_ns: the same, 95th percentile.
+    """
+
+    pairs_per_s: float
+    lost_share: float
+    propagation_p50_ns: float
+    queuing_p95_ns: float
+    starvation_p50_ns: float
+    end_to_end_p50_ns: float
+    end_to_end_p95_ns: float
+
+
+def values_of(ledgers: Sequence[PairLedger], value: Callable[[PairLedger], int]) -> Values:
+    """A column of numbers out of ledgers: (N,) float64."""
+    return np.array([value(ledger) for ledger in ledgers], dtype=np.float64)
+
+
+def fit_of(ledgers: Sequence[PairLedger], *, intervals: bool) -> DelayFit:
+    """Propagation as latency + bytes / rate over these pairs."""
+    size = values_of(ledgers, lambda ledger: ledger.bytes)
+    delay = values_of(ledgers, lambda ledger: ledger.propagation_ns)
+    return fit_delay(size, delay) if intervals else fit_delay(size, delay, draws=0)
+
+
+def measured(cell: Cell) -> Figures:
+    """The figures of a cell as they were measured."""
+
+    def percentile(value: Callable[[PairLedger], int], rank: float) -> float:
+        return float(np.percentile(values_of(cell.ledgers, value), rank))
+
+    return Figures(
+        pairs_per_s=cell.pairs_per_s,
+        lost_share=cell.lost_share,
+        propagation_p50_ns=percentile(lambda ledger: ledger.propagation_ns, 50),
+        queuing_p95_ns=percentile(lambda ledger: ledger.queuing_ns, 95),
+        starvation_p50_ns=percentile(lambda ledger: ledger.starvation_ns, 50),
+        end_to_end_p50_ns=percentile(lambda ledger: ledger.end_to_end_ns, 50),
+        end_to_end_p95_ns=percentile(lambda ledger: ledger.end_to_end_ns, 95),
+    )
+
+
+def held_out(cell: Cell, cells: Sequence[Cell]) -> Figures | Unknown:
+    """Predict a cell from all others.
+
+    Args:
+        cell: the one that gives nothing.
+        cells: all of them.
+    """
+    others = [other for other in cells if other is not cell]
+    link = learn_link(cell.interface, cell.images, others)
+    if isinstance(link, Unknown):
+        return link
+    return foretell(Target(cell.interface, link, cell.images, cell.fifo), others)
+
+
+def with_own_delays(cell: Cell, cells: Sequence[Cell]) -> Figures | Unknown:
+    """Let a cell's frames go through the queues once more, its own delays drawn anew: what differs from the run is the queues' error alone.
+
+    Args:
+        cell: which.
+        cells: all of them: the line through all frames of its interface says how much of the link's delay is bytes.
+    """
+    link = learn_link(cell.interface, cell.images, cells)
+    if isinstance(link, Unknown):
+        return link
+    size = values_of(cell.ledgers, lambda ledger: ledger.bytes)
+    delay = values_of(cell.ledgers, lambda ledger: ledger.propagation_ns)
+    own = replace(link, spread_ns=delay - link.latency_ns - link.ns_per_byte * size)
+    return foretell(Target(cell.interface, own, cell.images, cell.fifo), [cell])
+
+
+def foretell(target: Target, cells: Sequence[Cell]) -> Figures | Unknown:
+    """Predict any setting.
+
+    Args:
+        target: the setting.
+        cells: what was measured; cells of the target's interface are drawn from before others.
+
+    Returns:
+        The figures, or why there are none.
+    """
+    images, interface = target.images, target.interface
+    if not cells:
+        return Unknown("nothing else was measured")
+    near = [cell for cell in cells if cell.interface == interface] or list(cells)
+    ledgers = [ledger for cell in near for ledger in cell.ledgers]
+    idle = [ledger for ledger in ledgers if ledger.starvation_ns > 0] or ledgers
+    setting = Setting(
+        period_ns=images.period_ns,
+        size_bytes=images.size_bytes,
+        capture_ns=values_of(ledgers, lambda ledger: ledger.capture_ns),
+        link=target.link,
+        pairing_ns=values_of(ledgers, lambda ledger: ledger.pairing_ns),
+        wake_ns=np.array([np.median(values_of(idle, lambda ledger: ledger.queuing_ns))]),
+        service_ns=_services(images, cells) * target.processing_factor,
+        fifo=target.fifo,
+    )
+    return _figures(predict(setting, _FRAMES, np.random.default_rng(_SEED)))
+
+
+def learn_link(interface: str, images: Images, cells: Sequence[Cell]) -> LinkModel | Unknown:
+    """What a link does to frames of this size, from the cells that ran over it."""
+    mine = [cell for cell in cells if cell.interface == interface]
+    if not mine:
+        return Unknown(f"nothing else was measured over {interface}")
+    ledgers = [ledger for cell in mine for ledger in cell.ledgers]
+    size = values_of(ledgers, lambda ledger: ledger.bytes)
+    delay = values_of(ledgers, lambda ledger: ledger.propagation_ns)
+    if size.max() < LIKE_SIZES * size.min():
+        wanted = float(np.median(images.size_bytes))
+        if not size.min() / LIKE_SIZES <= wanted <= size.max() * LIKE_SIZES:
+            return Unknown(f"frames of one size only were measured over {interface}")
+        # No line can be told from frames of one size; how much of it is latency hardly matters for frames of the same.
+        latency_ns, ns_per_byte = 0.5 * float(np.median(delay)), 0.5 * float(np.median(delay / size))
+    else:
+        fit = fit_of(ledgers, intervals=False)
+        latency_ns, ns_per_byte = fit.latency_ns, fit.ns_per_byte
+    if mine[0].self_paced:
+        taken = [_occupied(cell) for cell in mine]
+        full = [one.ns_per_byte for one in taken if one.is_full]
+        # Lines that were full tell how long a byte takes them, others only that it takes no longer.
+        ns_per_byte = float(np.median(full)) if full else min(ns_per_byte, *(one.ns_per_byte for one in taken))
+    return LinkModel(latency_ns, ns_per_byte, delay - latency_ns - ns_per_byte * size, mine[0].self_paced)
+
+
+@dataclass(frozen=True, slots=True)
+class _Occupied:
+    """How long a self-paced line was taken, a byte, ns, from one frame's beginning to the next's; `is_full`: because of the line, not of the camera."""
+
+    ns_per_byte: float
+    is_full: bool
+
+
+def _occupied(cell: Cell) -> _Occupied:
+    """How long a line that begins a frame when the one before has left was taken for a byte, in the median.
+
+    What the machine adds to propagation does not hold up the next frame, but tilts the fitted line.
+    """
+    gaps = np.array([after.board.sent_ns - before.board.sent_ns for before, after in pairwise(cell.ledgers)])
+    if gaps.size < _LEAST_GAPS:
+        return _Occupied(float("inf"), is_full=False)
+    size = values_of(cell.ledgers, lambda ledger: ledger.bytes)[:-1]
+    starved = float(np.median(values_of(cell.ledgers, lambda ledger: ledger.starvation_ns))) > 0.0
+    slower = float(np.median(gaps)) > _SLOWER * cell.images.period_ns
+    return _Occupied(float(np.median(gaps / size)), is_full=starved and slower)
+
+
+def nominal_link(profile: Profile, *, self_paced: bool) -> LinkModel:
+    """A link that nobody ran, from its profile's figures alone."""
+    random = np.random.default_rng(_SEED)
+    middle_ns = profile.jitter_ns / 2.0
+    spread_ns = random.uniform(-middle_ns, middle_ns, 1000) if profile.jitter_ns else np.zeros(1)
+    return LinkModel(profile.delay_ns + middle_ns, 1e9 / profile.bytes_per_s, spread_ns, self_paced)
+
+
+def _services(images: Images, cells: Sequence[Cell]) -> Values:
+    """Processing delays to draw from: of the same size if there are any, over whichever interface, else scaled by the work.
+
+    What else the machine does changes from run to run by more than what an interface costs the processor: all runs of a size together tell more
+    than those over one interface.
+    """
+    alike = [cell for cell in cells if cell.images.work == images.work]
+    if alike:
+        return values_of([ledger for cell in alike for ledger in cell.ledgers], lambda ledger: ledger.processing_ns)
+    nearest = min(cells, key=lambda cell: abs(np.log(cell.images.work / images.work)))
+    drawn = values_of(nearest.ledgers, lambda ledger: ledger.processing_ns)
+    by_work: dict[float, list[float]] = {}
+    for cell in cells:
+        here = values_of(cell.ledgers, lambda ledger: ledger.processing_ns)
+        by_work.setdefault(cell.images.work, []).append(float(np.median(here)))
+    if len(by_work) == 1:
+        drawn *= images.work / nearest.images.work
+        return drawn
+    # Two sizes or more: what a pair costs is a part that every pair costs and a part by its work.
+    works = np.array(list(by_work))
+    medians = np.array([np.median(values) for values in by_work.values()])
+    slope, base = np.polyfit(works, medians, 1)
+    wanted = max(base + slope * images.work, float(medians.min()) * min(1.0, images.work / float(works.min())))
+    scaled: Values = drawn * (wanted / float(np.median(drawn)))
+    return scaled
+
+
+def _figures(made: Predicted) -> Figures:
+    def percentile(values: Values, rank: float) -> float:
+        return float(np.percentile(values, rank)) if values.size else float("nan")
+
+    return Figures(
+        pairs_per_s=made.pairs_per_s,
+        lost_share=1.0 - (1.0 - made.replaced_share) * (1.0 - made.dropped_share),
+        propagation_p50_ns=percentile(made.propagation_ns, 50),
+        queuing_p95_ns=percentile(made.queuing_ns, 95),
+        starvation_p50_ns=percentile(made.starvation_ns, 50),
+        end_to_end_p50_ns=percentile(made.end_to_end_ns, 50),
+        end_to_end_p95_ns=percentile(made.end_to_end_ns, 95),
+    )

@@ -1,0 +1,166 @@
+"""The host's calls at a board's door: exchange the words of pairing, keep the board's key. A core of its own decides (pairing_code).
+
+A call ends before the code is typed, and another one proves it: nobody holds a connection while a person walks.
+"""
+
+import os
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Final, assert_never
+
+from zmq.utils import z85
+
+from common import now
+from common.errors import DataError, ProtocolError, SettingsError, TandemError, UnavailableError
+from common.keys import KeyFolder, Peer, clean_name
+from common.protocol.enrolment_code import Asking, code_text
+from common.protocol.enrolment_wire import MAX_WORD_BYTES, WordReader, frame_word
+from common.protocol.enrolment_words import Identity, Open, Refuse, Refused, Word
+
+_ANSWER_S: Final = 10.0
+"""A word takes a round trip and one round of the board's loop; a board that is busy elsewhere, or opens its door only now, gets this long."""
+
+_AGAIN_S: Final = 0.2
+
+
+class PairingCall:
+    """One attempt to be trusted.
+
+    Args:
+        door: the board's, host and port.
+        keys: this host's key; the board's is added when it has proved the code.
+    """
+
+    def __init__(self, door: tuple[str, int], keys: KeyFolder) -> None:
+        self._door, self._keys = door, keys
+        me = Identity(z85.decode(keys.own().public.encode()), clean_name(socket.gethostname()))
+        self._asking = Asking(me, os.urandom)
+
+    def ask(self) -> str:
+        """Ask the board to show a code; gives the board's name.
+
+        Raises:
+            UnavailableError: the board takes in nobody, or not now.
+            DataError: what answers is no board.
+        """
+        deadline_ns = now.monotonic_ns() + round(_ANSWER_S * 1e9)
+        while True:
+            try:
+                with self._line() as line:
+                    line.say(self._asking.ask())
+                    self._asking.receive(line.hear())
+            except _HungUpError:
+                if now.monotonic_ns() >= deadline_ns:
+                    raise
+                threading.Event().wait(_AGAIN_S)
+            else:
+                break
+        assert self._asking.board is not None
+        return clean_name(self._asking.board.name)
+
+    def prove(self, code: int, link: str, progress: Callable[[], None]) -> Peer:
+        """Prove the code, have the board prove it, and keep the board's key.
+
+        Args:
+            code: what was typed.
+            link: where the board is to be found from now on.
+            progress: called once a round.
+
+        Returns:
+            The board as it is known from now on.
+
+        Raises:
+            SettingsError: this code was typed before.
+            DataError: one of the two does not know the code.
+            UnavailableError: the board has fallen silent.
+        """
+        if code_text(code) in self._keys.spent_codes():
+            raise SettingsError(
+                "this code was typed before", "type a new one: `sudo board-agent pair` on the board shows it"
+            )
+        is_spent = False
+        word: Word | None = self._asking.begin(code)
+        with self._line() as line:
+            while word is not None:
+                if isinstance(word, Open) and not is_spent:  # from now on somebody may learn of it
+                    self._keys.spend(code_text(code))
+                    is_spent = True
+                line.say(word)
+                word = self._asking.receive(line.hear())
+                progress()
+        board = self._asking.board
+        assert board is not None
+        assert self._asking.proved
+        return self._keys.add(Peer(board.name, z85.encode(board.key).decode(), now.wall_time(), link))
+
+    @contextmanager
+    def _line(self) -> "Iterator[_Line]":
+        where = f"tcp://{self._door[0]}:{self._door[1]}"
+        try:
+            connected = socket.create_connection(self._door, _ANSWER_S)
+        except OSError as error:
+            raise _HungUpError(
+                f"{where} takes in no new host ({error.strerror or error})",
+                "start board-agent there, and run sudo board-agent pair",
+            ) from None
+        with connected:
+            yield _Line(connected, where)
+
+
+class _HungUpError(UnavailableError):
+    """Nobody answers at the door; it may open in a moment."""
+
+
+class _Line:
+    """A connection to the door."""
+
+    def __init__(self, connected: socket.socket, where: str) -> None:
+        self._socket, self._where = connected, where
+        self._reader = WordReader()
+
+    def say(self, word: Word) -> None:
+        with suppress(OSError):  # the answer that does not come tells it
+            self._socket.sendall(frame_word(word))
+
+    def hear(self) -> Word:
+        deadline_ns = now.monotonic_ns() + round(_ANSWER_S * 1e9)
+        while True:
+            try:
+                # Not per read: what answers may be no board and say a byte now and then. 0 would mean not to wait at all.
+                self._socket.settimeout(max(1e-3, (deadline_ns - now.monotonic_ns()) / 1e9))
+                received = self._socket.recv(1 + MAX_WORD_BYTES)
+                words = self._reader.feed(received)
+            except TimeoutError:
+                raise UnavailableError(f"{self._where} has fallen silent", "try again") from None
+            except OSError:
+                received, words = b"", []
+            except ProtocolError as error:
+                raise DataError(f"{self._where} is no board's door ({error.problem})", "check --link") from None
+            if words:
+                if isinstance(words[0], Refuse):
+                    raise _refusal(words[0])
+                return words[0]
+            if not received:
+                raise _HungUpError(
+                    f"{self._where} hangs up",
+                    "start board-agent there, and run sudo board-agent pair",
+                )
+
+
+def _refusal(word: Refuse) -> TandemError:
+    wait = f"wait {word.seconds} s" if word.seconds else "try again"
+    match word.reason:
+        case Refused.CLOSED:
+            return UnavailableError("the board takes in no new host", "run `sudo board-agent pair` there")
+        case Refused.PAUSE:
+            return UnavailableError(
+                "the board takes a pause after wrong codes", f"{wait}, or run `sudo board-agent pair` there"
+            )
+        case Refused.BUSY:
+            return UnavailableError("another host is being paired", wait)
+        case Refused.WRONG:
+            return DataError("the code was wrong", f"{wait} with the new code that the board then shows")
+        case _:
+            assert_never(word.reason)

@@ -1,0 +1,99 @@
+"""Values around a calibration: pairs of board views, why one is not used, what came out. No behaviour."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from common.errors import DataError
+from phone_host.calibration.bundle import Vector
+from phone_host.calibration.target import Corners
+from phone_host.model import Rectification, Rig
+
+
+class Reason(Enum):
+    """Why a pair is not used."""
+
+    NO_PARTNER = "no partner"
+    UNREADABLE = "unreadable"
+    OTHER_SIZE = "other image size"
+    NOT_FOUND_LEFT = "board not found left"
+    NOT_FOUND_RIGHT = "board not found right"
+    NOT_FOUND_BOTH = "board not found in both"
+    CORNERS_LEFT = "corners jump left"
+    CORNERS_RIGHT = "corners jump right"
+    MOVED = "not the same moment"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoardPair:
+    """The corners of one pair.
+
+    Attributes:
+        name: how reports call the pair.
+        left_px: (N, 2) float64.
+        right_px: (N, 2) float64, in the same order.
+    """
+
+    name: str
+    left_px: Corners
+    right_px: Corners
+
+
+@dataclass(frozen=True, slots=True)
+class Rejected:
+    """A pair that is not used.
+
+    Attributes:
+        name: the pair.
+        reason: why.
+        detail: the same in words with numbers.
+    """
+
+    name: str
+    reason: Reason
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Used:
+    """A pair that is used, and how well it fits.
+
+    Attributes:
+        name: the pair.
+        left_px: its root mean square reprojection error in the left image, px.
+        right_px: the same, right.
+        vertical_px: its root mean square vertical error after rectification, px; NaN when the rig cannot be rectified.
+    """
+
+    name: str
+    left_px: float
+    right_px: float
+    vertical_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """What came out.
+
+    Attributes:
+        rig: the two cameras.
+        rectification: of the rig; None when it cannot be rectified: `obstacle` says why.
+        obstacle: why not, and the remedy.
+        used: pairs used.
+        rejected: pairs rejected here.
+        vertical_px: (M,) absolute vertical error of every corner used, after rectification.
+        baseline_sigma_m: how far the corners' noise leaves the baseline open, m.
+        tilts_deg: (V,) angle between each board and the image plane.
+        spread: share of the image's width and height that the corners span, the smaller over both cameras.
+        distortion_terms: number of coefficients estimated for each camera.
+    """
+
+    rig: Rig
+    rectification: Rectification | None
+    obstacle: DataError | None
+    used: tuple[Used, ...]
+    rejected: tuple[Rejected, ...]
+    vertical_px: Vector
+    baseline_sigma_m: float
+    tilts_deg: Vector
+    spread: float
+    distortion_terms: int

@@ -1,0 +1,124 @@
+"""One camera on its own: OpenCV's calibration, without the views that are plainly wrong. Gives `calibrate.py` its start."""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from common.errors import DataError
+from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
+from phone_host.calibration.bundle import Vector, camera_arrays
+from phone_host.calibration.target import Corners
+from phone_host.model import Side
+
+LEAST_PAIRS = 3
+"""Fewer tell focal length and distortion from nothing (Zhang 2000: two views without distortion)."""
+
+USUAL_PAIRS = 5
+"""From here on the usual four distortion coefficients are estimated; with fewer pairs the first radial one alone."""
+
+# Before anything is sure: only views that are plainly wrong.
+_GROSS_FACTOR, _GROSS_FLOOR_PX = 4.0, 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoneCamera:
+    """One camera on its own: its parameters, and the poses (V, 6) of the boards in its axes."""
+
+    side: Side
+    parameters: Vector
+    poses: Vector
+
+
+def corners_of(pair: BoardPair, side: Side) -> Corners:
+    """The corners of one side of a pair."""
+    return pair.left_px if side is Side.LEFT else pair.right_px
+
+
+def require_enough(pairs: list[BoardPair], rejected: list[Rejected]) -> None:
+    """Check that a calibration can be made.
+
+    Raises:
+        DataError: fewer than three pairs are left.
+    """
+    if len(pairs) < LEAST_PAIRS:
+        why = f" ({len(rejected)} rejected: {rejected[0].name}: {rejected[0].detail}, ...)" if rejected else ""
+        raise DataError(
+            f"only {len(pairs)} pairs are left to calibrate from{why}",
+            "take 15 or more pairs with the whole board sharp in both images",
+        )
+
+
+def calibrate_alone(
+    pairs: list[BoardPair], side: Side, points_m: Vector, size_px: tuple[int, int]
+) -> tuple[list[BoardPair], list[Rejected], LoneCamera]:
+    """Calibrate one camera; views that are plainly wrong are taken out until none is left.
+
+    Args:
+        pairs: all pairs.
+        side: which of their views to look at.
+        points_m: (N, 3) corners in the board's axes.
+        size_px: width and height of the side's images.
+
+    Returns:
+        The pairs left, those taken out, and the camera with one pose for each pair left.
+
+    Raises:
+        DataError: fewer than three pairs are left.
+    """
+    rejected: list[Rejected] = []
+    reason = Reason.CORNERS_LEFT if side is Side.LEFT else Reason.CORNERS_RIGHT
+    while True:
+        require_enough(pairs, rejected)
+        camera, errors = _opencv_camera(pairs, side, points_m, size_px)
+        limit = max(_GROSS_FACTOR * float(np.median(errors)), _GROSS_FLOOR_PX)
+        if errors.max() <= limit:
+            return pairs, rejected, camera
+        worst = int(errors.argmax())  # one at a time: a single wild view spoils the errors of the others
+        rejected.append(
+            Rejected(
+                pairs[worst].name,
+                reason,
+                f"corners in the {side.value} image are off by {errors[worst]:.2f} px, others by {np.median(errors):.2f} px",
+            )
+        )
+        pairs = [pair for index, pair in enumerate(pairs) if index != worst]
+
+
+def _opencv_camera(
+    pairs: list[BoardPair], side: Side, points_m: Vector, size_px: tuple[int, int]
+) -> tuple[LoneCamera, Vector]:
+    """OpenCV's calibration of one camera, and each view's root mean square error, px."""
+    flags = cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST
+    if len(pairs) < USUAL_PAIRS:
+        flags |= cv2.CALIB_FIX_K2
+    _, matrix, distortion, turns, shifts, _, _, errors = cv2.calibrateCameraExtended(
+        [points_m.astype(np.float32)] * len(pairs),
+        [corners_of(pair, side).astype(np.float32).reshape(-1, 1, 2) for pair in pairs],
+        size_px,
+        np.eye(3),
+        np.zeros(5),
+        flags=flags,
+    )
+    parameters = np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *np.ravel(distortion)[:5]])
+    poses = np.array([np.concatenate([np.ravel(r), np.ravel(t)]) for r, t in zip(turns, shifts, strict=True)])
+    return LoneCamera(side, parameters.astype(np.float64), poses), np.asarray(errors, dtype=np.float64).ravel()
+
+
+def with_poses(camera: LoneCamera, pairs: list[BoardPair], points_m: Vector) -> LoneCamera:
+    """The camera with one pose for each of the pairs that are left."""
+    poses = [fit_pose(points_m, corners_of(pair, camera.side), camera.parameters) for pair in pairs]
+    return replace(camera, poses=np.array(poses))
+
+
+def fit_pose(points_m: Vector, corners: Corners, parameters: Vector) -> Vector:
+    """(6,) pose of the board that fits one view best."""
+    _, rotation, translation = cv2.solvePnP(points_m, corners, *camera_arrays(parameters), flags=cv2.SOLVEPNP_ITERATIVE)
+    return np.concatenate([np.ravel(rotation), np.ravel(translation)]).astype(np.float64)
+
+
+def own_errors_px(points_m: Vector, corners: Corners, parameters: Vector) -> Vector:
+    """(N, 2) measured minus projected corners of one view, px, with the board's pose fitted to this view alone."""
+    pose = fit_pose(points_m, corners, parameters)
+    seen = cv2.projectPoints(points_m, pose[:3], pose[3:], *camera_arrays(parameters))[0]
+    return np.asarray(corners - np.asarray(seen).reshape(-1, 2), dtype=np.float64)

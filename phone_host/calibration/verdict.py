@@ -1,0 +1,139 @@
+"""What a calibration is good for, and what to do about it, in words.
+
+The measure is the vertical error after rectification: a matcher looks along rows, and rows that are off by half a pixel cost it
+more than blur or noise do: one pixel off, and a 9x7 census finds no partner.
+"""
+
+from collections import Counter
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
+
+GOOD_PX, USABLE_PX = 0.25, 0.5
+"""Limits of the 95th percentile of the vertical error."""
+
+# Real rigs fit to 0.15 to 0.4 px; beyond this no tuning helps, something is wrong at the root.
+_CONTRADICTION_PX = 1.0
+# A baseline known to 1 % is a depth known to 1 %; at 5 % there is no scale to speak of.
+_BASELINE_GOOD, _BASELINE_USABLE = 0.01, 0.05
+_FEW_PAIRS = 6
+_WANTED_PAIRS = 10
+# Corners that span less leave the rest of the image to the polynomial's fantasy.
+_WANTED_SPREAD = 0.6
+# The focal length shows in foreshortening only: 1 - cos(15 deg) = 3 %.
+_WANTED_TILT_DEG = 15.0
+_MANY_REJECTED = 1 / 3
+
+
+class Verdict(Enum):
+    """What the calibration is good for."""
+
+    GOOD = "good"
+    USABLE = "usable"
+    REJECT = "reject"
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """The verdict and what to do next.
+
+    Attributes:
+        verdict: the verdict.
+        remedies: sentences, the most important first; empty when there is nothing to better.
+    """
+
+    verdict: Verdict
+    remedies: tuple[str, ...]
+
+
+def vertical_p95_px(calibration: Calibration) -> float:
+    """The 95th percentile of the vertical error, px; NaN when the rig cannot be rectified."""
+    return float(np.percentile(calibration.vertical_px, 95))
+
+
+def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Judgement:
+    """Judge a calibration.
+
+    Args:
+        calibration: what came out.
+        rejected: all pairs that are not used, those the calibration never saw included.
+
+    Returns:
+        The verdict with remedies.
+    """
+    contradictions = []
+    if calibration.rig.rms_stereo_px > _CONTRADICTION_PX:
+        contradictions.append(
+            f"the views contradict each other by {calibration.rig.rms_stereo_px:.1f} px: check --board (inner corners), that"
+            " each LEFT image belongs to its RIGHT one, and that neither camera mirrors its image"
+        )
+    if calibration.obstacle is not None:
+        obstacle = f"{calibration.obstacle.problem}: {calibration.obstacle.remedy}"
+        return Judgement(Verdict.REJECT, (*contradictions, obstacle))
+    p95_px = vertical_p95_px(calibration)
+    baseline_m = float(np.linalg.norm(calibration.rig.t_right_left_m))
+    open_share = calibration.baseline_sigma_m / baseline_m
+    pairs = len(calibration.used)
+    rejects, limits, hints = contradictions, list[str](), list[str]()
+    if p95_px > USABLE_PX:
+        rejects.append(
+            f"rows of the two views differ by {p95_px:.2f} px (95 %): fix focus and zoom, hold board and cameras still in each"
+            " pair, glue the print to a flat plate, check --board, and take new pairs"
+        )
+    elif p95_px > GOOD_PX:
+        limits.append(
+            f"rows of the two views differ by {p95_px:.2f} px (95 %), {GOOD_PX} px is good: hold the board still, flat, sharp and"
+            " larger in the image"
+        )
+    if open_share > _BASELINE_USABLE:
+        rejects.append(_open_baseline(calibration, baseline_m))
+    elif open_share > _BASELINE_GOOD:
+        limits.append(_open_baseline(calibration, baseline_m))
+    if pairs < _FEW_PAIRS:
+        limits.append(f"{pairs} pairs are few: take 15")
+    elif pairs < _WANTED_PAIRS:
+        hints.append(f"{pairs} pairs are few: take 15")
+    hints += _hints(calibration, rejected)
+    verdict = Verdict.REJECT if rejects else Verdict.USABLE if limits else Verdict.GOOD
+    return Judgement(verdict, (*rejects, *limits, *hints))
+
+
+def _open_baseline(calibration: Calibration, baseline_m: float) -> str:
+    return (
+        f"these views leave the baseline open by {calibration.baseline_sigma_m * 1e3:.2f} of {baseline_m * 1e3:.1f} mm: show the"
+        " board nearer and farther, and tilted by 20 to 45 degrees"
+    )
+
+
+def _hints(calibration: Calibration, rejected: tuple[Rejected, ...]) -> list[str]:
+    """What would make the next calibration better; none of it changes the verdict."""
+    hints = []
+    if calibration.spread < _WANTED_SPREAD:
+        hints.append(
+            f"the board covered {calibration.spread:.0%} of an image's width or height only: show it in the corners too"
+        )
+    if calibration.tilts_deg.max() < _WANTED_TILT_DEG:
+        hints.append(
+            f"no board is tilted by more than {calibration.tilts_deg.max():.0f} degrees: tilt it by 20 to 45 degrees, in all"
+            " directions"
+        )
+    if len(rejected) > _MANY_REJECTED * (len(rejected) + len(calibration.used)):
+        reason, count = Counter(each.reason for each in rejected).most_common(1)[0]
+        hints.append(f"{len(rejected)} pairs were rejected, {count} of them: {reason.value}: {_CURES[reason]}")
+    return hints
+
+
+_CURES = {
+    Reason.NO_PARTNER: "give both images of a pair the same number",
+    Reason.UNREADABLE: "copy the images again",
+    Reason.OTHER_SIZE: "take all images of one camera at one resolution",
+    Reason.NOT_FOUND_LEFT: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
+    Reason.NOT_FOUND_RIGHT: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
+    Reason.NOT_FOUND_BOTH: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
+    Reason.CORNERS_LEFT: "avoid glare and blur",
+    Reason.CORNERS_RIGHT: "avoid glare and blur",
+    Reason.MOVED: "hold the board still, or put it down, until both cameras have their image",
+}

@@ -1,0 +1,89 @@
+"""A board-agent process on this machine, for the demo and the delay benchmark."""
+
+import json
+import os
+import socket
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from common.errors import UnavailableError
+from common.link.ipc import runtime_folder
+from common.program.commandline import INTERRUPTED
+from phone_host.children.child_process import GOODBYE_S, child_process
+
+
+@dataclass(frozen=True, slots=True)
+class BoardAccount:
+    """What the board process said of its frames at its end: grabbed = sent + all dropped.
+
+    Attributes:
+        grabbed: frames in all.
+        sent: given to the link.
+        dropped: those that were not, by reason.
+    """
+
+    grabbed: int
+    sent: int
+    dropped: tuple[tuple[str, int], ...]
+
+
+class BoardProcess:
+    """A running board-agent process."""
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        self._process = process
+
+    def check(self) -> None:
+        """Raise UnavailableError with the process's own last word if it is gone."""
+        if self._process.poll() is not None:
+            words = self._process.communicate()[1].decode(errors="replace").strip().splitlines()
+            raise UnavailableError(
+                f"board-agent ended with exit code {self._process.returncode}", words[-1] if words else "run it by hand"
+            )
+
+    def stop(self) -> BoardAccount:
+        """Ask it to end; gives its account."""
+        # Ctrl-C in a terminal reaches every process of it: then the board has ended by itself, and has given its account.
+        if self._process.poll() != INTERRUPTED:
+            self.check()
+        self._process.terminate()
+        try:
+            said = json.loads(self._process.communicate(timeout=GOODBYE_S)[0])
+        except (subprocess.TimeoutExpired, ValueError):
+            raise UnavailableError("board-agent did not end with its account", "run it by hand with --json") from None
+        return BoardAccount(said["grabbed"], said["sent"], tuple(sorted(said["dropped"].items())))
+
+
+@contextmanager
+def board_process(camera: str, address: str) -> Iterator[BoardProcess]:
+    """A board-agent process for the length of a block; whatever happens, it is gone afterwards."""
+    arguments = ["run", "--camera", camera, "--link", address, "--log-level", "warning", "--json"]
+    with child_process("board_agent.cli", arguments, errors=True) as process:
+        yield BoardProcess(process)
+
+
+@contextmanager
+def socket_folder() -> Iterator[Path]:
+    """A folder of this user's alone for sockets, for the length of a block.
+
+    Raises:
+        UnavailableError: it cannot be made.
+    """
+    parent = runtime_folder(os.environ)
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="tandemscan-", dir=parent)
+    except OSError as error:
+        raise UnavailableError(f"{parent} cannot be used ({error.strerror})", "make room, or set TMPDIR") from None
+    with folder as name:
+        yield Path(name)
+
+
+def free_port() -> int:
+    """A TCP port of the loopback interface that nobody has now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

@@ -1,0 +1,79 @@
+"""The demo's page: what the two cameras saw, the depth, how wrong it is, and every delay."""
+
+from collections.abc import Sequence
+
+from common import now
+from common.ledger import PairLedger
+from phone_host.demo.demonstration import CheckedPair, DepthErrors
+from phone_host.measure.run_facts import RunFacts
+from phone_host.report.report_page import Figure, PageData, Verdict, delay_series, page
+from phone_host.report.run_page import camera_table, drops_table, notes, pictures
+
+_GOOD_PERCENT = 0.6
+"""Depth error that the figures of the stereo core allow at 2 m; the demo's scene lies between 0.7 and 2.5 m."""
+
+
+def demo_page(facts: RunFacts, errors: DepthErrors, last: CheckedPair | None, ledgers: Sequence[PairLedger]) -> str:
+    """Make the page.
+
+    Args:
+        facts: the run.
+        errors: the depth against the truth.
+        last: the pair to show; None when there was none.
+        ledgers: of all pairs, in order.
+
+    Returns:
+        One self-contained HTML document.
+    """
+    verdict, sentence = _verdict(errors)
+    return page(
+        PageData(
+            title="tandemscan demo",
+            subtitle=f"two rendered cameras, two processes, one ipc link between them; {now.wall_time()}",
+            verdict=verdict,
+            sentence=sentence,
+            figures=_figures(facts, errors),
+            pictures=pictures(last.processed if last else None),
+            delays=delay_series(ledgers),
+            tables=(drops_table(facts), camera_table(facts.camera)),
+            notes=(
+                "The truth is the rendered scene itself: exact depth at every pixel that both cameras see.",
+                "Board and host share one clock here, so the clock's true offset is 0; what is plotted is what the echoes could prove.",
+                *notes(facts),
+            ),
+        )
+    )
+
+
+def _verdict(errors: DepthErrors) -> tuple[Verdict, str]:
+    if not errors.pairs:
+        return Verdict.BAD, "No pair was compared with the truth: the run was too short or the programs did not meet."
+    if errors.wrong_pairs:
+        return Verdict.BAD, f"{errors.wrong_pairs} of {errors.pairs} pairs show two different moments."
+    text = f"Every checked pair shows one moment, and its depth is right within {errors.depth_mm:.1f} mm ({errors.depth_percent:.2f} %) at the median."
+    return (Verdict.GOOD if errors.depth_percent <= _GOOD_PERCENT else Verdict.WARNING), text
+
+
+def _figures(facts: RunFacts, errors: DepthErrors) -> tuple[Figure, ...]:
+    end_to_end, skew = facts.delays.spread("end_to_end"), facts.delays.spread("time_skew")
+    uncertainty = facts.delays.spread("uncertainty")
+    return (
+        Figure(
+            "pairs per second",
+            f"{facts.pairs_per_second:.1f}",
+            "/s",
+            f"{facts.processed} pairs in {facts.seconds:.1f} s",
+        ),
+        Figure(
+            "depth error",
+            f"{errors.depth_mm:.1f}",
+            "mm",
+            f"median; {errors.at_1_m_mm:.1f} mm at 1 m, {errors.at_2_m_mm:.1f} mm at 2 m",
+        ),
+        Figure("pixels with depth", f"{errors.density * 100:.0f}", "%", "of those that both cameras see"),
+        Figure(
+            "end-to-end", f"{end_to_end.p50_ns / 1e6:.0f}", "ms", f"median; 99 % below {end_to_end.p99_ns / 1e6:.0f} ms"
+        ),
+        Figure("time skew", f"{skew.p50_ns / 1e3:.0f}", "us", f"median; 99 % below {skew.p99_ns / 1e3:.0f} us"),
+        Figure("clock uncertainty", f"{uncertainty.p50_ns / 1e3:.0f}", "us", "median over the pairs"),
+    )

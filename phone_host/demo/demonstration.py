@@ -1,0 +1,222 @@
+"""The demo: a rendered moving scene, a real board-agent process and the host on this machine, checked against the scene's truth."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from common import now
+from common.camera.factory import open_camera
+from common.ledger import PairLedger
+from common.link.factory import open_link, parse_link
+from common.stamp import HOST_CLOCK
+from phone_host.children.board_process import board_process
+from phone_host.model import CloudImage, Processed, Rig
+from phone_host.output.ply import write_ply
+from phone_host.output.preview import write_preview
+from phone_host.run.host import Host, HostSettings
+from phone_host.scene.film import Film
+from phone_host.scene.scene import RectifiedView, Scene, rig_poses, truth
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.reproject import disparities_for_near
+
+FPS: Final = 15
+"""Leaves the stereo pipeline its time on two small cores, so that the demo shows delays and not an overload."""
+
+NEAR_M: Final = 0.6
+"""Nearest depth searched; the demo's scene begins at 0.7 m."""
+
+_CHECKED_PAIRS: Final = 8
+"""Pairs whose depth is compared with the truth, spread over the run; each costs some 0.1 s afterwards."""
+
+_CHECK_EVERY: Final = 15
+_BOARD_PATIENCE_NS: Final = 10_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedPair:
+    """One pair kept for the comparison with the truth.
+
+    Attributes:
+        processed: what the pipeline made of it.
+        ledger: its marks and delays.
+        left_index: which image of the film the board showed.
+        right_index: which image the host's own camera showed.
+    """
+
+    processed: Processed
+    ledger: PairLedger
+    left_index: int
+    right_index: int
+
+
+@dataclass(frozen=True, slots=True)
+class DepthErrors:
+    """How far the measured depth is from the truth, over all checked pairs and all pixels that both cameras see.
+
+    Attributes:
+        pairs: pairs compared.
+        pixels: pixels compared.
+        density: share of them that got a depth.
+        disparity_px: median |disparity error|, px.
+        outliers: share of measured pixels that are off by more than 2 px.
+        depth_mm: median |depth error|, mm.
+        depth_p95_mm: 95th percentile of it, mm.
+        depth_percent: median |depth error| / depth, percent.
+        at_1_m_mm: median |depth error| of pixels between 0.9 and 1.1 m, mm; NaN where none is.
+        at_2_m_mm: the same between 1.8 and 2.2 m.
+        wrong_pairs: checked pairs whose two images show different moments.
+    """
+
+    pairs: int
+    pixels: int
+    density: float
+    disparity_px: float
+    outliers: float
+    depth_mm: float
+    depth_p95_mm: float
+    depth_percent: float
+    at_1_m_mm: float
+    at_2_m_mm: float
+    wrong_pairs: int
+
+
+class DemoRun:
+    """One run of both programs over a film.
+
+    Args:
+        film: what both cameras replay.
+        rig: the cameras.
+        out: folder for results.
+        sockets: folder of this user's alone, in which the two programs meet.
+    """
+
+    def __init__(self, film: Film, rig: Rig, out: Path, sockets: Path) -> None:
+        self._film = film
+        self._rectifier = Rectifier(rig)
+        self._rig = rig
+        self._checked: list[CheckedPair] = []
+        self.ledgers: list[PairLedger] = []
+        self.address = f"ipc://{sockets}/board"
+        near = disparities_for_near(self._rectifier.geometry, NEAR_M, self._rectifier.rectification.width_px)
+        core = StereoCore(create_matcher(MatchSettings(disparities=near)), self._rectifier)
+        camera = open_camera(film.replay_uri(film.right), HOST_CLOCK, now.monotonic_ns())
+        link = open_link(parse_link(self.address, listens_by_default=False))
+        settings = HostSettings(wait_ns=_BOARD_PATIENCE_NS, out=out, save_every=0)
+        self.host = Host(settings, camera, [link], core, self._keep)
+
+    @property
+    def last(self) -> CheckedPair | None:
+        """The newest pair that was kept."""
+        return self._checked[-1] if self._checked else None
+
+    def run(self, seconds: float, stop: Callable[[], bool], watch: Callable[[], None] | None) -> None:
+        """Stream for some seconds.
+
+        Args:
+            seconds: how long, from the first pair on.
+            stop: ends the run earlier.
+            watch: called several times a second.
+
+        Raises:
+            UnavailableError: the board process did not come up or died.
+        """
+        with board_process(self._film.replay_uri(self._film.left), self.address) as board:
+
+            def finished() -> bool:
+                board.check()
+                first_ns = self.host.first_done_ns
+                return stop() or (first_ns > 0 and now.monotonic_ns() - first_ns > seconds * 1e9)
+
+            self.host.run(finished, watch)
+
+    def check(self, scene: Scene) -> DepthErrors:
+        """Compare the kept pairs with the scene.
+
+        Args:
+            scene: the one that the film shows.
+        """
+        left_pose, right_pose = rig_poses(self._rig)
+        sensors = ((self._rig.left, left_pose), (self._rig.right, right_pose))
+        rectification = self._rectifier.rectification
+        view = RectifiedView(
+            rectification.geometry, rectification.width_px, rectification.height_px, rectification.R_left
+        )
+        disparity_errors, depths, measured = [], [], []
+        for pair in self._checked:
+            exact = truth(self._film.scene_at(scene, pair.left_index), view, sensors)
+            assert pair.processed.disparity is not None
+            assert pair.processed.cloud is not None
+            disparity_errors.append((pair.processed.disparity - exact.disparity_px)[exact.visible])
+            depths.append(exact.depth_m[exact.visible])
+            measured.append(pair.processed.cloud[..., 2][exact.visible])
+        wrong = sum(pair.left_index != pair.right_index for pair in self._checked)
+        return _errors(len(self._checked), wrong, disparity_errors, depths, measured)
+
+    def write_pictures(self, out: Path) -> None:
+        """Write cloud.ply and disparity.png of the newest kept pair.
+
+        Raises:
+            OSError: the folder cannot be written to.
+        """
+        if (pair := self.last) is None:
+            return
+        assert pair.processed.disparity is not None
+        assert pair.processed.cloud is not None
+        cloud: CloudImage = pair.processed.cloud
+        write_ply(out / "cloud.ply", cloud, pair.processed.pair.left)
+        write_preview(out / "disparity.png", pair.processed.disparity)
+
+    def _keep(self, processed: Processed, ledger: PairLedger) -> None:
+        self.ledgers.append(ledger)
+        if (len(self.ledgers) - 1) % _CHECK_EVERY:
+            return
+        host_exposed_ns = ledger.board.exposed_ns - ledger.time_skew_ns
+        # The board's stamp is known on this clock to some 50 us; the images are 1 / 15 s apart.
+        indices = (self._film.index_at(ledger.board.exposed_ns), self._film.index_at(host_exposed_ns))
+        self._checked.append(CheckedPair(processed, ledger, *indices))
+        if len(self._checked) > _CHECKED_PAIRS:
+            del self._checked[0]
+
+
+def truth_json(errors: DepthErrors) -> dict[str, float | int | None]:
+    """The comparison as a JSON object; None where nothing was measured."""
+    return {
+        name: None if math.isnan(value) else value
+        for name in DepthErrors.__slots__
+        for value in (getattr(errors, name),)
+    }
+
+
+def _errors(
+    pairs: int, wrong: int, disparity_errors: list[np.ndarray], depths: list[np.ndarray], measured: list[np.ndarray]
+) -> DepthErrors:
+    nan = float("nan")
+    if not pairs:
+        return DepthErrors(0, 0, nan, nan, nan, nan, nan, nan, nan, nan, wrong)
+    off_px, depth_m, measured_m = (np.concatenate(part) for part in (disparity_errors, depths, measured))
+    found = np.isfinite(measured_m)
+    off_px, depth_m, off_mm = np.abs(off_px[found]), depth_m[found], np.abs(measured_m[found] - depth_m[found]) * 1000
+
+    def near(low_m: float, high_m: float) -> float:
+        here = (depth_m >= low_m) & (depth_m <= high_m)
+        return float(np.median(off_mm[here])) if here.any() else nan
+
+    return DepthErrors(
+        pairs=pairs,
+        pixels=len(found),
+        density=float(found.mean()),
+        disparity_px=float(np.median(off_px)),
+        outliers=float((off_px > 2).mean()),
+        depth_mm=float(np.median(off_mm)),
+        depth_p95_mm=float(np.percentile(off_mm, 95)),
+        depth_percent=float(np.median(off_mm / depth_m) / 10),
+        at_1_m_mm=near(0.9, 1.1),
+        at_2_m_mm=near(1.8, 2.2),
+        wrong_pairs=wrong,
+    )

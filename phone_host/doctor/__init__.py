@@ -1,0 +1,1 @@
+"""phone-host doctor: what keeps this machine from a good run."""

@@ -1,0 +1,263 @@
+"""phone-host doctor: everything that keeps a host from pairing, each with its remedy. What both sides share lives in common/doctor.
+
+Python's own packages are under suspicion here, so nothing that needs numpy or OpenCV is imported before both were seen to work.
+"""
+
+import importlib
+import os
+import socket
+import sys
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Final
+from urllib.parse import urlsplit
+
+from common import now
+from common.camera.factory import parse_camera
+from common.doctor import machine
+from common.doctor.access import check_access
+from common.doctor.camera_probe import examine_camera
+from common.doctor.finding import Finding, Verdict, fail, ok
+from common.doctor.machine_checks import check_bluetooth, check_clocks, check_disk, check_power, check_usb_log
+from common.doctor.unit_check import Unit
+from common.errors import TandemError, UnavailableError
+from common.keys import KeyFolder
+from common.link.factory import open_link, parse_link
+from common.protocol.message import RefusalReason
+from common.stamp import HOST_CLOCK
+from phone_host.camera.factory import open_camera
+from phone_host.camera.http_uri import is_http
+from phone_host.doctor.host_checks import (
+    OPENCV_WHEELS,
+    Answer,
+    BoardReadings,
+    Package,
+    RigReadings,
+    check_board,
+    check_out,
+    check_package,
+    check_ports,
+    check_python,
+    check_rig,
+)
+
+_STEP_S: Final = 0.05
+_CONNECT_S: Final = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What a run would use.
+
+    Attributes:
+        camera: URI of the own camera; empty: none is given.
+        links: URIs of the links to the board; none: none is given.
+        calibration: rig.yaml; empty: none is given.
+        out: folder of the results.
+        wait_s: how long the board is waited for, s.
+        keys: folder of this host's key and the boards that it knows.
+    """
+
+    camera: str
+    links: tuple[str, ...]
+    calibration: str
+    out: Path
+    wait_s: float
+    keys: KeyFolder
+
+
+def examine(question: Question) -> list[Finding]:
+    """Check this machine for a run.
+
+    Args:
+        question: what it would use.
+
+    Returns:
+        The findings, in the order in which things go wrong.
+
+    Raises:
+        SettingsError: a URI makes no sense.
+    """
+    account = machine.own_account()
+    findings = [check_python(sys.version_info[:3], sys.platform)]
+    packages = [check_package(package) for package in _packages()]
+    findings += packages
+    works = all(finding.verdict is not Verdict.FAIL for finding in packages)
+    if is_http(question.camera):
+        findings.append(_server(question.camera))
+    elif question.camera:
+        findings += examine_camera(question.camera, account, Unit("phone-host"))
+    else:
+        findings.append(_cameras())
+    findings.append(_ports())
+    findings.append(
+        check_bluetooth(machine.read_bluetooth(), wanted=any(uri.startswith("rfcomm:") for uri in question.links))
+    )
+    if not question.links:
+        findings.append(ok("board", "not asked: give --link"))
+    for uri in question.links:
+        findings += _examine_board(uri, question.wait_s, question.keys, works=works)
+    if question.calibration and works:
+        findings.append(check_rig(_read_rig(question)))
+    findings += check_clocks(machine.read_clocks(Path(__file__).parent))
+    disk = machine.read_disk(question.out)
+    findings += [*check_out(str(question.out), writable=os.access(disk.path, os.W_OK)), check_disk(disk)]
+    log = machine.read_kernel_log()
+    findings += [check_power(log, machine.read_supply()), check_usb_log(log)]
+    return findings
+
+
+def _packages() -> list[Package]:
+    wheels = tuple(name for name in OPENCV_WHEELS if _is_installed(name))
+    return [
+        _package("numpy", "1.24"),
+        _package("cv2", "4.10", "5", wheels),
+        _package("zmq", "24"),
+        _package("msgpack", "1.0.3"),
+    ]
+
+
+def _is_installed(distribution: str) -> bool:
+    try:
+        metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return False
+    return True
+
+
+def _package(name: str, least: str, below: str = "", wheels: tuple[str, ...] = ()) -> Package:
+    try:
+        module = importlib.import_module(name)
+    except Exception as error:  # noqa: BLE001 - a broken package may raise anything (ImportError, AttributeError, OSError)
+        return Package(name, "", f"{type(error).__name__}: {error}", least, below, wheels)
+    version = getattr(module, "__version__", None) or ".".join(map(str, getattr(module, "version", ())))
+    return Package(name, str(version), "", least, below, wheels)
+
+
+def _server(uri: str) -> Finding:
+    try:
+        camera = open_camera(uri, HOST_CLOCK, now.monotonic_ns())
+    except UnavailableError as error:
+        return fail("camera", error.problem, error.remedy)
+    camera.close()
+    shown = camera.description
+    return ok("camera", f"{shown.name}: {shown.width_px}x{shown.height_px} every {shown.period_ns / 1e6:.1f} ms")
+
+
+def _cameras() -> Finding:
+    from common.camera.v4l2_device import capture_nodes  # noqa: PLC0415 - ctypes and the kernel's structures only here
+
+    nodes = capture_nodes()
+    text = f"{', '.join(map(str, nodes))}; give one with --camera" if nodes else "no camera of this machine is seen"
+    return ok("camera", text)
+
+
+def _ports() -> Finding:
+    if sys.platform != "linux":
+        return check_ports((), f"{sys.platform} shows none")
+    try:
+        from serial.tools import list_ports  # noqa: PLC0415 - optional
+    except ImportError as error:
+        return check_ports((), str(error))
+    found = sorted(port for port in list_ports.comports() if "ttyS" not in port.device)
+    return check_ports(tuple(f"{port.device} ({port.description})" for port in found), "")
+
+
+def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> list[Finding]:
+    """Check the way to the board and, where the packages allow it, ask the board itself."""
+    address = parse_link(uri, listens_by_default=False).address
+    findings = []
+    if address.startswith("serial:") and (node := machine.read_node(Path(address.removeprefix("serial:")))) is not None:
+        findings.append(check_access("permission", node, machine.own_account()))
+    if not works:
+        return [*findings, check_board(BoardReadings(uri, _way(address), 0.0))]
+    try:
+        board = _ask_board(uri, wait_s, keys)
+    except TandemError as error:
+        return [*findings, Finding("board", Verdict.FAIL, error.problem, error.remedy)]
+    if board.answer is Answer.SILENT:
+        board = BoardReadings(board.uri, _way(address), board.waited_s)
+    return [*findings, check_board(board)]
+
+
+def _ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
+    """Say hello as a host does, and leave again."""
+    import threading  # noqa: PLC0415
+
+    from phone_host.stream.pair_queue import PairQueue  # noqa: PLC0415 - numpy, seen to work
+    from phone_host.stream.receiver import Receiver  # noqa: PLC0415
+    from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
+
+    link = open_link(parse_link(uri, listens_by_default=False), keys)
+    receiver = Receiver([link], now.random_id(), PairQueue(FifoSettings(), None, 1), _Listener())
+    receiver.start()
+    pause = threading.Event()
+    deadline_ns = now.monotonic_ns() + round(wait_s * 1e9)
+    answer = Answer.SILENT
+    while answer is Answer.SILENT and now.monotonic_ns() < deadline_ns:
+        pause.wait(_STEP_S)
+        if receiver.hello is not None and receiver.estimate is not None:
+            answer = Answer.BOARD
+        elif receiver.refused is RefusalReason.VERSION:
+            answer = Answer.OTHER_VERSION
+    if answer is Answer.SILENT and receiver.refused is RefusalReason.BUSY:
+        answer = Answer.BUSY
+    hello, estimate = receiver.hello, receiver.estimate
+    receiver.stop()
+    if receiver.failure is not None:
+        raise receiver.failure
+    if hello is None or estimate is None:
+        return BoardReadings(uri, answer, wait_s)
+    camera = f"{hello.camera.name} {hello.camera.width_px}x{hello.camera.height_px}"
+    return BoardReadings(uri, answer, 0.0, camera, estimate.round_trip_ns, estimate.uncertainty_ns)
+
+
+class _Listener:
+    """A host that wants nothing but an answer."""
+
+    def session_began(self) -> None:
+        """See BoardListener."""
+
+    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
+        """See BoardListener."""
+
+
+def _way(address: str) -> Answer:
+    """Why a board is silent, as far as the network knows."""
+    if not address.startswith("tcp:"):
+        return Answer.SILENT
+    parts = urlsplit(address)
+    try:
+        socket.create_connection((parts.hostname, parts.port or 0), _CONNECT_S).close()
+    except ConnectionRefusedError:
+        return Answer.REFUSED
+    except socket.gaierror:
+        return Answer.UNKNOWN_NAME
+    except OSError:
+        return Answer.NO_WAY
+    return Answer.SILENT
+
+
+def _read_rig(question: Question) -> RigReadings:
+    import numpy as np  # noqa: PLC0415 - seen to work
+
+    from common.camera.v4l2_stream import V4l2Settings  # noqa: PLC0415
+    from phone_host.model import Side  # noqa: PLC0415
+    from phone_host.output.rig_yaml import read_rig  # noqa: PLC0415
+    from phone_host.stereo.rectify import Rectifier  # noqa: PLC0415
+
+    try:
+        rig = read_rig(Path(question.calibration))
+        Rectifier(rig)
+    except TandemError as error:
+        return RigReadings(question.calibration, error.problem, error.remedy)
+    own = rig.right if rig.board_side is Side.LEFT else rig.left
+    asked = parse_camera(question.camera, "") if question.camera and not is_http(question.camera) else None
+    return RigReadings(
+        path=question.calibration,
+        rms_px=rig.rms_stereo_px,
+        baseline_m=float(np.linalg.norm(rig.t_right_left_m)),
+        host_size_px=(own.width_px, own.height_px),
+        asked_size_px=asked.wanted.size_px if isinstance(asked, V4l2Settings) else None,
+    )

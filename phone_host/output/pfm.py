@@ -1,0 +1,75 @@
+"""Middlebury's PFM files: one float32 per pixel, bottom row first, +inf = no value.
+
+Source: https://vision.middlebury.edu/stereo/data/scenes2014/ ("disp*.pfm") and https://www.pauldebevec.com/Research/HDR/PFM/.
+In memory the top row comes first and NaN means no value; only this module knows the file's order and its infinity.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from common.errors import DataError
+from phone_host.model import Disparity
+from phone_host.output.atomic import write_bytes
+
+# Magic, width, height, scale; one white space ends the header (the data may begin with any byte). A larger header than 256
+# bytes is no PFM: three numbers never need that.
+_HEADER = re.compile(rb"\A(Pf|PF)\s+(\d{1,6})\s+(\d{1,6})\s+([-+0-9.eE]{1,32})\s")
+_HEADER_LIMIT_BYTES = 256
+
+
+def write_pfm(path: Path, disparity: Disparity) -> None:
+    """Write a disparity map.
+
+    Args:
+        path: the file; it appears whole or not at all.
+        disparity: (H, W) float32, px, NaN = none (any value that is not finite is written as +inf).
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    height, width = disparity.shape
+    rows = np.where(np.isfinite(disparity), disparity, np.float32(np.inf))[::-1]
+    data = np.ascontiguousarray(rows, dtype="<f4")
+    write_bytes(path, f"Pf\n{width} {height}\n-1\n".encode(), data.data.cast("B"))
+
+
+def read_pfm(path: Path) -> Disparity:
+    """Read a one-channel PFM file of either byte order.
+
+    Args:
+        path: the file.
+
+    Returns:
+        (H, W) float32, top row first, NaN where the file holds no finite value.
+
+    Raises:
+        DataError: the file is missing, is no one-channel PFM, or is cut short.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{path} cannot be read ({error.strerror})", "give a PFM file that exists") from error
+    header = _HEADER.match(content[:_HEADER_LIMIT_BYTES])
+    if header is None:
+        raise DataError(f"{path} is no PFM file", "its header must read 'Pf', width and height, and the scale")
+    magic, width_text, height_text, scale_text = header.groups()
+    if magic == b"PF":
+        raise DataError(f"{path} is a PFM of three channels", "a disparity map has one channel ('Pf')")
+    width, height = int(width_text), int(height_text)
+    try:
+        scale = float(scale_text)
+    except ValueError:
+        scale = 0.0
+    if scale == 0.0 or width == 0 or height == 0:
+        raise DataError(f"{path} has a bad PFM header", "width, height and scale must not be 0")
+    expected_bytes = width * height * 4
+    if len(content) - header.end() < expected_bytes:
+        raise DataError(f"{path} is cut short ({len(content)} bytes for {width}x{height})", "write the file again")
+    # The sign of the scale is the byte order: negative = little endian. Its magnitude has no meaning for disparities.
+    order = "<f4" if scale < 0 else ">f4"
+    values = np.frombuffer(content, dtype=order, count=width * height, offset=header.end())
+    top_first = values.reshape(height, width)[::-1].astype(np.float32)
+    top_first[~np.isfinite(top_first)] = np.nan
+    return top_first

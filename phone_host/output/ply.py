@@ -1,0 +1,121 @@
+"""Coloured point clouds as binary PLY: metres, x y z float32, red green blue uchar, little endian.
+
+The vertices are packed once into a structured array and written with one call: text PLY by `numpy.savetxt` takes 330 ms for a
+640x480 cloud, this takes milliseconds.
+Source: Greg Turk, "The PLY Polygon File Format", 1994.
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import DataError
+from phone_host.model import CloudImage, Image
+from phone_host.output.atomic import write_bytes
+
+_VERTEX = np.dtype([*((name, "<f4") for name in "xyz"), *((name, "u1") for name in ("red", "green", "blue"))])
+_PROPERTIES = (
+    "property float x\nproperty float y\nproperty float z\n"
+    "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+)
+_HEADER = re.compile(
+    rb"\Aply\nformat binary_little_endian 1\.0\n(?:comment [^\n]*\n)*element vertex (\d{1,10})\n"
+    + _PROPERTIES.encode()
+    + rb"end_header\n"
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointCloud:
+    """Points with colours.
+
+    Attributes:
+        points_m: (N, 3) float32, m, all finite.
+        colours: (N, 3) uint8, red green blue.
+    """
+
+    points_m: NDArray[np.float32]
+    colours: NDArray[np.uint8]
+
+
+def pack_ply(cloud: CloudImage, colours: Image) -> tuple[bytes, NDArray[np.void]]:
+    """Pack a cloud image into PLY's header and vertices.
+
+    Args:
+        cloud: (H, W, 3) float32, m; pixels with a value that is not finite are left out.
+        colours: (H, W) grey or (H, W, 3) BGR, uint8, of the same size.
+
+    Returns:
+        The header, and (N,) vertices to be written after it.
+
+    Raises:
+        ValueError: the two sizes differ.
+    """
+    if cloud.shape[:2] != colours.shape[:2]:
+        raise ValueError(f"cloud {cloud.shape[:2]} and colours {colours.shape[:2]} differ in size")
+    finite = np.isfinite(cloud)
+    # Channel by channel: `all(axis=2)` over a last axis of length 3 takes ten times as long.
+    chosen = np.flatnonzero(finite[..., 0] & finite[..., 1] & finite[..., 2])
+    vertices = np.empty(chosen.size, dtype=_VERTEX)
+    # One field at a time: numpy gathers rows of three at a fifth of this speed.
+    points = cloud.reshape(-1, 3)
+    bgr = colours.reshape(len(points), -1)
+    for channel, name in enumerate("xyz"):
+        vertices[name] = points[:, channel][chosen]
+    for channel, name in enumerate(("blue", "green", "red")):
+        vertices[name] = bgr[:, channel if colours.ndim == 3 else 0][chosen]
+    header = (
+        "ply\nformat binary_little_endian 1.0\ncomment unit metre; x right, y down, z forward of the left camera\n"
+        f"element vertex {chosen.size}\n{_PROPERTIES}end_header\n"
+    )
+    return header.encode(), vertices
+
+
+def write_ply(path: Path, cloud: CloudImage, colours: Image) -> int:
+    """Write the finite points of a cloud image with their colours.
+
+    Args:
+        path: the file; it appears whole or not at all.
+        cloud: (H, W, 3) float32, m, NaN = none.
+        colours: (H, W) grey or (H, W, 3) BGR, uint8: the rectified left image.
+
+    Returns:
+        The number of points written.
+
+    Raises:
+        OSError: the file cannot be written.
+        ValueError: the two sizes differ.
+    """
+    header, vertices = pack_ply(cloud, colours)
+    write_bytes(path, header, vertices.view(np.uint8).data)
+    return vertices.size
+
+
+def read_ply(path: Path) -> PointCloud:
+    """Read a PLY file of the form `write_ply` gives.
+
+    Args:
+        path: the file.
+
+    Returns:
+        Its points and colours.
+
+    Raises:
+        DataError: the file is missing, of another form, or not as long as its header says.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{path} cannot be read ({error.strerror})", "give a PLY file that exists") from error
+    header = _HEADER.match(content)
+    if header is None:
+        raise DataError(f"{path} is no coloured binary PLY", "give a cloud.ply that this program wrote")
+    count = int(header.group(1))
+    if len(content) - header.end() != count * _VERTEX.itemsize:
+        raise DataError(f"{path} does not hold the {count} points its header names", "write the file again")
+    vertices = np.frombuffer(content, dtype=_VERTEX, count=count, offset=header.end())
+    points = np.stack([vertices[name] for name in "xyz"], axis=-1).astype(np.float32)
+    return PointCloud(points, np.stack([vertices[name] for name in ("red", "green", "blue")], axis=-1))

@@ -1,0 +1,242 @@
+"""rig.yaml: a calibrated rig as OpenCV FileStorage YAML, readable by `cv2.FileStorage` anywhere.
+
+Keys: left_image_width, left_image_height, right_image_width, right_image_height (px); M1 D1 M2 D2 (camera matrices and
+distortion, left and right); R T (right from left, T in metres); R1 R2 P1 P2 Q (rectification); rectified_image_width,
+rectified_image_height (the size P1 and P2 belong to); board_side; rms_left rms_right rms_stereo (px, .Nan = unknown);
+time_offset_ns, time_offset_uncertainty_ns (host's stamp minus board's; absent: not measured).
+Reading takes the rig and makes its own rectification from it: R1 to Q are there for other programs.
+"""
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import DataError
+from common.files import read_whole
+from phone_host.model import Camera, Rectification, Rig, Side, TimeOffset
+from phone_host.output.atomic import write_text
+
+_DISTORTION_LENGTHS = (4, 5, 8, 12, 14)  # those OpenCV's model defines
+_LARGEST_IMAGE_PX = 100_000
+_ROTATION_TOLERANCE = 1e-6  # files hold 16 digits; a matrix typed with 6 digits is off by as much
+# No two cameras of one scanner stand farther apart; a larger number is a T in millimetres.
+_LARGEST_BASELINE_M = 10.0
+_LARGEST_OFFSET_NS = 2e9  # no camera with its driver is seconds behind another one
+
+
+def write_rig(path: Path, rig: Rig, rectification: Rectification) -> None:
+    """Write a rig and its rectification.
+
+    Args:
+        path: the file; it appears whole or not at all.
+        rig: the two cameras.
+        rectification: made from the same rig.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    storage = cv2.FileStorage(".yaml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
+    storage.write("left_image_width", rig.left.width_px)
+    storage.write("left_image_height", rig.left.height_px)
+    storage.write("right_image_width", rig.right.width_px)
+    storage.write("right_image_height", rig.right.height_px)
+    storage.write("board_side", rig.board_side.value)
+    storage.write("M1", rig.left.matrix)
+    storage.write("D1", rig.left.distortion.reshape(1, -1))
+    storage.write("M2", rig.right.matrix)
+    storage.write("D2", rig.right.distortion.reshape(1, -1))
+    storage.writeComment("a point of the left camera's axes is R p + T in the right camera's; T in metres")
+    storage.write("R", rig.R_right_left)
+    storage.write("T", rig.t_right_left_m.reshape(3, 1))
+    storage.writeComment("rectification: rotations, projections (metres), disparity to metres, size of both images")
+    storage.write("R1", rectification.R_left)
+    storage.write("R2", rectification.R_right)
+    storage.write("P1", rectification.P_left)
+    storage.write("P2", rectification.P_right)
+    storage.write("Q", rectification.Q)
+    storage.write("rectified_image_width", rectification.width_px)
+    storage.write("rectified_image_height", rectification.height_px)
+    storage.writeComment("reprojection errors of the calibration, px")
+    storage.write("rms_left", rig.rms_left_px)
+    storage.write("rms_right", rig.rms_right_px)
+    storage.write("rms_stereo", rig.rms_stereo_px)
+    storage.writeComment(
+        "the host camera's stamp minus the board camera's for one moment, ns, and what contains it in 99.9 %"
+    )
+    # Real numbers: FileStorage's integers have 32 bits, 2 s.
+    storage.write("time_offset_ns", float(rig.time_offset.offset_ns))
+    storage.write("time_offset_uncertainty_ns", float(rig.time_offset.uncertainty_ns))
+    write_text(path, storage.releaseAndGetString())
+
+
+def write_time_offset(path: Path, offset: TimeOffset) -> None:
+    """Put a time offset into a rig.yaml; all else in it stays as it is.
+
+    Args:
+        path: a file that `read_rig` takes.
+        offset: what was measured.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    lines = path.read_text(encoding="utf-8").splitlines()
+    kept = [line for line in lines if not line.startswith(("time_offset_ns:", "time_offset_uncertainty_ns:"))]
+    values = [f"time_offset_ns: {offset.offset_ns}.", f"time_offset_uncertainty_ns: {offset.uncertainty_ns}."]
+    write_text(path, "\n".join([*kept, *values]) + "\n")
+
+
+def read_rig(path: Path) -> Rig:
+    """Read a rig and check it.
+
+    Args:
+        path: a rig.yaml of this program, or any FileStorage file with the same keys.
+
+    Returns:
+        The rig.
+
+    Raises:
+        DataError: the file is missing or no FileStorage YAML, or a key is missing or makes no sense; names file and key.
+    """
+    reader = _Reader(path)
+    left = reader.camera("left_image_width", "left_image_height", "M1", "D1")
+    right = reader.camera("right_image_width", "right_image_height", "M2", "D2")
+    side = reader.text("board_side", Side.LEFT.value)
+    if side not in {choice.value for choice in Side}:
+        raise reader.problem("board_side", f"is {side!r}", "write left or right")
+    return Rig(
+        left=left,
+        right=right,
+        R_right_left=reader.rotation("R"),
+        t_right_left_m=reader.baseline("T"),
+        board_side=Side(side),
+        rms_left_px=reader.number("rms_left"),
+        rms_right_px=reader.number("rms_right"),
+        rms_stereo_px=reader.number("rms_stereo"),
+        time_offset=reader.time_offset(),
+    )
+
+
+_MOST_BYTES = 1 << 20
+"""Of a rig.yaml, which has two pages."""
+
+
+class _Reader:
+    """A FileStorage whose values are checked one by one; every error names file and key."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        try:
+            text = read_whole(path, _MOST_BYTES).decode("utf-8")
+        except OSError as error:
+            raise DataError(
+                f"{path} cannot be read ({error.strerror})", "give the rig.yaml of `phone-host calibrate`"
+            ) from error
+        except UnicodeDecodeError as error:
+            raise self._no_storage() from error
+        if not text.lstrip("\ufeff").startswith("%YAML"):
+            # OpenCV would also take JSON and XML, and abort on other text with a message of its own.
+            raise self._no_storage()
+        try:
+            self._storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+        except (cv2.error, SystemError) as error:
+            raise self._no_storage() from error
+        if not self._storage.root().isMap():  # a list, or nothing: OpenCV aborts when it is asked for a key
+            raise self._no_storage()
+
+    def _no_storage(self) -> DataError:
+        return DataError(f"{self._path} is no OpenCV FileStorage YAML", "give the rig.yaml of `phone-host calibrate`")
+
+    def problem(self, key: str, what: str, remedy: str) -> DataError:
+        return DataError(f"{self._path}: {key} {what}", remedy)
+
+    def _node(self, key: str) -> cv2.FileNode:
+        node = self._storage.getNode(key)
+        if node.empty() or node.isNone():
+            raise self.problem(key, "is missing", "calibrate again, or add the key")
+        return node
+
+    def matrix(self, key: str) -> NDArray[np.float64]:
+        """Any matrix of finite numbers, as float64."""
+        node = self._node(key)
+        try:
+            values = node.mat() if node.isMap() else None
+        except cv2.error:
+            values = None
+        if values is None or values.size == 0:
+            raise self.problem(key, "is no matrix", "calibrate again")
+        matrix = np.asarray(values, dtype=np.float64)
+        if not np.isfinite(matrix).all():
+            raise self.problem(key, "holds values that are not finite", "calibrate again")
+        return matrix
+
+    def _shaped(self, key: str, shape: tuple[int, int]) -> NDArray[np.float64]:
+        matrix = self.matrix(key)
+        if matrix.shape != shape:
+            raise self.problem(key, f"is {'x'.join(map(str, matrix.shape))}", f"it must be {shape[0]}x{shape[1]}")
+        return matrix
+
+    def camera(self, width_key: str, height_key: str, matrix_key: str, distortion_key: str) -> Camera:
+        """One camera."""
+        matrix = self._shaped(matrix_key, (3, 3))
+        if not (matrix[0, 0] > 0 and matrix[1, 1] > 0) or not np.array_equal(matrix[2], [0, 0, 1]):
+            raise self.problem(
+                matrix_key, "is no camera matrix", "its focal lengths are positive, its last row is 0 0 1"
+            )
+        distortion = self.matrix(distortion_key)
+        if min(distortion.shape) != 1 or distortion.size not in _DISTORTION_LENGTHS:
+            lengths = ", ".join(map(str, _DISTORTION_LENGTHS))
+            raise self.problem(distortion_key, f"has {distortion.size} values", f"OpenCV's models have {lengths}")
+        return Camera(self.size(width_key), self.size(height_key), matrix, distortion.reshape(-1))
+
+    def size(self, key: str) -> int:
+        """An image's width or height."""
+        node = self._node(key)
+        value = node.real() if node.isInt() or node.isReal() else math.nan
+        if not (1 <= value <= _LARGEST_IMAGE_PX and value == int(value)):
+            raise self.problem(key, "is no image size", "give whole pixels")
+        return int(value)
+
+    def rotation(self, key: str) -> NDArray[np.float64]:
+        """A rotation matrix."""
+        matrix = self._shaped(key, (3, 3))
+        if np.abs(matrix @ matrix.T - np.eye(3)).max() > _ROTATION_TOLERANCE or np.linalg.det(matrix) < 0:
+            raise self.problem(key, "is no rotation", "calibrate again")
+        return matrix
+
+    def baseline(self, key: str) -> NDArray[np.float64]:
+        """A translation between two cameras, m."""
+        matrix = self.matrix(key)
+        if matrix.size != 3:
+            raise self.problem(key, f"has {matrix.size} values", "it must have 3")
+        length_m = float(np.linalg.norm(matrix))
+        if length_m == 0:
+            raise self.problem(key, "is 0: both cameras at one place", "calibrate again")
+        if length_m > _LARGEST_BASELINE_M:
+            raise self.problem(key, f"is {length_m:g} m long", "T is in metres; divide millimetres by 1000")
+        return matrix.reshape(3)
+
+    def number(self, key: str) -> float:
+        """A figure that may be missing (NaN)."""
+        node = self._storage.getNode(key)
+        return float(node.real()) if node.isReal() or node.isInt() else math.nan
+
+    def time_offset(self) -> TimeOffset:
+        """What was measured, or that nothing was."""
+        offset_ns, uncertainty_ns = self.number("time_offset_ns"), self.number("time_offset_uncertainty_ns")
+        if math.isnan(offset_ns) and math.isnan(uncertainty_ns):
+            return TimeOffset()
+        if not abs(offset_ns) <= _LARGEST_OFFSET_NS:
+            raise self.problem("time_offset_ns", f"is {offset_ns:g}", "measure it: phone-host calibrate-time")
+        if not 0 < uncertainty_ns <= _LARGEST_OFFSET_NS:
+            raise self.problem(
+                "time_offset_uncertainty_ns", f"is {uncertainty_ns:g}", "measure it: phone-host calibrate-time"
+            )
+        return TimeOffset(round(offset_ns), round(uncertainty_ns))
+
+    def text(self, key: str, default: str) -> str:
+        """A word, or its default."""
+        node = self._storage.getNode(key)
+        return str(node.string()) if node.isString() else default

@@ -1,0 +1,1 @@
+"""What both cameras saw, kept for later."""

@@ -1,0 +1,1 @@
+"""A run as text, as JSON and as a page."""

@@ -1,0 +1,312 @@
+"""A run as one self-contained HTML page: pictures, delays of all pairs as plots, key figures. Pure: data in, text out.
+
+The page refers to nothing outside itself and runs no script: it opens offline, years later, from any folder, in light and dark,
+on a phone. What was not measured is said to be so. All text that comes from outside is escaped.
+"""
+
+import base64
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from enum import Enum
+from html import escape
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import DataError
+from common.ledger import PairLedger, StageTimes
+from phone_host.report.page_frame import HALF_PX, document, section, table, two_widths
+from phone_host.svg.plot_parts import legend
+from phone_host.svg.plots import (
+    Budget,
+    Part,
+    Quantity,
+    Strips,
+    budgets,
+    distributions,
+    over_time,
+    stacked_over_time,
+)
+
+MEANINGS: Final = (
+    ("capture", "from the middle of the exposure until the board's program has the frame"),
+    ("outbox", "waiting on the board for the link"),
+    ("propagation", "from the first byte written to the last byte received"),
+    ("pairing", "waiting for the partner frame of the other camera"),
+    ("queuing", "waiting in the FIFO for the processor"),
+    ("processing", "decode, rectify, match, reproject and write"),
+)
+"""The delays that add up to end-to-end, in their order on the life line (DESIGN, section 4)."""
+
+_END_TO_END: Final = "from the middle of the exposure until the results are written: the sum of the delays above"
+_STARVATION: Final = "how long the processor had nothing to do before this pair; no part of end-to-end"
+
+
+class Verdict(Enum):
+    """How a run went; the page shows it as a colour and a sign."""
+
+    GOOD = "good"
+    WARNING = "warning"
+    BAD = "bad"
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One number to read first.
+
+    Attributes:
+        label: what it is.
+        value: as text.
+        unit: its unit, may be empty.
+        note: a short explanation below it, may be empty.
+    """
+
+    label: str
+    value: str
+    unit: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One picture.
+
+    Attributes:
+        label: its caption.
+        data: a whole PNG or JPEG file.
+    """
+
+    label: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A small table, for example drops by reason.
+
+    Attributes:
+        title: its heading.
+        columns: column names.
+        rows: one text for each column.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DelaySeries:
+    """The delays of all pairs, in the order in which they were done; `delay_series` makes it from ledgers.
+
+    Attributes:
+        time_s: (N,) float64, when each pair was done, counted from the first, s.
+        delays: the delays that add up to end-to-end, N values each.
+        end_to_end: their sum.
+        starvation: how long the processor waited before each pair.
+        stages: shares of processing.
+        time_skew: signed.
+        uncertainty: of the clocks' offset.
+    """
+
+    time_s: NDArray[np.float64]
+    delays: tuple[Quantity, ...]
+    end_to_end: Quantity
+    starvation: Quantity
+    stages: tuple[Quantity, ...]
+    time_skew: Quantity
+    uncertainty: Quantity
+
+    @property
+    def pairs(self) -> int:
+        """N."""
+        return int(self.time_s.size)
+
+
+@dataclass(frozen=True, slots=True)
+class PageData:
+    """All that stands on a page.
+
+    Attributes:
+        title: of the run.
+        subtitle: when, where, how long; may be empty.
+        verdict: how it went.
+        sentence: the verdict in words.
+        figures: key figures, most important first.
+        pictures: left, right, disparity.
+        delays: of all pairs.
+        tables: drops by reason and the like.
+        notes: what to know or try next, a sentence each.
+    """
+
+    title: str
+    subtitle: str
+    verdict: Verdict
+    sentence: str
+    figures: tuple[Figure, ...]
+    pictures: tuple[Picture, ...]
+    delays: DelaySeries
+    tables: tuple[Table, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def delay_series(ledgers: Sequence[PairLedger]) -> DelaySeries:
+    """Columns out of ledgers.
+
+    Args:
+        ledgers: one a pair, in the order in which they were done; may be empty.
+
+    Returns:
+        The series of every delay.
+    """
+
+    def column(value: Callable[[PairLedger], int]) -> NDArray[np.float64]:
+        return np.array([value(ledger) for ledger in ledgers], dtype=np.float64)
+
+    def attribute(name: str) -> NDArray[np.float64]:
+        return column(lambda ledger: int(getattr(ledger, name)))
+
+    def stage(name: str) -> NDArray[np.float64]:
+        return column(lambda ledger: int(getattr(ledger.stages, name)))
+
+    first_ns = ledgers[0].done_ns if ledgers else 0
+    return DelaySeries(
+        time_s=column(lambda ledger: ledger.done_ns - first_ns) / 1e9,
+        delays=tuple(
+            Quantity(name, attribute(f"{name}_ns"), colour, meaning) for colour, (name, meaning) in enumerate(MEANINGS)
+        ),
+        end_to_end=Quantity("end-to-end", attribute("end_to_end_ns"), 7, _END_TO_END),
+        starvation=Quantity("starvation", attribute("starvation_ns"), 6, _STARVATION),
+        stages=tuple(
+            Quantity(field.name, stage(field.name), colour) for colour, field in enumerate(fields(StageTimes))
+        ),
+        time_skew=Quantity("time skew", attribute("time_skew_ns"), 5),
+        uncertainty=Quantity("clock uncertainty", attribute("uncertainty_ns"), 2),
+    )
+
+
+def page(data: PageData) -> str:
+    """The whole page.
+
+    Args:
+        data: what stands on it.
+
+    Returns:
+        An HTML document.
+
+    Raises:
+        DataError: a picture is neither PNG nor JPEG.
+    """
+    sign = {Verdict.GOOD: "✓", Verdict.WARNING: "!", Verdict.BAD: "✕"}[data.verdict]
+    subtitle = f'<p class="sub">{escape(data.subtitle)}</p>' if data.subtitle else ""
+    parts = [
+        f"<header><h1>{escape(data.title)}</h1>{subtitle}</header>",
+        f'<p class="verdict {data.verdict.value}"><b aria-hidden="true">{sign}</b><span>{escape(data.sentence)}</span></p>',
+        _figures(data.figures),
+        _pictures(data.pictures),
+        *_delays(data.delays),
+        *(_table(one) for one in data.tables),
+        _notes(data.notes),
+    ]
+    return document(data.title, "".join(parts))
+
+
+def _figures(figures: tuple[Figure, ...]) -> str:
+    if not figures:
+        return ""
+    cards = "".join(
+        f"<div><dt>{escape(figure.label)}</dt><dd>{escape(figure.value)}"
+        f"{f' <small>{escape(figure.unit)}</small>' if figure.unit else ''}</dd>"
+        f"{f'<dd class=note>{escape(figure.note)}</dd>' if figure.note else ''}</div>"
+        for figure in figures
+    )
+    return f'<dl class="figures">{cards}</dl>'
+
+
+def _pictures(pictures: tuple[Picture, ...]) -> str:
+    if not pictures:
+        return ""
+    items = "".join(
+        f'<figure><img alt="{escape(picture.label)}" src="{_data_uri(picture)}"><figcaption>{escape(picture.label)}'
+        "</figcaption></figure>"
+        for picture in pictures
+    )
+    return f'<div class="pictures">{items}</div>'
+
+
+def _data_uri(picture: Picture) -> str:
+    if picture.data.startswith(b"\x89PNG\r\n\x1a\n"):
+        kind = "png"
+    elif picture.data.startswith(b"\xff\xd8\xff"):
+        kind = "jpeg"
+    else:
+        raise DataError(f"the picture '{picture.label}' is neither PNG nor JPEG", "encode it as one of them")
+    return f"data:image/{kind};base64,{base64.b64encode(picture.data).decode('ascii')}"
+
+
+def _delays(series: DelaySeries) -> list[str]:
+    """The cards with plots."""
+    if not series.pairs:
+        return [section("Delays", "No pair was processed, so there are no delays to show.", "")]
+    names = [(quantity.label, quantity.colour) for quantity in series.delays]
+    mean = Budget(f"mean of {series.pairs} pairs, end to end", tuple(_mean(quantity) for quantity in series.delays))
+    work = Budget("mean processing delay", tuple(_mean(quantity) for quantity in series.stages))
+    everything = Strips("", (*series.delays, series.end_to_end, series.starvation))
+    return [
+        section(
+            "Where the time goes",
+            "From the middle of the board camera's exposure to the written result; the delays of a pair add up to its "
+            "end-to-end delay. A column is one pair, or the mean of its slice of time where pairs are many.",
+            legend(names)
+            + two_widths(lambda width: budgets([mean], width))
+            + two_widths(lambda width: stacked_over_time(series.time_s, series.delays, width)),
+        ),
+        section(
+            "Each delay by itself",
+            "Bar: 5th to 95th percentile. Line across: median. Small tick: 99th percentile. Dot: the longest. Logarithmic axis.",
+            two_widths(lambda width: distributions([everything], width)) + _glossary(everything.quantities),
+        ),
+        section(
+            "Stages of processing",
+            "",
+            legend([(quantity.label, quantity.colour) for quantity in series.stages])
+            + two_widths(lambda width: budgets([work], width))
+            + two_widths(lambda width: distributions([Strips("", series.stages)], width)),
+        ),
+        '<div class="pair">'
+        + section(
+            "Time skew of the pairs",
+            "Exposure of the board's frame minus that of the host's; the band is the clocks' uncertainty.",
+            two_widths(
+                lambda width: over_time(series.time_s, series.time_skew, width, band_ns=series.uncertainty.values_ns),
+                HALF_PX,
+            ),
+        )
+        + section(
+            "Clock uncertainty",
+            "How well the host knows the board's clock, plus or minus.",
+            two_widths(lambda width: over_time(series.time_s, series.uncertainty, width), HALF_PX),
+        )
+        + "</div>",
+    ]
+
+
+def _glossary(quantities: tuple[Quantity, ...]) -> str:
+    """What each delay means, folded away: tooltips do not exist on a phone."""
+    items = "".join(f"<dt>{escape(one.label)}</dt><dd>{escape(one.meaning)}</dd>" for one in quantities)
+    return f'<details><summary>What each delay means</summary><dl class="words">{items}</dl></details>'
+
+
+def _mean(quantity: Quantity) -> Part:
+    return Part(quantity.label, float(np.mean(quantity.values_ns)), quantity.colour)
+
+
+def _table(one: Table) -> str:
+    return section(one.title, "", table(one.columns, one.rows or (("none",),)))
+
+
+def _notes(notes: tuple[str, ...]) -> str:
+    if not notes:
+        return ""
+    return section("What next", "", f"<ul>{''.join(f'<li>{escape(note)}</li>' for note in notes)}</ul>")

@@ -1,0 +1,182 @@
+"""A run's page: the last pair, every delay, who waits for whom, how the own camera has fared. The demo's page shares its parts."""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from common import now
+from common.camera.base import CameraHealth
+from common.ledger import PairLedger
+from phone_host.measure.accounts import rung_lines
+from phone_host.measure.regime import Judgement, Regime, judge
+from phone_host.measure.run_facts import RunFacts, board_drops, concerns, disbelieved, figures
+from phone_host.measure.trust import Concern
+from phone_host.model import Image, Processed, Side
+from phone_host.output.preview import colour_disparity, colour_range_px
+from phone_host.report.report_page import Figure, PageData, Picture, Table, Verdict, delay_series, page
+from phone_host.report.summary import phase_lines
+
+
+def run_page(facts: RunFacts, last: Processed | None, board_side: Side, ledgers: Sequence[PairLedger]) -> str:
+    """Make the page.
+
+    Args:
+        facts: the run.
+        last: its last pair; None when there was none.
+        board_side: which of its views is the board's.
+        ledgers: of all pairs, or of evenly chosen ones, in order.
+
+    Returns:
+        One self-contained HTML document.
+    """
+    judgement, found = judge(figures(facts)), concerns(facts)
+    verdict, sentence = _verdict(facts, judgement, found)
+    return page(
+        PageData(
+            title="tandemscan run",
+            subtitle=f"ended: {facts.ended.replace('_', ' ')}; {now.wall_time()}",
+            verdict=verdict,
+            sentence=sentence,
+            figures=_figures(facts) if facts.processed else (),
+            pictures=pictures(last, board_side),
+            delays=delay_series(ledgers),
+            tables=(*links_tables(facts), drops_table(facts), camera_table(facts.camera)),
+            notes=notes(facts),
+        )
+    )
+
+
+def notes(facts: RunFacts) -> tuple[str, ...]:
+    """Who waits for whom and what would help, what makes depth wrong, and how the cameras' exposures stand to each other."""
+    judgement = judge(figures(facts))
+    return (
+        f"Queue: {judgement.sentence}.",
+        *(f"Would help: {remedy}." for remedy in judgement.remedies),
+        *(f"Warning: {item.sentence}. Remedy: {item.remedy}." for item in concerns(facts)),
+        *phase_lines(facts.phase, facts.alignment),
+        *rung_lines(facts.link),
+    )
+
+
+def links_tables(facts: RunFacts) -> tuple[Table, ...]:
+    """The links side by side, where there were several."""
+    if len(facts.link.links) < 2:
+        return ()
+    rows = []
+    for tally in facts.link.links:
+        age = tally.age.spread()
+        ages = f"{age.p50_ns / 1e6:.1f} ms; {age.p95_ns / 1e6:.1f} ms" if age.count else "-"
+        rows.append((tally.name, str(tally.frames), str(tally.carried), str(tally.lost), ages))
+    title = f"Links: the stream went from one to another {facts.link.switches} times"
+    columns = ("link", "frames", "times it took over", "times it was lost", "age of frames on arrival: median; p95")
+    return (Table(title, columns, tuple(rows)),)
+
+
+def camera_table(health: CameraHealth) -> Table:
+    """How the own camera has fared."""
+    rows = [
+        ("measured rate", "unknown" if health.period_ns is None else f"{1e9 / health.period_ns:.2f} frames/s"),
+        ("unplugged", str(health.unplugged)),
+        ("stalled", str(health.stalls)),
+        ("failed", str(health.failures)),
+        ("came back after any of these", str(health.returned)),
+        ("frames that its driver missed", str(health.missed)),
+        *((f"spoiled frames: {fault.value.replace('_', ' ')}", str(count)) for fault, count in health.faults),
+        ("stamps not believed", str(health.distrusted_stamps)),
+        ("controls that its driver refused", str(health.refused_controls)),
+        *((f"held: {name.replace('_', ' ')}", str(value)) for name, value in health.held),
+    ]
+    return Table("The own camera", ("what", "value"), tuple(rows))
+
+
+def _verdict(facts: RunFacts, judgement: Judgement, found: Sequence[Concern]) -> tuple[Verdict, str]:
+    if not facts.processed and facts.spoiled_images:
+        return Verdict.BAD, "Not one pair had two sound images: look at the cameras."
+    if not facts.processed:
+        return Verdict.BAD, "Not one pair was processed: the two cameras or the programs did not meet."
+    if found:
+        return Verdict.WARNING, f"{found[0].sentence}: {found[0].remedy}."
+    fine = judgement.regime in {Regime.STARVED_BY_CAMERAS, Regime.UNKNOWN}
+    return (Verdict.GOOD if fine else Verdict.WARNING), f"{judgement.sentence}."
+
+
+def _figures(facts: RunFacts) -> tuple[Figure, ...]:
+    end_to_end, skew = facts.delays.spread("end_to_end"), facts.delays.spread("time_skew")
+    uncertainty = facts.delays.spread("uncertainty")
+    pairs = f"{facts.processed} pairs in {facts.seconds:.1f} s"
+    return (
+        _measured("pairs per second", facts.pairs_per_second, 1, "/s", pairs),
+        Figure(
+            "end-to-end", f"{end_to_end.p50_ns / 1e6:.0f}", "ms", f"median; 99 % below {end_to_end.p99_ns / 1e6:.0f} ms"
+        ),
+        Figure("time skew", f"{skew.p50_ns / 1e6:.1f}", "ms", f"median; 95 % below {skew.p95_ns / 1e6:.1f} ms"),
+        Figure("clock uncertainty", f"{uncertainty.p50_ns / 1e3:.0f}", "us", "median over the pairs"),
+        _measured("image motion", facts.motion_px_s, 0, "px/s", "the fastest tenth of the own camera's image"),
+    )
+
+
+def _measured(label: str, value: float, decimals: int, unit: str, note: str) -> Figure:
+    """A figure that may not be known (NaN)."""
+    return (
+        Figure(label, "-", "", f"not measured; {note}")
+        if np.isnan(value)
+        else Figure(label, f"{value:.{decimals}f}", unit, note)
+    )
+
+
+def pictures(last: Processed | None, board_side: Side = Side.LEFT) -> tuple[Picture, ...]:
+    """The views of a pair, and its disparity where there is one.
+
+    Args:
+        last: the pair; None when there was none.
+        board_side: which of the views is the board's.
+    """
+    if last is None:
+        return ()
+    whose = ("the board's", "the host's") if board_side is Side.LEFT else ("the host's", "the board's")
+    rectified = "" if last.disparity is None else ", rectified"
+    views = (
+        Picture(f"left: {whose[0]} camera{rectified}", _jpeg(last.pair.left)),
+        Picture(f"right: {whose[1]} camera{rectified}", _jpeg(last.pair.right)),
+    )
+    if last.disparity is None or not np.isfinite(last.disparity).any():
+        return views
+    coloured = colour_disparity(last.disparity, *colour_range_px(last.disparity))
+    return (*views, Picture("disparity: bright is near, black is none", _png(coloured)))
+
+
+def drops_table(facts: RunFacts) -> Table:
+    """What was not used, by reason."""
+    rows = [
+        *(
+            (f"frames dropped on the board: {reason.replace('_', ' ')}", count)
+            for reason, count in board_drops(facts.link).items()
+        ),
+        ("frames lost on the link", sum(account.lost for account in facts.link.sessions)),
+        *((f"frames not believed: {reason.replace('_', ' ')}", count) for reason, count in disbelieved(facts).items()),
+        *(
+            (f"board frames without partner: {reason.replace('_', ' ')}", count)
+            for reason, count in facts.counts.board_orphans
+        ),
+        *(
+            (f"host frames without partner: {reason.replace('_', ' ')}", count)
+            for reason, count in facts.counts.host_orphans
+        ),
+        ("pairs that gave way in a full FIFO", facts.counts.dropped),
+        *((f"pairs with a spoiled image: {reason.replace('_', ' ')}", count) for reason, count in facts.spoiled_images),
+    ]
+    counted = tuple((what, str(count)) for what, count in rows)
+    return Table("Frames and pairs that were not used", ("what", "count"), counted)
+
+
+def _jpeg(image: Image) -> bytes:
+    done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 88])
+    assert done
+    return data.tobytes()
+
+
+def _png(image: Image) -> bytes:
+    done, data = cv2.imencode(".png", image)
+    assert done
+    return data.tobytes()

@@ -1,0 +1,137 @@
+"""A run in some lines for people. Pure."""
+
+import math
+from typing import Final
+
+from common.camera.base import CameraHealth
+from phone_host.measure.accounts import LinkAccount, rung_lines
+from phone_host.measure.delays import DELAYS
+from phone_host.measure.regime import judge
+from phone_host.measure.run_facts import RunFacts, board_drops, concerns, disbelieved, figures
+from phone_host.model import TimeOffset
+from phone_host.sync.phase import Alignment, Phase
+
+_MS: Final = 1e6
+
+
+def summary(facts: RunFacts) -> str:
+    """Say in a few lines what the run was."""
+    rate = "" if math.isnan(facts.pairs_per_second) else f" in {facts.seconds:.1f} s ({facts.pairs_per_second:.1f} /s)"
+    lines = [f"{facts.processed} pairs{rate}, ended: {facts.ended.replace('_', ' ')}"]
+    if facts.processed:
+        lines.append(f"{'delay, ms':14} {'p50':>9} {'p95':>9} {'p99':>9} {'max':>9}")
+        for name in DELAYS:
+            spread = facts.delays.spread(name)
+            values = (spread.p50_ns, spread.p95_ns, spread.p99_ns, spread.max_ns)
+            lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value / _MS:9.3f}" for value in values))
+    if facts.estimate is not None:
+        lines.append(
+            f"clock known to +-{facts.estimate.uncertainty_ns / 1000:.0f} us"
+            f" (+-{facts.estimate.bound_ns / 1000:.0f} us whatever the link does), skew {facts.estimate.skew * 1e6:+.1f} ppm"
+        )
+    lines += _agreement(facts)
+    lines += phase_lines(facts.phase, facts.alignment)
+    lines += _arrivals(facts.camera, facts.time_offset)
+    lines.append(judge(figures(facts)).sentence)
+    lines += [f"  {remedy}" for remedy in judge(figures(facts)).remedies]
+    lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(facts)]
+    lines += camera_troubles(facts.camera)
+    lines += [*rung_lines(facts.link), *_links(facts.link), *_losses(facts)]
+    return "\n".join(lines)
+
+
+def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
+    """Say how the two cameras' exposures stand to each other, and what came of steering them."""
+    lines = []
+    if phase is not None:
+        drift = (
+            ""
+            if not math.isfinite(phase.beat_s)
+            else f", drifts by {phase.drift * 1e6:+.1f} ppm, comes round in {phase.beat_s:.0f} s"
+        )
+        side = "before" if phase.time_skew_ns < 0 else "after"
+        lines.append(
+            f"phase: the board exposes {abs(phase.time_skew_ns) / _MS:.1f} of {phase.period_ns / _MS:.1f} ms {side} the host{drift}"
+        )
+    if alignment is not None:
+        lines.append(f"alignment: {alignment.state.value}: {alignment.words}")
+    return lines
+
+
+def camera_troubles(health: CameraHealth) -> list[str]:
+    """Say what has befallen a camera, in one line; nothing where nothing has."""
+    parts = [
+        *([f"unplugged {health.unplugged} times"] if health.unplugged else []),
+        *([f"stalled {health.stalls} times"] if health.stalls else []),
+        *([f"failed {health.failures} times"] if health.failures else []),
+        *([f"back {health.returned} times"] if health.returned else []),
+        *([f"{health.missed} frames missed by its driver"] if health.missed else []),
+        *(f"{count} frames {fault.value}" for fault, count in health.faults),
+        *([f"{health.distrusted_stamps} stamps not believed"] if health.distrusted_stamps else []),
+        *([f"{health.refused_controls} controls refused"] if health.refused_controls else []),
+    ]
+    return [f"own camera: {', '.join(parts)}".replace("_", " ")] if parts else []
+
+
+def _agreement(facts: RunFacts) -> list[str]:
+    """How well the two cameras' stamps agree; nothing where they say by definition when their images were exposed."""
+    offset = facts.time_offset
+    known = f"+-{offset.uncertainty_ns / _MS:.2f} ms"
+    if offset != TimeOffset():
+        return [f"the cameras' stamps differ by {offset.offset_ns / _MS:+.2f} {known}, which is taken out"]
+    if facts.stamps_exact:
+        return []
+    return [f"the cameras' stamps agree to {known}: not measured (phone-host calibrate-time)"]
+
+
+def _arrivals(health: CameraHealth, offset: TimeOffset) -> list[str]:
+    """What the stamps of an own camera mean that tells of arrivals only."""
+    if health.jitter_ns is None:
+        return []
+    jitter = f"they arrive up to {health.jitter_ns / _MS:.1f} ms late (p95)"
+    if health.latency_ns is not None:
+        stated = health.latency_uncertainty_ns
+        known = "" if stated is None else f", known to +-{(stated + health.jitter_ns) / _MS:.1f} ms"
+        return [f"own camera: stamps are arrivals - {health.latency_ns / _MS:g} ms{known}; {jitter}"]
+    if offset != TimeOffset():
+        return [f"own camera: stamps are arrivals, its latency part of the measured difference; {jitter}"]
+    return [
+        f"own camera: its latency is not known, every time skew is off by it (calibrate-time, or ?latency_ms=); {jitter}"
+    ]
+
+
+def _links(link: LinkAccount) -> list[str]:
+    """The links side by side, where there are several."""
+    if len(link.links) < 2:
+        return []
+    lines = [f"{'link':14} {'frames':>9} {'carried':>9} {'lost':>9} {'age p50':>9} {'p95':>9}"]
+    for tally in link.links:
+        age = tally.age.spread()
+        ages = f"{age.p50_ns / _MS:9.3f} {age.p95_ns / _MS:9.3f}" if age.count else f"{'-':>9} {'-':>9}"
+        lines.append(f"{tally.name:14} {tally.frames:9} {tally.carried:9} {tally.lost:9} {ages}")
+    return lines
+
+
+def _losses(facts: RunFacts) -> list[str]:
+    lost = sum(account.lost for account in facts.link.sessions)
+    late = sum(account.late for account in facts.link.sessions)
+    stale = sum(account.duplicate + account.old_session for account in facts.link.sessions)
+    board = {reason: n for reason, n in board_drops(facts.link).items() if n}
+    parts = [
+        *(f"{n} {reason} on the board" for reason, n in board.items()),
+        *([f"{lost} lost on the link{f' ({late} of them came too late)' if late else ''}"] if lost else []),
+        *([f"{stale} stale"] if stale else []),
+        *(f"{n} not believed: {reason}" for reason, n in disbelieved(facts).items()),
+        *(f"{n} board frames {reason}" for reason, n in facts.counts.board_orphans),
+        *(f"{n} host frames {reason}" for reason, n in facts.counts.host_orphans),
+        *([f"{facts.counts.dropped} pairs in a full FIFO"] if facts.counts.dropped else []),
+        *([f"{facts.stopped} pairs by the run's end"] if facts.stopped else []),
+        *([f"{facts.undecodable} pairs undecodable"] if facts.undecodable else []),
+        *(f"{n} of them with an image {reason}" for reason, n in facts.spoiled_images),
+    ]
+    lines = ["dropped: " + (", ".join(parts).replace("_", " ") or "nothing")]
+    if facts.unwritten.lines or facts.unwritten.pairs:
+        lines.append(
+            f"not written: {facts.unwritten.lines} lines, {facts.unwritten.pairs} pairs ({facts.unwritten.cause})"
+        )
+    return lines

@@ -1,0 +1,112 @@
+"""What the worker does with a pair: decode, interpolate if asked for, rectify or pass, match, reproject; each stage timed. The order of the stages lives here."""
+
+from collections.abc import Callable
+
+from common.errors import DataError
+from common.frame import Frame
+from common.imagesize import MOST_PIXELS
+from common.ledger import StageTimes
+from common.protocol.message import FrameMessage
+from phone_host.model import BoardFrame, FramePair, Image, Processed, RectifiedPair, Side
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.images import enlarged
+from phone_host.stereo.interpolate import LARGEST_PART, Interpolator
+from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_frames
+
+
+class Pipeline:
+    """The stereo pipeline.
+
+    Args:
+        core: rectification, matching and reprojection; None to decode only (delays without depth).
+        board_side: which view the board's frame is.
+        clock: gives ns of CLOCK_MONOTONIC.
+        interpolator: takes the board's image to the moment of the host's; None to leave it as it is.
+        most_pixels: neither camera may have more.
+    """
+
+    def __init__(
+        self,
+        core: StereoCore | None,
+        board_side: Side,
+        clock: Callable[[], int],
+        interpolator: Interpolator | None = None,
+        most_pixels: int = MOST_PIXELS,
+    ) -> None:
+        self._most_pixels = most_pixels
+        self._interpolator = interpolator
+        self._core = core
+        self._board_side = board_side
+        self._clock = clock
+
+    def process(self, pair: FramePair) -> Processed:
+        """Compute a pair's depth.
+
+        Args:
+            pair: two encoded frames.
+
+        Returns:
+            Images, disparity, cloud and stage times.
+
+        Raises:
+            SpoiledImageError: a frame's bytes are no whole image, or its size is not believed.
+            DataError: the cameras' sizes do not fit the rig.
+        """
+        board, host = _encoded(pair.board.message, "board", pair.board.asked_px), _encoded(pair.host, "host")
+        first, second = (board, host) if self._board_side is Side.LEFT else (host, board)
+        start_ns = self._clock()
+        check = None if self._core is None else self._core.require_sizes
+        left, right = decode_frames(first, second, self._most_pixels, check)
+        if self._board_side is Side.LEFT:
+            left = _at_asked_size(left, pair.board)
+        else:
+            right = _at_asked_size(right, pair.board)
+        decoded_ns = self._clock()
+        if self._board_side is Side.LEFT:
+            left = self._at_host_time(pair, left)
+        else:
+            right = self._at_host_time(pair, right)
+        interpolated_ns = self._clock()
+        early = StageTimes(decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
+        if self._core is None:
+            return Processed(RectifiedPair(left, right), None, None, early)
+        rectified = self._core.rectify(left, right)
+        rectified_ns = self._clock()
+        disparity = self._core.match(rectified)
+        matched_ns = self._clock()
+        cloud = self._core.reproject(disparity) if self._core.geometry is not None else None
+        reprojected_ns = self._clock()
+        stages = StageTimes(
+            decode=early.decode,
+            interpolate=early.interpolate,
+            rectify=rectified_ns - interpolated_ns,
+            match=matched_ns - rectified_ns,
+            reproject=reprojected_ns - matched_ns,
+        )
+        return Processed(rectified, disparity, cloud, stages)
+
+    def _at_host_time(self, pair: FramePair, image: Image) -> Image:
+        """The board's image as it would have been at the host's exposure; as it is where the frame before is missing, far away or spoiled."""
+        if self._interpolator is None or pair.before is None:
+            return image
+        part = pair.time_skew_ns / (pair.board.marks.exposed_ns - pair.before.marks.exposed_ns)
+        if abs(part) > LARGEST_PART:
+            return image
+        try:
+            before = _encoded(pair.before.message, "board", pair.before.asked_px)
+            earlier = _at_asked_size(decode_frame(before, self._most_pixels), pair.before)
+        except DataError:
+            return image
+        return self._interpolator.back(earlier, image, part) if earlier.shape == image.shape else image
+
+
+def _at_asked_size(image: Image, frame: BoardFrame) -> Image:
+    """The image as large as the board's camera was asked for: rig, matcher and geometry are of that size."""
+    if not any(frame.asked_px):
+        return image
+    return enlarged(image, frame.asked_px, f"board frame {frame.message.sequence}")
+
+
+def _encoded(frame: FrameMessage | Frame, whose: str, asked_px: tuple[int, int] = (0, 0)) -> EncodedImage:
+    name = f"{whose} frame {frame.sequence}"
+    return EncodedImage(memoryview(frame.payload), frame.pixel_format, frame.width_px, frame.height_px, name, asked_px)

@@ -1,0 +1,124 @@
+"""The live table of a run in a terminal."""
+
+from types import TracebackType
+from typing import Final, Self
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.table import Table
+from rich.text import Text
+
+from common import now
+from phone_host.measure.accounts import rung_lines
+from phone_host.measure.delays import DELAYS, STAGES, Spread
+from phone_host.measure.regime import judge
+from phone_host.measure.run_facts import board_drops, figures
+from phone_host.report.summary import camera_troubles, phase_lines
+from phone_host.run.host import Host
+
+_REFRESH_S: Final = 0.25
+_RECENT: Final = 300
+"""Percentiles are over this many newest pairs: ten seconds at 30 per second."""
+
+
+class LiveTable:
+    """Shows a host's delays while it runs; a context manager.
+
+    Args:
+        host: the run to show.
+        console: where; stderr by default, so that stdout stays for results.
+        seconds: the run's planned length for the progress bar, s; 0 when it is counted in pairs or open.
+    """
+
+    def __init__(self, host: Host, console: Console | None = None, seconds: float = 0.0) -> None:
+        self._host = host
+        self._live = Live(console=console or Console(stderr=True), auto_refresh=False, transient=True)
+        self._seconds = seconds
+        self._started_s = now.monotonic_ns() / 1e9
+        self._shown_s = 0.0
+        self._last = (0, self._started_s)
+        self._rate = 0.0
+        self._progress = Progress(
+            TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f}")
+        )
+        total = seconds or host.settings.pairs
+        self._task = self._progress.add_task("seconds" if seconds else "pairs", total=total) if total else None
+
+    def __enter__(self) -> Self:
+        self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._live.stop()
+
+    def refresh(self) -> None:
+        """Show the present state, at most a few times a second."""
+        now_s = now.monotonic_ns() / 1e9
+        if now_s - self._shown_s < _REFRESH_S:
+            return
+        self._shown_s = now_s
+        pairs, since_s = self._last
+        if now_s - since_s >= 1.0:
+            self._rate = (self._host.processed - pairs) / (now_s - since_s)
+            self._last = (self._host.processed, now_s)
+        if self._task is not None:
+            done = now_s - self._started_s if self._seconds else self._host.processed
+            self._progress.update(self._task, completed=done)
+        bar = [self._progress] if self._task is not None else []
+        # What is wrong comes first: a small terminal cuts off what is below.
+        shown = Group(*self._judgement(), self._table(), self._stages(), self._state(), *bar)
+        self._live.update(shown, refresh=True)
+
+    def _table(self) -> Table:
+        table = Table(title=f"{self._host.processed} pairs, {self._rate:.1f} /s", title_justify="left")
+        table.add_column("delay, ms")
+        for name in ("p50", "p95", "p99", "max"):
+            table.add_column(name, justify="right")
+        for name in (*DELAYS, "time_skew"):
+            spread = self._host.delays.spread(name, _RECENT)
+            table.add_row(name.replace("_", "-"), *_values_ms(spread))
+        return table
+
+    def _stages(self) -> Text:
+        """Processing's shares in one line: with a row for each the warnings would leave a terminal of 24 lines."""
+        medians = [(name, self._host.delays.spread(name, _RECENT).p50_ns) for name in STAGES]
+        shares = [f"{name} {value_ns / 1e6:.1f}" for name, value_ns in medians if value_ns == value_ns]  # noqa: PLR0124 - NaN is the only value unlike itself
+        return Text(f"processing, p50 in ms: {', '.join(shares) or 'not yet'}", style="dim")
+
+    def _judgement(self) -> list[Text]:
+        """The queueing regime, what has befallen the two cameras, and what makes depth wrong."""
+        facts = self._host.facts("running")
+        warnings = [
+            Text(f"warning: {item.sentence}: {item.remedy}", style="bold red") for item in self._host.concerns()
+        ]
+        lines = (*camera_troubles(facts.camera), *rung_lines(facts.link))
+        camera = [Text(line, style="yellow") for line in lines]
+        return [Text(judge(figures(facts)).sentence, style="dim"), *camera, *warnings]
+
+    def _state(self) -> Text:
+        receiver, counts = self._host.receiver, self._host.queue.counts
+        estimate = receiver.estimate
+        clock = (
+            f"clock +-{estimate.uncertainty_ns / 1000:.0f} us (hard +-{estimate.bound_ns / 1000:.0f} us)"
+            if estimate
+            else "clock unknown"
+        )
+        carrier = receiver.carrier
+        board = f"board connected over {carrier}" if carrier else "waiting for the board"
+        drops = {f"{reason} (board)": count for reason, count in board_drops(receiver.account).items()}
+        drops["lost on the link"] = sum(account.lost for account in receiver.account.sessions)
+        drops |= {f"not believed: {reason.value}": count for reason, count in receiver.account.disbelieved.items()}
+        drops |= {f"{reason} (host)": count for reason, count in counts.board_orphans}
+        drops["full FIFO"] = counts.dropped
+        shown = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in drops.items() if count) or "none"
+        phase = "\n".join(phase_lines(self._host.queue.phase, self._host.alignment))
+        return Text(f"{board} · {clock} · drops: {shown}" + (f"\n{phase}" if phase else ""))
+
+
+def _values_ms(spread: Spread) -> list[str]:
+    if not spread.count:
+        return ["-"] * 4
+    return [f"{value / 1e6:.3f}" for value in (spread.p50_ns, spread.p95_ns, spread.p99_ns, spread.max_ns)]

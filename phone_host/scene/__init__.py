@@ -1,0 +1,1 @@
+"""Rendered scenes and films whose depth is known exactly."""

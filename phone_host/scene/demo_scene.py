@@ -1,0 +1,116 @@
+"""Ready-made rigs and scenes: two unlike cameras, two alike, planes at a known distance, and the demo's moving still life."""
+
+import math
+
+import numpy as np
+
+from phone_host.model import Camera, Rig, StereoGeometry
+from phone_host.scene.scene_model import (
+    Body,
+    Box,
+    Light,
+    Look,
+    Path,
+    Plane,
+    RectifiedView,
+    Scene,
+    Sphere,
+    Texture,
+    rotation,
+)
+
+DEMO_PERIOD_S = 4.0
+"""The demo's scene repeats after this: a film of one period can be shown in a loop."""
+
+BASELINE_M = 0.100
+FOCAL_PX = 525.0
+
+
+def matched_rig() -> Rig:
+    """Two ideal pinhole cameras of 640x480, f = 525 px, 100 mm apart, already rectified: for accuracy tests."""
+    matrix = np.array([[FOCAL_PX, 0.0, 319.5], [0.0, FOCAL_PX, 239.5], [0.0, 0.0, 1.0]])
+    camera = Camera(640, 480, matrix, np.zeros(5))
+    return Rig(camera, camera, np.eye(3), np.array([-BASELINE_M, 0.0, 0.0]))
+
+
+def matched_view() -> RectifiedView:
+    """The rectified view of `matched_rig`: its own left camera."""
+    return RectifiedView(StereoGeometry(FOCAL_PX, BASELINE_M, 319.5, 239.5), 640, 480)
+
+
+def unlike_rig() -> Rig:
+    """The demo's two cameras: a 640x480 webcam with barrel distortion on the left, an 800x600 phone on the right.
+
+    The phone is turned by about 1.5 degrees and stands 100 mm to the right, a little higher and farther back.
+    """
+    webcam = Camera(
+        640,
+        480,
+        np.array([[525.0, 0.0, 316.8], [0.0, 526.2, 243.1], [0.0, 0.0, 1.0]]),
+        np.array([-0.24, 0.085, 0.0006, -0.0004, -0.012]),
+    )
+    phone = Camera(
+        800,
+        600,
+        np.array([[702.5, 0.0, 404.6], [0.0, 701.1, 296.2], [0.0, 0.0, 1.0]]),
+        np.array([0.065, -0.14, -0.0005, 0.0007, 0.05]),
+    )
+    turn = rotation((0.3, 1.0, 0.45), math.radians(-1.5))
+    centre = np.array([0.0998, -0.004, -0.005])
+    centre *= BASELINE_M / np.linalg.norm(centre)
+    return Rig(webcam, phone, turn, -turn @ centre)
+
+
+WEBCAM_LOOK = Look(gain_bgr=(0.95, 0.97, 1.02), offset=4.0, gamma=2.0, vignetting=0.25, noise_sigma=1.2, seed=1)
+PHONE_LOOK = Look(gain_bgr=(1.06, 1.04, 1.0), offset=0.0, gamma=2.0, vignetting=0.1, noise_sigma=0.8, seed=2)
+
+
+def plane_scene(depth_m: float, tilt_rad: float = 0.0, seed: int = 0) -> Scene:
+    """One infinite textured plane through (0, 0, depth), turned about the vertical axis by `tilt_rad`.
+
+    Args:
+        depth_m: its distance along the left camera's axis.
+        tilt_rad: 0 faces the camera.
+        seed: of the texture.
+
+    Returns:
+        A still scene.
+    """
+    turn = rotation((0.0, 1.0, 0.0), tilt_rad)
+    return Scene((Body("plane", Plane(), (0.0, 0.0, depth_m), Texture(seed=seed), turn),))
+
+
+def demo_scene() -> Scene:
+    """A still life at 0.7 to 2.5 m that moves: a table before a wall, a ball that rolls round, boxes that turn.
+
+    It repeats every `DEMO_PERIOD_S`.
+    """
+    flat = rotation((1.0, 0.0, 0.0), math.radians(-90.0))
+    upright = (0.0, 1.0, 0.0)
+    table_y = 0.32
+    turn = 2.0 * math.pi / DEMO_PERIOD_S
+    quarter = math.pi / 2.0
+    roll = Path((0.20, 0.0, 0.14), (0.0, 0.0, quarter), DEMO_PERIOD_S, (0.3, 1.0, 0.2), turn)
+    hover = Path((0.03, 0.04, 0.06), (1.0, 0.0, 2.0), DEMO_PERIOD_S, (0.4, 1.0, 0.2), -turn)
+    sway = Path((0.05, 0.0, 0.0), (0.5, 0.0, 0.0), DEMO_PERIOD_S, upright, turn)
+    wall = Texture(11, (0.58, 0.62, 0.63), (0.50, 0.53, 0.51), 0.36, shortest_m=0.008)
+    wood = Texture(12, (0.24, 0.42, 0.64), (0.12, 0.24, 0.42), 0.45, longest_m=0.13, stretch=(1.0, 2.5, 1.0))
+    poster = Texture(17, (0.50, 0.44, 0.22), (0.34, 0.26, 0.10), 0.45, shortest_m=0.008)
+    red = Texture(13, (0.16, 0.22, 0.80), (0.06, 0.08, 0.45), longest_m=0.13)
+    blue = Texture(14, (0.72, 0.46, 0.16), (0.44, 0.20, 0.06), longest_m=0.13)
+    green = Texture(16, (0.28, 0.60, 0.30), (0.12, 0.36, 0.12), longest_m=0.13)
+    yellow = Texture(15, (0.14, 0.62, 0.84), (0.08, 0.36, 0.60), longest_m=0.13)
+    violet = Texture(18, (0.62, 0.34, 0.52), (0.34, 0.14, 0.28), longest_m=0.06)
+    return Scene(
+        (
+            Body("wall", Plane(), (0.0, 0.0, 2.5), wall),
+            Body("table", Plane(), (0.0, table_y, 1.5), wood, flat),
+            Body("poster", Plane(0.9, 0.62), (-0.52, -0.42, 2.30), poster, rotation(upright, -0.35)),
+            Body("brick", Box((0.34, 0.12, 0.18)), (-0.60, table_y - 0.06, 1.9), yellow, rotation(upright, 0.5)),
+            Body("marble", Sphere(0.05), (0.27, table_y - 0.05, 0.86), violet),
+            Body("ball", Sphere(0.12), (0.02, table_y - 0.12, 1.15), red, path=roll),
+            Body("cube", Box((0.19, 0.19, 0.19)), (-0.27, -0.08, 1.1), blue, path=hover),
+            Body("tower", Box((0.22, 0.50, 0.22)), (0.50, table_y - 0.25, 1.65), green, path=sway),
+        ),
+        Light(),
+    )

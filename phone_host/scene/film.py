@@ -1,0 +1,140 @@
+"""A rendered scene as two folders of JPEGs, one for each camera of a rig, to be replayed in a loop; it knows which image shows when."""
+
+import errno
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import cv2
+
+from phone_host.model import Camera, Rig
+from phone_host.output.atomic import write_bytes
+from phone_host.scene.scene import Look, Renderer, Scene, rig_poses
+
+JPEG_QUALITY: Final = 92
+"""Below 90 the matcher pays for the artefacts (study of the stereo core, 3.5b)."""
+
+_NS: Final = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Film:
+    """Images of both cameras, taken at the same moments.
+
+    Attributes:
+        left: folder of the left camera's images.
+        right: folder of the right camera's images.
+        frames: images in each.
+        fps: images per second.
+    """
+
+    left: Path
+    right: Path
+    frames: int
+    fps: int
+
+    def index_at(self, exposed_ns: int) -> int:
+        """Number of the image that a replay (`loop=1`, `pace=clock`) exposes nearest to a moment of CLOCK_MONOTONIC, ns."""
+        return round(exposed_ns * self.fps / _NS) % self.frames
+
+    def scene_at(self, scene: Scene, index: int) -> Scene:
+        """The scene as that image shows it."""
+        return scene.at(index / self.fps)
+
+    def replay_uri(self, folder: Path) -> str:
+        """Camera URI of one of the folders."""
+        return f"replay:{folder}?fps={self.fps}&loop=1"
+
+
+def render_film(
+    scene: Scene,
+    rig: Rig,
+    looks: tuple[Look, Look],
+    folder: Path,
+    *,
+    fps: int,
+    seconds: float,
+    advance: Callable[[], None],
+) -> Film:
+    """Render a scene for both cameras.
+
+    Args:
+        scene: what to show; it should repeat after `seconds`.
+        rig: the two cameras.
+        looks: of the left and right sensor.
+        folder: gets the folders `left` and `right`.
+        fps: images per second.
+        seconds: length.
+        advance: called after each image, twice `frames` times in all.
+
+    Returns:
+        The film.
+
+    Raises:
+        OSError: the folder cannot be written to.
+    """
+    (film,) = render_films(scene, rig, looks, {JPEG_QUALITY: folder}, fps=fps, seconds=seconds, advance=advance)
+    return film
+
+
+def render_films(
+    scene: Scene,
+    rig: Rig,
+    looks: tuple[Look, Look],
+    folders: Mapping[int, Path],
+    *,
+    fps: int,
+    seconds: float,
+    advance: Callable[[], None],
+) -> tuple[Film, ...]:
+    """Render a scene for both cameras once and compress it several times.
+
+    Args:
+        scene: what to show; it should repeat after `seconds`.
+        rig: the two cameras.
+        looks: of the left and right sensor.
+        folders: for each JPEG quality, 1 to 100, the folder that gets `left` and `right`.
+        fps: images per second.
+        seconds: length.
+        advance: called after each rendered image, twice `frames` times in all.
+
+    Returns:
+        The films, in the order of `folders`.
+
+    Raises:
+        OSError: a folder cannot be written to.
+    """
+    films = {
+        quality: Film(folder / "left", folder / "right", round(fps * seconds), fps)
+        for quality, folder in folders.items()
+    }
+    poses = rig_poses(rig)
+    left = {quality: film.left for quality, film in films.items()}
+    right = {quality: film.right for quality, film in films.items()}
+    for camera, pose, look, targets in ((rig.left, poses[0], looks[0], left), (rig.right, poses[1], looks[1], right)):
+        times_s = [index / fps for index in range(round(fps * seconds))]
+        _render(Renderer(scene, camera, pose, look), camera, targets, times_s, advance)
+    return tuple(films.values())
+
+
+def _render(
+    renderer: Renderer,
+    camera: Camera,
+    targets: Mapping[int, Path],
+    times_s: Sequence[float],
+    advance: Callable[[], None],
+) -> None:
+    for target in targets.values():
+        target.mkdir(parents=True, exist_ok=True)
+        if target.is_symlink():
+            raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(target))
+    digits = len(str(len(times_s)))
+    for index, time_s in enumerate(times_s):
+        image = renderer.frame(time_s)
+        assert image.shape == (camera.height_px, camera.width_px, 3)
+        for quality, target in targets.items():
+            done, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+            assert done
+            write_bytes(target / f"{index:0{digits}d}.jpg", jpeg.tobytes())
+        advance()

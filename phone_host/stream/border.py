@@ -1,0 +1,235 @@
+"""The border of the host: which frames of the board are believed, by which clock. What cannot be is dropped here and counted by its reason.
+
+Rules: no frame from before a doubt of the clock meets one from after it; while the clock is in doubt none is believed. What passes needs no
+check of its stamps any more. Belongs to the receiver's thread.
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from common.program.logs import event
+from common.protocol.message import CameraDescription, FrameMessage, Pacing
+from common.protocol.session import Echo
+from phone_host.measure.accounts import LinkAccount, SessionAccount
+from phone_host.model import BoardFrame
+from phone_host.sync.clock import ClockEstimate, Heard
+from phone_host.sync.clocks import LinkClocks
+from phone_host.sync.quarantine import Disbelief, Quarantine, Unproven, disbelief
+
+_LOG = logging.getLogger(__name__)
+
+_MOST_HELD: Final = 4
+"""While so many frames wait for an echo no more are asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """A frame that came, with what was known of it at that moment: link, session's account, camera, and its last byte's arrival, ns."""
+
+    frame: FrameMessage
+    link: int
+    account: SessionAccount
+    camera: CameraDescription
+    received_ns: int
+
+
+_TIGHT_NS: Final = 10_000_000
+"""An echo is tight that takes no longer than twice the least of late and this."""
+
+_WAIT_NS: Final = 500_000_000
+"""So long a frame waits for a tight echo, several of which are asked for in that time; where a queue keeps all echoes slow there are none."""
+
+Admitted = tuple[int, BoardFrame]
+"""A frame that may pass, and the link that it came over."""
+
+
+class Border:
+    """Clock and quarantine of one board.
+
+    Args:
+        account: of the links; doubts, steps and what was not believed are counted there.
+        on_doubt: told when nothing from before this moment may be paired any more.
+        on_demand: whether the own camera shows images on demand; else a board whose stamps are mere labels has no part in the run.
+    """
+
+    def __init__(self, account: LinkAccount, on_doubt: Callable[[], None], *, on_demand: bool = False) -> None:
+        self._account = account
+        self._on_demand = on_demand
+        self._on_doubt = on_doubt
+        self._clock = LinkClocks(len(account.links))
+        self._quarantine: Quarantine[Arrival] = Quarantine()
+        self._unproven = Unproven()
+
+    @property
+    def estimate(self) -> ClockEstimate | None:
+        """The clock estimate now; None before the first echo, and while it is in doubt."""
+        return self._clock.estimate
+
+    @property
+    def waits_for_echo(self) -> bool:
+        """Whether the next echo is wanted as soon as possible."""
+        return self._clock.in_doubt or self._quarantine.held > 0
+
+    @property
+    def takes_frames(self) -> bool:
+        """Whether a frame that came now could be of use."""
+        return self._clock.estimate is not None and self._quarantine.held < _MOST_HELD
+
+    def round_trip_ns(self, link: int) -> int | None:
+        """Least round trip of late over one link; None before its first echo."""
+        return self._clock.round_trip_ns(link)
+
+    def other_clock(self) -> None:
+        """The board has booted anew, or slept: another clock. A doubt of the old one is never decided."""
+        if self._clock.in_doubt:
+            self._note_suspects()
+        self._clock = LinkClocks(len(self._account.links))
+        self._unproven = Unproven()
+        self.close()
+
+    def void(self, why: str) -> None:
+        """Forget what was learnt of the clock; the next echo tells whether it has stepped."""
+        self._clock.void()
+        self._begin_doubt(why)
+
+    def slept(self, slept_ns: int) -> None:
+        """This machine has slept: its clock stood still, the board's and the cameras' went on."""
+        self._clock.void(stepped=True)
+        self._begin_doubt(f"this machine slept for {slept_ns / 1e9:.1f} s")
+        self._note_step()
+
+    def link_down(self, link: int) -> None:
+        """A link is lost, and with it what its echoes left open."""
+        self._clock.down(link)
+
+    def close(self) -> None:
+        """Give up the frames that wait for an echo: none will come for them."""
+        for arrival in self._quarantine.void():
+            arrival.account.disbelieved[Disbelief.CLOCK] += 1
+
+    def learn(self, echo: Echo) -> list[Admitted]:
+        """Take an echo to the clock.
+
+        Args:
+            echo: its four times.
+
+        Returns:
+            Frames that it has proven.
+        """
+        was_in_doubt = self._clock.in_doubt
+        match self._clock.add(echo):
+            case Heard.DOUBTED if not was_in_doubt:
+                self._begin_doubt("an echo contradicts the ones before it")
+            case Heard.STEPPED:
+                self._note_step()
+            case Heard.AGREED:
+                if was_in_doubt and not self._clock.in_doubt and self._account.clock_doubts.bit_count() == 1:
+                    _LOG.info(event("clock_confirmed"))
+                return self._confirm(echo)
+            case _:
+                pass
+        return []
+
+    def _confirm(self, echo: Echo) -> list[Admitted]:
+        """Take an echo that agreed. One that took long leaves room for a step: it proves nothing, and lets only those pass that have waited for a better one."""
+        estimate = self._clock.estimate
+        if estimate is None:
+            return []
+        round_trip_ns = (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns)
+        if round_trip_ns <= 2 * estimate.round_trip_ns + _TIGHT_NS:
+            self._unproven.confirmed(echo.t1_ns)
+            passed = self._quarantine.confirmed(echo.t1_ns, echo.t3_ns)
+        else:
+            passed = self._quarantine.confirmed(echo.t1_ns, echo.t3_ns - _WAIT_NS)
+        return [known for arrival in passed for known in self._examine(arrival)]
+
+    def admit(self, arrival: Arrival) -> list[Admitted]:
+        """Take a frame that has come.
+
+        Args:
+            arrival: what came.
+
+        Returns:
+            The frame with its marks on the host's clock, if it may pass now; none where it was dropped or has to wait for an echo.
+        """
+        if self._clock.estimate is None and not self._clock.in_doubt:
+            self._account.no_clock += 1
+            return []
+        known = self._examine(arrival)
+        if not known or arrival.camera.pacing is Pacing.DEMAND:
+            return known
+        transit_ns = arrival.received_ns - known[0][1].marks.sent_ns
+        sent_ns, period_ns = arrival.frame.marks.sent_ns, arrival.camera.period_ns
+        passes = self._quarantine.arrived(arrival, sent_ns, transit_ns, period_ns, arrival.received_ns)
+        return known if passes else []
+
+    def tick(self, now_ns: int) -> None:
+        """Let time pass: frames that no echo proves are given up by name."""
+        for arrival in self._quarantine.expired(now_ns):
+            arrival.account.disbelieved[Disbelief.UNPROVEN] += 1
+            self._warn(
+                "frame_unproven", arrival.account.disbelieved[Disbelief.UNPROVEN], why="the board answers no echo"
+            )
+
+    def _examine(self, arrival: Arrival) -> list[Admitted]:
+        """Map a frame's marks to the host's clock; nothing where they cannot be, which is counted."""
+        frame, estimate = arrival.frame, self._clock.estimate
+        reason = Disbelief.CLOCK if estimate is None else self._doubts(arrival, estimate)
+        if estimate is None or reason is not None:
+            arrival.account.disbelieved[reason or Disbelief.CLOCK] += 1
+            return []
+        # Only `sent` is mapped to the host's clock, once, when the frame is believed; the other marks keep their distance to it.
+        sent_ns = frame.marks.sent_ns
+        told = estimate.to_host(sent_ns)
+        name, asked_px = self._account.links[arrival.link].name, (arrival.camera.width_px, arrival.camera.height_px)
+        marks = frame.marks.moved_to(told.ns)
+        offset_ns = told.ns - sent_ns
+        return [
+            (
+                arrival.link,
+                BoardFrame(frame, name, marks, arrival.received_ns, offset_ns, told.uncertainty_ns, asked_px),
+            )
+        ]
+
+    def _doubts(self, arrival: Arrival, estimate: ClockEstimate) -> Disbelief | None:
+        frame, camera = arrival.frame, arrival.camera
+        if frame.width_px > camera.width_px or frame.height_px > camera.height_px:
+            return Disbelief.SIZE
+        labelled, since_ns = camera.pacing is Pacing.DEMAND, self._clock.since_ns
+        if labelled and not self._on_demand:
+            return Disbelief.PACING
+        if since_ns is not None and frame.marks.exposed_ns < since_ns and not labelled:
+            return Disbelief.CLOCK
+        arrived_ns = arrival.received_ns - estimate.offset_at(arrival.received_ns - estimate.offset_ns)
+        return disbelief(frame.marks, arrived_ns, estimate.bound_at(arrived_ns), labelled=labelled)
+
+    def passed(self, frame: FrameMessage) -> None:
+        """Take note of a frame that was given on: until an echo proves it, it counts as suspect."""
+        self._unproven.passed(frame.marks.sent_ns, frame.session, frame.sequence)
+
+    def _begin_doubt(self, why: str) -> None:
+        self._account.clock_doubts += 1
+        self.close()
+        self._on_doubt()
+        self._warn("clock_in_doubt", self._account.clock_doubts, why=why)
+
+    def _note_step(self) -> None:
+        """A clock has stepped: what passed since the last echo before may be paired wrongly."""
+        self._account.clock_steps += 1
+        frames = self._note_suspects()
+        self._warn("clock_stepped", self._account.clock_steps, suspect_frames=frames)
+
+    def _note_suspects(self) -> int:
+        """Name the frames that no echo has proven since; gives how many."""
+        suspects = self._unproven.stepped()
+        if suspects is None:
+            return 0
+        self._account.suspects.append(suspects)
+        return suspects.frames
+
+    @staticmethod
+    def _warn(name: str, count: int, **facts: object) -> None:
+        if count.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: a board that steps on purpose must not fill the log
+            _LOG.warning(event(name, count=count, **facts))

@@ -1,0 +1,192 @@
+"""The host's end of all links, in a thread of its own: bytes become messages for the reception, what that says goes out."""
+
+import os
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Final
+
+from common import now
+from common.errors import ProtocolError
+from common.link.base import Broken, Garbage, Incoming, Link, Packet
+from common.link.several import SeveralLinks
+from common.link.waiter import Waiter
+from common.protocol.message import BoardHello, Ping, RefusalReason
+from common.protocol.session import Outgoing, connection_name
+from common.protocol.wire import VersionError, decode, encode_stamped
+from phone_host.measure.accounts import LinkAccount
+from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.reception import BoardListener, LinkFacts, Reception
+from phone_host.sync.clock import ClockEstimate
+
+_LONGEST_WAIT_MS: Final = 50
+"""The pair queue's patience is checked at least this often."""
+
+_FAREWELL_NS: Final = 300_000_000
+"""How long a leaving host waits for the board's last account: a few round trips of any usable link."""
+
+
+class Receiver:
+    """Owns the links and speaks the host's role over them.
+
+    Args:
+        links: open links to one board, the preferred one first; closed by this.
+        host_id: random id of this process's life.
+        queue: where frames go.
+        listener: told of sessions and frames.
+    """
+
+    def __init__(self, links: Sequence[Link], host_id: str, queue: PairQueue, listener: BoardListener) -> None:
+        self._links = tuple(links)
+        self._several = SeveralLinks(links)
+        facts = [
+            LinkFacts(
+                link.kind,
+                {lane: connection_name(number, path) for lane, path in link.dialled.items()},
+                link.self_paced,
+            )
+            for number, link in enumerate(links)
+        ]
+        self._reception = Reception(facts, host_id, queue, listener, self._send)
+        self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        self._waiter = Waiter([*(item for link in links for item in link.pollables), self._wake_read])
+        self._stopping = False
+        self._later_ns = 0
+        self._sleep, self._time_of_day = now.SleepWatch(), now.TimeOfDayWatch()
+        self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
+        self.failure: Exception | None = None
+
+    @property
+    def account(self) -> LinkAccount:
+        """What was seen so far."""
+        return self._reception.account
+
+    @property
+    def refused(self) -> RefusalReason | None:
+        """Why the board that was last heard does not talk to us; None when it does, or is silent now."""
+        return self._reception.refused(now.monotonic_ns())
+
+    @property
+    def connected(self) -> bool:
+        """Whether a board talks to us now."""
+        return self._reception.connected
+
+    @property
+    def carrier(self) -> str:
+        """Name of the link that frames come over now; empty while there is none."""
+        return self._reception.carrier
+
+    @property
+    def hello(self) -> BoardHello | None:
+        """What the board said of itself; None before the first contact."""
+        return self._reception.hello
+
+    @property
+    def estimate(self) -> ClockEstimate | None:
+        """The clock estimate now; None before the first echo, and while it is in doubt."""
+        return self._reception.estimate
+
+    @property
+    def ended(self) -> bool:
+        """Whether the board's camera has come to its end."""
+        return self._reception.ended
+
+    def start(self) -> None:
+        """Begin to look for the board."""
+        self._thread.start()
+
+    def wake(self) -> None:
+        """Let the thread look at the queue's free places now; safe from any thread."""
+        with suppress(BlockingIOError):  # then it has been told often enough
+            os.write(self._wake_write, b"\0")
+
+    def steer(self, later_ns: int) -> None:
+        """Ask the board's camera to expose later; safe from any thread."""
+        self._later_ns = later_ns
+        self.wake()
+
+    def stop(self) -> None:
+        """Say goodbye and close the link."""
+        self._stopping = True
+        self.wake()
+        self._thread.join()
+        os.close(self._wake_read)
+        os.close(self._wake_write)
+
+    def _run(self) -> None:
+        try:
+            while not self._stopping:
+                self._step()
+            self._part()
+        except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
+            self.failure = error
+        finally:
+            self._reception.close()
+            for link in self._links:
+                link.close()
+
+    def _part(self) -> None:
+        """Say goodbye and wait a moment for the board's last account: it comes behind the last frame."""
+        reception = self._reception
+        heard = reception.leave(now.monotonic_ns())
+        deadline_ns = now.monotonic_ns() + _FAREWELL_NS
+        while heard and not reception.tail_known and (left_ns := deadline_ns - now.monotonic_ns()) > 0:
+            self._waiter.wait(left_ns // 1_000_000 + 1)
+            self._receive()
+        if heard and not reception.tail_known:
+            reception.lose_tail()
+
+    def _receive(self) -> None:
+        """Take all that has come."""
+        for number, incoming in self._several.receive():
+            self._take(number, incoming, now.monotonic_ns())
+
+    def _step(self) -> None:
+        now_ns = now.monotonic_ns()
+        links_due_ns = min(link.due_ns for link in self._links)
+        due_ns = min(self._reception.due_ns, links_due_ns)
+        wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
+        ready = self._waiter.wait(wait_ms)
+        self._watch_clock()
+        if ready or now.monotonic_ns() >= links_due_ns:
+            self._receive()
+            if self._wake_read in ready:
+                os.read(self._wake_read, 4096)
+        now_ns = now.monotonic_ns()
+        self._reception.tick(now_ns)
+        if self._later_ns:
+            later_ns, self._later_ns = self._later_ns, 0
+            self._reception.steer(later_ns, now_ns)
+
+    def _watch_clock(self) -> None:
+        """Notice that this machine's clock has, or may have, stood still, before anything is taken that came meanwhile."""
+        jumped = self._time_of_day.jumped()
+        if slept_ns := self._sleep.slept_ns():
+            self._reception.slept(slept_ns, now.monotonic_ns())
+        elif jumped:
+            self._reception.doubt_clock(
+                "the time of day was set: this machine may have stood still", now.monotonic_ns()
+            )
+
+    def _take(self, link: int, incoming: Incoming, now_ns: int) -> None:
+        reception, connection = self._reception, connection_name(link, incoming.connection)
+        match incoming:
+            case Broken():
+                reception.interrupted(connection, now_ns)
+            case Garbage():
+                reception.count_garbage("not a packet")
+            case Packet(_, header, payload):
+                try:
+                    message = decode(header, payload)
+                except VersionError as error:
+                    reception.refuse_version(connection, error.problem, now_ns)
+                except ProtocolError as error:
+                    reception.count_garbage(error.problem)
+                else:
+                    reception.receive(connection, message, now_ns)
+
+    def _send(self, outgoing: Outgoing) -> None:
+        header, payload = encode_stamped(outgoing.message, now.monotonic_ns)
+        self._links[outgoing.connection[0]].send(outgoing.connection[1:], header, payload)
+        if isinstance(outgoing.message, Ping):
+            self._waiter.stay_awake()

@@ -1,0 +1,401 @@
+"""The host's side of all that comes from a board: session, choice of the link, credit, border. Frames that are believed go to the pair queue.
+
+No thread, no link and no clock of its own: messages and `now_ns` come in, what is to be said goes to `send`, so that it runs on simulated time, too.
+"""
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
+
+from common.errors import UnavailableError
+from common.program.logs import event
+from common.protocol.host_session import HostSession
+from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Lane, Message, Pacing, RefusalReason, Rung
+from common.protocol.session import (
+    Accepted,
+    Arrived,
+    ClockVoid,
+    Counted,
+    Echo,
+    LinkDown,
+    LinkUp,
+    OtherBoard,
+    Outgoing,
+    Output,
+    Refused,
+    Stale,
+    Stepped,
+    Unbelievable,
+    Vanished,
+)
+from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount, link_names
+from phone_host.model import BoardFrame
+from phone_host.stream.border import Arrival, Border
+from phone_host.stream.pair_queue import PairQueue
+from phone_host.sync.choice import LinkChoice
+from phone_host.sync.clock import ClockEstimate
+from phone_host.sync.flow import Flow
+from phone_host.sync.quarantine import Disbelief
+
+_LOG = logging.getLogger(__name__)
+
+_REFUSAL_NS: Final = 1_000_000_000
+"""A board that refuses does so at every hello, five times a second; one that has not done so for this long is gone."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkFacts:
+    """What must be known of a link.
+
+    Attributes:
+        kind: the transport's name.
+        dialled: the connections that this side opened, named uniquely over all links; empty where the board dials.
+        self_paced: whether it holds the next frame back by itself until the one before has left.
+    """
+
+    kind: str
+    dialled: dict[Lane, bytes]
+    self_paced: bool
+
+
+class BoardListener(Protocol):
+    """Who is told of the board by the receiver's thread."""
+
+    def session_began(self) -> None:
+        """A life of the board begins; nothing of the one before will follow."""
+
+    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
+        """A frame has come: its exposure on the host's clock, and its number if the board shows images on demand."""
+
+
+class Reception:
+    """The board as this host knows it.
+
+    Args:
+        links: what they are, the preferred one first.
+        host_id: random id of this process's life.
+        queue: where frames go.
+        listener: told of sessions and frames.
+        send: takes what is to be said.
+    """
+
+    def __init__(
+        self,
+        links: Sequence[LinkFacts],
+        host_id: str,
+        queue: PairQueue,
+        listener: BoardListener,
+        send: Callable[[Outgoing], None],
+    ) -> None:
+        self._links = tuple(links)
+        self._queue = queue
+        self._listener = listener
+        self._send = send
+        self._session = HostSession(host_id, [link.dialled for link in links])
+        self._choice = LinkChoice(len(links))
+        self._boot_id = ""
+        self._hello: BoardHello | None = None
+        self._flow = Flow()
+        self._streamed_over: int | None = None
+        self._refused: tuple[RefusalReason, int] | None = None
+        self._turned_away: set[int] = set()
+        self.tail_known = False
+        self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
+        self._border = Border(self.account, queue.void, on_demand=queue.shows_on_demand)
+
+    def refused(self, now_ns: int) -> RefusalReason | None:
+        """Why the board that was last heard does not talk to us; None when it does, or is silent now."""
+        refused = self._refused  # read once: another thread may be writing
+        return None if refused is None or now_ns - refused[1] > _REFUSAL_NS else refused[0]
+
+    @property
+    def connected(self) -> bool:
+        """Whether a board talks to us now."""
+        return self._session.is_open
+
+    @property
+    def carrier(self) -> str:
+        """Name of the link that frames come over now; empty while there is none."""
+        link = self._session.carrier
+        return "" if link is None else self.account.links[link].name
+
+    @property
+    def hello(self) -> BoardHello | None:
+        """What the board said of itself; None before the first contact."""
+        return self._hello
+
+    @property
+    def estimate(self) -> ClockEstimate | None:
+        """The clock estimate now; None before the first echo, and while it is in doubt."""
+        return self._border.estimate
+
+    @property
+    def ended(self) -> bool:
+        """Whether the board's camera has come to its end."""
+        return bool(self.account.sessions) and self.account.sessions[-1].ended
+
+    @property
+    def due_ns(self) -> int:
+        """When `tick` wants to be called next even if nothing comes, ns."""
+        return self._session.due_ns
+
+    def receive(self, connection: bytes, message: Message, now_ns: int) -> None:
+        """Take a message.
+
+        Args:
+            connection: where it came from, named uniquely over all links.
+            message: what came.
+            now_ns: arrival of its last byte, ns.
+        """
+        self._handle(self._session.receive(connection, message, now_ns), now_ns)
+
+    def refuse_version(self, connection: bytes, problem: str, now_ns: int) -> None:
+        """Take note of a message of another protocol version.
+
+        In a running session it is somebody else's noise; whoever called here, not being called, may be anybody.
+        """
+        if not self._session.is_open and connection in self._links[connection[0]].dialled.values():
+            self._refused = (RefusalReason.VERSION, now_ns)
+        self.count_garbage(problem)
+
+    def interrupted(self, connection: bytes, now_ns: int) -> None:
+        """Take note that a connection broke."""
+        self._handle(self._session.interrupted(connection, now_ns), now_ns)
+
+    def tick(self, now_ns: int) -> None:
+        """Do what time demands, and let frames come where there is room for them."""
+        self._border.tick(now_ns)
+        if self._border.waits_for_echo:
+            self._session.probe(now_ns)
+        if now_ns >= self._session.due_ns:
+            self._handle(self._session.tick(now_ns), now_ns)
+            if len(self._links) > 1 and (best := self._choice.best(now_ns)) is not None:
+                self._handle(self._session.carry(best, now_ns), now_ns)
+        self._queue.tick()
+        self._grant(now_ns)
+
+    def steer(self, later_ns: int, now_ns: int) -> None:
+        """Ask the board's camera to expose later."""
+        self._handle(self._session.steer(later_ns), now_ns)
+
+    def slept(self, slept_ns: int, now_ns: int) -> None:
+        """Take note that this machine has slept: its clock stood still, the board's and the cameras' went on."""
+        self._border.slept(slept_ns)
+        self._handle(self._session.begin_clock(now_ns), now_ns)
+
+    def doubt_clock(self, why: str, now_ns: int) -> None:
+        """Take note that this machine's clock may have stood still; an echo that is asked for from now on tells."""
+        self._border.void(why)
+        self._handle(self._session.begin_clock(now_ns), now_ns)
+
+    def leave(self, now_ns: int) -> bool:
+        """Say goodbye; gives whether anybody hears it, who will answer with the last account (`tail_known`)."""
+        farewell = self._session.leave()
+        self._handle(farewell, now_ns)
+        return bool(farewell)
+
+    def close(self) -> None:
+        """Take note that nothing comes any more."""
+        self._border.close()
+
+    def lose_tail(self) -> None:
+        """Take note that the last account did not come: what the board sent since its newest one is not known."""
+        self._current.vanished = True
+
+    def count_garbage(self, problem: str) -> None:
+        """Take note of something that is no message of ours."""
+        self.account.garbage += 1
+        if self.account.garbage.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: a hostile peer must not fill the log
+            _LOG.warning(event("garbage", count=self.account.garbage, problem=problem))
+
+    def _grant(self, now_ns: int) -> None:
+        carrier, hello = self._session.carrier, self._hello
+        if carrier is None or hello is None or not self._border.takes_frames:
+            return  # without a clock a frame could not be paired
+        if hello.camera.pacing is Pacing.DEMAND or self._queue.held_back_by_credit:
+            self._handle(self._session.grant(self._queue.free_slots()), now_ns)
+            return
+        round_trip_ns = (self._border.round_trip_ns(carrier) or 0) if self._links[carrier].self_paced else None
+        frames = self._flow.credit(self._session.outstanding, hello.camera.period_ns, round_trip_ns)
+        if frames:
+            self._handle(self._session.grant(frames), now_ns)
+
+    def _handle(self, outputs: list[Output], now_ns: int) -> None:
+        for output in outputs:
+            match output:
+                case Outgoing():
+                    self._send(output)
+                case Arrived(frame, lost, link):
+                    self._accept_frame(frame, lost, link, now_ns)
+                case Echo() | ClockVoid():
+                    self._note_clock(output, now_ns)
+                case Stale(_, reason):
+                    self._current.count_stale(reason)
+                case Accepted():
+                    self._begin(output, now_ns)
+                case LinkUp() | LinkDown() | OtherBoard():
+                    self._note_link(output, now_ns)
+                case Counted():
+                    self._note_account(output, now_ns)
+                case Stepped(rung):
+                    self._note_rung(rung)
+                case Refused() | Unbelievable():
+                    self._note_refusal(output, now_ns)
+                case Vanished(orderly):
+                    self._note_gone(orderly=orderly, now_ns=now_ns)
+
+    def _note_clock(self, echo: Echo | ClockVoid, now_ns: int) -> None:
+        """Take an echo to the clock, and let frames pass that it has proven; or begin anew."""
+        if isinstance(echo, ClockVoid):
+            self._border.void("the board had not heard this host for a while")
+            return
+        for passed in self._border.learn(echo):
+            self._pass(*passed)
+        self._choice.echo(echo.link, (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns), now_ns)
+
+    def _note_account(self, counted: Counted, now_ns: int) -> None:
+        """Take the board's account of the running session."""
+        self.tail_known |= counted.last  # an older account on the other lane may come behind it
+        account = self._current
+        account.lost += counted.lost
+        account.latest = max(counted.counts, account.latest, key=lambda counts: counts.grabbed)
+        account.ended |= counted.ended
+        self._choice.account(counted.counts.grabbed, now_ns, has_credit=self._session.outstanding > 0)
+
+    def _note_refusal(self, refused: Refused | Unbelievable, now_ns: int) -> None:
+        """A board does not talk to us, which is told once where another link is up, because then the run goes on; or it talks nonsense."""
+        if isinstance(refused, Unbelievable):
+            self.count_garbage(refused.problem)
+            return
+        self._refused = (refused.reason, now_ns)
+        if self._session.is_open and refused.link not in self._turned_away:
+            self._turned_away.add(refused.link)
+            problem, remedy = refusal_text(refused.reason)
+            _LOG.warning(
+                event("link_refused", link=self.account.links[refused.link].name, problem=problem, remedy=remedy)
+            )
+
+    def _note_gone(self, *, orderly: bool, now_ns: int) -> None:
+        """The board is not there any more, on no link."""
+        self._border.close()
+        self._current.vanished = not orderly
+        for number, tally in enumerate(self.account.links):
+            self._choice.down(number, now_ns)
+            tally.is_up = False
+        _LOG.info(event("board_gone", session=self._current.session, orderly=orderly))
+
+    def _note_link(self, news: LinkUp | LinkDown | OtherBoard, now_ns: int) -> None:
+        """Take note of a link that came up, went down, or leads astray."""
+        tally = self.account.links[news.link]
+        match news:
+            case LinkUp(link, hello):
+                tally.is_up = True
+                self._turned_away.discard(link)
+                if hello.boot_id != self._boot_id:
+                    self._boot_id = hello.boot_id
+                    self._border.other_clock()
+                self._choice.up(link, now_ns)
+                _LOG.info(event("link_up", link=tally.name))
+            case LinkDown(link, stuck):
+                tally.is_up = stuck
+                tally.lost += 1
+                self._border.link_down(link)
+                self._choice.down(link, now_ns)
+                if stuck:
+                    self._choice.up(link, now_ns)
+                _LOG.info(event("link_down", link=tally.name, stuck=stuck))
+            case OtherBoard(link, hello):
+                ours = self._hello
+                names = " and ".join(tally.name for tally in self.account.links)
+                if tally.frames or tally.lost or ours is None:  # it was right once: somebody has moved a cable
+                    _LOG.warning(event("other_board", link=tally.name, camera=hello.camera.name))
+                    return
+                raise UnavailableError(
+                    f"links {names} lead to different boards ({ours.camera.name} and, on link {link + 1}, {hello.camera.name})",
+                    "give --link only addresses of one board",
+                )
+
+    @property
+    def _current(self) -> SessionAccount:
+        if not self.account.sessions:
+            self.account.sessions.append(SessionAccount("", BoardCounts(), BoardCounts()))
+        return self.account.sessions[-1]
+
+    def _begin(self, accepted: Accepted, now_ns: int) -> None:
+        hello, link = accepted.hello, accepted.link
+        self._refused = None
+        self._hello = hello
+        self._flow = Flow()
+        self.tail_known = False
+        self._choice.carries(link, now_ns)
+        tally, before = self.account.links[link], self._streamed_over
+        self._streamed_over = link
+        if accepted.resumed:
+            self._current.lost += accepted.lost
+            self._current.vanished = False
+        else:
+            self.account.sessions.append(SessionAccount(hello.session, hello.counts, hello.counts))
+            self._listener.session_began()
+            self._queue.begin(hello.camera.period_ns, on_demand=hello.camera.pacing is Pacing.DEMAND)
+        self._current.rung = hello.rung
+        self._queue.change_period(hello.camera.period_ns)
+        if link != before:
+            tally.carried += 1
+        if accepted.resumed and before is not None and link != before:
+            self.account.switches += 1
+            names = self.account.links
+            _LOG.info(event("link_switched", source=names[before].name, target=tally.name, lost=accepted.lost))
+            return
+        self.account.connects += 1
+        camera = hello.camera
+        size = f"{camera.width_px}x{camera.height_px}"
+        found = {"session": hello.session, "resumed": accepted.resumed, "link": tally.name}
+        _LOG.info(event("board_found", **found, camera=camera.name, size=size))
+
+    def _note_rung(self, rung: Rung) -> None:
+        """Go by another rate of the board's camera."""
+        assert self._hello is not None
+        self._hello = replace(self._hello, camera=replace(self._hello.camera, period_ns=rung.period_ns), rung=rung)
+        self._current.rung = rung
+        self._queue.change_period(rung.period_ns)
+        fps = round(1e9 / rung.period_ns, 2)
+        _LOG.info(event("board_camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality))
+
+    def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
+        """Take a frame of the running session to the border."""
+        account, tally = self._current, self.account.links[link]
+        account.received += 1
+        account.lost += lost
+        tally.frames += 1
+        tally.bytes += len(frame.payload)
+        assert self._hello is not None
+        for passed in self._border.admit(Arrival(frame, link, account, self._hello.camera, now_ns)):
+            self._pass(*passed)
+
+    def _pass(self, link: int, frame: BoardFrame) -> None:
+        """Give a frame that is believed to the pair queue."""
+        assert self._hello is not None
+        camera, message, marks = self._hello.camera, frame.message, frame.marks
+        age_ns = frame.received_ns - marks.exposed_ns
+        if camera.pacing is Pacing.CLOCK and age_ns > self._queue.history_ns:
+            self._current.disbelieved[Disbelief.PAST] += 1
+            self._queue.note_age(age_ns)  # if the link has become so slow the next one finds its partner
+            return
+        transit_ns = frame.received_ns - marks.sent_ns
+        self._choice.frame(link, transit_ns, frame.received_ns)
+        self._flow.arrived(transit_ns, marks.sent_ns - marks.grabbed_ns, camera.period_ns, frame.received_ns)
+        self.account.links[link].age.add(age_ns)
+        self._border.passed(message)
+        stamp_ns = self._queue.add_board(frame)
+        on_demand = camera.pacing is Pacing.DEMAND
+        self._listener.frame_arrived(stamp_ns, message.sequence if on_demand else None)
+
+
+def refusal_text(reason: RefusalReason) -> tuple[str, str]:
+    """What a refusal means, and its remedy."""
+    match reason:
+        case RefusalReason.BUSY:
+            return "the board is busy with another host", "stop the other one first"
+        case RefusalReason.VERSION:
+            return "the board speaks another protocol version", "update the older of the two"

@@ -1,0 +1,1 @@
+"""Plots as SVG. Pure: values in, text out."""

@@ -1,0 +1,258 @@
+"""Plots of the delay benchmark as inline SVG: delay against bytes with its line, and single pairs' lives. Pure; see `plots` for the rules."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Final, Protocol
+
+import numpy as np
+
+from common.ledger import PairLedger, StageTimes
+from phone_host.svg.plot_parts import (
+    BOTTOM_PX,
+    DARK_COLOURS,
+    LEFT_PX,
+    RIGHT_PX,
+    TOP_PX,
+    axes,
+    empty,
+    point,
+    svg,
+    triangle,
+)
+from phone_host.svg.plot_scale import Linear, Log, Values, duration_text, duration_unit, number_text, span, ticks
+
+_MOST_DOTS: Final = 700
+_ROW_PX: Final = 26
+_LETTER_PX: Final = 7
+
+
+class FittedLine(Protocol):
+    """A line through delays of frames of different size."""
+
+    @property
+    def ns_per_byte(self) -> float:
+        """Its slope; NaN where there is no line."""
+
+    def delay_ns(self, size_bytes: float) -> float:
+        """Its delay for a frame, ns."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scatter:
+    """Delays of frames of different size.
+
+    Attributes:
+        size_bytes: (N,).
+        delay_ns: (N,).
+        number: (N,) 0 and up, which run each frame belongs to.
+        fit: the line through them.
+    """
+
+    size_bytes: Values
+    delay_ns: Values
+    number: tuple[int, ...]
+    fit: FittedLine
+
+
+def against_bytes(scatter: Scatter, width_px: int, height_px: int = 240) -> str:
+    """Delay against bytes as dots, with the fitted line.
+
+    A delay far beyond the rest is cut off and marked by a triangle at the top, so that the line's neighbourhood stays legible.
+
+    Args:
+        scatter: what to draw.
+        width_px: of the picture.
+        height_px: of the picture.
+
+    Returns:
+        An <svg> element.
+    """
+    size, delay, fit = scatter.size_bytes, scatter.delay_ns, scatter.fit
+    x = Linear(0.0, 1.05 * span(size)[1], LEFT_PX, width_px - RIGHT_PX)
+    wanted = max(2.5 * float(np.percentile(delay, 75)), 1.25 * fit.delay_ns(x.high) if fit.ns_per_byte > 0 else 0.0)
+    top = min(1.06 * float(delay.max()), wanted)
+    y = Linear(0.0, max(1.0, top), height_px - BOTTOM_PX, TOP_PX)
+    dots = []
+    every = max(1, -(-size.size // _MOST_DOTS))
+    late = set(np.flatnonzero(delay > y.high).tolist())
+    for index in sorted({*range(0, size.size, every), *late}):
+        title = f"{size[index] / 1e3:.1f} kB: {duration_text(float(delay[index]))}"
+        number, across = scatter.number[index], x.px(float(size[index]))
+        if index in late:
+            dots.append(triangle(number, across, TOP_PX - 1.0, title))
+        else:
+            dots.append(point(number, (across, y.px(float(delay[index]))), 1.8, title, ".65"))
+    line = ""
+    if not np.isnan(fit.ns_per_byte):
+        ends = ((at, fit.delay_ns(at)) for at in (0.0, x.high))
+        (x0, y0), (x1, y1) = ((x.px(at), y.px(max(0.0, value))) for at, value in ends)
+        line = f'<path class="mark fit" d="M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}"/>'
+    return svg(
+        width_px,
+        height_px,
+        "propagation against bytes",
+        [axes(x, y, (width_px, height_px), "size of the frame, kB", 1e3), *dots, line],
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """One figure, measured and predicted.
+
+    Attributes:
+        name: of the run.
+        measured_ns: what was.
+        predicted_ns: what the model said.
+        number: 0 and up, what it belongs to.
+    """
+
+    name: str
+    measured_ns: float
+    predicted_ns: float
+    number: int
+
+
+def compared(points: Sequence[Compared], width_px: int, height_px: int = 300) -> str:
+    """Predicted against measured, both logarithmic; on the line they are equal.
+
+    Args:
+        points: at least one.
+        width_px: of the picture.
+        height_px: of the picture.
+
+    Returns:
+        An <svg> element.
+    """
+    values = np.array([value for one in points for value in (one.measured_ns, one.predicted_ns)])
+    low, high = 0.8 * float(values.min()), 1.25 * float(values.max())
+    x = Log(low, high, LEFT_PX, width_px - RIGHT_PX)
+    y = Log(low, high, height_px - BOTTOM_PX, TOP_PX)
+    parts = ['<text x="0" y="11">predicted</text>']
+    for value in _steps(low, high):
+        across, up = x.px(value), y.px(value)
+        name = duration_text(value).replace(".00", "").replace(".0\u202f", "\u202f")
+        parts.append(
+            f'<path class="grid" d="M{LEFT_PX} {up:.1f}H{width_px - RIGHT_PX}M{across:.1f} {TOP_PX}V{height_px - BOTTOM_PX}"/>'
+        )
+        parts.append(f'<text x="{LEFT_PX - 6}" y="{up + 4:.1f}" text-anchor="end">{name}</text>')
+        parts.append(f'<text x="{across:.1f}" y="{height_px - BOTTOM_PX + 16}" text-anchor="middle">{name}</text>')
+    parts.append(f'<text x="{width_px - RIGHT_PX}" y="{height_px - 3}" text-anchor="end">measured</text>')
+    parts.append(f'<path class="axis" d="M{x.px(low):.1f} {y.px(low):.1f}L{x.px(high):.1f} {y.px(high):.1f}"/>')
+    parts.extend(
+        point(
+            one.number,
+            (x.px(one.measured_ns), y.px(one.predicted_ns)),
+            4.0,
+            f"{one.name}: measured {duration_text(one.measured_ns)}, predicted {duration_text(one.predicted_ns)}",
+        )
+        for one in points
+    )
+    return svg(width_px, height_px, "predicted against measured", parts)
+
+
+def _steps(low: float, high: float) -> list[float]:
+    """1, 2 and 5 of each decade within two values."""
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    return [step * 10.0**decade for decade in decades for step in (1, 2, 5) if low <= step * 10.0**decade <= high]
+
+
+@dataclass(frozen=True, slots=True)
+class Life:
+    """One pair whose life is drawn.
+
+    Attributes:
+        heading: which one.
+        ledger: its marks.
+    """
+
+    heading: str
+    ledger: PairLedger
+
+
+def lives(pairs: Sequence[Life], width_px: int) -> str:
+    """Single pairs' lives as bars on three lanes each, board, link and host, on one time axis from the exposure.
+
+    The stages of processing stand below its bar. A bar too short to be seen is drawn two pixels wide.
+
+    Args:
+        pairs: in order.
+        width_px: of the picture.
+
+    Returns:
+        An <svg> element.
+    """
+    longest = max((pair.ledger.end_to_end_ns for pair in pairs), default=0)
+    if longest <= 0:
+        return empty(width_px, "no pairs")
+    x = Linear(0.0, 1.02 * longest, LEFT_PX, width_px - RIGHT_PX)
+    height = 4.0
+    rows = []
+    for pair in pairs:
+        rows.append(
+            f'<text class="strong" x="0" y="{height + 13:.0f}" font-weight="600">{escape(pair.heading)}</text>'
+            f'<text x="{width_px}" y="{height + 13:.0f}" text-anchor="end">{duration_text(pair.ledger.end_to_end_ns)}</text>'
+        )
+        height += 22.0
+        rows.append(_life(pair.ledger, x, height))
+        height += 3.0 * _ROW_PX + 18.0
+    unit, name = duration_unit(longest)
+    grid = []
+    for value in ticks(0.0, x.high / unit, max(2, width_px // 110)):
+        at = x.px(value * unit)
+        grid.append(f'<path class="grid" d="M{at:.1f} 22V{height - 4:.0f}"/>')
+        grid.append(f'<text x="{at:.1f}" y="{height + 10:.0f}" text-anchor="middle">{number_text(value)}</text>')
+    grid.append(
+        f'<text x="{width_px - RIGHT_PX}" y="{height + 26:.0f}" text-anchor="end">since the exposure, {name}</text>'
+    )
+    return svg(width_px, height + 32.0, "lives of single pairs", [*grid, *rows])
+
+
+def _life(ledger: PairLedger, x: Linear, top: float) -> str:
+    """The three lanes of one pair."""
+    board, zero_ns = ledger.board, ledger.board.exposed_ns
+    # Lane, name, from, to, colour as everywhere (report_page.MEANINGS).
+    bars = (
+        (0, "capture", zero_ns, board.grabbed_ns, 0),
+        (0, "outbox", board.grabbed_ns, board.sent_ns, 1),
+        (1, "propagation", board.sent_ns, ledger.received_ns, 2),
+        (2, "pairing", ledger.received_ns, ledger.queued_ns, 3),
+        (2, "queuing", ledger.queued_ns, ledger.dequeued_ns, 4),
+        (2, "processing", ledger.dequeued_ns, ledger.done_ns, 5),
+    )
+    parts = [
+        f'<text x="{LEFT_PX - 8}" y="{top + lane * _ROW_PX + 15:.0f}" text-anchor="end">{name}</text>'
+        for lane, name in enumerate(("board", "link", "host"))
+    ]
+    for lane, name, start_ns, end_ns, colour in bars:
+        parts.append(_bar(name, x, (start_ns - zero_ns, end_ns - zero_ns), (top + lane * _ROW_PX, 20.0), colour))
+    at_ns = ledger.dequeued_ns
+    for index, stage in enumerate(StageTimes.__slots__):
+        length_ns = getattr(ledger.stages, stage)
+        begin_ns = ledger.done_ns - length_ns if stage == "write" else at_ns
+        place = (top + 3 * _ROW_PX - 4.0, 7.0)
+        parts.append(_bar(stage, x, (begin_ns - zero_ns, begin_ns + length_ns - zero_ns), place, index, words=False))
+        at_ns += length_ns
+    for lane, mark_ns in ((0, board.sent_ns), (1, ledger.received_ns)):
+        at, below = x.px(mark_ns - zero_ns), top + lane * _ROW_PX + 20.0
+        parts.append(f'<path class="axis" d="M{at:.1f} {below:.1f}v{_ROW_PX - 20}"/>')
+    return "".join(parts)
+
+
+def _bar(
+    name: str, x: Linear, reach_ns: tuple[float, float], place: tuple[float, float], colour: int, *, words: bool = True
+) -> str:
+    """One bar; `place` is its top and height, px. Its name stands in it where it fits."""
+    left, right = (x.px(value) for value in reach_ns)
+    top, height = place
+    length = duration_text(reach_ns[1] - reach_ns[0])
+    wide = max(2.0, right - left)
+    bar = (
+        f'<rect x="{left:.1f}" y="{top:.1f}" width="{wide:.1f}" height="{height:.0f}" rx="2" style="fill:var(--c{colour})">'
+        f"<title>{escape(name)}: {length}</title></rect>"
+    )
+    text = f"{name} {length}"
+    if not words or wide < _LETTER_PX * len(text):
+        return bar
+    pale = " pale" if colour in DARK_COLOURS else ""
+    return bar + f'<text class="on{pale}" x="{left + 6:.1f}" y="{top + 14:.1f}">{escape(text)}</text>'

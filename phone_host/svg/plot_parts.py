@@ -1,0 +1,149 @@
+"""What all plots are drawn with: colours, marks, axes, the frame around them. Pure: values in, SVG out.
+
+There are eight colours. Where more things than that are told apart, further ones take the same colours with another shape of mark, so that the first 32 differ.
+"""
+
+from collections.abc import Sequence
+from html import escape
+from typing import Final
+
+from phone_host.svg.plot_scale import Linear, duration_unit, number_text, ticks
+
+# Okabe and Ito's palette, safe for all common kinds of colour blindness ("Color Universal Design", 2008); the last is grey.
+STYLE: Final = """
+:root{--c0:#56b4e9;--c1:#e69f00;--c2:#009e73;--c3:#cc79a7;--c4:#d55e00;--c5:#0072b2;--c6:#e3d332;--c7:#9aa3ad}
+@media (prefers-color-scheme:dark){:root{--c3:#d88cb6;--c5:#3d9be0;--c4:#e8702a;--c2:#1fb98d;--c7:#77818c}}
+svg.plot{display:block;width:100%;height:auto;font:12px/1 system-ui,sans-serif;font-variant-numeric:tabular-nums}
+svg.plot text{fill:var(--ink2)}svg.plot text.strong{fill:var(--ink)}
+svg.plot .grid{stroke:var(--line);fill:none}svg.plot .axis{stroke:var(--ink2);fill:none}
+svg.plot .hit{fill:transparent}svg.plot .hit:hover{fill:var(--ink);fill-opacity:.12}
+svg.plot text.on{fill:#111;pointer-events:none}svg.plot text.on.pale{fill:#fff}
+@media (prefers-color-scheme:dark){svg.plot text.on.pale{fill:#111}}
+svg.plot .mark{stroke:var(--ink);stroke-width:2;fill:none}svg.plot .late{fill:var(--ink)}
+ul.legend{display:flex;flex-wrap:wrap;gap:.25rem 1rem;margin:.5rem 0;padding:0;list-style:none;color:var(--ink2);font-size:.85rem}
+ul.legend svg{width:.85em;height:.85em;margin-right:.35em;vertical-align:-.08em}
+ul.legend i{display:inline-block;width:.8em;height:.8em;border-radius:2px;margin-right:.4em;vertical-align:-.05em}
+"""
+
+LEFT_PX, RIGHT_PX, TOP_PX, BOTTOM_PX = 52, 10, 24, 34
+"""Margins of a plot with axes."""
+
+DARK_COLOURS: Final = (2, 4, 5)
+"""Those on which text is pale in the light."""
+
+_COLOURS: Final = 8
+
+
+def fill(number: int) -> str:
+    """The attribute that gives something the colour of the thing with this number, 0 and up."""
+    return f'style="fill:var(--c{number % _COLOURS})"'
+
+
+def point(number: int, at_px: tuple[float, float], radius: float, title: str, opacity: str = "1") -> str:
+    """A mark for one of many things: a dot, a square, a diamond or a ring, in its colour.
+
+    Args:
+        number: of the thing, 0 and up.
+        at_px: its middle.
+        radius: of the dot, px; the other shapes have about its area.
+        title: plain text, shown when the pointer rests on it.
+        opacity: of its inside.
+    """
+    x, y = at_px
+    words, inside = f"<title>{escape(title)}</title>", f'fill-opacity="{opacity}" {fill(number)}'
+    match number // _COLOURS % 4:
+        case 0:
+            return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" {inside}>{words}</circle>'
+        case 1:
+            half = 0.9 * radius
+            return f'<path d="M{x - half:.1f} {y - half:.1f}h{2 * half:.1f}v{2 * half:.1f}h{-2 * half:.1f}z" {inside}>{words}</path>'
+        case 2:
+            half = 1.3 * radius
+            return f'<path d="M{x - half:.1f} {y:.1f}l{half:.1f} {-half:.1f}l{half:.1f} {half:.1f}l{-half:.1f} {half:.1f}z" {inside}>{words}</path>'
+        case _:
+            colour = f"stroke:var(--c{number % _COLOURS});stroke-width:{radius / 2:.1f};fill:none"
+            return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" style="{colour}">{words}</circle>'
+
+
+def triangle(number: int, x: float, y: float, title: str) -> str:
+    """A small triangle that stands on `y` and points up: a value beyond the plot's edge."""
+    return f'<path d="M{x - 4:.1f} {y:.1f}l4 -7l4 7z" {fill(number)}><title>{escape(title)}</title></path>'
+
+
+def hit(x: float, y: float, width: float, height: float, title: str) -> str:
+    """An invisible area that shows a text when the pointer rests on it."""
+    return (
+        f'<rect class="hit" x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}">'
+        f"<title>{escape(title)}</title></rect>"
+    )
+
+
+def legend(labels: Sequence[tuple[str, int]]) -> str:
+    """A legend as an HTML list: it wraps where the window is narrow.
+
+    Args:
+        labels: names with their index into the palette, 0..7.
+    """
+    items = "".join(f'<li><i style="background:var(--c{colour})"></i>{escape(name)}</li>' for name, colour in labels)
+    return f'<ul class="legend">{items}</ul>'
+
+
+def point_legend(labels: Sequence[tuple[str, int]]) -> str:
+    """The same for points: each name beside its mark.
+
+    Args:
+        labels: names with their numbers, 0 and up.
+    """
+    items = "".join(
+        f'<li><svg viewBox="0 0 10 10" aria-hidden="true">{point(number, (5.0, 5.0), 3.6, name)}</svg>{escape(name)}</li>'
+        for name, number in labels
+    )
+    return f'<ul class="legend">{items}</ul>'
+
+
+def axes(x: Linear, y: Linear, size_px: tuple[int, int], name: str, unit: float = 1.0) -> str:
+    """Grid, tick labels and names of both axes; the upright one is a duration.
+
+    Args:
+        x: scale of the level axis.
+        y: scale of the upright axis, ns.
+        size_px: width and height of the picture.
+        name: of the level axis, plain text.
+        unit: what its numbers count, in those of `x`.
+    """
+    width_px, height_px = size_px
+    unit_ns, symbol = duration_unit(max(abs(y.low), abs(y.high)))
+    parts = [f'<text x="0" y="11">{symbol}</text>']
+    for value in ticks(y.low / unit_ns, y.high / unit_ns, 4):
+        level = y.px(value * unit_ns)
+        kind = "axis" if value == 0.0 else "grid"
+        parts.append(f'<path class="{kind}" d="M{LEFT_PX} {level:.1f}H{width_px - RIGHT_PX}"/>')
+        parts.append(f'<text x="{LEFT_PX - 6}" y="{level + 4:.1f}" text-anchor="end">{number_text(value)}</text>')
+    bottom = height_px - BOTTOM_PX
+    for value in ticks(x.low / unit, x.high / unit, max(2, width_px // 110)):
+        at = x.px(value * unit)
+        parts.append(f'<path class="axis" d="M{at:.1f} {bottom}v4"/>')
+        parts.append(f'<text x="{at:.1f}" y="{bottom + 16}" text-anchor="middle">{number_text(value)}</text>')
+    parts.append(f'<text x="{width_px - RIGHT_PX}" y="{height_px - 3}" text-anchor="end">{escape(name)}</text>')
+    return "".join(parts)
+
+
+def svg(width_px: int, height_px: float, label: str, parts: Sequence[str]) -> str:
+    """The picture: an <svg> element around its parts.
+
+    Args:
+        width_px: of the picture.
+        height_px: of the picture.
+        label: what it shows, for those who do not see it.
+        parts: SVG.
+    """
+    return (
+        f'<svg class="plot" role="img" aria-label="{escape(label)}" viewBox="0 0 {width_px} {height_px:.0f}">'
+        f"{''.join(parts)}</svg>"
+    )
+
+
+def empty(width_px: int, reason: str) -> str:
+    """A picture that says why there is nothing to see."""
+    words = f'<text x="{width_px / 2:.0f}" y="34" text-anchor="middle">{escape(reason)}</text>'
+    return svg(width_px, 60.0, reason, [words])

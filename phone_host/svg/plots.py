@@ -1,0 +1,334 @@
+"""Plots as inline SVG: delays over time, their distributions, their shares. Pure: values in, text out.
+
+Every plot is drawn for a given width in CSS pixels and is not meant to be scaled much, so that its text stays legible; colours
+are the CSS variables --c0 to --c7 and a few of the page's own (see `plot_parts.STYLE`), so that one SVG serves light and dark. What a mark
+means is in its <title>, which browsers show when the pointer rests on it.
+
+All values are durations in ns, float64, NaN = no measurement. The x axis is time in s.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+
+from phone_host.svg.plot_parts import BOTTOM_PX, DARK_COLOURS, LEFT_PX, RIGHT_PX, TOP_PX, axes, empty, hit, point, svg
+from phone_host.svg.plot_scale import Linear, Values, duration_text, duration_unit, log_scale, number_text, span
+
+_LEAST_COLUMN_PX = 3
+_ROOM_FOR_MAX_PX = 440
+_LETTER_PX = 8
+"""Room for a letter of 12 px text, generously."""
+
+_OUTLIER = 2.5
+"""A total this many times above the 98th percentile would flatten all others: it is cut off and marked."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Quantity:
+    """One named delay of every pair.
+
+    Attributes:
+        label: its name.
+        values_ns: (N,) float64, ns.
+        colour: index into the palette, 0..7.
+        meaning: one sentence for the tooltip.
+    """
+
+    label: str
+    values_ns: Values
+    colour: int
+    meaning: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A piece of a budget.
+
+    Attributes:
+        label: its name.
+        value_ns: its length, ns.
+        colour: index into the palette, 0..7.
+    """
+
+    label: str
+    value_ns: float
+    colour: int
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """One bar made of parts that add up.
+
+    Attributes:
+        label: what it is the sum of, for example an interface.
+        parts: in order.
+    """
+
+    label: str
+    parts: tuple[Part, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Strips:
+    """Distributions under one heading.
+
+    Attributes:
+        heading: for example an interface; empty for none.
+        quantities: one strip each.
+    """
+
+    heading: str
+    quantities: tuple[Quantity, ...]
+
+
+def stacked_over_time(time_s: Values, layers: Sequence[Quantity], width_px: int, height_px: int = 260) -> str:
+    """Columns over time whose parts stack up to their sum.
+
+    Each pair is a column; where there are more pairs than room, a column is the mean of the pairs of its slice of time (means
+    add up as the parts do). A sum far beyond the rest is cut off and marked by a triangle.
+
+    Args:
+        time_s: (N,) when each pair was done, ascending, s.
+        layers: what adds up, lowest first, N values each.
+        width_px: of the picture.
+        height_px: of the picture.
+
+    Returns:
+        An <svg> element.
+    """
+    columns = list(_columns(time_s, layers, width_px - LEFT_PX - RIGHT_PX))
+    if not columns:
+        return empty(width_px, "no pairs")
+    sums = np.array([column.values_ns.sum() for column in columns])
+    usual = float(np.percentile(sums, 98))
+    highest = float(sums.max())
+    top = max(1.0, highest if highest <= _OUTLIER * usual else 1.25 * usual)
+    x = Linear(columns[0].start_s, columns[-1].end_s, LEFT_PX, width_px - RIGHT_PX)
+    y = Linear(0.0, top, height_px - BOTTOM_PX, TOP_PX)
+    paths = [""] * len(layers)
+    hits, late = [], []
+    for column, total in zip(columns, sums, strict=True):
+        left, right = x.px(column.start_s), x.px(column.end_s)
+        gap = 0.8 if right - left > 4 else 0.0
+        levels = [y.px(value) for value in np.concatenate([[0.0], np.cumsum(column.values_ns)])]
+        for index in range(len(layers)):
+            paths[index] += (
+                f"M{left:.1f} {levels[index]:.1f}V{levels[index + 1]:.1f}H{right - gap:.1f}V{levels[index]:.1f}z"
+            )
+        lines = [f"{column.name}: {duration_text(total)}"]
+        lines += [
+            f"{layer.label} {duration_text(value)}" for layer, value in zip(layers, column.values_ns, strict=True)
+        ]
+        hits.append(hit(left, TOP_PX, right - left, height_px - TOP_PX - BOTTOM_PX, "\n".join(lines)))
+        if total > top:
+            middle = (left + right) / 2.0
+            late.append(
+                f'<path class="late" d="M{middle - 4:.1f} {TOP_PX - 1}l4 -7l4 7z"><title>{duration_text(total)}</title></path>'
+            )
+    body = "".join(
+        f'<path d="{path}" style="fill:var(--c{layer.colour})"/>' for path, layer in zip(paths, layers, strict=True)
+    )
+    return svg(
+        width_px,
+        height_px,
+        "delays of the pairs over time, stacked",
+        [axes(x, y, (width_px, height_px), "time, s"), body, *late, *hits],
+    )
+
+
+def over_time(
+    time_s: Values, quantity: Quantity, width_px: int, height_px: int = 190, band_ns: Values | None = None
+) -> str:
+    """One quantity of every pair as dots over time, about zero where it has a sign.
+
+    Args:
+        time_s: (N,) s, ascending.
+        quantity: N values.
+        width_px: of the picture.
+        height_px: of the picture.
+        band_ns: (N,) half width of a band about zero drawn behind the dots, ns.
+
+    Returns:
+        An <svg> element.
+    """
+    values = quantity.values_ns
+    known = np.isfinite(values)
+    if not known.any():
+        return empty(width_px, "no pairs")
+    both = values if band_ns is None else np.concatenate([values, band_ns, -band_ns])
+    low, high = span(np.append(both[np.isfinite(both)], 0.0))
+    edge = 0.06 * (high - low)
+    x = Linear(*span(time_s), LEFT_PX, width_px - RIGHT_PX)
+    y = Linear(low - edge if low < 0.0 else 0.0, high + edge, height_px - BOTTOM_PX, TOP_PX)
+    parts = [axes(x, y, (width_px, height_px), "time, s")]
+    if band_ns is not None:
+        parts.append(_band(time_s, band_ns, x, y, quantity.colour))
+    # More dots than three for every pixel add ink, not knowledge; extremes stay.
+    keep = np.flatnonzero(known)
+    if keep.size > 3 * width_px:
+        ends = [int(keep[np.argmin(values[keep])]), int(keep[np.argmax(values[keep])])]
+        keep = np.unique(np.append(keep[:: math.ceil(keep.size / (3 * width_px))], ends))
+    radius = 2.4 if keep.size < 200 else 1.6
+    parts.extend(
+        point(
+            quantity.colour,
+            (x.px(time_s[index]), y.px(values[index])),
+            radius,
+            f"{number_text(round(float(time_s[index]), 3))} s: {duration_text(float(values[index]))}",
+        )
+        for index in keep
+    )
+    return svg(width_px, height_px, f"{quantity.label} over time", parts)
+
+
+def distributions(groups: Sequence[Strips], width_px: int) -> str:
+    """Strips on one logarithmic axis, one for each quantity.
+
+    A bar reaches from p5 to p95, with a line at p50 and a tick at p99; a thin line from the least to a dot at the greatest.
+
+    Args:
+        groups: one or several (interfaces side by side), each with its quantities.
+        width_px: of the picture.
+
+    Returns:
+        An <svg> element.
+    """
+    everything = [quantity.values_ns for group in groups for quantity in group.quantities]
+    x = log_scale(np.concatenate(everything) if everything else np.zeros(0), 8.0, width_px - 12.0)
+    height = 4.0
+    rows = []
+    for group in groups:
+        if group.heading:
+            rows.append(
+                f'<text class="strong" x="0" y="{height + 15:.0f}" font-weight="600">{escape(group.heading)}</text>'
+            )
+            height += 24.0
+        for quantity in group.quantities:
+            rows.append(_strip(quantity, x.px, height, width_px))
+            height += 36.0
+    marks = x.decades()
+    # Where the window is narrow, every other decade has its name.
+    every = max(1, math.ceil(len(marks) * 52 / width_px))
+    axis = "".join(f'<path class="grid" d="M{x.px(mark):.1f} 0V{height:.0f}"/>' for mark in marks)
+    axis += "".join(
+        f'<text x="{x.px(mark):.1f}" y="{height + 15:.0f}" text-anchor="{_anchor(index, len(marks))}">{_decade(mark)}</text>'
+        for index, mark in enumerate(marks)
+        if index % every == 0
+    )
+    return svg(width_px, height + 22.0, "distribution of each delay", [axis, *rows])
+
+
+def budgets(rows: Sequence[Budget], width_px: int) -> str:
+    """Horizontal bars whose parts add up, all on one axis from zero.
+
+    Args:
+        rows: one or several (interfaces side by side).
+        width_px: of the picture.
+
+    Returns:
+        An <svg> element.
+    """
+    totals = [math.fsum(part.value_ns for part in row.parts) for row in rows]
+    if not totals or not max(totals) > 0.0:
+        return empty(width_px, "nothing measured")
+    x = Linear(0.0, max(totals), 0.0, float(width_px))
+    parts = []
+    for index, (row, total) in enumerate(zip(rows, totals, strict=True)):
+        top = index * 56
+        parts.append(f'<text class="strong" x="0" y="{top + 13}">{escape(row.label)}</text>')
+        parts.append(
+            f'<text class="strong" x="{width_px}" y="{top + 13}" text-anchor="end">{duration_text(total)}</text>'
+        )
+        start = 0.0
+        for part in row.parts:
+            left, right = x.px(start), x.px(start + part.value_ns)
+            start += part.value_ns
+            label = f"{part.label}: {duration_text(part.value_ns)}, {100.0 * part.value_ns / total:.1f} %"
+            parts.append(
+                f'<rect x="{left:.1f}" y="{top + 20}" width="{max(0.0, right - left):.1f}" height="26" '
+                f'style="fill:var(--c{part.colour})"><title>{escape(label)}</title></rect>'
+            )
+            words = f"{part.label} {duration_text(part.value_ns)}"
+            if right - left > _LETTER_PX * len(words):
+                pale = " pale" if part.colour in DARK_COLOURS else ""
+                parts.append(f'<text class="on{pale}" x="{left + 7:.1f}" y="{top + 37}">{escape(words)}</text>')
+    return svg(width_px, 56.0 * len(rows) - 6.0, "shares of the delays", parts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Column:
+    """One column of a stacked plot: when, what it stands for, and the mean of each layer, ns."""
+
+    start_s: float
+    end_s: float
+    name: str
+    values_ns: Values
+
+
+def _columns(time_s: Values, layers: Sequence[Quantity], room_px: int) -> Iterator[_Column]:
+    """Pairs as columns, or slices of time where there are too many pairs; empty slices give none, so that a gap shows."""
+    count = time_s.size
+    if not count:
+        return
+    table = np.stack([layer.values_ns for layer in layers])
+    most = max(1, room_px // _LEAST_COLUMN_PX)
+    if count <= most:
+        wide = float(np.median(np.diff(time_s))) if count > 1 else 1.0
+        ends = np.minimum(np.append(time_s[1:], math.inf), time_s + max(wide, 1e-6))
+        for index in range(count):
+            yield _Column(float(time_s[index]), float(ends[index]), f"pair {index + 1}", table[:, index])
+        return
+    edges = np.linspace(time_s[0], time_s[-1], most + 1)
+    slots = np.clip(np.searchsorted(edges, time_s, side="right") - 1, 0, most - 1)
+    for slot in np.unique(slots):
+        mine = np.flatnonzero(slots == slot)
+        name = f"pair {mine[0] + 1}" if mine.size == 1 else f"mean of pairs {mine[0] + 1} to {mine[-1] + 1}"
+        yield _Column(float(edges[slot]), float(edges[slot + 1]), name, table[:, mine].mean(axis=1))
+
+
+def _strip(quantity: Quantity, px: Callable[[float], float], top: float, width_px: int) -> str:
+    """One row of `distributions`."""
+    values = quantity.values_ns[np.isfinite(quantity.values_ns)]
+    name = f'<text class="strong" x="0" y="{top + 12:.0f}">{escape(quantity.label)}<title>{escape(quantity.meaning)}</title></text>'
+    if not values.size:
+        return name + f'<text x="{width_px}" y="{top + 12:.0f}" text-anchor="end">not measured</text>'
+    p5, p50, p95, p99 = (float(p) for p in np.percentile(values, (5, 50, 95, 99)))
+    greatest = float(values.max())
+    numbers = f"p50 {duration_text(p50)} · p95 {duration_text(p95)} · p99 {duration_text(p99)}"
+    title = f"{quantity.label}: p5 {duration_text(p5)}, {numbers.replace(' · ', ', ')}, max {duration_text(greatest)}"
+    if width_px >= _ROOM_FOR_MAX_PX:
+        numbers += f" · max {duration_text(greatest)}"
+    middle = top + 24.0
+    left, right = px(p5), px(p95)
+    return (
+        f'<g>{name}<text x="{width_px}" y="{top + 12:.0f}" text-anchor="end">{numbers}</text>'
+        f'<path class="grid" d="M{px(float(values.min())):.1f} {middle:.1f}H{px(greatest):.1f}" style="stroke:var(--c{quantity.colour})"/>'
+        f'<rect class="bar" x="{left:.1f}" y="{middle - 5:.1f}" width="{max(2.0, right - left):.1f}" height="10" rx="3" '
+        f'style="fill:var(--c{quantity.colour})"/>'
+        f'<path class="mark p50" d="M{px(p50):.1f} {middle - 7:.1f}v14"/>'
+        f'<path class="mark p99" d="M{px(p99):.1f} {middle - 4:.1f}v8" style="stroke:var(--c{quantity.colour})"/>'
+        f'<circle cx="{px(greatest):.1f}" cy="{middle:.1f}" r="2.5" style="fill:var(--c{quantity.colour})"/>'
+        f"{hit(0.0, top, width_px, 34.0, title)}</g>"
+    )
+
+
+def _band(time_s: Values, half_ns: Values, x: Linear, y: Linear, colour: int) -> str:
+    known = np.flatnonzero(np.isfinite(half_ns))
+    if known.size < 2:
+        return ""
+    known = known[:: max(1, known.size // 300)]
+    upper = [f"{x.px(time_s[i]):.1f} {y.px(half_ns[i]):.1f}" for i in known]
+    lower = [f"{x.px(time_s[i]):.1f} {y.px(-half_ns[i]):.1f}" for i in known[::-1]]
+    return f'<path class="band" d="M{"L".join(upper + lower)}z" style="fill:var(--c{colour});fill-opacity:.25"/>'
+
+
+def _decade(ns: float) -> str:
+    unit, name = duration_unit(ns)
+    return f"{ns / unit:.0f}\u202f{name}"
+
+
+def _anchor(index: int, count: int) -> str:
+    return "start" if index == 0 else "end" if index == count - 1 else "middle"
