@@ -5,7 +5,7 @@ their differences on the board's own clock. So end-to-end is the sum of the dela
 """
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +35,14 @@ class BoardMarks:
 
 
 @dataclass(frozen=True, slots=True)
+class HostMarks:
+    """The marks of the host's own frame, on its own clock: exposure mid-point and dequeue from the driver (ns)."""
+
+    exposed_ns: int
+    grabbed_ns: int
+
+
+@dataclass(frozen=True, slots=True)
 class PairLedger:
     """Everything measured about one pair. All marks in ns on the host's clock; the delays are defined in DESIGN, section 4.
 
@@ -49,12 +57,13 @@ class PairLedger:
         paired_ns: the partner was found.
         queued_ns: the pair entered the FIFO.
         dequeued_ns: processing began.
-        done_ns: results were written.
+        done_ns: the result was handed to the sinks.
         previous_done_ns: when the pair before this one was done; the first pair carries its own `queued_ns`.
         stages: shares of the processing delay.
         time_skew_ns: exposure of the board's frame minus that of the host's.
         offset_ns: host clock minus board clock as estimated for this frame.
         uncertainty_ns: of that offset.
+        host: the marks of the host's own frame.
     """
 
     session: str
@@ -73,6 +82,7 @@ class PairLedger:
     time_skew_ns: int
     offset_ns: int
     uncertainty_ns: int
+    host: HostMarks = field(kw_only=True)
 
     @property
     def capture_ns(self) -> int:
@@ -101,12 +111,12 @@ class PairLedger:
 
     @property
     def processing_ns(self) -> int:
-        """From dequeue to results written."""
+        """From dequeue to the hand-over of the result."""
         return self.done_ns - self.dequeued_ns
 
     @property
     def end_to_end_ns(self) -> int:
-        """From exposure mid-point to results: the sum of the six delays above."""
+        """From exposure mid-point to the hand-over: the sum of the six delays above."""
         return self.done_ns - self.board.exposed_ns
 
     @property
@@ -115,7 +125,7 @@ class PairLedger:
         return max(0, self.queued_ns - self.previous_done_ns)
 
     def to_json(self) -> str:
-        """One line of delays.jsonl, with the keys of DESIGN, section 4."""
+        """One line of delays.jsonl: the keys of DESIGN, section 4, and the marks of the host's own frame behind them."""
         record = {
             "session": self.session,
             "sequence": self.sequence,
@@ -140,4 +150,5 @@ class PairLedger:
         record |= {name: getattr(self, name) for name in marks + delays}
         record["stages_ns"] = asdict(self.stages)
         record |= {name: getattr(self, name) for name in ("time_skew_ns", "offset_ns", "uncertainty_ns")}
+        record |= {"host_exposed_ns": self.host.exposed_ns, "host_grabbed_ns": self.host.grabbed_ns}
         return json.dumps(record, separators=(",", ":"))

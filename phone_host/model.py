@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.frame import Frame
-from common.ledger import BoardMarks, StageTimes
+from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.protocol.message import FrameMessage
 
 Image = NDArray[np.uint8]
@@ -211,6 +211,23 @@ class Processed:
     disparity: Disparity | None
     cloud: CloudImage | None
     stages: StageTimes
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What the worker hands to the sinks of a run.
+
+    Attributes:
+        number: of the processed pair in this run, from 0.
+        pair: its two frames as they came.
+        processed: its images and depth.
+        ledger: its marks and delays.
+    """
+
+    number: int
+    pair: FramePair
+    processed: Processed
+    ledger: PairLedger
 
 
 @dataclass(frozen=True, slots=True)

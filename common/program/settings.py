@@ -75,6 +75,21 @@ def resolve(kind: type[T], prefix: str, file: Path | None, options: Mapping[str,
     return Resolved(kind(**values), tuple(origins))
 
 
+def with_origins(resolved: Resolved[Any], options: Mapping[str, object]) -> dict[str, dict[str, object]]:
+    """Settings and options of a run as one JSON object, by name, each with its value and its origin.
+
+    Args:
+        resolved: the settings.
+        options: all that the command line gave, by name, with the defaults of those that it did not; those that are settings are left out.
+    """
+    names = {name for name, _ in resolved.origins}
+    given = {name: str(value) if isinstance(value, Path) else value for name, value in options.items()}
+    found = {name: {"value": getattr(resolved.values, name), "origin": origin} for name, origin in resolved.origins}
+    return found | {
+        name: {"value": value, "origin": "command line"} for name, value in given.items() if name not in names
+    }
+
+
 def listing(resolved: Resolved[Any], *, as_json: bool) -> str:
     """What a `settings` verb prints: each setting with its value and origin.
 

@@ -30,7 +30,7 @@ from phone_host.bench.runs import CaseResult
 from phone_host.measure.delay_fit import DelayFit
 from phone_host.measure.delays import DelayStatistics
 from phone_host.measure.regime import Judgement, judge
-from phone_host.measure.run_facts import figures_of
+from phone_host.measure.run_snapshot import figures_of
 from phone_host.sync.fifo import FifoSettings, Overflow
 
 _SELF_PACED: Final = ("serial", "rfcomm")

@@ -25,8 +25,9 @@ from phone_host.bench.relay import RelayAccount
 from phone_host.children.board_process import BoardAccount
 from phone_host.demo.demonstration import NEAR_M
 from phone_host.measure.accounts import LinkAccount
-from phone_host.model import Camera, PairCounts, Processed, Rig, StereoGeometry
+from phone_host.model import Camera, PairCounts, Result, Rig, StereoGeometry
 from phone_host.run.host import Host, HostSettings
+from phone_host.run.sinks import FunctionSink
 from phone_host.scene.film import JPEG_QUALITY, Film, render_films
 from phone_host.scene.scene import DEMO_PERIOD_S, WEBCAM_LOOK, demo_scene, matched_rig
 from phone_host.stereo.core import StereoCore
@@ -154,9 +155,8 @@ def run_case(
     shown = replace(film, fps=case.rate_hz)
     ledgers: list[PairLedger] = []
 
-    def keep(processed: Processed, ledger: PairLedger) -> None:
-        del processed
-        ledgers.append(ledger)
+    def keep(result: Result) -> None:
+        ledgers.append(result.ledger)
 
     with ends_of(case.interface, shown.replay_uri(shown.left), folder) as ends:
         host = Host(
@@ -169,17 +169,18 @@ def run_case(
                 )
             ],
             _core(case.size, settings.matcher),
-            keep,
+            [FunctionSink("bench", keep, waits=True)],
         )
         host.run(_finished(host, ends, settings.seconds, stop))
         kept, measured_s = after_warm_up(ledgers)
         if stop() and not kept:
             return None
-        board, relay = ends.stop(host.receiver.account)
-    estimate = host.receiver.estimate
+        run = host.snapshot("stopped")
+        board, relay = ends.stop(run.link)
+    estimate = run.estimate
     uncertainty_ns = float("nan") if estimate is None else float(estimate.uncertainty_ns)
     bound_ns = float("nan") if estimate is None else float(estimate.bound_ns)
-    accounts = (host.receiver.account, host.queue.counts, host.processed, host.undecodable, relay)
+    accounts = (run.link, run.counts, run.processed, run.undecodable, relay)
     return CaseResult(case, kept, measured_s, uncertainty_ns, bound_ns, board, *accounts)
 
 

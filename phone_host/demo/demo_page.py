@@ -5,19 +5,19 @@ from collections.abc import Sequence
 from common import now
 from common.ledger import PairLedger
 from phone_host.demo.demonstration import CheckedPair, DepthErrors
-from phone_host.measure.run_facts import RunFacts
+from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.report.report_page import Figure, PageData, Verdict, delay_series, page
-from phone_host.report.run_page import camera_table, drops_table, notes, pictures
+from phone_host.report.run_page import camera_table, losses_table, notes, pictures
 
 _GOOD_PERCENT = 0.6
 """Depth error that the figures of the stereo core allow at 2 m; the demo's scene lies between 0.7 and 2.5 m."""
 
 
-def demo_page(facts: RunFacts, errors: DepthErrors, last: CheckedPair | None, ledgers: Sequence[PairLedger]) -> str:
+def demo_page(run: RunSnapshot, errors: DepthErrors, last: CheckedPair | None, ledgers: Sequence[PairLedger]) -> str:
     """Make the page.
 
     Args:
-        facts: the run.
+        run: the run.
         errors: the depth against the truth.
         last: the pair to show; None when there was none.
         ledgers: of all pairs, in order.
@@ -32,14 +32,14 @@ def demo_page(facts: RunFacts, errors: DepthErrors, last: CheckedPair | None, le
             subtitle=f"two rendered cameras, two processes, one ipc link between them; {now.wall_time()}",
             verdict=verdict,
             sentence=sentence,
-            figures=_figures(facts, errors),
+            figures=_figures(run, errors),
             pictures=pictures(last.processed if last else None),
             delays=delay_series(ledgers),
-            tables=(drops_table(facts), camera_table(facts.camera)),
+            tables=(losses_table(run), camera_table(run.camera)),
             notes=(
                 "The truth is the rendered scene itself: exact depth at every pixel that both cameras see.",
                 "Board and host share one clock here, so the clock's true offset is 0; what is plotted is what the echoes could prove.",
-                *notes(facts),
+                *notes(run),
             ),
         )
     )
@@ -54,15 +54,15 @@ def _verdict(errors: DepthErrors) -> tuple[Verdict, str]:
     return (Verdict.GOOD if errors.depth_percent <= _GOOD_PERCENT else Verdict.WARNING), text
 
 
-def _figures(facts: RunFacts, errors: DepthErrors) -> tuple[Figure, ...]:
-    end_to_end, skew = facts.delays.spread("end_to_end"), facts.delays.spread("time_skew")
-    uncertainty = facts.delays.spread("uncertainty")
+def _figures(run: RunSnapshot, errors: DepthErrors) -> tuple[Figure, ...]:
+    end_to_end, skew = run.delays.spread("end_to_end"), run.delays.spread("time_skew")
+    uncertainty = run.delays.spread("uncertainty")
     return (
         Figure(
             "pairs per second",
-            f"{facts.pairs_per_second:.1f}",
+            f"{run.pairs_per_second:.1f}",
             "/s",
-            f"{facts.processed} pairs in {facts.seconds:.1f} s",
+            f"{run.processed} pairs in {run.seconds:.1f} s",
         ),
         Figure(
             "depth error",

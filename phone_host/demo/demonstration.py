@@ -14,10 +14,11 @@ from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.children.board_process import board_process
-from phone_host.model import CloudImage, Processed, Rig
+from phone_host.model import CloudImage, Processed, Result, Rig
 from phone_host.output.ply import write_ply
 from phone_host.output.preview import write_preview
 from phone_host.run.host import Host, HostSettings
+from phone_host.run.sinks import FunctionSink
 from phone_host.scene.film import Film
 from phone_host.scene.scene import RectifiedView, Scene, rig_poses, truth
 from phone_host.stereo.core import StereoCore
@@ -108,7 +109,7 @@ class DemoRun:
         camera = open_camera(film.replay_uri(film.right), HOST_CLOCK, now.monotonic_ns())
         link = open_link(parse_link(self.address, listens_by_default=False))
         settings = HostSettings(wait_ns=_BOARD_PATIENCE_NS, out=out, save_every=0)
-        self.host = Host(settings, camera, [link], core, self._keep)
+        self.host = Host(settings, camera, [link], core, [FunctionSink("check", self._keep, waits=True)])
 
     @property
     def last(self) -> CheckedPair | None:
@@ -172,13 +173,13 @@ class DemoRun:
         write_ply(out / "cloud.ply", cloud, pair.processed.pair.left)
         write_preview(out / "disparity.png", pair.processed.disparity)
 
-    def _keep(self, processed: Processed, ledger: PairLedger) -> None:
+    def _keep(self, result: Result) -> None:
+        processed, ledger = result.processed, result.ledger
         self.ledgers.append(ledger)
         if (len(self.ledgers) - 1) % _CHECK_EVERY:
             return
-        host_exposed_ns = ledger.board.exposed_ns - ledger.time_skew_ns
-        # The board's stamp is known on this clock to some 50 us; the images are 1 / 15 s apart.
-        indices = (self._film.index_at(ledger.board.exposed_ns), self._film.index_at(host_exposed_ns))
+            # The board's stamp is known on this clock to some 50 us; the images are 1 / 15 s apart.
+        indices = (self._film.index_at(ledger.board.exposed_ns), self._film.index_at(ledger.host.exposed_ns))
         self._checked.append(CheckedPair(processed, ledger, *indices))
         if len(self._checked) > _CHECKED_PAIRS:
             del self._checked[0]

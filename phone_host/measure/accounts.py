@@ -1,8 +1,8 @@
-"""What the host saw of a board and its links, in figures. Written by the receiver's thread only, read by others at leisure."""
+"""What the host saw of a board and its links, in figures. Written by the receiver's thread only; others read copies."""
 
 from collections import Counter, deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from common.protocol.message import BoardCounts, Rung
@@ -46,6 +46,10 @@ class SessionAccount:
     ended: bool = False
     vanished: bool = False
 
+    def copy(self) -> "SessionAccount":
+        """The same, as it is now."""
+        return replace(self, disbelieved=Counter(dict(self.disbelieved)))
+
     def count_stale(self, reason: StaleReason) -> None:
         """Count a frame that must not be used."""
         match reason:
@@ -81,10 +85,14 @@ class LinkTally:
     is_up: bool = False
     age: Series = field(default_factory=Series)
 
+    def copy(self) -> "LinkTally":
+        """The same, as it is now."""
+        return replace(self, age=self.age.copy())
+
 
 @dataclass(slots=True)
 class LinkAccount:
-    """What the receiver has seen so far; written by its thread only, read by others at leisure.
+    """What the receiver has seen so far; written by its thread only; others read copies.
 
     Attributes:
         sessions: lives of the board.
@@ -107,6 +115,15 @@ class LinkAccount:
     clock_doubts: int = 0
     clock_steps: int = 0
     suspects: deque[Suspects] = field(default_factory=lambda: deque(maxlen=_MOST_SUSPECTS))
+
+    def copy(self) -> "LinkAccount":
+        """The same, as it is now; may be called while the receiver's thread writes."""
+        return replace(
+            self,
+            sessions=[account.copy() for account in tuple(self.sessions)],
+            links=tuple(tally.copy() for tally in self.links),
+            suspects=deque(tuple(self.suspects), maxlen=_MOST_SUSPECTS),
+        )
 
     @property
     def disbelieved(self) -> Counter[Disbelief]:

@@ -64,6 +64,12 @@ class Series:
         self._sum += value
         self._max = value if self._max is None else max(self._max, value)
 
+    def copy(self) -> "Series":
+        """The same values, which stay as they are now; takes memory for those only, and nothing more can be added beyond EXACT."""
+        copied = Series.__new__(Series)
+        copied.__dict__ |= self.__dict__ | {"_values": self._values[: self._kept].copy()}
+        return copied
+
     def spread(self, last: int | None = None) -> Spread:
         """Summarise all values, or the percentiles of the last ones only.
 
@@ -104,6 +110,13 @@ class DelayStatistics:
     def __init__(self) -> None:
         self._series = {name: Series() for name in (*DELAYS, *STAGES, *OTHERS)}
         self._bytes = 0
+
+    def copy(self) -> "DelayStatistics":
+        """The delays so far, which stay as they are now."""
+        copied = DelayStatistics.__new__(DelayStatistics)
+        series = {name: series.copy() for name, series in self._series.items()}
+        copied.__dict__ |= self.__dict__ | {"_series": series}
+        return copied
 
     def add(self, ledger: PairLedger) -> None:
         """Take one pair's ledger."""

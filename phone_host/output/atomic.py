@@ -2,7 +2,7 @@
 
 Rule: every writer of this package goes through `replacing`; none opens its target for writing itself. So a link under a result's name is
 replaced, never followed. What people keep and read (reports, rigs, pages: `write_text`) also survives a power cut; images and clouds, of which
-a live run writes many, do not wait for the disk.
+a run writes many, are synced with their folder (`listed.py`), in a thread that nobody waits for.
 """
 
 import os

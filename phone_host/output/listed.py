@@ -11,6 +11,8 @@ import fcntl
 import os
 import re
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
@@ -83,6 +85,35 @@ class ListedFolder:
         self.add(name)
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
         return os.open(name, flags, 0o644, dir_fd=self.descriptor)
+
+    @contextmanager
+    def new_folder(self, name: str) -> Iterator[Path]:
+        """Make a folder that is not there yet; it appears under its name when the block ends well, with files that survive a power cut.
+
+        Args:
+            name: of the folder, in this one.
+
+        Yields:
+            Where to write its files, which must be among `inner`. The path leads to the open folder: whoever exchanges its name changes nothing.
+
+        Raises:
+            OSError: as the operating system gives it, FileExistsError among others; nothing of the folder is left then.
+        """
+        self.add(name)
+        part = f"{name}.part"
+        os.mkdir(part, dir_fd=self.descriptor)
+        folder = os.open(part, _FOLDER, dir_fd=self.descriptor)
+        try:
+            yield _way_to(folder, self._path / part)
+            for entry in _entries(folder):
+                _sync_file(entry, folder)
+            os.fsync(folder)
+            os.rename(part, name, src_dir_fd=self.descriptor, dst_dir_fd=self.descriptor)
+        except BaseException:
+            self._remove(part)
+            raise
+        finally:
+            os.close(folder)
 
     def write_text(self, name: str, text: str) -> None:
         """Write a listed file, whole or not at all; it survives a power cut.
@@ -196,6 +227,20 @@ def claim(path: Path, *names: str) -> None:
         folder.add(*names)
     finally:
         folder.close()
+
+
+def _way_to(folder: int, path: Path) -> Path:
+    """A path to an open folder."""
+    way = Path(f"/proc/self/fd/{folder}")
+    return way if way.exists() else path
+
+
+def _sync_file(name: str, folder: int) -> None:
+    descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC, dir_fd=folder)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _entries(folder: int) -> list[str]:

@@ -7,74 +7,82 @@ from typing import Final
 from common.camera.base import CameraHealth, health_values
 from phone_host.measure.accounts import LinkTally, rung_values
 from phone_host.measure.delays import DELAYS, STAGES, Spread
+from phone_host.measure.losses import losses
 from phone_host.measure.regime import Judgement, judge
-from phone_host.measure.run_facts import RunFacts, concerns, disbelieved, figures
+from phone_host.measure.run_snapshot import RunSnapshot, concerns, disbelieved, figures
+from phone_host.measure.sink_account import SinkAccount
 from phone_host.model import TimeOffset
 from phone_host.sync.fifo import Overflow
 
 _MS: Final = 1e6
 
 
-def build(facts: RunFacts) -> dict[str, object]:
+def build(run: RunSnapshot) -> dict[str, object]:
     """Make the report.json object; times in ms, None where nothing was measured.
 
     Args:
-        facts: the run.
+        run: the run.
     """
     return {
-        "ended": facts.ended,
-        "pairs": facts.processed,
-        "pairs_per_second": _number(facts.pairs_per_second),
-        "delays_ms": {name: spread_ms(facts.delays.spread(name)) for name in DELAYS},
-        "stages_ms": {name: spread_ms(facts.delays.spread(name)) for name in STAGES},
-        "time_skew_ms": spread_ms(facts.delays.spread("time_skew")),
-        "clock": _clock(facts),
-        "phase": _phase(facts),
+        "ended": run.ended,
+        "pairs": run.processed,
+        "pairs_per_second": _number(run.pairs_per_second),
+        "delays_ms": {name: spread_ms(run.delays.spread(name)) for name in DELAYS},
+        "stages_ms": {name: spread_ms(run.delays.spread(name)) for name in STAGES},
+        "time_skew_ms": spread_ms(run.delays.spread("time_skew")),
+        "clock": _clock(run),
+        "phase": _phase(run),
         "time_offset_ms": {
-            "applied": facts.time_offset.offset_ns / _MS,
-            "uncertainty": facts.time_offset.uncertainty_ns / _MS,
-            "measured": facts.time_offset != TimeOffset(),
+            "applied": run.time_offset.offset_ns / _MS,
+            "uncertainty": run.time_offset.uncertainty_ns / _MS,
+            "measured": run.time_offset != TimeOffset(),
         },
-        "fifo": {"depth": facts.fifo.depth, "overflow": facts.fifo.overflow.value, "age_bound": age_bound(facts)},
-        "tolerance_ms": facts.tolerance_ns / _MS,
-        "sessions": [_session(facts, index) for index in range(len(facts.link.sessions))],
-        "links": [_link(tally) for tally in facts.link.links],
-        "switches": facts.link.switches,
-        "connects": facts.link.connects,
-        "garbage": facts.link.garbage,
+        "fifo": {"depth": run.fifo.depth, "overflow": run.fifo.overflow.value, "age_bound": age_bound(run)},
+        "tolerance_ms": run.tolerance_ns / _MS,
+        "sessions": [_session(run, index) for index in range(len(run.link.sessions))],
+        "links": [_link(tally) for tally in run.link.links],
+        "switches": run.link.switches,
+        "connects": run.link.connects,
+        "garbage": run.link.garbage,
         "frames": {
-            "received": facts.counts.received,
-            "paired": facts.counts.paired,
-            "held": facts.counts.held_board,
-            "orphaned": dict(facts.counts.board_orphans),
-            "before_clock": facts.link.no_clock,
-            "disbelieved": disbelieved(facts),
+            "received": run.counts.received,
+            "paired": run.counts.paired,
+            "held": run.counts.held_board,
+            "orphaned": dict(run.counts.board_orphans),
+            "before_clock": run.link.no_clock,
+            "disbelieved": disbelieved(run),
         },
         "host_frames": {
-            "grabbed": facts.counts.host_frames + facts.spoiled + facts.skipped + facts.own_future,
-            "spoiled": facts.spoiled,
-            "skipped": facts.skipped,
-            "from_the_future": facts.own_future,
-            "paired": facts.counts.paired,
-            "held": facts.counts.held_host,
-            "orphaned": dict(facts.counts.host_orphans),
-            "camera": _camera(facts.camera),
+            "grabbed": run.counts.host_frames + run.spoiled + run.skipped + run.own_future,
+            "spoiled": run.spoiled,
+            "skipped": run.skipped,
+            "from_the_future": run.own_future,
+            "paired": run.counts.paired,
+            "held": run.counts.held_host,
+            "orphaned": dict(run.counts.host_orphans),
+            "camera": _camera(run.camera),
         },
-        "regime": _regime(judge(figures(facts))),
-        "image_motion_px_per_s": _number(facts.motion_px_s),
+        "regime": _regime(judge(figures(run))),
+        "image_motion_px_per_s": _number(run.motion_px_s),
         "warnings": [
-            {"doubt": item.doubt.value, "sentence": item.sentence, "remedy": item.remedy} for item in concerns(facts)
+            {"doubt": item.doubt.value, "sentence": item.sentence, "remedy": item.remedy} for item in concerns(run)
         ],
         "pairs_account": {
-            "paired": facts.counts.paired,
-            "processed": facts.processed,
-            "undecodable": facts.undecodable,
-            "spoiled_images": dict(facts.spoiled_images),
-            "dropped_fifo": facts.counts.dropped,
-            "stopped": facts.stopped,
+            "paired": run.counts.paired,
+            "processed": run.processed,
+            "undecodable": run.undecodable,
+            "spoiled_images": dict(run.spoiled_images),
+            "dropped_fifo": run.counts.dropped,
+            "stopped": run.stopped,
         },
-        "unwritten": asdict(facts.unwritten),
+        "losses": [{"place": loss.place, "reason": loss.reason, "count": loss.count} for loss in losses(run)],
+        "sinks": {sink.name: _sink(sink) for sink in run.sinks},
+        "unwritten": asdict(run.unwritten),
     }
+
+
+def _sink(sink: SinkAccount) -> dict[str, object]:
+    return {"written": sink.written, "dropped": sink.dropped, "delay_ms": spread_ms(sink.delay)}
 
 
 def spread_ms(spread: Spread) -> dict[str, float | int | None]:
@@ -89,22 +97,22 @@ def spread_ms(spread: Spread) -> dict[str, float | int | None]:
     return {"count": spread.count} | {name: _number(value / _MS) for name, value in values.items()}
 
 
-def age_bound(facts: RunFacts) -> str:
+def age_bound(run: RunSnapshot) -> str:
     """Say how old a pair can get in the FIFO, from its depth and policy and the rates of this run."""
-    depth, processing = facts.fifo.depth, facts.delays.spread("processing")
-    if facts.fifo.overflow is Overflow.DROP_OLDEST:
+    depth, processing = run.fifo.depth, run.delays.spread("processing")
+    if run.fifo.overflow is Overflow.DROP_OLDEST:
         return f"{depth} frame period(s): newer pairs push older ones out"
     how = (
         "pairs that are in stay in"
-        if facts.fifo.overflow is Overflow.DROP_NEWEST
+        if run.fifo.overflow is Overflow.DROP_NEWEST
         else "a pair is fetched when a place is free"
     )
     measured = f", here {depth * processing.p95_ns / _MS:.1f} ms (p95)" if processing.count else ""
     return f"{depth} processing time(s): {how}{measured}"
 
 
-def _phase(facts: RunFacts) -> dict[str, object]:
-    phase, alignment = facts.phase, facts.alignment
+def _phase(run: RunSnapshot) -> dict[str, object]:
+    phase, alignment = run.phase, run.alignment
     said: dict[str, object] = {"known": phase is not None}
     if phase is not None:
         said |= {
@@ -132,8 +140,8 @@ def _regime(judgement: Judgement) -> dict[str, object]:
     }
 
 
-def _clock(facts: RunFacts) -> dict[str, object]:
-    estimate, link = facts.estimate, facts.link
+def _clock(run: RunSnapshot) -> dict[str, object]:
+    estimate, link = run.estimate, run.link
     told = {
         "doubts": link.clock_doubts,
         "steps": link.clock_steps,
@@ -150,7 +158,7 @@ def _clock(facts: RunFacts) -> dict[str, object]:
         "round_trip_us": estimate.round_trip_ns / 1e3,
         "uncertainty_at_pairs_us": {
             k: None if v is None else v * 1e3
-            for k, v in spread_ms(facts.delays.spread("uncertainty")).items()
+            for k, v in spread_ms(run.delays.spread("uncertainty")).items()
             if k != "count"
         },
     }
@@ -185,8 +193,8 @@ def _link(tally: LinkTally) -> dict[str, object]:
     }
 
 
-def _session(facts: RunFacts, index: int) -> dict[str, object]:
-    account = facts.link.sessions[index]
+def _session(run: RunSnapshot, index: int) -> dict[str, object]:
+    account = run.link.sessions[index]
     before = dict(account.first.dropped)
     dropped = {reason.value: count - before.get(reason, 0) for reason, count in account.latest.dropped}
     grabbed, sent = account.latest.grabbed - account.first.grabbed, account.latest.sent - account.first.sent

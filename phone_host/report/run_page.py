@@ -9,8 +9,9 @@ from common import now
 from common.camera.base import CameraHealth
 from common.ledger import PairLedger
 from phone_host.measure.accounts import rung_lines
+from phone_host.measure.losses import losses
 from phone_host.measure.regime import Judgement, Regime, judge
-from phone_host.measure.run_facts import RunFacts, board_drops, concerns, disbelieved, figures
+from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.trust import Concern
 from phone_host.model import Image, Processed, Side
 from phone_host.output.preview import colour_disparity, colour_range_px
@@ -18,11 +19,11 @@ from phone_host.report.report_page import Figure, PageData, Picture, Table, Verd
 from phone_host.report.summary import phase_lines
 
 
-def run_page(facts: RunFacts, last: Processed | None, board_side: Side, ledgers: Sequence[PairLedger]) -> str:
+def run_page(run: RunSnapshot, last: Processed | None, board_side: Side, ledgers: Sequence[PairLedger]) -> str:
     """Make the page.
 
     Args:
-        facts: the run.
+        run: the run.
         last: its last pair; None when there was none.
         board_side: which of its views is the board's.
         ledgers: of all pairs, or of evenly chosen ones, in order.
@@ -30,45 +31,45 @@ def run_page(facts: RunFacts, last: Processed | None, board_side: Side, ledgers:
     Returns:
         One self-contained HTML document.
     """
-    judgement, found = judge(figures(facts)), concerns(facts)
-    verdict, sentence = _verdict(facts, judgement, found)
+    judgement, found = judge(figures(run)), concerns(run)
+    verdict, sentence = _verdict(run, judgement, found)
     return page(
         PageData(
             title="tandemscan run",
-            subtitle=f"ended: {facts.ended.replace('_', ' ')}; {now.wall_time()}",
+            subtitle=f"ended: {run.ended.replace('_', ' ')}; {now.wall_time()}",
             verdict=verdict,
             sentence=sentence,
-            figures=_figures(facts) if facts.processed else (),
+            figures=_figures(run) if run.processed else (),
             pictures=pictures(last, board_side),
             delays=delay_series(ledgers),
-            tables=(*links_tables(facts), drops_table(facts), camera_table(facts.camera)),
-            notes=notes(facts),
+            tables=(*links_tables(run), losses_table(run), camera_table(run.camera)),
+            notes=notes(run),
         )
     )
 
 
-def notes(facts: RunFacts) -> tuple[str, ...]:
+def notes(run: RunSnapshot) -> tuple[str, ...]:
     """Who waits for whom and what would help, what makes depth wrong, and how the cameras' exposures stand to each other."""
-    judgement = judge(figures(facts))
+    judgement = judge(figures(run))
     return (
         f"Queue: {judgement.sentence}.",
         *(f"Would help: {remedy}." for remedy in judgement.remedies),
-        *(f"Warning: {item.sentence}. Remedy: {item.remedy}." for item in concerns(facts)),
-        *phase_lines(facts.phase, facts.alignment),
-        *rung_lines(facts.link),
+        *(f"Warning: {item.sentence}. Remedy: {item.remedy}." for item in concerns(run)),
+        *phase_lines(run.phase, run.alignment),
+        *rung_lines(run.link),
     )
 
 
-def links_tables(facts: RunFacts) -> tuple[Table, ...]:
+def links_tables(run: RunSnapshot) -> tuple[Table, ...]:
     """The links side by side, where there were several."""
-    if len(facts.link.links) < 2:
+    if len(run.link.links) < 2:
         return ()
     rows = []
-    for tally in facts.link.links:
+    for tally in run.link.links:
         age = tally.age.spread()
         ages = f"{age.p50_ns / 1e6:.1f} ms; {age.p95_ns / 1e6:.1f} ms" if age.count else "-"
         rows.append((tally.name, str(tally.frames), str(tally.carried), str(tally.lost), ages))
-    title = f"Links: the stream went from one to another {facts.link.switches} times"
+    title = f"Links: the stream went from one to another {run.link.switches} times"
     columns = ("link", "frames", "times it took over", "times it was lost", "age of frames on arrival: median; p95")
     return (Table(title, columns, tuple(rows)),)
 
@@ -90,10 +91,10 @@ def camera_table(health: CameraHealth) -> Table:
     return Table("The own camera", ("what", "value"), tuple(rows))
 
 
-def _verdict(facts: RunFacts, judgement: Judgement, found: Sequence[Concern]) -> tuple[Verdict, str]:
-    if not facts.processed and facts.spoiled_images:
+def _verdict(run: RunSnapshot, judgement: Judgement, found: Sequence[Concern]) -> tuple[Verdict, str]:
+    if not run.processed and run.spoiled_images:
         return Verdict.BAD, "Not one pair had two sound images: look at the cameras."
-    if not facts.processed:
+    if not run.processed:
         return Verdict.BAD, "Not one pair was processed: the two cameras or the programs did not meet."
     if found:
         return Verdict.WARNING, f"{found[0].sentence}: {found[0].remedy}."
@@ -101,18 +102,18 @@ def _verdict(facts: RunFacts, judgement: Judgement, found: Sequence[Concern]) ->
     return (Verdict.GOOD if fine else Verdict.WARNING), f"{judgement.sentence}."
 
 
-def _figures(facts: RunFacts) -> tuple[Figure, ...]:
-    end_to_end, skew = facts.delays.spread("end_to_end"), facts.delays.spread("time_skew")
-    uncertainty = facts.delays.spread("uncertainty")
-    pairs = f"{facts.processed} pairs in {facts.seconds:.1f} s"
+def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
+    end_to_end, skew = run.delays.spread("end_to_end"), run.delays.spread("time_skew")
+    uncertainty = run.delays.spread("uncertainty")
+    pairs = f"{run.processed} pairs in {run.seconds:.1f} s"
     return (
-        _measured("pairs per second", facts.pairs_per_second, 1, "/s", pairs),
+        _measured("pairs per second", run.pairs_per_second, 1, "/s", pairs),
         Figure(
             "end-to-end", f"{end_to_end.p50_ns / 1e6:.0f}", "ms", f"median; 99 % below {end_to_end.p99_ns / 1e6:.0f} ms"
         ),
         Figure("time skew", f"{skew.p50_ns / 1e6:.1f}", "ms", f"median; 95 % below {skew.p95_ns / 1e6:.1f} ms"),
         Figure("clock uncertainty", f"{uncertainty.p50_ns / 1e3:.0f}", "us", "median over the pairs"),
-        _measured("image motion", facts.motion_px_s, 0, "px/s", "the fastest tenth of the own camera's image"),
+        _measured("image motion", run.motion_px_s, 0, "px/s", "the fastest tenth of the own camera's image"),
     )
 
 
@@ -146,28 +147,10 @@ def pictures(last: Processed | None, board_side: Side = Side.LEFT) -> tuple[Pict
     return (*views, Picture("disparity: bright is near, black is none", _png(coloured)))
 
 
-def drops_table(facts: RunFacts) -> Table:
-    """What was not used, by reason."""
-    rows = [
-        *(
-            (f"frames dropped on the board: {reason.replace('_', ' ')}", count)
-            for reason, count in board_drops(facts.link).items()
-        ),
-        ("frames lost on the link", sum(account.lost for account in facts.link.sessions)),
-        *((f"frames not believed: {reason.replace('_', ' ')}", count) for reason, count in disbelieved(facts).items()),
-        *(
-            (f"board frames without partner: {reason.replace('_', ' ')}", count)
-            for reason, count in facts.counts.board_orphans
-        ),
-        *(
-            (f"host frames without partner: {reason.replace('_', ' ')}", count)
-            for reason, count in facts.counts.host_orphans
-        ),
-        ("pairs that gave way in a full FIFO", facts.counts.dropped),
-        *((f"pairs with a spoiled image: {reason.replace('_', ' ')}", count) for reason, count in facts.spoiled_images),
-    ]
-    counted = tuple((what, str(count)) for what, count in rows)
-    return Table("Frames and pairs that were not used", ("what", "count"), counted)
+def losses_table(run: RunSnapshot) -> Table:
+    """What was not used, by place and reason."""
+    rows = tuple((loss.words, str(loss.count)) for loss in losses(run))
+    return Table("Frames and pairs that were not used", ("what", "count"), rows)
 
 
 def _jpeg(image: Image) -> bytes:

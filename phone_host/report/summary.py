@@ -6,37 +6,38 @@ from typing import Final
 from common.camera.base import CameraHealth
 from phone_host.measure.accounts import LinkAccount, rung_lines
 from phone_host.measure.delays import DELAYS
+from phone_host.measure.losses import losses
 from phone_host.measure.regime import judge
-from phone_host.measure.run_facts import RunFacts, board_drops, concerns, disbelieved, figures
+from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.model import TimeOffset
 from phone_host.sync.phase import Alignment, Phase
 
 _MS: Final = 1e6
 
 
-def summary(facts: RunFacts) -> str:
+def summary(run: RunSnapshot) -> str:
     """Say in a few lines what the run was."""
-    rate = "" if math.isnan(facts.pairs_per_second) else f" in {facts.seconds:.1f} s ({facts.pairs_per_second:.1f} /s)"
-    lines = [f"{facts.processed} pairs{rate}, ended: {facts.ended.replace('_', ' ')}"]
-    if facts.processed:
+    rate = "" if math.isnan(run.pairs_per_second) else f" in {run.seconds:.1f} s ({run.pairs_per_second:.1f} /s)"
+    lines = [f"{run.processed} pairs{rate}, ended: {run.ended.replace('_', ' ')}"]
+    if run.processed:
         lines.append(f"{'delay, ms':14} {'p50':>9} {'p95':>9} {'p99':>9} {'max':>9}")
         for name in DELAYS:
-            spread = facts.delays.spread(name)
+            spread = run.delays.spread(name)
             values = (spread.p50_ns, spread.p95_ns, spread.p99_ns, spread.max_ns)
             lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value / _MS:9.3f}" for value in values))
-    if facts.estimate is not None:
+    if run.estimate is not None:
         lines.append(
-            f"clock known to +-{facts.estimate.uncertainty_ns / 1000:.0f} us"
-            f" (+-{facts.estimate.bound_ns / 1000:.0f} us whatever the link does), skew {facts.estimate.skew * 1e6:+.1f} ppm"
+            f"clock known to +-{run.estimate.uncertainty_ns / 1000:.0f} us"
+            f" (+-{run.estimate.bound_ns / 1000:.0f} us whatever the link does), skew {run.estimate.skew * 1e6:+.1f} ppm"
         )
-    lines += _agreement(facts)
-    lines += phase_lines(facts.phase, facts.alignment)
-    lines += _arrivals(facts.camera, facts.time_offset)
-    lines.append(judge(figures(facts)).sentence)
-    lines += [f"  {remedy}" for remedy in judge(figures(facts)).remedies]
-    lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(facts)]
-    lines += camera_troubles(facts.camera)
-    lines += [*rung_lines(facts.link), *_links(facts.link), *_losses(facts)]
+    lines += _agreement(run)
+    lines += phase_lines(run.phase, run.alignment)
+    lines += _arrivals(run.camera, run.time_offset)
+    lines.append(judge(figures(run)).sentence)
+    lines += [f"  {remedy}" for remedy in judge(figures(run)).remedies]
+    lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(run)]
+    lines += camera_troubles(run.camera)
+    lines += [*rung_lines(run.link), *_links(run.link), *_losses(run)]
     return "\n".join(lines)
 
 
@@ -73,13 +74,13 @@ def camera_troubles(health: CameraHealth) -> list[str]:
     return [f"own camera: {', '.join(parts)}".replace("_", " ")] if parts else []
 
 
-def _agreement(facts: RunFacts) -> list[str]:
+def _agreement(run: RunSnapshot) -> list[str]:
     """How well the two cameras' stamps agree; nothing where they say by definition when their images were exposed."""
-    offset = facts.time_offset
+    offset = run.time_offset
     known = f"+-{offset.uncertainty_ns / _MS:.2f} ms"
     if offset != TimeOffset():
         return [f"the cameras' stamps differ by {offset.offset_ns / _MS:+.2f} {known}, which is taken out"]
-    if facts.stamps_exact:
+    if run.stamps_exact:
         return []
     return [f"the cameras' stamps agree to {known}: not measured (phone-host calibrate-time)"]
 
@@ -112,26 +113,10 @@ def _links(link: LinkAccount) -> list[str]:
     return lines
 
 
-def _losses(facts: RunFacts) -> list[str]:
-    lost = sum(account.lost for account in facts.link.sessions)
-    late = sum(account.late for account in facts.link.sessions)
-    stale = sum(account.duplicate + account.old_session for account in facts.link.sessions)
-    board = {reason: n for reason, n in board_drops(facts.link).items() if n}
-    parts = [
-        *(f"{n} {reason} on the board" for reason, n in board.items()),
-        *([f"{lost} lost on the link{f' ({late} of them came too late)' if late else ''}"] if lost else []),
-        *([f"{stale} stale"] if stale else []),
-        *(f"{n} not believed: {reason}" for reason, n in disbelieved(facts).items()),
-        *(f"{n} board frames {reason}" for reason, n in facts.counts.board_orphans),
-        *(f"{n} host frames {reason}" for reason, n in facts.counts.host_orphans),
-        *([f"{facts.counts.dropped} pairs in a full FIFO"] if facts.counts.dropped else []),
-        *([f"{facts.stopped} pairs by the run's end"] if facts.stopped else []),
-        *([f"{facts.undecodable} pairs undecodable"] if facts.undecodable else []),
-        *(f"{n} of them with an image {reason}" for reason, n in facts.spoiled_images),
-    ]
-    lines = ["dropped: " + (", ".join(parts).replace("_", " ") or "nothing")]
-    if facts.unwritten.lines or facts.unwritten.pairs:
-        lines.append(
-            f"not written: {facts.unwritten.lines} lines, {facts.unwritten.pairs} pairs ({facts.unwritten.cause})"
-        )
+def _losses(run: RunSnapshot) -> list[str]:
+    """What was not used, and what was not written."""
+    parts = [f"{loss.count} {loss.words}" for loss in losses(run)]
+    lines = [f"not used: {', '.join(parts) or 'nothing'}"]
+    if run.unwritten.lines or run.unwritten.pairs:
+        lines.append(f"not written: {run.unwritten.lines} lines, {run.unwritten.pairs} pairs ({run.unwritten.cause})")
     return lines

@@ -1,30 +1,30 @@
-"""The host's composition root: receiver and own camera -> pair queue -> worker -> results, each in its thread."""
+"""The host's composition root: receiver and own camera -> pair queue -> worker -> sinks, each in its thread."""
 
 import logging
-import threading
-from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import Final
 
 from common import now
 from common.camera.base import Camera
-from common.errors import DataError, UnavailableError
-from common.frame import FrameFault, SpoiledImageError
+from common.errors import UnavailableError
 from common.imagesize import MOST_PIXELS
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.program.logs import event
 from common.protocol.message import Pacing, RefusalReason, Steering
-from phone_host.measure.delays import DelayStatistics, Sample
 from phone_host.measure.image_motion import MotionMeter
-from phone_host.measure.run_facts import RunFacts, concerns
-from phone_host.measure.trust import Concern, Doubt
-from phone_host.model import FramePair, Processed, Side, TimeOffset
+from phone_host.measure.run_snapshot import RunSnapshot, concerns
+from phone_host.measure.trust import Doubt
+from phone_host.model import Processed, Result, Side, TimeOffset
+from phone_host.run.file_sink import FileSink
+from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.pipeline import Pipeline
-from phone_host.run.results import Results
+from phone_host.run.sinks import FunctionSink, Sink
+from phone_host.run.worker import Worker
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
 from phone_host.stream.own_camera import Source
@@ -46,9 +46,6 @@ _BUSY_NS: Final = 4_000_000_000
 _TRUST_NS: Final = 1_000_000_000
 _RECENT: Final = 60
 """Once a second the last 60 pairs are judged: two seconds at 30 per second."""
-
-_HOPELESS: Final = 10
-"""This many pairs in a row that cannot be processed, and none that could: it is not a spoiled frame now and then."""
 
 
 class EndReason(Enum):
@@ -75,6 +72,7 @@ class HostSettings:
         interpolate: whether the board's image is taken to the moment of the host's before anything else is done with it.
         steered: the cameras that may be steered until both expose together; none: the phase stays as it is.
         most_pixels: neither camera may have more.
+        resolved: the settings of the run with their origins, for settings.json; None: not saved.
     """
 
     board_side: Side = Side.LEFT
@@ -88,6 +86,7 @@ class HostSettings:
     interpolate: bool = False
     steered: frozenset[Whose] = frozenset()
     most_pixels: int = MOST_PIXELS
+    resolved: Mapping[str, object] | None = None
 
 
 class Host:
@@ -98,7 +97,7 @@ class Host:
         camera: the own camera, open.
         links: open links to the board, the preferred one first.
         core: the stereo core; None to measure pairs and delays only.
-        on_pair: told of each processed pair and its ledger, in the worker's thread; for live views and for checks against truth.
+        sinks: take the results, beside those on disk.
     """
 
     def __init__(
@@ -107,41 +106,41 @@ class Host:
         camera: Camera,
         links: Sequence[Link],
         core: StereoCore | None,
-        on_pair: Callable[[Processed, PairLedger], None] | None = None,
+        sinks: Sequence[Sink] = (),
     ) -> None:
-        self.settings = settings
-        self.delays = DelayStatistics()
-        self.sample = Sample()
-        self.last: Processed | None = None
-        self.results = Results(settings.out, settings.save_every)
-        own = camera.description
-        on_demand = own.pacing is Pacing.DEMAND
-        self.queue = PairQueue(
+        self._settings = settings
+        self._own = camera.description
+        on_demand = self._own.pacing is Pacing.DEMAND
+        self.started_ns = now.monotonic_ns()
+        self._motion = MotionMeter()
+        self._files = FileSink(
+            settings.out, settings.save_every, waits=bool(settings.pairs) or on_demand, settings=settings.resolved
+        )
+        self._sinks: tuple[Sink, ...] = (self._files, FunctionSink("motion", self._measure_motion), *sinks)
+        self._queue = PairQueue(
             settings.fifo,
             settings.tolerance_ns,
-            own.period_ns,
+            self._own.period_ns,
             on_demand=on_demand,
             time_offset_ns=settings.time_offset.offset_ns,
         )
-        self.source = Source(camera, self.queue.add_host)
-        self.receiver = Receiver(links, now.random_id(), self.queue, self)
+        self._camera = Source(camera, self._queue.add_host)
+        self._receiver = Receiver(links, now.random_id(), self._queue, self)
         interpolator = Interpolator() if settings.interpolate else None
-        self._pipeline = Pipeline(core, settings.board_side, now.monotonic_ns, interpolator, settings.most_pixels)
-        self.motion = MotionMeter()
-        self._own = own
+        pipeline = Pipeline(core, settings.board_side, now.monotonic_ns, interpolator, settings.most_pixels)
+        self._ledgerer = Ledgerer()
+        self._worker = Worker(
+            self._queue,
+            pipeline,
+            self._ledgerer,
+            self._sinks,
+            most_pairs=settings.pairs,
+            taken=self._receiver.wake,
+        )
         self._known_doubts: frozenset[Doubt] = frozenset()
         self._trust_due_ns = 0
-        self._on_pair = on_pair
-        self._worker = threading.Thread(target=self._work, name="worker", daemon=True)
         self._controller: PhaseController | None = None
         self._steered_session = ""
-        self._finished = threading.Event()
-        self._failure: Exception | None = None
-        self.processed = 0
-        self.undecodable = 0
-        self._spoiled: Counter[FrameFault] = Counter()
-        self.started_ns = now.monotonic_ns()
-        self.first_done_ns = self.last_done_ns = 0
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
         """Run until the pairs are reached, a stream ends or `stop` says so.
@@ -158,79 +157,127 @@ class Host:
             DataError: the streams' images do not fit the rig.
         """
         self._worker.start()
-        self.receiver.start()
-        self.source.start()
+        self._receiver.start()
+        self._camera.start()
         try:
-            return self._watch(stop, watch)
-        finally:
-            self._finished.set()  # the pair in hand is finished, those that still wait are not begun
-            self.source.stop()
-            self.queue.finish()
-            self._worker.join()
-            self.receiver.stop()  # last: the worker wakes it
+            ended = self._watch(stop, watch)
+        except BaseException:
+            with suppress(Exception):  # what ended the run is told, not what followed from it
+                self._end()
+            raise
+        self._end()
+        return ended
 
-    @property
-    def alignment(self) -> Alignment | None:
-        """How the steering of a camera stands; None where it was not asked for."""
-        return None if self._controller is None else self._controller.alignment
+    def _end(self) -> None:
+        """Finish the pair in hand, not those that still wait, and let the sinks work off what they have."""
+        self._worker.finished.set()
+        self._camera.stop()
+        self._queue.finish()
+        self._worker.stop()
+        self._receiver.stop()  # last: the worker wakes it
+        for sink in self._sinks:
+            sink.finish()
+        self._raise_failures()
 
-    def facts(self, ended: str) -> RunFacts:
-        """Give everything a report is made of, now.
+    def write_report(self, report: dict[str, object], page: str = "") -> bool:
+        """Write what is said of the whole run into the folder of its results, after `run`; nothing where there is none.
 
         Args:
-            ended: why the run ended, or how it stands.
+            report: for report.json.
+            page: for index.html; empty: none.
+
+        Returns:
+            Whether everything of the run was written.
         """
-        return RunFacts(
+        self._files.close(report, page)
+        return self._files.complete
+
+    @property
+    def last(self) -> Processed | None:
+        """The newest pair's images and depth."""
+        return self._ledgerer.last
+
+    @property
+    def first_done_ns(self) -> int:
+        """When the first pair was done, CLOCK_MONOTONIC, ns; 0: none was yet."""
+        return self._ledgerer.first_done_ns
+
+    @property
+    def has_met_board(self) -> bool:
+        """Whether a board has said hello."""
+        return self._receiver.hello is not None
+
+    def sample(self) -> Sequence[PairLedger]:
+        """Ledgers for plots: of all pairs, or of evenly chosen ones, in order."""
+        return self._ledgerer.sample()
+
+    def snapshot(self, ended: str = "running") -> RunSnapshot:
+        """Give everything that presenters show, as it is now.
+
+        Args:
+            ended: why the run ended; while it runs, time and motion are judged over the newest pairs only.
+        """
+        books, receiver = self._ledgerer.books(), self._receiver
+        return RunSnapshot(
             ended=ended,
-            processed=self.processed,
-            undecodable=self.undecodable,
-            seconds=(self.last_done_ns - self.first_done_ns) / 1e9,
-            delays=self.delays,
-            counts=self.queue.counts,
-            link=self.receiver.account,
-            estimate=self.receiver.estimate,
-            tolerance_ns=self.queue.tolerance_ns,
-            fifo=self.settings.fifo,
-            unwritten=self.results.unwritten,
-            spoiled=self.source.spoiled,
-            skipped=self.source.skipped,
-            own_future=self.source.from_the_future,
-            time_offset=self.settings.time_offset,
-            phase=self.queue.phase,
-            alignment=self.alignment,
-            camera=self.source.health,
+            processed=books.processed,
+            undecodable=books.undecodable,
+            seconds=(books.last_done_ns - books.first_done_ns) / 1e9,
+            delays=books.delays,
+            counts=self._queue.counts,
+            link=receiver.account.copy(),
+            carrier=receiver.carrier,
+            estimate=receiver.estimate,
+            tolerance_ns=self._queue.tolerance_ns,
+            fifo=self._settings.fifo,
+            sinks=tuple(account for sink in self._sinks for account in sink.accounts),
+            unwritten=self._files.unwritten,
+            spoiled=self._camera.spoiled,
+            skipped=self._camera.skipped,
+            own_future=self._camera.from_the_future,
+            time_offset=self._settings.time_offset,
+            phase=self._queue.phase,
+            alignment=self._alignment,
+            camera=self._camera.health,
             period_ns=self._period_ns,
-            motion_px_s=self.motion.px_s,
-            width_px=self.motion.width_px,
-            interpolated=self.settings.interpolate,
-            spoiled_images=tuple((fault.value, count) for fault, count in list(self._spoiled.items())),
+            motion_px_s=self._motion.px_s,
+            width_px=self._motion.width_px,
+            interpolated=self._settings.interpolate,
+            spoiled_images=books.spoiled_images,
             stamps_exact=self._stamps_are_exact,
+            judged_pairs=_RECENT if ended == "running" else None,
         )
+
+    @property
+    def _alignment(self) -> Alignment | None:
+        """How the steering of a camera stands; None where it was not asked for."""
+        return None if self._controller is None else self._controller.alignment
 
     @property
     def _stamps_are_exact(self) -> bool:
         """Whether both cameras' stamps are right by definition; an absent board's are not doubted."""
-        hello = self.receiver.hello
+        hello = self._receiver.hello
         return self._own.has_exact_stamps and (hello is None or hello.camera.has_exact_stamps)
 
     @property
     def _period_ns(self) -> int:
         """Of the slower camera, ns; 0 where one gives images on demand, or before the board is known."""
-        hello = self.receiver.hello
+        hello = self._receiver.hello
         if hello is None or Pacing.DEMAND in {hello.camera.pacing, self._own.pacing}:
             return 0
         return max(hello.camera.period_ns, self._own.period_ns)
 
-    def concerns(self) -> tuple[Concern, ...]:
-        """What makes the depth of the last pairs wrong."""
-        return concerns(self.facts("running"), _RECENT)
+    def _measure_motion(self, result: Result) -> None:
+        # The host's own image: the board's may have been interpolated to another moment.
+        seen = result.processed.pair.right if self._settings.board_side is Side.LEFT else result.processed.pair.left
+        self._motion.add(seen, result.ledger.host.exposed_ns, result.ledger.done_ns)
 
     def _watch_trust(self, now_ns: int) -> None:
         """Log each reason not to trust the depth when it comes, and when it has gone."""
         if now_ns < self._trust_due_ns:
             return
         self._trust_due_ns = now_ns + _TRUST_NS
-        found = {concern.doubt: concern for concern in self.concerns()}
+        found = {concern.doubt: concern for concern in concerns(self.snapshot())}
         for doubt in found.keys() - self._known_doubts:
             concern = found[doubt]
             _LOG.warning(event("depth_doubtful", doubt=doubt.value, problem=concern.sentence, remedy=concern.remedy))
@@ -241,7 +288,7 @@ class Host:
     def _watch(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
         absent_since_ns = now.monotonic_ns()
         ending_since_ns: int | None = None
-        while not self._finished.wait(_STEP_S):
+        while not self._worker.finished.wait(_STEP_S):
             now_ns = now.monotonic_ns()
             self._raise_failures()
             self._align(now_ns)
@@ -250,10 +297,10 @@ class Host:
                 watch()
             if stop():
                 return EndReason.STOPPED
-            if self.receiver.connected or self.receiver.ended:
+            if self._receiver.connected or self._receiver.ended:
                 absent_since_ns = now_ns
             self._check_presence(now_ns - absent_since_ns)
-            if self.receiver.ended or self.source.ended:
+            if self._receiver.ended or self._camera.ended:
                 ending_since_ns = now_ns if ending_since_ns is None else ending_since_ns
                 if self._all_paired() or now_ns - ending_since_ns > _LAST_PARTNER_NS:
                     return self._drain(stop, watch)
@@ -262,44 +309,43 @@ class Host:
 
     def _align(self, now_ns: int) -> None:
         """Steer a camera where that was asked for and is due; another life of the board is steered anew."""
-        hello = self.receiver.hello
-        if not self.settings.steered or hello is None or not self.receiver.connected:
+        hello = self._receiver.hello
+        if not self._settings.steered or hello is None or not self._receiver.connected:
             return
         if self._controller is None or hello.session != self._steered_session:
             self._steered_session = hello.session
-            ways = (Whose.BOARD, hello.camera.steering), (Whose.HOST, self.source.steering)
-            board, own = (way if whose in self.settings.steered else Steering.NONE for whose, way in ways)
-            self._controller = PhaseController(board, own, has_phase=self.queue.has_phase)
+            ways = (Whose.BOARD, hello.camera.steering), (Whose.HOST, self._camera.steering)
+            board, own = (way if whose in self._settings.steered else Steering.NONE for whose, way in ways)
+            self._controller = PhaseController(board, own, has_phase=self._queue.has_phase)
         state = self._controller.alignment.state
-        correction = self._controller.update(now_ns, self.queue.phase)
+        correction = self._controller.update(now_ns, self._queue.phase)
         if correction is not None:
-            steer = self.receiver.steer if correction.whose is Whose.BOARD else self.source.steer
+            steer = self._receiver.steer if correction.whose is Whose.BOARD else self._camera.steer
             steer(correction.later_ns)
-            self.queue.restart_phase()
+            self._queue.restart_phase()
         alignment = self._controller.alignment
         if alignment.state is not state or correction is not None:
             _LOG.info(event("phase", state=alignment.state.value, words=alignment.words))
 
     def _drain(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
         """Let the worker finish the pairs that wait; no frame will follow."""
-        self.queue.finish()
-        while self._worker.is_alive():
-            self._worker.join(_STEP_S)
+        self._queue.finish()
+        while not self._worker.has_ended(_STEP_S):
             if watch is not None:
                 watch()
             if stop():
                 return EndReason.STOPPED
         self._raise_failures()
-        reached = self.settings.pairs and self.processed >= self.settings.pairs
+        reached = self._settings.pairs and self._ledgerer.processed >= self._settings.pairs
         return EndReason.PAIRS_REACHED if reached else EndReason.STREAM_ENDED
 
     def _all_paired(self) -> bool:
-        counts = self.queue.counts
-        return self.receiver.ended and (counts.held_board == 0 or (self.source.ended and counts.held_host == 0))
+        counts = self._queue.counts
+        return self._receiver.ended and (counts.held_board == 0 or (self._camera.ended and counts.held_host == 0))
 
     def _check_presence(self, absent_ns: int) -> None:
-        refused = self.receiver.refused
-        patience_ns = self.settings.wait_ns
+        refused = self._receiver.refused
+        patience_ns = self._settings.wait_ns
         if refused is not None:
             patience_ns = max(patience_ns or 0, _BUSY_NS) if refused is RefusalReason.BUSY else 0
         if patience_ns is None or absent_ns <= patience_ns:
@@ -312,86 +358,16 @@ class Host:
         )
 
     def _raise_failures(self) -> None:
-        for failure in (self._failure, self.receiver.failure, self.source.failure):
+        of_sinks = (sink.failure for sink in self._sinks)
+        for failure in (self._worker.failure, self._receiver.failure, self._camera.failure, *of_sinks):
             if failure is not None:
                 raise failure
 
     def session_began(self) -> None:
         """See BoardListener."""
-        self.source.forget()
+        self._camera.forget()
 
     def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
         """See BoardListener."""
-        if self.source.on_demand:
-            self.source.want(exposed_ns, index)
-
-    def _work(self) -> None:
-        try:
-            while (pair := self.queue.take()) is not None:
-                dequeued_ns = now.monotonic_ns()
-                self.receiver.wake()  # a place is free
-                if not self._finished.is_set():
-                    self._process(pair, dequeued_ns)
-        except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
-            self._failure = error
-            self._finished.set()
-
-    def _process(self, pair: FramePair, dequeued_ns: int) -> None:
-        try:
-            processed = self._pipeline.process(pair)
-        except DataError as error:
-            self._note_failed(error)
-            return
-        before_write_ns = now.monotonic_ns()
-        self.results.save_pair(self.processed, processed)
-        done_ns = now.monotonic_ns()
-        ledger = self._ledger(pair, processed, dequeued_ns, before_write_ns, done_ns)
-        self.results.append(ledger)
-        self.delays.add(ledger)
-        self.sample.add(ledger)
-        self.last = processed
-        self.first_done_ns = self.first_done_ns or done_ns
-        self.last_done_ns = done_ns
-        self.processed += 1
-        # The host's own image: the board's may have been interpolated to another moment.
-        seen = processed.pair.right if self.settings.board_side is Side.LEFT else processed.pair.left
-        self.motion.add(seen, pair.host.exposed.ns, done_ns)
-        if self._on_pair is not None:
-            self._on_pair(processed, ledger)
-        if self.settings.pairs and self.processed >= self.settings.pairs:
-            self._finished.set()
-
-    def _note_failed(self, error: DataError) -> None:
-        """Count a pair that could not be processed. Spoiled images never end a run: whoever sends them must not be able to; a rig that fits no pair does."""
-        self.undecodable += 1
-        if isinstance(error, SpoiledImageError):
-            self._spoiled[error.fault] += 1
-            if self.processed == 0 and self._spoiled.total() == _HOPELESS:
-                _LOG.error(event("no_sound_image", count=_HOPELESS, problem=error.problem, remedy=error.remedy))
-        elif self.processed == 0 and self.undecodable - self._spoiled.total() > _HOPELESS:
-            raise error  # not one pair fits: wrong rig, wrong camera
-        if self.undecodable.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: one bad camera must not fill the log
-            _LOG.warning(event("pair_failed", count=self.undecodable, problem=error.problem))
-
-    def _ledger(
-        self, pair: FramePair, processed: Processed, dequeued_ns: int, before_write_ns: int, done_ns: int
-    ) -> PairLedger:
-        board = pair.board
-        return PairLedger(
-            session=board.message.session,
-            sequence=board.message.sequence,
-            host_sequence=pair.host.sequence,
-            bytes=len(board.message.payload),
-            link=board.link,
-            board=board.marks,
-            received_ns=board.received_ns,
-            paired_ns=pair.paired_ns,
-            queued_ns=pair.queued_ns,
-            dequeued_ns=dequeued_ns,
-            done_ns=done_ns,
-            previous_done_ns=self.last_done_ns or pair.queued_ns,
-            stages=replace(processed.stages, write=done_ns - before_write_ns),
-            time_skew_ns=pair.time_skew_ns,
-            offset_ns=board.offset_ns,
-            uncertainty_ns=board.uncertainty_ns,
-        )
+        if self._camera.on_demand:
+            self._camera.want(exposed_ns, index)

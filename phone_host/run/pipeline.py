@@ -1,6 +1,8 @@
 """What the worker does with a pair: decode, interpolate if asked for, rectify or pass, match, reproject; each stage timed. The order of the stages lives here."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeVar
 
 from common.errors import DataError
 from common.frame import Frame
@@ -12,6 +14,8 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import enlarged
 from phone_host.stereo.interpolate import LARGEST_PART, Interpolator
 from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_frames
+
+T = TypeVar("T")
 
 
 class Pipeline:
@@ -53,37 +57,27 @@ class Pipeline:
             DataError: the cameras' sizes do not fit the rig.
         """
         board, host = _encoded(pair.board.message, "board", pair.board.asked_px), _encoded(pair.host, "host")
-        first, second = (board, host) if self._board_side is Side.LEFT else (host, board)
         start_ns = self._clock()
-        check = None if self._core is None else self._core.require_sizes
-        left, right = decode_frames(first, second, self._most_pixels, check)
-        if self._board_side is Side.LEFT:
-            left = _at_asked_size(left, pair.board)
-        else:
-            right = _at_asked_size(right, pair.board)
+        board_image, host_image = decode_frames(board, host, self._most_pixels, self._check_sizes)
+        board_image = _at_asked_size(board_image, pair.board)
         decoded_ns = self._clock()
-        if self._board_side is Side.LEFT:
-            left = self._at_host_time(pair, left)
-        else:
-            right = self._at_host_time(pair, right)
+        board_image = self._at_host_time(pair, board_image)
         interpolated_ns = self._clock()
-        early = StageTimes(decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
+        left, right = self._in_sides(board_image, host_image)
         if self._core is None:
-            return Processed(RectifiedPair(left, right), None, None, early)
-        rectified = self._core.rectify(left, right)
-        rectified_ns = self._clock()
-        disparity = self._core.match(rectified)
-        matched_ns = self._clock()
-        cloud = self._core.reproject(disparity) if self._core.geometry is not None else None
-        reprojected_ns = self._clock()
-        stages = StageTimes(
-            decode=early.decode,
-            interpolate=early.interpolate,
-            rectify=rectified_ns - interpolated_ns,
-            match=matched_ns - rectified_ns,
-            reproject=reprojected_ns - matched_ns,
-        )
-        return Processed(rectified, disparity, cloud, stages)
+            processed = Processed(RectifiedPair(left, right), None, None, StageTimes())
+        else:
+            processed = self._core.compute(left, right, self._clock)
+        stages = replace(processed.stages, decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
+        return replace(processed, stages=stages)
+
+    def _in_sides(self, board: T, host: T) -> tuple[T, T]:
+        """Left and right: the only place that knows which camera is which."""
+        return (board, host) if self._board_side is Side.LEFT else (host, board)
+
+    def _check_sizes(self, board_px: tuple[int, int], host_px: tuple[int, int]) -> None:
+        if self._core is not None:
+            self._core.require_sizes(*self._in_sides(board_px, host_px))
 
     def _at_host_time(self, pair: FramePair, image: Image) -> Image:
         """The board's image as it would have been at the host's exposure; as it is where the frame before is missing, far away or spoiled."""

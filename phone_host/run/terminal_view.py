@@ -1,5 +1,6 @@
 """The live table of a run in a terminal."""
 
+from collections.abc import Callable
 from types import TracebackType
 from typing import Final, Self
 
@@ -12,10 +13,10 @@ from rich.text import Text
 from common import now
 from phone_host.measure.accounts import rung_lines
 from phone_host.measure.delays import DELAYS, STAGES, Spread
+from phone_host.measure.losses import losses
 from phone_host.measure.regime import judge
-from phone_host.measure.run_facts import board_drops, figures
+from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.report.summary import camera_troubles, phase_lines
-from phone_host.run.host import Host
 
 _REFRESH_S: Final = 0.25
 _RECENT: Final = 300
@@ -23,16 +24,24 @@ _RECENT: Final = 300
 
 
 class LiveTable:
-    """Shows a host's delays while it runs; a context manager.
+    """Shows a run's delays while it goes on; a context manager.
 
     Args:
-        host: the run to show.
+        snapshot: gives the run as it is now.
         console: where; stderr by default, so that stdout stays for results.
         seconds: the run's planned length for the progress bar, s; 0 when it is counted in pairs or open.
+        pairs: the same in pairs.
     """
 
-    def __init__(self, host: Host, console: Console | None = None, seconds: float = 0.0) -> None:
-        self._host = host
+    def __init__(
+        self,
+        snapshot: Callable[[], RunSnapshot],
+        console: Console | None = None,
+        *,
+        seconds: float = 0.0,
+        pairs: int = 0,
+    ) -> None:
+        self._snapshot = snapshot
         self._live = Live(console=console or Console(stderr=True), auto_refresh=False, transient=True)
         self._seconds = seconds
         self._started_s = now.monotonic_ns() / 1e9
@@ -42,7 +51,7 @@ class LiveTable:
         self._progress = Progress(
             TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f}")
         )
-        total = seconds or host.settings.pairs
+        total = seconds or pairs
         self._task = self._progress.add_task("seconds" if seconds else "pairs", total=total) if total else None
 
     def __enter__(self) -> Self:
@@ -60,62 +69,55 @@ class LiveTable:
         if now_s - self._shown_s < _REFRESH_S:
             return
         self._shown_s = now_s
+        run = self._snapshot()
         pairs, since_s = self._last
         if now_s - since_s >= 1.0:
-            self._rate = (self._host.processed - pairs) / (now_s - since_s)
-            self._last = (self._host.processed, now_s)
+            self._rate = (run.processed - pairs) / (now_s - since_s)
+            self._last = (run.processed, now_s)
         if self._task is not None:
-            done = now_s - self._started_s if self._seconds else self._host.processed
-            self._progress.update(self._task, completed=done)
+            self._progress.update(self._task, completed=now_s - self._started_s if self._seconds else run.processed)
         bar = [self._progress] if self._task is not None else []
         # What is wrong comes first: a small terminal cuts off what is below.
-        shown = Group(*self._judgement(), self._table(), self._stages(), self._state(), *bar)
+        shown = Group(*_judgement(run), _table(run, self._rate), _stages(run), _state(run), *bar)
         self._live.update(shown, refresh=True)
 
-    def _table(self) -> Table:
-        table = Table(title=f"{self._host.processed} pairs, {self._rate:.1f} /s", title_justify="left")
-        table.add_column("delay, ms")
-        for name in ("p50", "p95", "p99", "max"):
-            table.add_column(name, justify="right")
-        for name in (*DELAYS, "time_skew"):
-            spread = self._host.delays.spread(name, _RECENT)
-            table.add_row(name.replace("_", "-"), *_values_ms(spread))
-        return table
 
-    def _stages(self) -> Text:
-        """Processing's shares in one line: with a row for each the warnings would leave a terminal of 24 lines."""
-        medians = [(name, self._host.delays.spread(name, _RECENT).p50_ns) for name in STAGES]
-        shares = [f"{name} {value_ns / 1e6:.1f}" for name, value_ns in medians if value_ns == value_ns]  # noqa: PLR0124 - NaN is the only value unlike itself
-        return Text(f"processing, p50 in ms: {', '.join(shares) or 'not yet'}", style="dim")
+def _table(run: RunSnapshot, rate: float) -> Table:
+    table = Table(title=f"{run.processed} pairs, {rate:.1f} /s", title_justify="left")
+    table.add_column("delay, ms")
+    for name in ("p50", "p95", "p99", "max"):
+        table.add_column(name, justify="right")
+    for name in (*DELAYS, "time_skew"):
+        table.add_row(name.replace("_", "-"), *_values_ms(run.delays.spread(name, _RECENT)))
+    return table
 
-    def _judgement(self) -> list[Text]:
-        """The queueing regime, what has befallen the two cameras, and what makes depth wrong."""
-        facts = self._host.facts("running")
-        warnings = [
-            Text(f"warning: {item.sentence}: {item.remedy}", style="bold red") for item in self._host.concerns()
-        ]
-        lines = (*camera_troubles(facts.camera), *rung_lines(facts.link))
-        camera = [Text(line, style="yellow") for line in lines]
-        return [Text(judge(figures(facts)).sentence, style="dim"), *camera, *warnings]
 
-    def _state(self) -> Text:
-        receiver, counts = self._host.receiver, self._host.queue.counts
-        estimate = receiver.estimate
-        clock = (
-            f"clock +-{estimate.uncertainty_ns / 1000:.0f} us (hard +-{estimate.bound_ns / 1000:.0f} us)"
-            if estimate
-            else "clock unknown"
-        )
-        carrier = receiver.carrier
-        board = f"board connected over {carrier}" if carrier else "waiting for the board"
-        drops = {f"{reason} (board)": count for reason, count in board_drops(receiver.account).items()}
-        drops["lost on the link"] = sum(account.lost for account in receiver.account.sessions)
-        drops |= {f"not believed: {reason.value}": count for reason, count in receiver.account.disbelieved.items()}
-        drops |= {f"{reason} (host)": count for reason, count in counts.board_orphans}
-        drops["full FIFO"] = counts.dropped
-        shown = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in drops.items() if count) or "none"
-        phase = "\n".join(phase_lines(self._host.queue.phase, self._host.alignment))
-        return Text(f"{board} · {clock} · drops: {shown}" + (f"\n{phase}" if phase else ""))
+def _stages(run: RunSnapshot) -> Text:
+    """Processing's shares in one line: with a row for each the warnings would leave a terminal of 24 lines."""
+    medians = [(name, run.delays.spread(name, _RECENT).p50_ns) for name in STAGES]
+    shares = [f"{name} {value_ns / 1e6:.1f}" for name, value_ns in medians if value_ns == value_ns]  # noqa: PLR0124 - NaN is the only value unlike itself
+    return Text(f"processing, p50 in ms: {', '.join(shares) or 'not yet'}", style="dim")
+
+
+def _judgement(run: RunSnapshot) -> list[Text]:
+    """The queueing regime, what has befallen the two cameras, and what makes depth wrong."""
+    warnings = [Text(f"warning: {item.sentence}: {item.remedy}", style="bold red") for item in concerns(run)]
+    lines = (*camera_troubles(run.camera), *rung_lines(run.link))
+    camera = [Text(line, style="yellow") for line in lines]
+    return [Text(judge(figures(run)).sentence, style="dim"), *camera, *warnings]
+
+
+def _state(run: RunSnapshot) -> Text:
+    estimate = run.estimate
+    clock = (
+        f"clock +-{estimate.uncertainty_ns / 1000:.0f} us (hard +-{estimate.bound_ns / 1000:.0f} us)"
+        if estimate
+        else "clock unknown"
+    )
+    board = f"board connected over {run.carrier}" if run.carrier else "waiting for the board"
+    lost = ", ".join(f"{loss.count} {loss.words}" for loss in losses(run)) or "nothing"
+    phase = "\n".join(phase_lines(run.phase, run.alignment))
+    return Text(f"{board} · {clock} · not used: {lost}" + (f"\n{phase}" if phase else ""))
 
 
 def _values_ms(spread: Spread) -> list[str]:

@@ -1,9 +1,12 @@
 """The stereo core: rectify or pass, match, reproject. One class for files and for live streams: both give the same bits.
 
-No I/O and no clocks here: the caller times the stages.
+No I/O, and no clock of its own: the caller brings the one by which the stages are timed.
 """
 
-from phone_host.model import CloudImage, Disparity, Image, RectifiedPair, StereoGeometry
+from collections.abc import Callable
+
+from common.ledger import StageTimes
+from phone_host.model import CloudImage, Disparity, Image, Processed, RectifiedPair, StereoGeometry
 from phone_host.stereo.images import require_same_size, size_px
 from phone_host.stereo.match import Matcher
 from phone_host.stereo.rectify import Rectifier
@@ -32,6 +35,31 @@ class StereoCore:
         self.rig = None if rectifier is None else rectifier.rig
         self._rectifier = rectifier
         self.geometry = geometry if rectifier is None else rectifier.geometry
+
+    def compute(self, left: Image, right: Image, clock: Callable[[], int]) -> Processed:
+        """All stages, each timed: rectify or pass, match, and reproject where the geometry is known.
+
+        Args:
+            left: (H, W) grey or (H, W, 3) BGR, uint8.
+            right: the same; another size is possible with a rectifier only.
+            clock: monotonic, ns.
+
+        Returns:
+            The rectified pair, its disparity, its cloud (None without geometry), and the times of these three stages.
+
+        Raises:
+            DataError: a size that does not fit the rig, or two sizes without a rig.
+        """
+        start_ns = clock()
+        pair = self.rectify(left, right)
+        rectified_ns = clock()
+        disparity = self.match(pair)
+        matched_ns = clock()
+        cloud = None if self.geometry is None else self.reproject(disparity)
+        times = StageTimes(
+            rectify=rectified_ns - start_ns, match=matched_ns - rectified_ns, reproject=clock() - matched_ns
+        )
+        return Processed(pair, disparity, cloud, times)
 
     def require_sizes(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> None:
         """Check that images of these sizes can be rectified, before they are decoded.

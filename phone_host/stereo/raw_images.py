@@ -48,31 +48,31 @@ class EncodedImage:
 
 
 def decode_frames(
-    left: EncodedImage,
-    right: EncodedImage,
+    first: EncodedImage,
+    second: EncodedImage,
     most_pixels: int = MOST_PIXELS,
     check: Callable[[tuple[int, int], tuple[int, int]], None] | None = None,
 ) -> tuple[Image, Image]:
     """Decode the two frames of a pair.
 
     Args:
-        left: the left frame.
-        right: the right frame, of the same encoding or another one.
+        first: the frame of one camera.
+        second: that of the other, of the same encoding or another one.
         most_pixels: what neither a camera nor a frame may exceed.
         check: told the whole sizes of both, px, before either is decoded; raises where they are of no use.
 
     Returns:
-        Left and right, each (H, W) grey or (H, W, 3) BGR, uint8.
+        Both in that order, each (H, W) grey or (H, W, 3) BGR, uint8.
 
     Raises:
         SpoiledImageError: one of the two is spoiled, or its size is not believed.
     """
-    first, second = _examined(left, most_pixels), _examined(right, most_pixels)
+    one, other = _examined(first, most_pixels), _examined(second, most_pixels)
     if check is not None:
-        check(left.whole_px, right.whole_px)
-    if isinstance(first, EncodedFile) and isinstance(second, EncodedFile):
-        return decode_files(first, second)
-    return _decoded(first), _decoded(second)
+        check(first.whole_px, second.whole_px)
+    if isinstance(one, EncodedFile) and isinstance(other, EncodedFile):
+        return decode_files(one, other)
+    return _decoded(one), _decoded(other)
 
 
 def decode_frame(image: EncodedImage, most_pixels: int = MOST_PIXELS) -> Image:

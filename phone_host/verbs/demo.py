@@ -64,19 +64,19 @@ def run(options: argparse.Namespace) -> int:
         write_rig(out / "rig.yaml", rig, rectify_rig(rig))
         with socket_folder() as sockets:
             demo = DemoRun(film, rig, out, sockets)
-            live = LiveTable(demo.host, console, options.seconds) if console.is_terminal else None
+            live = LiveTable(demo.host.snapshot, console, seconds=options.seconds) if console.is_terminal else None
             try:
                 with live or nullcontext():
                     demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
             except BaseException:
-                demo.host.results.finish(build(demo.host.facts("failed")))
+                demo.host.write_report(build(demo.host.snapshot("failed")))
                 raise
-        facts = demo.host.facts("stopped" if signals.stop else "time_over")
+        snapshot = demo.host.snapshot("stopped" if signals.stop else "time_over")
         errors = demo.check(scene)
-        report = build(facts) | {"truth": truth_json(errors)}
-        demo.host.results.finish(report)
+        report = build(snapshot) | {"truth": truth_json(errors)}
+        complete = demo.host.write_report(report)
         demo.write_pictures(out)
-        write_text(out / "index.html", demo_page(facts, errors, demo.last, demo.ledgers))
+        write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers))
     except _StoppedError:
         return INTERRUPTED if signals.interrupted else 0
     except OSError as error:
@@ -84,11 +84,11 @@ def run(options: argparse.Namespace) -> int:
             f"{error.filename or out} cannot be written ({error.strerror})",
             "make room, or give another folder with --out",
         ) from None
-    print(json.dumps(report) if options.json else summary(facts))
+    print(json.dumps(report) if options.json else summary(snapshot))
     print(_closing(out, film, errors), file=sys.stderr)
     if signals.stop:
         return INTERRUPTED if signals.interrupted else 0
-    return 0 if errors.pairs and not errors.wrong_pairs and demo.host.results.complete else _CHECK_FAILED
+    return 0 if errors.pairs and not errors.wrong_pairs and complete else _CHECK_FAILED
 
 
 def _clear(out: Path) -> None:
@@ -99,7 +99,7 @@ def _clear(out: Path) -> None:
         OSError: the folder cannot be used.
     """
     from phone_host.output.listed import ListedFolder  # noqa: PLC0415 - as in run
-    from phone_host.run.results import NAMES, PAIR_FILES  # noqa: PLC0415
+    from phone_host.run.file_sink import NAMES, PAIR_FILES  # noqa: PLC0415
 
     names = rf"{NAMES}|rig\.yaml|cloud\.ply|disparity\.png"
     folder = ListedFolder(out, names, kept="film", inner=PAIR_FILES)

@@ -13,7 +13,7 @@ from common.errors import SettingsError
 from common.link.factory import open_links, parse_link, tell_insecure
 from common.program import logs
 from common.program.commandline import INTERRUPTED
-from common.program.settings import Resolved, log_level, resolve
+from common.program.settings import Resolved, log_level, resolve, with_origins
 from common.program.signals import StopSignals
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import EXAMPLE, open_camera
@@ -128,12 +128,13 @@ def run(options: argparse.Namespace) -> int:
     from phone_host.report.run_json import build  # noqa: PLC0415
     from phone_host.report.run_page import run_page  # noqa: PLC0415
     from phone_host.report.summary import summary  # noqa: PLC0415
+    from phone_host.run.file_sink import NAMES  # noqa: PLC0415
     from phone_host.run.host import EndReason, Host  # noqa: PLC0415 - OpenCV, only now
-    from phone_host.run.results import NAMES  # noqa: PLC0415
     from phone_host.run.terminal_view import LiveTable  # noqa: PLC0415
     from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
 
-    settings = resolve_settings(options).values
+    resolved = resolve_settings(options)
+    settings = resolved.values
     check(settings)
     logs.set_up(log_level(settings.log_level))
     if not settings.camera:
@@ -152,26 +153,25 @@ def run(options: argparse.Namespace) -> int:
         tell_insecure(uri)
     links = open_links(uris, keys)
     signals = StopSignals()
-    host = Host(_host_settings(options, settings, fifo, board_side, core), camera, links, core)
-    live = LiveTable(host) if sys.stderr.isatty() else None
+    host = Host(_host_settings(options, resolved, fifo, board_side, core), camera, links, core)
+    live = LiveTable(host.snapshot, pairs=options.pairs) if sys.stderr.isatty() else None
     with live or nullcontext():
         try:
             ended = host.run(lambda: signals.stop, live.refresh if live else None)
         except BaseException:
-            host.results.finish(build(host.facts("failed")))
+            host.write_report(build(host.snapshot("failed")))
             raise
-    if host.receiver.hello is not None and len(named) == 1 and "?" not in named[0] and named[0].startswith("tcp://"):
+    if host.has_met_board and len(named) == 1 and "?" not in named[0] and named[0].startswith("tcp://"):
         remember(keys.path, named[0])
-    host.results.flush()
-    facts = host.facts(ended.value)
-    report = build(facts)
-    page = run_page(facts, host.last, board_side, host.sample.ledgers) if options.out else ""
-    host.results.finish(report, page)
-    print(json.dumps(report) if options.json else summary(facts))
+    snapshot = host.snapshot(ended.value)
+    report = build(snapshot)
+    page = run_page(snapshot, host.last, board_side, host.sample()) if options.out else ""
+    complete = host.write_report(report, page)
+    print(json.dumps(report) if options.json else summary(snapshot))
     if signals.interrupted:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
-    return _CHECK_FAILED if too_few or not host.results.complete else 0
+    return _CHECK_FAILED if too_few or not complete else 0
 
 
 def _core(
@@ -195,7 +195,7 @@ def _core(
 
 def _host_settings(
     options: argparse.Namespace,
-    settings: PhoneHostSettings,
+    resolved: Resolved[PhoneHostSettings],
     fifo: "FifoSettings",
     board_side: "Side",
     core: "StereoCore | None",
@@ -204,7 +204,9 @@ def _host_settings(
     from phone_host.run.host import HostSettings  # noqa: PLC0415 - OpenCV, only now
     from phone_host.sync.phase import Whose  # noqa: PLC0415
 
+    settings = resolved.values
     return HostSettings(
+        resolved=with_origins(resolved, vars(options)),
         board_side=board_side,
         tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
         fifo=fifo,

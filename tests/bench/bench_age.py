@@ -28,8 +28,9 @@ from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.children.board_process import board_process, free_port
-from phone_host.model import Disparity, Processed, RectifiedPair
+from phone_host.model import Disparity, RectifiedPair, Result
 from phone_host.run.host import Host, HostSettings
+from phone_host.run.sinks import FunctionSink
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
 from tests.bench.machine import machine
@@ -95,7 +96,7 @@ class WatchedHost(Host):
             open_camera(right, HOST_CLOCK, now.monotonic_ns()),
             [open_link(parse_link(address, listens_by_default=False))],
             StereoCore(SlowMatcher()),
-            self._keep,
+            [FunctionSink("bench", self._keep, waits=True)],
         )
 
     def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
@@ -104,9 +105,8 @@ class WatchedHost(Host):
         self.link_ages.append((now_ns, now_ns - exposed_ns))
         super().frame_arrived(exposed_ns, index)
 
-    def _keep(self, processed: Processed, ledger: PairLedger) -> None:
-        del processed
-        self.ledgers.append(ledger)
+    def _keep(self, result: Result) -> None:
+        self.ledgers.append(result.ledger)
 
 
 def windows(ages: Sequence[tuple[int, int]]) -> tuple[Window, Window]:
@@ -138,12 +138,12 @@ def ours(policy: str, folder: Path, seconds: float) -> Row:
         host.run(finished)
         account = board.stop()
         stopped_ns = now.monotonic_ns()
-    before = host.receiver.account.sessions[-1].first.grabbed
+    run = host.snapshot("stopped")
+    before = run.link.sessions[-1].first.grabbed
     # The board's count begins with its life and ends with it; the first frame that came tells when frame `before` was exposed.
     grabbed, since_ns = account.grabbed - before, host.link_ages[0][0] - host.link_ages[0][1]
     pipeline = [(ledger.dequeued_ns, ledger.dequeued_ns - ledger.board.exposed_ns) for ledger in host.ledgers]
-    span_s = (host.last_done_ns - host.first_done_ns) / 1e9
-    rates = (grabbed / ((stopped_ns - since_ns) / 1e9), (host.processed - 1) / span_s)
+    rates = (grabbed / ((stopped_ns - since_ns) / 1e9), run.pairs_per_second)
     return Row(f"FIFO 1:{policy}", windows(host.link_ages), windows(pipeline), *rates)
 
 

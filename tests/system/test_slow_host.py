@@ -10,9 +10,10 @@ from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.measure.regime import Regime, judge
-from phone_host.measure.run_facts import figures
-from phone_host.model import Processed
+from phone_host.measure.run_snapshot import figures
+from phone_host.model import Result
 from phone_host.run.host import EndReason, Host, HostSettings
+from phone_host.run.sinks import FunctionSink
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
 from tests.support.numbered import write_film
@@ -30,8 +31,8 @@ def test_pairs_do_not_get_older_on_a_slow_host(fifo: str, tmp_path: Path) -> Non
     uri, policy = f"replay:{film}?fps={FPS}&loop=1", FifoSettings.parse(fifo)
     kept: list[PairLedger] = []
 
-    def keep(_: Processed, ledger: PairLedger) -> None:
-        kept.append(ledger)
+    def keep(result: Result) -> None:
+        kept.append(result.ledger)
 
     slow_ns = 10 * PERIOD_NS
     with board(["run", "--camera", uri, "--link", link, "--json"], tmp_path) as sender:
@@ -42,7 +43,7 @@ def test_pairs_do_not_get_older_on_a_slow_host(fifo: str, tmp_path: Path) -> Non
             camera,
             [open_link(parse_link(link, listens_by_default=False))],
             core,
-            keep,
+            [FunctionSink("test", keep, waits=True)],
         )
         assert host.run(lambda: False) is EndReason.PAIRS_REACHED
         assert sender.stop() == 0
@@ -55,10 +56,10 @@ def test_pairs_do_not_get_older_on_a_slow_host(fifo: str, tmp_path: Path) -> Non
     assert account["grabbed"] == account["sent"] + sum(account["dropped"].values())
     assert account["camera"]["missed"] == 0
     assert account["grabbed"] > kept[-1].sequence
-    judgement = judge(figures(host.facts("pairs_reached")))
+    judgement = judge(figures(host.snapshot("pairs_reached")))
     assert judgement.regime is Regime.BACKLOG
     assert any("smaller images" in remedy for remedy in judgement.remedies)
-    counts = host.queue.counts
+    counts = host.snapshot("pairs_reached").counts
     assert counts.received == counts.paired + counts.held_board + sum(n for _, n in counts.board_orphans)
     assert counts.paired == counts.taken + counts.dropped + counts.waiting
     if fifo.endswith("block"):

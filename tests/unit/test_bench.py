@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import SettingsError
-from common.ledger import BoardMarks, PairLedger, StageTimes
+from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts
 from phone_host.bench.analysis import Analysis, analyse
 from phone_host.bench.cases import (
@@ -67,6 +67,7 @@ def ledger(number: int, period_ns: int = 33_000_000) -> PairLedger:
         time_skew_ns=-5_000,
         offset_ns=0,
         uncertainty_ns=40_000,
+        host=HostMarks(exposed_ns + 5_000, exposed_ns + 1_000_000),
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.ledger import BoardMarks, PairLedger, StageTimes
+from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 from phone_host.measure.delays import DELAYS, EXACT, STAGES, DelayStatistics, Series
 
 
@@ -76,7 +76,9 @@ def test_nothing_measured_is_nan() -> None:
 def test_each_delay_of_a_ledger_reaches_its_series() -> None:
     """Marks 1, 2, 4, ... ns apart give each delay and stage its own value, and time skews lose their sign."""
     board = BoardMarks(0, 1, 3)
-    ledger = PairLedger("s", 0, 0, 9, "tcp", board, 7, 9, 15, 31, 63, 14, StageTimes(1, 2, 3, 4, 5, 6), -77, 0, 88)
+    ledger = PairLedger(
+        "s", 0, 0, 9, "tcp", board, 7, 9, 15, 31, 63, 14, StageTimes(1, 2, 3, 4, 5, 6), -77, 0, 88, host=HostMarks(0, 0)
+    )
     statistic = DelayStatistics()
     statistic.add(ledger)
     expected = (1, 2, 4, 8, 16, 32, 63, 1)

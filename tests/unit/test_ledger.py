@@ -6,7 +6,7 @@ from dataclasses import replace
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.ledger import BoardMarks, PairLedger, StageTimes
+from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 
 TIMES_NS = st.integers(-(2**62), 2**62)
 MARKS = st.builds(BoardMarks, TIMES_NS, TIMES_NS, TIMES_NS)
@@ -29,14 +29,15 @@ LEDGERS = st.builds(
     time_skew_ns=TIMES_NS,
     offset_ns=TIMES_NS,
     uncertainty_ns=DURATIONS_NS,
+    host=st.builds(HostMarks, TIMES_NS, TIMES_NS),
 )
 
 KEYS = (
     "session, sequence, host_sequence, bytes, link, exposed_ns grabbed_ns sent_ns received_ns paired_ns queued_ns dequeued_ns done_ns, "
     "capture_ns outbox_ns propagation_ns pairing_ns queuing_ns processing_ns end_to_end_ns starvation_ns, stages_ns, time_skew_ns, "
-    "offset_ns, uncertainty_ns"
+    "offset_ns, uncertainty_ns, host_exposed_ns host_grabbed_ns"
 )
-"""The keys of delays.jsonl as the design lists them."""
+"""The keys of delays.jsonl as the design lists them, and the host frame's own marks."""
 
 
 @given(LEDGERS)

@@ -14,7 +14,7 @@ from common.errors import DataError, SettingsError, TandemError, UnavailableErro
 from common.files import read_whole
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.listed import LIST, ListedFolder, claim
-from phone_host.run.results import NAMES, PAIR_FILES, Results
+from phone_host.run.file_sink import NAMES, PAIR_FILES, FileSink
 from phone_host.verbs.output_folders import spare_inputs
 
 FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
@@ -22,7 +22,7 @@ FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
 
 def earlier_run(folder: Path) -> None:
     """What a run of three pairs leaves, the last of them killed half-way."""
-    results = Results(folder, 1)
+    results = FileSink(folder, 1)
     assert results._own is not None
     for name in ("pair-000000", "pair-1000000"):
         results._own.add(name)
@@ -33,7 +33,7 @@ def earlier_run(folder: Path) -> None:
     (folder / "pair-000002.part").mkdir()
     (folder / "pair-000002.part" / f".left.png.{'0' * 16}.part").write_bytes(b"x")
     (folder / f".report.json.{'0' * 16}.part").write_bytes(b"x")
-    results.finish({"of": "an earlier run"}, "<html>")
+    results.close({"of": "an earlier run"}, "<html>")
 
 
 def tree(folder: Path) -> dict[str, bytes]:
@@ -52,23 +52,23 @@ def test_a_later_run_removes_what_an_earlier_one_left_and_nothing_else(tmp_path:
     for name, content in mine.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_bytes(content)
-    results = Results(tmp_path, 1)
+    results = FileSink(tmp_path, 1)
     left = tree(tmp_path)
     assert left.pop(LIST)
     assert left == {**mine, "delays.jsonl": b""}
-    results.finish({})
+    results.close({})
 
 
 def test_a_run_again_and_again_in_one_folder(tmp_path: Path) -> None:
     """Each run takes the place of the one before, also after it was killed before its report."""
     for number in range(3):
-        Results(tmp_path, 1).finish({"number": number})
-    killed = Results(tmp_path, 1)
+        FileSink(tmp_path, 1).close({"number": number})
+    killed = FileSink(tmp_path, 1)
     assert killed._own is not None
     with pytest.raises(UnavailableError, match="is being written by another run"):
-        Results(tmp_path, 1)
+        FileSink(tmp_path, 1)
     killed._own.close()
-    Results(tmp_path, 1).finish({})
+    FileSink(tmp_path, 1).close({})
     assert sorted(path.name for path in tmp_path.iterdir()) == [LIST, "delays.jsonl", "report.json"]
 
 
@@ -86,7 +86,7 @@ def refused(out: Path, name: str) -> None:
     """A run into this folder ends with one line that names what is in the way and the remedy; nothing is changed by then."""
     before = tree(out.parent)
     with pytest.raises(UnavailableError, match=name) as caught:
-        Results(out, 1)
+        FileSink(out, 1)
     assert "--out" in str(caught.value)
     assert "\n" not in str(caught.value)
     assert tree(out.parent) == before
@@ -124,13 +124,13 @@ def test_a_users_file_in_a_pair_of_ours_ends_the_run(file: str, tmp_path: Path) 
     (tmp_path / "pair-000000" / file).write_text("mine")
     before = tree(tmp_path)
     with pytest.raises(UnavailableError, match=f"pair-000000/{file}"):
-        Results(tmp_path, 1)
+        FileSink(tmp_path, 1)
     assert tree(tmp_path) == before
     (tmp_path / "pair-000000" / file).unlink()
     (tmp_path / "pair-000000" / "left.png").unlink()
     (tmp_path / "pair-000000" / "left.png").symlink_to(tmp_path / "report.json")
     with pytest.raises(UnavailableError, match="pair-000000/left"):
-        Results(tmp_path, 1)
+        FileSink(tmp_path, 1)
     assert (tmp_path / "report.json").exists()
 
 
@@ -138,10 +138,10 @@ def test_a_link_planted_while_the_run_goes_on_is_replaced(tmp_path: Path) -> Non
     """A link under report.json or index.html that appears after the start is replaced by the report; its target stays as it is."""
     precious, out = tmp_path / "precious", tmp_path / "out"
     precious.write_text("precious")
-    results = Results(out, 1)
+    results = FileSink(out, 1)
     (out / "report.json").symlink_to(precious)
     (out / "index.html").symlink_to(precious)
-    results.finish({"a": 1}, "<html>")
+    results.close({"a": 1}, "<html>")
     assert precious.read_text() == "precious"
     assert not (out / "report.json").is_symlink()
     assert (out / "index.html").read_text() == "<html>"
@@ -158,10 +158,10 @@ def test_every_writer_replaces_a_link(write: Callable[[Path], None], tmp_path: P
 
 def test_a_torn_last_line_of_the_list_counts_for_nothing(tmp_path: Path) -> None:
     """A list whose last line was cut by a full disk names what stands before it; the next run mends it."""
-    Results(tmp_path, 1).finish({})
+    FileSink(tmp_path, 1).close({})
     with (tmp_path / LIST).open("a") as list_file:
         list_file.write("pair-0000")
-    Results(tmp_path, 1).finish({})
+    FileSink(tmp_path, 1).close({})
     assert "pair-0000" not in (tmp_path / LIST).read_text()
 
 
@@ -172,7 +172,7 @@ def test_what_another_verb_has_listed_stays(tmp_path: Path) -> None:
     other.close()
     for name in ("disparity.pfm", "report.json"):
         (tmp_path / name).write_text("of stereo")
-    Results(tmp_path, 1).finish({})
+    FileSink(tmp_path, 1).close({})
     assert (tmp_path / "disparity.pfm").read_text() == "of stereo"
     ListedFolder(tmp_path, r"disparity\.pfm").close()
     assert not (tmp_path / "disparity.pfm").exists()
@@ -181,7 +181,7 @@ def test_what_another_verb_has_listed_stays(tmp_path: Path) -> None:
 def test_a_list_with_ways_out_of_the_folder_leads_nowhere(tmp_path: Path) -> None:
     """Whoever writes the list can have results removed, nothing above the folder and nothing of another name."""
     out = tmp_path / "out"
-    Results(out, 1).finish({})
+    FileSink(out, 1).close({})
     (tmp_path / "report.json").write_text("precious")
     (out / "notes.txt").write_text("precious")
     with (out / LIST).open("a") as list_file:
@@ -223,7 +223,7 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to("nowhere/at/all")
     for name in ("file", "link"):
         with pytest.raises(TandemError, match=rf"{name}.*--out"):
-            Results(tmp_path / name, 1)
+            FileSink(tmp_path / name, 1)
 
 
 def test_names_are_claimed_before_they_are_written(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from common.ledger import BoardMarks, PairLedger, StageTimes
+from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 from phone_host.measure.delay_fit import fit_delay
 from phone_host.svg.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
 from phone_host.svg.plot_parts import point_legend
@@ -66,7 +66,9 @@ def test_a_pairs_bars_are_as_long_as_its_delays() -> None:
     """Delays of 10, 20, 40, 10, 20 and 100 ms are bars of these lengths on one scale, each beginning where the one before ends."""
     board = BoardMarks(0, 10 * MS, 30 * MS)
     marks = (70 * MS, 80 * MS, 80 * MS, 100 * MS, 200 * MS, 0)
-    ledger = PairLedger("s", 0, 0, 9, "tcp", board, *marks, StageTimes(match=90 * MS, write=10 * MS), 0, 0, 0)
+    ledger = PairLedger(
+        "s", 0, 0, 9, "tcp", board, *marks, StageTimes(match=90 * MS, write=10 * MS), 0, 0, 0, host=HostMarks(0, 0)
+    )
     root = svg(lives([Life("tcp, typical", ledger)], 500))
     bars = {
         (title.text or "").partition(":")[0]: (float(bar.get("x", "nan")), float(bar.get("width", "nan")))

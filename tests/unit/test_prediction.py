@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from common.ledger import BoardMarks, PairLedger, StageTimes
+from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 from phone_host.bench.emulate import PROFILES
 from phone_host.bench.prediction import (
     Cell,
@@ -39,7 +39,11 @@ def cell(interface: str = "tcp", size_bytes: int = 10_000, period_ms: int = 40, 
         board = BoardMarks(exposed_ns, exposed_ns + 1 * MS, exposed_ns + 1 * MS)
         done_ns = received_ns + processing_ns
         marks = (received_ns, received_ns, received_ns, received_ns, done_ns, done_ns - period_ms * MS)
-        ledgers.append(PairLedger("s", number, number, size_bytes, "tcp", board, *marks, StageTimes(), 0, 0, 0))
+        ledgers.append(
+            PairLedger(
+                "s", number, number, size_bytes, "tcp", board, *marks, StageTimes(), 0, 0, 0, host=HostMarks(0, 0)
+            )
+        )
     return Cell(
         interface,
         self_paced=False,

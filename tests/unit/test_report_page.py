@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
-from common.ledger import BoardMarks, PairLedger, StageTimes
+from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 from phone_host.report.page_frame import document
 from phone_host.report.report_page import (
     DelaySeries,
@@ -90,7 +90,23 @@ def ledger(number: int, delays_ms: tuple[int, ...] = (1, 2, 3, 4, 5, 20), start_
     stages = StageTimes(1_000_000, 0, 2_000_000, 10_000_000, 3_000_000, 4_000_000)
     board = BoardMarks(exposed, grabbed, sent)
     return PairLedger(
-        "s", number, number, 1, "tcp", board, received, received, queued, dequeued, done, queued, stages, -7000, 0, 9000
+        "s",
+        number,
+        number,
+        1,
+        "tcp",
+        board,
+        received,
+        received,
+        queued,
+        dequeued,
+        done,
+        queued,
+        stages,
+        -7000,
+        0,
+        9000,
+        host=HostMarks(exposed + 7000, grabbed),
     )
 
 

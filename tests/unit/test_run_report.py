@@ -6,11 +6,12 @@ from typing import Any
 import pytest
 
 from common.camera.base import CameraHealth, CameraState
-from common.ledger import BoardMarks, PairLedger, StageTimes
+from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts
 from phone_host.measure.accounts import LinkAccount, SessionAccount
 from phone_host.measure.delays import DelayStatistics
-from phone_host.measure.run_facts import RunFacts
+from phone_host.measure.losses import losses
+from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.model import PairCounts, Side, TimeOffset, Unwritten
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
@@ -23,31 +24,48 @@ NAN = float("nan")
 MS = 1_000_000
 
 
-def facts(pairs: int) -> RunFacts:
+def run(pairs: int) -> RunSnapshot:
     """A run of some pairs, 50 ms apart, whose image motion nobody measured."""
     delays = DelayStatistics()
     for number in range(pairs):
         at = number * 50 * MS
         marks = (at + 3 * MS, at + 4 * MS, at + 4 * MS, at + 5 * MS, at + 15 * MS, at)
         board = BoardMarks(at, at + MS, at + 2 * MS)
-        delays.add(PairLedger("s", number, number, 9, "ipc", board, *marks, StageTimes(), 0, 0, 50))
+        delays.add(
+            PairLedger(
+                "s", number, number, 9, "ipc", board, *marks, StageTimes(), 0, 0, 50, host=HostMarks(at, at + MS)
+            )
+        )
     counts = PairCounts(received=pairs, paired=pairs, taken=pairs)
     seconds = max(0, pairs - 1) * 0.05
-    account = (FifoSettings(), Unwritten(0, 0, ""), 0, 0, CameraHealth(CameraState.RUNNING), 50 * MS, NAN, 0)
-    return RunFacts("stopped", pairs, 0, seconds, delays, counts, LinkAccount([]), None, 25 * MS, *account)
+    return RunSnapshot(
+        ended="stopped",
+        processed=pairs,
+        undecodable=0,
+        seconds=seconds,
+        delays=delays,
+        counts=counts,
+        link=LinkAccount([]),
+        estimate=None,
+        tolerance_ns=25 * MS,
+        fifo=FifoSettings(),
+        unwritten=Unwritten(),
+        camera=CameraHealth(CameraState.RUNNING),
+        period_ns=50 * MS,
+    )
 
 
 @pytest.mark.parametrize("pairs", [0, 1, 30])
 def test_what_was_not_measured_is_no_number(pairs: int) -> None:
     """Neither the summary nor the page of a run of no pair, of one or of many shows `nan` or `inf`."""
-    text = summary(facts(pairs)) + run_page(facts(pairs), None, Side.LEFT, ())
+    text = summary(run(pairs)) + run_page(run(pairs), None, Side.LEFT, ())
     assert not any(word in text for word in (" nan", "(nan", ">nan", " inf ", "nan<"))
 
 
 def test_a_rate_needs_two_pairs() -> None:
     """One pair has no rate; 31 pairs 50 ms apart are 20 a second."""
-    assert summary(facts(1)).startswith("1 pairs, ended: stopped\n")
-    assert summary(facts(31)).startswith("31 pairs in 1.5 s (20.0 /s), ended: stopped\n")
+    assert summary(run(1)).startswith("1 pairs, ended: stopped\n")
+    assert summary(run(31)).startswith("31 pairs in 1.5 s (20.0 /s), ended: stopped\n")
 
 
 def test_the_phase_is_told_with_its_side() -> None:
@@ -65,20 +83,25 @@ def test_a_late_frame_has_one_reason() -> None:
     """A lost frame that came after all stays lost and is no stale one, so that what was sent is what was received and lost, to the frame."""
     sent = BoardCounts(grabbed=10, sent=10)
     account = SessionAccount("s", BoardCounts(), sent, received=7, lost=3, late=2, duplicate=1)
-    seen = replace(facts(7), link=LinkAccount([account]))
+    seen = replace(run(7), link=LinkAccount([account]))
     told: Any = build(seen)["sessions"]
     assert told[0]["sent"] == told[0]["received"] + told[0]["lost"]
     assert (told[0]["lost_late"], told[0]["stale"]) == (2, {"duplicate": 1, "old_session": 0})
-    assert "3 lost on the link (2 of them came too late), 1 stale" in summary(seen)
+    found = {loss.place: loss.count for loss in losses(seen)}
+    assert found == {
+        "frames lost on the link": 1,
+        "frames that came too late over another link": 2,
+        "frames delivered again": 1,
+    }
 
 
 def test_only_stamps_that_nobody_knows_are_called_unmeasured() -> None:
     """Cameras whose stamps say by definition when they exposed need no measuring; others are told how; what was measured is told."""
     told = "cameras' stamps"
-    assert f"{told} agree to" in summary(facts(31))
-    assert told not in summary(replace(facts(31), stamps_exact=True))
+    assert f"{told} agree to" in summary(run(31))
+    assert told not in summary(replace(run(31), stamps_exact=True))
     measured = TimeOffset(offset_ns=3 * MS, uncertainty_ns=MS // 2)
-    assert f"{told} differ by +3.00 +-0.50 ms" in summary(replace(facts(31), time_offset=measured))
+    assert f"{told} differ by +3.00 +-0.50 ms" in summary(replace(run(31), time_offset=measured))
 
 
 def test_what_was_not_believed_is_told_everywhere() -> None:
@@ -88,7 +111,7 @@ def test_what_was_not_believed_is_told_everywhere() -> None:
     account.disbelieved[Disbelief.CREDIT] = 2
     link = LinkAccount([account], clock_doubts=2, clock_steps=1)
     link.suspects.append(Suspects("s", 11, 17, 7))
-    seen = replace(facts(30), link=link, own_future=4, spoiled_images=(("too_large", 5),))
+    seen = replace(run(30), link=link, own_future=4, spoiled_images=(("too_large", 5),))
     told: Any = build(seen)
     assert told["clock"]["steps"] == 1
     assert told["clock"]["doubts"] == 2

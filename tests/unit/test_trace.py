@@ -5,7 +5,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.ledger import BoardMarks, PairLedger, StageTimes
+from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 from phone_host.bench.trace import TracedRun, trace_json
 from tests.support.trace_format import checked
 
@@ -28,7 +28,9 @@ def runs(draw: st.DrawFn) -> tuple[PairLedger, ...]:
         done_ns = dequeued_ns + rest_ns + sum(getattr(stages, name) for name in StageTimes.__slots__)
         board = BoardMarks(grabbed_ns - draw(st.integers(0, 10**9)), grabbed_ns, sent_ns)
         marks = (received_ns, queued_ns, queued_ns, dequeued_ns, done_ns, 0)
-        ledgers.append(PairLedger("s", number, number, 1000, "tcp", board, *marks, stages, 5, 0, 9))
+        ledgers.append(
+            PairLedger("s", number, number, 1000, "tcp", board, *marks, stages, 5, 0, 9, host=HostMarks(0, 0))
+        )
     return tuple(ledgers)
 
 
@@ -65,6 +67,8 @@ def test_a_pairs_slices_are_its_delays_one_behind_the_other(ledgers: tuple[PairL
 def test_a_clock_that_errs_gives_no_negative_slice() -> None:
     """A frame that seems to come before it was sent, within the clock's uncertainty, is shown as a slice without length."""
     board = BoardMarks(0, 1000, 2000)
-    ledger = PairLedger("s", 0, 0, 9, "ipc", board, 1990, 3000, 3000, 4000, 5000, 0, StageTimes(), 0, 0, 50)
+    ledger = PairLedger(
+        "s", 0, 0, 9, "ipc", board, 1990, 3000, 3000, 4000, 5000, 0, StageTimes(), 0, 0, 50, host=HostMarks(0, 0)
+    )
     events = checked(trace_json([TracedRun("run", (ledger,))]))
     assert [event["dur"] for event in events if event["name"] == "propagation"] == [0.0]

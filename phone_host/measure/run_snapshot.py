@@ -1,4 +1,4 @@
-"""What a run was, in one object, and what others judge it by. Pure."""
+"""What a run is at one moment, in one object of copied values: terminal, page and JSON show this and nothing else. Pure."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -8,6 +8,7 @@ from common.frame import NOT_AS_SAID
 from phone_host.measure.accounts import LinkAccount
 from phone_host.measure.delays import DelayStatistics
 from phone_host.measure.regime import RunFigures
+from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import (
     NO_DOUBT,
     Concern,
@@ -24,21 +25,23 @@ from phone_host.sync.phase import Alignment, Phase
 from phone_host.sync.quarantine import Disbelief
 
 
-@dataclass(frozen=True, slots=True)
-class RunFacts:
-    """Everything a report is made of.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunSnapshot:
+    """Everything that presenters show. Nothing in it changes afterwards.
 
     Attributes:
-        ended: why the run ended.
-        processed: pairs whose results were written.
+        ended: why the run ended, or `running`.
+        processed: pairs whose results were handed to the sinks.
         undecodable: pairs whose bytes were no images.
         seconds: from the first to the last result, s.
-        delays: of the processed pairs.
+        delays: of the processed pairs, a copy.
         counts: of frames and pairs on the host.
-        link: the link's account.
+        link: the link's account, a copy.
+        carrier: name of the link that frames come over now; empty while there is none.
         estimate: the last clock estimate, if there was one.
         tolerance_ns: greatest time skew of a pair.
         fifo: depth and policy.
+        sinks: how each sink has fared.
         unwritten: what the disk did not take.
         spoiled: own frames that were no whole images.
         skipped: own frames that a newer one had replaced before they were looked at.
@@ -53,6 +56,7 @@ class RunFacts:
         interpolated: whether the board's images were taken to the moment of the host's, so that their time skew did no harm.
         spoiled_images: pairs one of whose images was not the whole image that it claimed to be, by reason; part of `undecodable`.
         stamps_exact: whether both cameras' stamps say by definition when their images were exposed.
+        judged_pairs: over how many of the newest pairs time and motion are judged; None: over all.
     """
 
     ended: str
@@ -66,19 +70,22 @@ class RunFacts:
     tolerance_ns: int
     fifo: FifoSettings
     unwritten: Unwritten
-    spoiled: int
-    skipped: int
     camera: CameraHealth
     period_ns: int
-    motion_px_s: float
-    width_px: int
+    carrier: str = ""
+    sinks: tuple[SinkAccount, ...] = ()
+    spoiled: int = 0
+    skipped: int = 0
     own_future: int = 0
+    motion_px_s: float = float("nan")
+    width_px: int = 0
     interpolated: bool = False
     stamps_exact: bool = False
     spoiled_images: tuple[tuple[str, int], ...] = ()
     time_offset: TimeOffset = field(default_factory=TimeOffset)
     phase: Phase | None = None
     alignment: Alignment | None = None
+    judged_pairs: int | None = None
 
     @property
     def stopped(self) -> int:
@@ -91,17 +98,17 @@ class RunFacts:
         return (self.processed - 1) / self.seconds if self.processed > 1 and self.seconds > 0 else float("nan")
 
 
-def figures(facts: RunFacts) -> RunFigures:
+def figures(run: RunSnapshot) -> RunFigures:
     """What the queueing regime is judged by, over the whole run."""
-    processed = facts.processed
-    interval_ns = facts.seconds * 1e9 / (processed - 1) if processed > 1 else float("nan")
+    processed = run.processed
+    interval_ns = run.seconds * 1e9 / (processed - 1) if processed > 1 else float("nan")
     return figures_of(
-        facts.delays,
-        facts.counts,
+        run.delays,
+        run.counts,
         processed,
         interval_ns=interval_ns,
-        period_ns=facts.period_ns,
-        overflow=facts.fifo.overflow,
+        period_ns=run.period_ns,
+        overflow=run.fifo.overflow,
     )
 
 
@@ -139,59 +146,40 @@ def figures_of(
     )
 
 
-def time_and_motion(facts: RunFacts, last: int | None = None) -> Timing:
-    """What time and motion are.
-
-    Args:
-        facts: the run.
-        last: over how many of the newest pairs; None for all.
-    """
+def time_and_motion(run: RunSnapshot) -> Timing:
+    """What time and motion are, over the pairs that are to be judged."""
+    last = run.judged_pairs
     return Timing(
-        time_skew_ns=float("nan") if facts.interpolated else facts.delays.spread("time_skew", last).p95_ns,
-        uncertainty_ns=facts.delays.spread("uncertainty", last).p50_ns,
-        end_to_end_ns=facts.delays.spread("end_to_end", last).p50_ns,
-        motion_px_s=facts.motion_px_s,
-        width_px=facts.width_px,
-        stamps=NO_DOUBT if facts.stamps_exact else stamp_doubt(facts.time_offset, facts.camera),
+        time_skew_ns=float("nan") if run.interpolated else run.delays.spread("time_skew", last).p95_ns,
+        uncertainty_ns=run.delays.spread("uncertainty", last).p50_ns,
+        end_to_end_ns=run.delays.spread("end_to_end", last).p50_ns,
+        motion_px_s=run.motion_px_s,
+        width_px=run.width_px,
+        stamps=NO_DOUBT if run.stamps_exact else stamp_doubt(run.time_offset, run.camera),
     )
 
 
-def concerns(facts: RunFacts, last: int | None = None) -> tuple[Concern, ...]:
-    """What makes the depth of a run wrong or its figures doubtful, the gravest first.
-
-    Args:
-        facts: the run.
-        last: how many of the newest pairs time and motion are judged by; None: all.
-    """
-    link = facts.link
+def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
+    """What makes the depth of a run wrong or its figures doubtful, the gravest first."""
+    link = run.link
     unbelieved = Unbelieved(
         clock_steps=link.clock_steps,
         suspect_frames=sum(suspects.frames for suspects in link.suspects),
-        disbelieved=disbelieved(facts),
+        disbelieved=disbelieved(run),
         received=sum(account.received + account.disbelieved[Disbelief.CREDIT] for account in link.sessions),
-        spoiled_images=spoiled(facts),
+        spoiled_images=spoiled(run),
     )
-    return unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(facts, last))
+    return unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
 
 
-def spoiled(facts: RunFacts) -> dict[str, int]:
+def spoiled(run: RunSnapshot) -> dict[str, int]:
     """Images of either camera that were not what their headers said, by what was wrong; those that a camera drops as cut short are told with it."""
-    found = Counter(dict(facts.spoiled_images))
-    found.update({fault.value: count for fault, count in facts.camera.faults if fault in NOT_AS_SAID})
+    found = Counter(dict(run.spoiled_images))
+    found.update({fault.value: count for fault, count in run.camera.faults if fault in NOT_AS_SAID})
     return {reason: count for reason, count in found.items() if count}
 
 
-def disbelieved(facts: RunFacts) -> dict[str, int]:
+def disbelieved(run: RunSnapshot) -> dict[str, int]:
     """Frames that came and were not believed, by reason, the own camera's last."""
-    found = {reason.value: count for reason, count in facts.link.disbelieved.items()}
-    return found | ({"own_from_the_future": facts.own_future} if facts.own_future else {})
-
-
-def board_drops(link: LinkAccount) -> dict[str, int]:
-    """Frames that the board dropped while this host was connected, by reason."""
-    drops: dict[str, int] = {}
-    for account in link.sessions:
-        before = dict(account.first.dropped)
-        for reason, count in account.latest.dropped:
-            drops[reason.value] = drops.get(reason.value, 0) + count - before.get(reason, 0)
-    return drops
+    found = {reason.value: count for reason, count in run.link.disbelieved.items()}
+    return found | ({"own_from_the_future": run.own_future} if run.own_future else {})

@@ -1,0 +1,76 @@
+"""Everything that came and was not used, by place and reason, in the order of its way: counted here once, for every presenter. Pure."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from phone_host.measure.accounts import LinkAccount
+from phone_host.measure.run_snapshot import RunSnapshot, disbelieved
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """One place and reason.
+
+    Attributes:
+        place: where they ended, with what they are, for example `frames dropped on the board`.
+        reason: why, in the words of its account; empty where the place says it.
+        count: how many, at least 1.
+    """
+
+    place: str
+    reason: str
+    count: int
+
+    @property
+    def words(self) -> str:
+        """Place and reason for people."""
+        return f"{self.place}: {self.reason}".replace("_", " ") if self.reason else self.place
+
+
+def losses(run: RunSnapshot) -> tuple[Loss, ...]:
+    """What was not used, as far as it is known; nothing is told twice."""
+    return tuple(loss for loss in (*_on_the_way(run), *_on_the_host(run)) if loss.count)
+
+
+def _on_the_way(run: RunSnapshot) -> Iterator[Loss]:
+    sessions = run.link.sessions
+    for reason, count in board_drops(run.link).items():
+        yield Loss("frames dropped on the board", reason, count)
+    lost, late = sum(account.lost for account in sessions), sum(account.late for account in sessions)
+    yield Loss("frames lost on the link", "", lost - late)
+    yield Loss("frames that came too late over another link", "", late)
+    yield Loss("frames delivered again", "", sum(account.duplicate for account in sessions))
+    yield Loss("frames of an earlier session", "", sum(account.old_session for account in sessions))
+    yield Loss("packets that were none of ours", "", run.link.garbage)
+    yield Loss("frames that came before the clock was known", "", run.link.no_clock)
+    for reason, count in disbelieved(run).items():
+        yield Loss("frames not believed", reason, count)
+
+
+def _on_the_host(run: RunSnapshot) -> Iterator[Loss]:
+    counts = run.counts
+    yield Loss("own frames that were no whole images", "", run.spoiled)
+    yield Loss("own frames replaced by newer ones", "", run.skipped)
+    for reason, count in counts.board_orphans:
+        yield Loss("board frames without partner", reason, count)
+    for reason, count in counts.host_orphans:
+        yield Loss("own frames without partner", reason, count)
+    yield Loss("pairs that gave way in a full FIFO", "", counts.dropped)
+    spoiled = sum(count for _, count in run.spoiled_images)
+    for reason, count in run.spoiled_images:
+        yield Loss("pairs with a spoiled image", reason, count)
+    yield Loss("pairs that could not be processed", "", run.undecodable - spoiled)
+    if run.ended != "running":
+        yield Loss("pairs that still waited at the end", "", run.stopped)
+    for sink in run.sinks:
+        yield Loss("results that came too fast for the sink", sink.name, sink.dropped)
+
+
+def board_drops(link: LinkAccount) -> dict[str, int]:
+    """Frames that the board dropped while this host was connected, by reason."""
+    drops: dict[str, int] = {}
+    for account in link.sessions:
+        before = dict(account.first.dropped)
+        for reason, count in account.latest.dropped:
+            drops[reason.value] = drops.get(reason.value, 0) + count - before.get(reason, 0)
+    return drops

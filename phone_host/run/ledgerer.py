@@ -1,0 +1,127 @@
+"""The books of a run: a ledger for each pair, and what all of them come to."""
+
+import threading
+from collections import Counter
+from dataclasses import dataclass, replace
+
+from common.frame import FrameFault, SpoiledImageError
+from common.ledger import HostMarks, PairLedger
+from phone_host.measure.delays import DelayStatistics, Sample
+from phone_host.model import FramePair, Processed
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerMarks:
+    """When the worker did what with a pair, CLOCK_MONOTONIC, ns.
+
+    Attributes:
+        dequeued_ns: it took the pair.
+        computed_ns: the depth was there; from then on the result was handed over.
+        done_ns: it was handed over.
+    """
+
+    dequeued_ns: int
+    computed_ns: int
+    done_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Books:
+    """What the ledgers of a run come to so far: copies.
+
+    Attributes:
+        processed: pairs that were handed over.
+        undecodable: pairs that could not be processed.
+        spoiled_images: those of them one of whose images was not the whole image that it claimed to be, by reason.
+        first_done_ns: when the first pair was done; 0: none was.
+        last_done_ns: the same of the last one.
+        delays: of all pairs.
+    """
+
+    processed: int
+    undecodable: int
+    spoiled_images: tuple[tuple[str, int], ...]
+    first_done_ns: int
+    last_done_ns: int
+    delays: DelayStatistics
+
+
+class Ledgerer:
+    """Keeps the books. Written by the worker's thread, read by any."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._delays, self._sample = DelayStatistics(), Sample()
+        self._spoiled: Counter[FrameFault] = Counter()
+        self.last: Processed | None = None
+        self.processed = self.undecodable = 0
+        self.first_done_ns = self.last_done_ns = 0
+
+    @property
+    def spoiled(self) -> int:
+        """Pairs that could not be processed for a spoiled image."""
+        return self._spoiled.total()
+
+    def enter(self, pair: FramePair, processed: Processed, marks: WorkerMarks) -> PairLedger:
+        """Make a pair's ledger and enter it.
+
+        Args:
+            pair: its frames.
+            processed: what became of them.
+            marks: when.
+
+        Returns:
+            The ledger, whose delays add up to end-to-end exactly.
+        """
+        board = pair.board
+        ledger = PairLedger(
+            session=board.message.session,
+            sequence=board.message.sequence,
+            host_sequence=pair.host.sequence,
+            bytes=len(board.message.payload),
+            link=board.link,
+            board=board.marks,
+            received_ns=board.received_ns,
+            paired_ns=pair.paired_ns,
+            queued_ns=pair.queued_ns,
+            dequeued_ns=marks.dequeued_ns,
+            done_ns=marks.done_ns,
+            previous_done_ns=self.last_done_ns or pair.queued_ns,
+            stages=replace(processed.stages, write=marks.done_ns - marks.computed_ns),
+            time_skew_ns=pair.time_skew_ns,
+            offset_ns=board.offset_ns,
+            uncertainty_ns=board.uncertainty_ns,
+            host=HostMarks(pair.host.exposed.ns, pair.host.grabbed.ns),
+        )
+        with self._lock:
+            self._delays.add(ledger)
+            self._sample.add(ledger)
+            self.last = processed
+            self.first_done_ns = self.first_done_ns or marks.done_ns
+            self.last_done_ns = marks.done_ns
+            self.processed += 1
+        return ledger
+
+    def enter_failed(self, error: Exception) -> None:
+        """Count a pair that could not be processed."""
+        with self._lock:
+            self.undecodable += 1
+            if isinstance(error, SpoiledImageError):
+                self._spoiled[error.fault] += 1
+
+    def books(self) -> Books:
+        """What there is so far."""
+        with self._lock:
+            return Books(
+                processed=self.processed,
+                undecodable=self.undecodable,
+                spoiled_images=tuple((fault.value, count) for fault, count in self._spoiled.items()),
+                first_done_ns=self.first_done_ns,
+                last_done_ns=self.last_done_ns,
+                delays=self._delays.copy(),
+            )
+
+    def sample(self) -> tuple[PairLedger, ...]:
+        """Ledgers for plots: all of them, or evenly chosen ones, in order."""
+        with self._lock:
+            return tuple(self._sample.ledgers)

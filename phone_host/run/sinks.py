@@ -1,0 +1,175 @@
+"""Sinks: whatever takes the results of a run, each behind a bounded queue and in a thread of its own, so that a slow one never delays a pair.
+
+Rules: a sink is handed a result once its pair is done. When its queue is full the result is dropped there and counted under the sink's name. A sink
+that `waits` loses nothing: the worker waits for a place before it calls the pair done, and the time counts as the pair's stage `write`.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Generic, Protocol, TypeVar
+
+from common import now
+from phone_host.measure.delays import Series
+from phone_host.measure.sink_account import SinkAccount
+from phone_host.model import Result
+
+T = TypeVar("T")
+
+DEPTH: Final = 2
+"""Results that wait for a sink: one to go on with, and one that comes meanwhile. Each holds its images and its cloud, 7 MB at 640x480."""
+
+
+class Sink(Protocol):
+    """Takes results. Used by the worker's thread, but for `finish`, which the run's root calls when the worker has ended."""
+
+    def await_place(self) -> None:
+        """Wait until there is a place for one result, if this sink is one that waits; else nothing."""
+
+    def offer(self, result: Result) -> None:
+        """Take a result, or drop and count it; never waits."""
+
+    def finish(self) -> None:
+        """Work off what was taken, then end."""
+
+    @property
+    def failure(self) -> Exception | None:
+        """What it failed with; from then on it drops everything."""
+
+    @property
+    def accounts(self) -> tuple[SinkAccount, ...]:
+        """How it has fared, under the name of each of its queues; copies."""
+
+
+@dataclass(slots=True)
+class _Waiting(Generic[T]):
+    item: T
+    since_ns: int
+
+
+class SinkQueue(Generic[T]):
+    """A bounded queue with a thread that works it off.
+
+    Args:
+        name: as it stands in report.json.
+        take: called with each item, in the queue's thread. Once it has failed nothing is taken any more.
+        depth: most items that wait.
+        waits: whether `await_place` waits.
+        clock: monotonic, ns.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        take: Callable[[T], None],
+        *,
+        depth: int = DEPTH,
+        waits: bool = False,
+        clock: Callable[[], int] = now.monotonic_ns,
+    ) -> None:
+        self._name, self._take, self._depth, self._waits, self._clock = name, take, depth, waits, clock
+        self._items: deque[_Waiting[T]] = deque()
+        self._changed = threading.Condition()
+        self._finishing = False
+        self._written = self._dropped = 0
+        self._delay = Series()
+        self._failure: Exception | None = None
+        self._thread = threading.Thread(target=self._run, name=f"sink {name}", daemon=True)
+        self._thread.start()
+
+    def await_place(self) -> None:
+        """Wait until there is a place, where this queue is one that waits. It stays free for whoever is alone in offering."""
+        if self._waits:
+            with self._changed:
+                self._changed.wait_for(lambda: len(self._items) < self._depth or self._failure is not None)
+
+    def offer(self, item: T) -> bool:
+        """Take an item; never waits.
+
+        Returns:
+            Whether it was taken; False: it was dropped and counted.
+        """
+        with self._changed:
+            if len(self._items) >= self._depth or self._failure is not None or self._finishing:
+                self._dropped += 1
+                return False
+            self._items.append(_Waiting(item, self._clock()))
+            self._changed.notify_all()
+            return True
+
+    def finish(self) -> None:
+        """Work off what waits, then end; may be called again."""
+        with self._changed:
+            self._finishing = True
+            self._changed.notify_all()
+        self._thread.join()
+
+    @property
+    def failure(self) -> Exception | None:
+        """What `take` failed with; from then on everything is dropped."""
+        return self._failure
+
+    @property
+    def account(self) -> SinkAccount:
+        """How it has fared so far, a copy."""
+        with self._changed:
+            return SinkAccount(self._name, self._written, self._dropped, len(self._items), self._delay.spread())
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: bool(self._items) or self._finishing)
+                if not self._items:
+                    return
+                waiting = self._items[0]  # it keeps its place until it is done: the bound is one of memory
+            try:
+                self._take(waiting.item)
+            except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
+                with self._changed:
+                    self._failure = error
+                    self._dropped += len(self._items)
+                    self._items.clear()
+                    self._changed.notify_all()
+                return
+            with self._changed:
+                self._items.popleft()
+                self._written += 1
+                self._delay.add(self._clock() - waiting.since_ns)
+                self._changed.notify_all()
+
+
+class FunctionSink:
+    """A function that is told of each result.
+
+    Args:
+        name: as it stands in report.json.
+        take: the function, called in the sink's thread.
+        depth: most results that wait.
+        waits: whether it must miss none.
+    """
+
+    def __init__(self, name: str, take: Callable[[Result], None], *, depth: int = DEPTH, waits: bool = False) -> None:
+        self._queue = SinkQueue(name, take, depth=depth, waits=waits)
+
+    def await_place(self) -> None:
+        """See Sink."""
+        self._queue.await_place()
+
+    def offer(self, result: Result) -> None:
+        """See Sink."""
+        self._queue.offer(result)
+
+    def finish(self) -> None:
+        """See Sink."""
+        self._queue.finish()
+
+    @property
+    def failure(self) -> Exception | None:
+        """See Sink."""
+        return self._queue.failure
+
+    @property
+    def accounts(self) -> tuple[SinkAccount, ...]:
+        """See Sink."""
+        return (self._queue.account,)

@@ -1,0 +1,104 @@
+"""The worker: takes pairs from the queue, has their depth computed, and hands the results to the sinks."""
+
+import logging
+import threading
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from common import now
+from common.errors import DataError
+from common.frame import SpoiledImageError
+from common.program.logs import event
+from phone_host.model import FramePair, Result
+from phone_host.run.ledgerer import Ledgerer, WorkerMarks
+from phone_host.run.pipeline import Pipeline
+from phone_host.run.sinks import Sink
+from phone_host.stream.pair_queue import PairQueue
+
+_LOG = logging.getLogger(__name__)
+
+_HOPELESS: Final = 10
+"""This many pairs in a row that cannot be processed, and none that could: it is not a spoiled frame now and then."""
+
+
+class Worker:
+    """One thread.
+
+    Args:
+        queue: gives the pairs.
+        pipeline: computes their depth.
+        ledgerer: keeps the books.
+        sinks: take the results.
+        most_pairs: after so many the worker ends; 0 for no limit.
+        taken: called when a place in the queue has become free.
+    """
+
+    def __init__(
+        self,
+        queue: PairQueue,
+        pipeline: Pipeline,
+        ledgerer: Ledgerer,
+        sinks: Sequence[Sink],
+        *,
+        most_pairs: int,
+        taken: Callable[[], None],
+    ) -> None:
+        self._queue, self._pipeline, self._ledgerer, self._sinks = queue, pipeline, ledgerer, tuple(sinks)
+        self._most_pairs, self._taken = most_pairs, taken
+        self._thread = threading.Thread(target=self._work, name="worker", daemon=True)
+        self.finished = threading.Event()
+        self.failure: Exception | None = None
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Finish the pair in hand, begin none of those that wait, and end; the queue must be closed."""
+        self.finished.set()
+        self._thread.join()
+
+    def has_ended(self, wait_s: float) -> bool:
+        """Wait a while for the end of a closed queue's last pair."""
+        self._thread.join(wait_s)
+        return not self._thread.is_alive()
+
+    def _work(self) -> None:
+        try:
+            while (pair := self._queue.take()) is not None:
+                dequeued_ns = now.monotonic_ns()
+                self._taken()
+                if not self.finished.is_set():
+                    self._process(pair, dequeued_ns)
+        except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
+            self.failure = error
+            self.finished.set()
+
+    def _process(self, pair: FramePair, dequeued_ns: int) -> None:
+        try:
+            processed = self._pipeline.process(pair)
+        except DataError as error:
+            self._note_failed(error)
+            return
+        computed_ns = now.monotonic_ns()
+        for sink in self._sinks:
+            sink.await_place()
+        marks = WorkerMarks(dequeued_ns, computed_ns, done_ns=now.monotonic_ns())
+        number = self._ledgerer.processed
+        result = Result(number, pair, processed, self._ledgerer.enter(pair, processed, marks))
+        for sink in self._sinks:
+            sink.offer(result)
+        if self._most_pairs and number + 1 >= self._most_pairs:
+            self.finished.set()
+
+    def _note_failed(self, error: DataError) -> None:
+        """Count a pair that could not be processed. Spoiled images never end a run: whoever sends them must not be able to; a rig that fits no pair does."""
+        books = self._ledgerer
+        books.enter_failed(error)
+        if isinstance(error, SpoiledImageError):
+            if books.processed == 0 and books.spoiled == _HOPELESS:
+                _LOG.error(event("no_sound_image", count=_HOPELESS, problem=error.problem, remedy=error.remedy))
+        elif books.processed == 0 and books.undecodable - books.spoiled > _HOPELESS:
+            raise error  # not one pair fits: wrong rig, wrong camera
+        if books.undecodable.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: one bad camera must not fill the log
+            _LOG.warning(event("pair_failed", count=books.undecodable, problem=error.problem))
