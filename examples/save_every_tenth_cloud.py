@@ -1,0 +1,27 @@
+"""Save every tenth cloud as PLY: `python examples/save_every_tenth_cloud.py LINK CAMERA RIG [PAIRS]`.
+
+For example, with the two programs of the demo (`phone-host demo` prints their cameras):
+
+    python examples/save_every_tenth_cloud.py tcp://127.0.0.1:5555 'replay:tandemscan-demo/film/right?fps=15&loop=1' tandemscan-demo/rig.yaml
+"""
+
+import sys
+from pathlib import Path
+
+from phone_host.api import open_scanner
+from phone_host.output.ply import write_ply
+
+
+def main(link: str, camera: str, rig: str, pairs: str = "100") -> None:
+    """Scan, and save."""
+    with open_scanner(link=link, camera=camera, rig=rig, pairs=int(pairs), lossless=True) as scanner:
+        for result in scanner:
+            cloud = result.processed.cloud
+            if result.number % 10 == 0 and cloud is not None:
+                path = Path(f"cloud-{result.number:06d}.ply")
+                points = write_ply(path, cloud, result.processed.pair.left)
+                print(f"{path}: {points} points")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

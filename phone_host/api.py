@@ -1,0 +1,279 @@
+"""tandemscan for other people's programs: two cameras, and an iterator of what they see.
+
+    from phone_host.api import open_scanner
+
+    with open_scanner(link="tcp://192.168.7.2:5555", camera="v4l2:/dev/video0", rig="rig.yaml") as scanner:
+        for result in scanner:
+            print(result.number, result.ledger.end_to_end_ns, result.processed.cloud.shape)
+
+A result holds the rectified images, the disparity, the cloud in metres and the pair's delays (`phone_host.model.Result`). A program that is slower
+than the cameras gets the newest results; what it missed is counted in `scanner.snapshot()`. With `lossless=True`, and where the own camera shows
+stills, it gets every one, and the scanner waits for it.
+
+What is here stays compatible; what lies below may move.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from common import now
+from common.camera.base import Camera
+from common.errors import SettingsError
+from common.keys import KeyFolder
+from common.link.base import Link
+from common.link.factory import open_links, parse_link, tell_insecure
+from common.protocol.message import Pacing
+from common.stamp import HOST_CLOCK
+from phone_host.camera.factory import open_camera
+from phone_host.measure.delays import Series
+from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.sink_account import SinkAccount
+from phone_host.model import Result, Rig, Side, StereoGeometry, TimeOffset
+from phone_host.output.rig_yaml import read_rig
+from phone_host.run.host import EndReason, Host, HostSettings
+from phone_host.settings import key_folder
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.match import Matcher, MatcherName, MatchSettings, create_matcher
+from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.reproject import DEFAULT_NEAR_M, disparities_for_near
+from phone_host.sync.fifo import FifoSettings
+
+__all__ = ["Result", "RunSnapshot", "Scanner", "StereoGeometry", "open_scanner"]
+
+_DEPTH = 2
+
+
+def open_scanner(
+    *,
+    link: str | Sequence[str],
+    camera: str,
+    rig: str | Path | Rig | None = None,
+    geometry: StereoGeometry | None = None,
+    matcher: str | Matcher = "sgbm",
+    disparities: int | None = None,
+    near_m: float = DEFAULT_NEAR_M,
+    board_side: str | None = None,
+    fifo: str = "1:drop-oldest",
+    tolerance_ms: float | None = None,
+    pairs: int = 0,
+    wait_s: float | None = None,
+    lossless: bool = False,
+    out: str | Path | None = None,
+    save_every: int = 0,
+    keys: str | Path | None = None,
+) -> "Scanner":
+    """Open both cameras; the scan begins when the scanner is entered (`with`).
+
+    Args:
+        link: where the board is (`tcp://HOST:5555`, `serial:DEVICE` …); several: the best one that is up is used.
+        camera: the own camera (`v4l2:/dev/video0?size=640x480`, `http://…/video`, `replay:FOLDER` …).
+        rig: rig.yaml, or a rig; None: the images come rectified if `disparities` is given, else there is no depth, only pairs and delays.
+        geometry: of images that come rectified; None: disparities without metres.
+        matcher: name of a matcher, or any object with `match(pair) -> disparity` (`phone_host.stereo.match.Matcher`).
+        disparities: 0 <= d < this is searched, px; None with a rig: as `near_m` asks.
+        near_m: nearest depth that is searched, m.
+        board_side: `left` or `right`: which view the board's camera is; None: as the rig says, else left.
+        fifo: depth and overflow policy of the queue before the matcher.
+        tolerance_ms: greatest time skew of a pair, ms; None: half of the longer frame period.
+        pairs: end after so many; 0: go on.
+        wait_s: an absent board is waited for so long, s; None: for ever.
+        lossless: give every result, and wait for the program where it is slower.
+        out: folder for delays.jsonl, report.json and saved pairs; None: nothing is written.
+        save_every: every which pair is saved in `out`; 0: none.
+        keys: folder of keys; None: the usual one.
+
+    Returns:
+        The scanner.
+
+    Raises:
+        SettingsError: arguments that make no sense, or contradict each other.
+        DataError: a bad rig.yaml.
+        UnavailableError: a camera, link or folder that cannot be had.
+    """
+    known = read_rig(Path(rig)) if isinstance(rig, str | Path) else rig
+    if known is not None and geometry is not None:
+        raise SettingsError("rig and geometry are both given", "leave geometry out: the rig has its own")
+    side = _side(board_side, known)
+    core = _core(known, geometry, matcher, disparities, near_m)
+    settings = HostSettings(
+        board_side=side,
+        tolerance_ns=None if tolerance_ms is None else round(tolerance_ms * 1e6),
+        fifo=FifoSettings.parse(fifo),
+        pairs=pairs,
+        wait_ns=None if wait_s is None else round(wait_s * 1e9),
+        out=None if out is None else Path(out),
+        save_every=save_every,
+        time_offset=TimeOffset() if known is None else known.time_offset,
+    )
+    opened = open_camera(camera, HOST_CLOCK, now.monotonic_ns())
+    links = _open_links([link] if isinstance(link, str) else link, key_folder("" if keys is None else str(keys)))
+    return Scanner(settings, opened, links, core, lossless=lossless)
+
+
+class Scanner:
+    """A running scan: a context manager, and an iterator of its results, in the order of the pairs. Made by `open_scanner`.
+
+    Args:
+        settings: of the run.
+        camera: the own camera, open.
+        links: to the board, open.
+        core: computes the depth; None: pairs and delays only.
+        lossless: whether every result is given.
+    """
+
+    def __init__(
+        self,
+        settings: HostSettings,
+        camera: Camera,
+        links: Sequence[Link],
+        core: StereoCore | None,
+        *,
+        lossless: bool,
+    ) -> None:
+        self._results = _ResultQueue(waits=lossless or camera.description.pacing is Pacing.DEMAND)
+        self._host = Host(settings, camera, links, core, [self._results])
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="scanner", daemon=True)
+        self._failure: BaseException | None = None
+        self.ended: EndReason | None = None
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stopping.set()
+        self._results.leave()
+        self._thread.join()
+
+    def __iter__(self) -> Iterator[Result]:
+        """Give results until the run ends.
+
+        Raises:
+            TandemError: as `phone-host run` would end with: no board, images that do not fit the rig, a link that is gone.
+        """
+        while (result := self._results.take()) is not None:
+            yield result
+        self._thread.join()
+        if self._failure is not None:
+            raise self._failure
+
+    def snapshot(self) -> RunSnapshot:
+        """Delays, accounts, clock, doubts and drops as they are now, or were at the end."""
+        return self._host.snapshot("running" if self.ended is None else self.ended.value)
+
+    def _run(self) -> None:
+        try:
+            self.ended = self._host.run(self._stopping.is_set)
+        except BaseException as error:  # noqa: BLE001 - a thread's root: the iterator raises it
+            self._failure = error
+        finally:
+            self._results.finish()
+
+
+class _ResultQueue:
+    """The sink that the program itself works off; when it is full the oldest result gives way, unless it is one that waits."""
+
+    def __init__(self, *, waits: bool) -> None:
+        self._waits = waits
+        self._items: deque[tuple[Result, int]] = deque()
+        self._changed = threading.Condition()
+        self._ended = self._left = False
+        self._given = self._dropped = 0
+        self._delay = Series()
+
+    def await_place(self) -> None:
+        """See Sink."""
+        if self._waits:
+            with self._changed:
+                self._changed.wait_for(lambda: len(self._items) < _DEPTH or self._left)
+
+    def offer(self, result: Result) -> None:
+        """See Sink."""
+        with self._changed:
+            if self._left:
+                return
+            if len(self._items) >= _DEPTH:
+                self._items.popleft()
+                self._dropped += 1
+            self._items.append((result, now.monotonic_ns()))
+            self._changed.notify_all()
+
+    def take(self) -> Result | None:
+        """Give the oldest result, or wait for one; None at the end."""
+        with self._changed:
+            self._changed.wait_for(lambda: bool(self._items) or self._ended)
+            if not self._items:
+                return None
+            result, since_ns = self._items.popleft()
+            self._given += 1
+            self._delay.add(now.monotonic_ns() - since_ns)
+            self._changed.notify_all()
+            return result
+
+    def leave(self) -> None:
+        """Take nothing more: the program has left."""
+        with self._changed:
+            self._left = True
+            self._changed.notify_all()
+
+    def finish(self) -> None:
+        """See Sink."""
+        with self._changed:
+            self._ended = True
+            self._changed.notify_all()
+
+    @property
+    def failure(self) -> Exception | None:
+        """See Sink; it cannot fail."""
+        return None
+
+    @property
+    def accounts(self) -> tuple[SinkAccount, ...]:
+        """See Sink."""
+        with self._changed:
+            return (SinkAccount("program", self._given, self._dropped, len(self._items), self._delay.spread()),)
+
+
+def _open_links(addresses: Sequence[str], keys: KeyFolder) -> list[Link]:
+    uris = [parse_link(address, listens_by_default=False) for address in addresses]
+    for uri in uris:
+        tell_insecure(uri)
+    return list(open_links(uris, keys))
+
+
+def _side(asked: str | None, rig: Rig | None) -> Side:
+    if asked not in {None, *(side.value for side in Side)}:
+        raise SettingsError(f"board_side is {asked!r}", "give 'left' or 'right'")
+    if rig is not None and asked not in {None, rig.board_side.value}:
+        raise SettingsError(
+            f"board_side {asked!r} contradicts the rig", "leave it out, or calibrate with the board there"
+        )
+    if asked is not None:
+        return Side(asked)
+    return Side.LEFT if rig is None else rig.board_side
+
+
+def _core(
+    rig: Rig | None, geometry: StereoGeometry | None, matcher: str | Matcher, disparities: int | None, near_m: float
+) -> StereoCore | None:
+    if rig is None and geometry is None and disparities is None and isinstance(matcher, str):
+        return None
+    rectifier = None if rig is None else Rectifier(rig)
+    if disparities is None and rectifier is not None:
+        disparities = disparities_for_near(rectifier.geometry, near_m, rectifier.rectification.width_px)
+    return StereoCore(_matcher(matcher, disparities), rectifier, geometry)
+
+
+def _matcher(matcher: str | Matcher, disparities: int | None) -> Matcher:
+    if not isinstance(matcher, str):
+        return matcher
+    if disparities is None:
+        raise SettingsError("rectified images without disparities", "give the number of disparities, for example 64")
+    return create_matcher(MatchSettings(MatcherName(matcher), disparities))

@@ -1,0 +1,182 @@
+"""Sinks: a slow one never delays a pair, each drop is counted, a waiting one loses nothing; and what is on disk afterwards."""
+
+import json
+import os
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.frame import Frame, PixelFormat
+from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
+from common.protocol.message import FrameMessage
+from common.stamp import HOST_CLOCK, Stamp
+from phone_host.model import BoardFrame, FramePair, Processed, RectifiedPair, Result
+from phone_host.output.listed import LIST
+from phone_host.run.file_sink import FileSink
+from phone_host.run.sinks import FunctionSink, SinkQueue
+
+PATIENCE_S = 60.0
+
+
+def result(number: int) -> Result:
+    """A result of two grey images."""
+    marks = BoardMarks(number, number + 1, number + 2)
+    message = FrameMessage("s", number, number, 4, 3, PixelFormat.GREY, None, marks, b"\0" * 12)
+    board = BoardFrame(message, "ipc", marks, number + 3, 0, 0)
+    host = Frame(number, Stamp(number, HOST_CLOCK), Stamp(number + 1, HOST_CLOCK), 4, 3, PixelFormat.GREY, None, b"")
+    image = np.full((3, 4), number % 256, np.uint8)
+    ledger = PairLedger(
+        *("s", number, number, 12, "ipc", marks, number + 3, number + 4, number + 5, number + 6, number + 7, 0),
+        *(StageTimes(), 0, 0, 0),
+        host=HostMarks(number, number + 1),
+    )
+    pair = FramePair(board, host, 0, number + 4, number + 5)
+    processed = Processed(RectifiedPair(image, image), np.full((3, 4), np.nan, np.float32), None, StageTimes())
+    return Result(number, pair, processed, ledger)
+
+
+class Gate:
+    """Holds a sink up until it is opened."""
+
+    def __init__(self) -> None:
+        self.entered, self.opened, self.seen = threading.Event(), threading.Event(), list[int]()
+
+    def take(self, number: int) -> None:
+        """Wait, then note the number."""
+        self.entered.set()
+        assert self.opened.wait(PATIENCE_S)
+        self.seen.append(number)
+
+
+@pytest.fixture
+def gate() -> Iterator[Gate]:
+    """A gate that is open at the end, whatever fails."""
+    found = Gate()
+    yield found
+    found.opened.set()
+
+
+def test_a_stuck_sink_drops_and_counts_and_holds_nobody_up(gate: Gate) -> None:
+    """While a sink does nothing, a thousand results are offered without waiting: as many as its queue is deep are kept, the others counted under its name."""
+    queue = SinkQueue("stuck", gate.take, depth=3)
+    taken = [queue.offer(number) for number in range(1000)]
+    account = queue.account
+    assert (account.name, account.written, account.dropped, account.waiting) == ("stuck", 0, 997, 3)
+    assert taken == [True] * 3 + [False] * 997
+    gate.opened.set()
+    queue.finish()
+    assert gate.seen == [0, 1, 2]
+    assert (queue.account.written, queue.account.dropped, queue.account.waiting) == (3, 997, 0)
+
+
+def test_a_waiting_sink_misses_nothing() -> None:
+    """A sink that waits gets all of a thousand results in order, however fast they come and however small its queue."""
+    seen: list[int] = []
+    queue = SinkQueue("waiting", seen.append, depth=1, waits=True)
+    for number in range(1000):
+        queue.await_place()
+        assert queue.offer(number)
+    queue.finish()
+    assert seen == list(range(1000))
+    assert queue.account.delay.count == 1000
+
+
+def test_only_a_waiting_sink_makes_its_worker_wait(gate: Gate) -> None:
+    """With a full queue `await_place` comes back at once, unless the sink is one that waits: then when there is a place."""
+    hasty, patient = SinkQueue("hasty", gate.take, depth=1), SinkQueue("patient", gate.take, depth=1, waits=True)
+    hasty.offer(0)
+    hasty.await_place()
+    patient.offer(1)
+    thread = threading.Thread(target=patient.await_place, daemon=True)
+    thread.start()
+    assert gate.entered.wait(PATIENCE_S)
+    assert thread.is_alive()
+    gate.opened.set()
+    thread.join(PATIENCE_S)
+    assert not thread.is_alive()
+    hasty.finish()
+    patient.finish()
+
+
+@given(st.integers(1, 4), st.lists(st.booleans(), max_size=60))
+@settings(deadline=None, max_examples=40)
+def test_what_is_offered_is_written_or_dropped(depth: int, pauses: list[bool]) -> None:
+    """Whatever the order of offers and pauses, offered = written + dropped at the end, and what is written keeps its order."""
+    seen: list[int] = []
+    queue = SinkQueue("any", seen.append, depth=depth)
+    for number, pause in enumerate(pauses):
+        queue.offer(number)
+        if pause:
+            os.sched_yield()
+    queue.finish()
+    assert queue.account.written + queue.account.dropped == len(pauses)
+    assert len(seen) == queue.account.written
+    assert seen == sorted(seen)
+
+
+def test_a_sink_that_fails_is_told_and_takes_nothing_more() -> None:
+    """A sink's exception is its failure; from then on it drops, wakes whoever waits for a place, and ends."""
+
+    def fail(_: Result) -> None:
+        raise ZeroDivisionError
+
+    sink = FunctionSink("failing", fail, depth=1, waits=True)
+    for number in range(5):
+        sink.await_place()
+        sink.offer(result(number))
+    sink.finish()
+    assert isinstance(sink.failure, ZeroDivisionError)
+    assert (sink.accounts[0].written, sink.accounts[0].dropped) == (0, 5)
+
+
+def test_all_lines_and_every_third_pair_are_on_disk(tmp_path: Path) -> None:
+    """Of ten results each has its line, every third its folder with whole files, and the settings stand beside them; all of it is listed as ours."""
+    sink = FileSink(tmp_path, 3, waits=True, settings={"fifo": {"value": "1:block", "origin": "--fifo"}})
+    for number in range(10):
+        sink.await_place()
+        sink.offer(result(number))
+    sink.close({"pairs": 10})
+    lines = [json.loads(line) for line in (tmp_path / "delays.jsonl").read_text().splitlines()]
+    assert [line["sequence"] for line in lines] == list(range(10))
+    assert {path.name for path in tmp_path.glob("pair-*")} == {f"pair-{number:06d}" for number in (0, 3, 6, 9)}
+    assert {path.name for path in (tmp_path / "pair-000003").iterdir()} == {"left.png", "right.png", "disparity.pfm"}
+    assert json.loads((tmp_path / "settings.json").read_text()) == {"fifo": {"value": "1:block", "origin": "--fifo"}}
+    listed = (tmp_path / LIST).read_text().splitlines()
+    assert {"report.json", "delays.jsonl", "settings.json", "pair-000009"} <= set(listed)
+    assert sink.complete
+
+
+def test_a_pair_whose_name_somebody_has_taken_is_counted_and_the_run_goes_on(tmp_path: Path) -> None:
+    """A file in the way of one pair's folder costs this pair alone; its half-made folder is gone, and so is nothing of the other's."""
+    sink = FileSink(tmp_path, 1, waits=True)
+    (tmp_path / "pair-000001").mkdir()
+    (tmp_path / "pair-000001" / "mine").write_text("mine")
+    for number in range(3):
+        sink.await_place()
+        sink.offer(result(number))
+    sink.close({})
+    assert (sink.unwritten.pairs, sink.complete) == (1, False)
+    assert (tmp_path / "pair-000001" / "mine").read_text() == "mine"
+    assert not list(tmp_path.glob("*.part"))
+    assert (tmp_path / "pair-000002" / "left.png").exists()
+
+
+def test_a_disk_slower_than_the_pairs_costs_pairs_and_no_line(tmp_path: Path) -> None:
+    """Of 30 large pairs that come at once some are dropped, under the name of the sink that saves them; each has its line all the same."""
+    noise = np.random.default_rng(1).integers(0, 256, (1200, 1600), np.uint8)
+    sink = FileSink(tmp_path, 1)
+    for number in range(30):
+        small = result(number)
+        sink.offer(replace(small, processed=replace(small.processed, pair=RectifiedPair(noise, noise))))
+    sink.close({})
+    assert len((tmp_path / "delays.jsonl").read_text().splitlines()) == 30
+    by_name = {account.name: account for account in sink.accounts}
+    assert by_name["pairs"].dropped > 0
+    assert by_name["pairs"].written == len(list(tmp_path.glob("pair-*"))) == 30 - by_name["pairs"].dropped
+    assert (by_name["lines"].dropped, sink.complete) == (0, True)
