@@ -34,6 +34,7 @@ from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.model import Result, Rig, Side, StereoGeometry, TimeOffset
 from phone_host.output.rig_yaml import read_rig
+from phone_host.report.run_json import build
 from phone_host.run.host import EndReason, Host, HostSettings
 from phone_host.settings import key_folder
 from phone_host.stereo.core import StereoCore
@@ -166,6 +167,8 @@ class Scanner:
 
     def snapshot(self) -> RunSnapshot:
         """Delays, accounts, clock, doubts and drops as they are now, or were at the end."""
+        if self._failure is not None:
+            return self._host.snapshot("failed")
         return self._host.snapshot("running" if self.ended is None else self.ended.value)
 
     def _run(self) -> None:
@@ -174,6 +177,7 @@ class Scanner:
         except BaseException as error:  # noqa: BLE001 - a thread's root: the iterator raises it
             self._failure = error
         finally:
+            self._host.write_report(build(self.snapshot()))
             self._results.finish()
 
 

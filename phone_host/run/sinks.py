@@ -76,7 +76,7 @@ class SinkQueue(Generic[T]):
         self._delay = Series()
         self._failure: Exception | None = None
         self._thread = threading.Thread(target=self._run, name=f"sink {name}", daemon=True)
-        self._thread.start()
+        self._started = False
 
     def await_place(self) -> None:
         """Wait until there is a place, where this queue is one that waits. It stays free for whoever is alone in offering."""
@@ -96,6 +96,9 @@ class SinkQueue(Generic[T]):
                 return False
             self._items.append(_Waiting(item, self._clock()))
             self._changed.notify_all()
+            if not self._started:  # a run that never begins leaves no thread
+                self._started = True
+                self._thread.start()
             return True
 
     def finish(self) -> None:
@@ -103,7 +106,8 @@ class SinkQueue(Generic[T]):
         with self._changed:
             self._finishing = True
             self._changed.notify_all()
-        self._thread.join()
+        if self._started:
+            self._thread.join()
 
     @property
     def failure(self) -> Exception | None:
