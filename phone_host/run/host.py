@@ -11,13 +11,13 @@ from typing import Final
 
 from common import now
 from common.camera.base import Camera
-from common.errors import DataError, UnavailableError
+from common.errors import DataError
 from common.frame import FrameFault, SpoiledImageError
 from common.imagesize import MOST_PIXELS
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.program.logs import event
-from common.protocol.message import Pacing, RefusalReason, Steering
+from common.protocol.message import Pacing, Steering
 from phone_host.measure.delays import DelayStatistics, Sample
 from phone_host.measure.image_motion import MotionMeter
 from phone_host.measure.run_facts import RunFacts, concerns
@@ -27,10 +27,11 @@ from phone_host.run.pipeline import Pipeline
 from phone_host.run.results import Results
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
-from phone_host.stream.own_camera import Source
+from phone_host.stream.await_board import BoardPatience
+from phone_host.stream.demand_clock import DemandClock
+from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.receiver import Receiver
-from phone_host.stream.reception import refusal_text
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Alignment, PhaseController, Whose
 
@@ -39,9 +40,6 @@ _LOG = logging.getLogger(__name__)
 _STEP_S: Final = 0.05
 _LAST_PARTNER_NS: Final = 1_000_000_000
 """After a stream's end the other one gets this long to deliver the last partners."""
-
-_BUSY_NS: Final = 4_000_000_000
-"""A board may take a host that crashed for alive for a moment; only after this long `busy` is believed."""
 
 _TRUST_NS: Final = 1_000_000_000
 _RECENT: Final = 60
@@ -115,16 +113,16 @@ class Host:
         self.last: Processed | None = None
         self.results = Results(settings.out, settings.save_every)
         own = camera.description
-        on_demand = own.pacing is Pacing.DEMAND
+        demand = DemandClock(own.pacing)
         self.queue = PairQueue(
             settings.fifo,
             settings.tolerance_ns,
             own.period_ns,
-            on_demand=on_demand,
+            demand=demand,
             time_offset_ns=settings.time_offset.offset_ns,
         )
-        self.source = Source(camera, self.queue.add_host)
-        self.receiver = Receiver(links, now.random_id(), self.queue, self)
+        self.source = OwnCamera(camera, self.queue.add_host, demand)
+        self.receiver = Receiver(links, now.random_id(), self.queue)
         interpolator = Interpolator() if settings.interpolate else None
         self._pipeline = Pipeline(core, settings.board_side, now.monotonic_ns, interpolator, settings.most_pixels)
         self.motion = MotionMeter()
@@ -239,7 +237,7 @@ class Host:
         self._known_doubts = frozenset(found)
 
     def _watch(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
-        absent_since_ns = now.monotonic_ns()
+        patience = BoardPatience(self.settings.wait_ns, now.monotonic_ns())
         ending_since_ns: int | None = None
         while not self._finished.wait(_STEP_S):
             now_ns = now.monotonic_ns()
@@ -250,9 +248,8 @@ class Host:
                 watch()
             if stop():
                 return EndReason.STOPPED
-            if self.receiver.connected or self.receiver.ended:
-                absent_since_ns = now_ns
-            self._check_presence(now_ns - absent_since_ns)
+            present = self.receiver.connected or self.receiver.ended
+            patience.look(now_ns, self.receiver.refused, present=present)
             if self.receiver.ended or self.source.ended:
                 ending_since_ns = now_ns if ending_since_ns is None else ending_since_ns
                 if self._all_paired() or now_ns - ending_since_ns > _LAST_PARTNER_NS:
@@ -297,33 +294,10 @@ class Host:
         counts = self.queue.counts
         return self.receiver.ended and (counts.held_board == 0 or (self.source.ended and counts.held_host == 0))
 
-    def _check_presence(self, absent_ns: int) -> None:
-        refused = self.receiver.refused
-        patience_ns = self.settings.wait_ns
-        if refused is not None:
-            patience_ns = max(patience_ns or 0, _BUSY_NS) if refused is RefusalReason.BUSY else 0
-        if patience_ns is None or absent_ns <= patience_ns:
-            return
-        if refused is not None:
-            raise UnavailableError(*refusal_text(refused))
-        raise UnavailableError(
-            f"no board within {patience_ns / 1e9:g} s",
-            "start board-agent there, check --link, or give --wait more seconds",
-        )
-
     def _raise_failures(self) -> None:
         for failure in (self._failure, self.receiver.failure, self.source.failure):
             if failure is not None:
                 raise failure
-
-    def session_began(self) -> None:
-        """See BoardListener."""
-        self.source.forget()
-
-    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """See BoardListener."""
-        if self.source.on_demand:
-            self.source.want(exposed_ns, index)
 
     def _work(self) -> None:
         try:

@@ -28,7 +28,7 @@ from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.children.board_process import board_process, free_port
-from phone_host.model import Disparity, Processed, RectifiedPair
+from phone_host.model import BoardFrame, Disparity, Processed, RectifiedPair
 from phone_host.run.host import Host, HostSettings
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
@@ -97,12 +97,15 @@ class WatchedHost(Host):
             StereoCore(SlowMatcher()),
             self._keep,
         )
+        take_in = self.queue.add_board
 
-    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """Take the age of each frame as it comes."""
-        now_ns = now.monotonic_ns()
-        self.link_ages.append((now_ns, now_ns - exposed_ns))
-        super().frame_arrived(exposed_ns, index)
+        def watched(frame: BoardFrame) -> None:
+            """Take the age of each frame as it comes."""
+            take_in(frame)
+            now_ns = now.monotonic_ns()
+            self.link_ages.append((now_ns, now_ns - frame.marks.exposed_ns))
+
+        self.queue.add_board = watched  # type: ignore[method-assign]
 
     def _keep(self, processed: Processed, ledger: PairLedger) -> None:
         del processed

@@ -26,7 +26,6 @@ from phone_host.stream.reception import LinkFacts, Reception
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.quarantine import Disbelief
 from tests.support.session_world import CAMERA
-from tests.support.unheard import Unheard
 
 NAMES = {lane: connection_name(0, lane.name.encode()) for lane in Lane}
 
@@ -43,7 +42,7 @@ class Talk:
         self.said: list[Outgoing] = []
         self.queue = PairQueue(FifoSettings(8), None, CAMERA.period_ns, clock=lambda: self.now_ns)
         facts = [LinkFacts("tcp", dict(NAMES) if dialled else {}, self_paced=False)]
-        self.reception = Reception(facts, "host", self.queue, Unheard(), self.said.append)
+        self.reception = Reception(facts, "host", self.queue, self.said.append)
         self.begin("first")
 
     def begin(self, session: str) -> None:
