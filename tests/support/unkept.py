@@ -2,6 +2,7 @@
 
 from common.protocol.message import CameraDescription
 from phone_host.model import BoardFrame
+from phone_host.sync.quarantine import Disbelief
 
 
 class Unkept:
@@ -27,8 +28,8 @@ class Unkept:
         """There is always as much."""
         return self._slots
 
-    def objection(self, frame: BoardFrame) -> None:
-        """Every frame is wanted."""
+    def objection(self, frame: BoardFrame) -> Disbelief | None:
+        """None: every frame is wanted."""
 
     def add_board(self, frame: BoardFrame) -> None:
         """A frame ends its way."""
