@@ -49,6 +49,18 @@ class MissingDeviceError(UnavailableError):
     """Raised when a device is not there. Nobody's fault; it may be plugged in at any time."""
 
 
+class AbsentBoardError(UnavailableError):
+    """Raised when no board answers in time. Nobody's fault; it may be started at any time."""
+
+
+class BusyBoardError(UnavailableError):
+    """Raised when the board talks to another host. Nobody's fault; the other one must let go first."""
+
+
+class OtherVersionError(UnavailableError):
+    """Raised when the board speaks another protocol version. Nobody's fault; one of the two needs an update."""
+
+
 class DataError(TandemError):
     """Raised when a file, image or result is bad, or a check failed. The input's fault."""
 

@@ -6,7 +6,6 @@ Shell: starts real processes and takes them down again, whatever happens. What c
 import fcntl
 import socket
 import struct
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -17,21 +16,18 @@ from common import now
 from common.errors import UnavailableError
 from common.keys import usual_keys
 from common.link.factory import open_link, parse_link
-from common.protocol.message import BoardHello, Pacing
+from common.protocol.message import Pacing
 from phone_host.bench.cases import BOARD_SETS, Case, Interface, Size
 from phone_host.bench.emulate import NOTHING
 from phone_host.bench.relay import RelayAccount, RelayProcess, relay_process
 from phone_host.children.board_process import BoardAccount, BoardProcess, board_process, free_port
 from phone_host.measure.accounts import LinkAccount
-from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.await_board import BoardPatience, await_board
+from phone_host.stream.frame_sink import NoFrames
 from phone_host.stream.receiver import Receiver
-from phone_host.stream.reception import refusal_text
-from phone_host.sync.fifo import FifoSettings
 
 _CHANNEL: Final = 22
 """For the benchmark's own RFCOMM listener: in the range that profiles do not use by themselves (1 to 30 exist)."""
-
-_STEP_S: Final = 0.05
 
 # Numbers of the kernel: a Python without Bluetooth has no names for them.
 _AF_BLUETOOTH, _BTPROTO_HCI = 31, 1
@@ -113,16 +109,6 @@ def obstacle(interface: Interface) -> str:
     return ""
 
 
-class _Silent:
-    """Listens to no frames: only the board's hello is wanted."""
-
-    def session_began(self) -> None:
-        """See BoardListener."""
-
-    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """See BoardListener."""
-
-
 def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | None:
     """Ask a remote board what its camera shows: that, and nothing else, can be measured there.
 
@@ -138,10 +124,13 @@ def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | No
         UnavailableError: there is no board, it is busy, or its images come on demand only.
     """
     link = open_link(parse_link(uri, listens_by_default=False), usual_keys())
-    receiver = Receiver([link], now.random_id(), PairQueue(FifoSettings(), None, 1), _Silent())
+    receiver = Receiver([link], now.random_id(), NoFrames())
+    remedy = "start board-agent there, or check --links"
+    patience = BoardPatience(patience_ns, now.monotonic_ns(), where=uri, remedy=remedy)
     receiver.start()
     try:
-        hello = _hello_of(receiver, uri, now.monotonic_ns() + patience_ns, stop)
+        await_board(receiver, patience, lambda: receiver.hello is not None, stop)
+        hello = receiver.hello
     finally:
         receiver.stop()
     if hello is None:
@@ -153,19 +142,6 @@ def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | No
         )
     rate_hz = max(1, round(1e9 / camera.period_ns))
     return Case(Interface(uri), Size(camera.width_px, camera.height_px), BOARD_SETS, rate_hz)
-
-
-def _hello_of(receiver: Receiver, uri: str, deadline_ns: int, stop: Callable[[], bool]) -> BoardHello | None:
-    pause = threading.Event()
-    while (hello := receiver.hello) is None and not stop():
-        if receiver.failure is not None:
-            raise receiver.failure
-        if now.monotonic_ns() > deadline_ns:
-            if receiver.refused is not None:
-                raise UnavailableError(*refusal_text(receiver.refused))
-            raise UnavailableError(f"no board at {uri}", "start board-agent there, or check --links")
-        pause.wait(_STEP_S)
-    return hello
 
 
 def _account_of(seen: LinkAccount) -> BoardAccount:

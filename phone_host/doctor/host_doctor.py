@@ -21,10 +21,9 @@ from common.doctor.camera_probe import examine_camera
 from common.doctor.finding import Finding, Verdict, fail, ok
 from common.doctor.machine_checks import check_bluetooth, check_clocks, check_disk, check_power, check_usb_log
 from common.doctor.unit_check import Unit
-from common.errors import TandemError, UnavailableError
+from common.errors import AbsentBoardError, BusyBoardError, OtherVersionError, TandemError, UnavailableError
 from common.keys import KeyFolder
 from common.link.factory import open_link, parse_link
-from common.protocol.message import RefusalReason
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import is_http
@@ -42,7 +41,6 @@ from phone_host.doctor.host_checks import (
     check_rig,
 )
 
-_STEP_S: Final = 0.05
 _CONNECT_S: Final = 2.0
 
 
@@ -183,44 +181,32 @@ def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> 
 
 def _ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
     """Say hello as a host does, and leave again."""
-    import threading  # noqa: PLC0415
-
-    from phone_host.stream.pair_queue import PairQueue  # noqa: PLC0415 - numpy, seen to work
+    from phone_host.stream.await_board import BoardPatience, await_board  # noqa: PLC0415 - numpy, seen to work
+    from phone_host.stream.frame_sink import NoFrames  # noqa: PLC0415
     from phone_host.stream.receiver import Receiver  # noqa: PLC0415
-    from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
 
     link = open_link(parse_link(uri, listens_by_default=False), keys)
-    receiver = Receiver([link], now.random_id(), PairQueue(FifoSettings(), None, 1), _Listener())
+    receiver = Receiver([link], now.random_id(), NoFrames())
+    patience = BoardPatience(round(wait_s * 1e9), now.monotonic_ns())
+    answer = Answer.BOARD
     receiver.start()
-    pause = threading.Event()
-    deadline_ns = now.monotonic_ns() + round(wait_s * 1e9)
-    answer = Answer.SILENT
-    while answer is Answer.SILENT and now.monotonic_ns() < deadline_ns:
-        pause.wait(_STEP_S)
-        if receiver.hello is not None and receiver.estimate is not None:
-            answer = Answer.BOARD
-        elif receiver.refused is RefusalReason.VERSION:
-            answer = Answer.OTHER_VERSION
-    if answer is Answer.SILENT and receiver.refused is RefusalReason.BUSY:
+    try:
+        await_board(receiver, patience, lambda: receiver.hello is not None and receiver.estimate is not None)
+    except AbsentBoardError:
+        answer = Answer.SILENT
+    except BusyBoardError:
         answer = Answer.BUSY
-    hello, estimate = receiver.hello, receiver.estimate
-    receiver.stop()
+    except OtherVersionError:
+        answer = Answer.OTHER_VERSION
+    finally:
+        hello, estimate = receiver.hello, receiver.estimate
+        receiver.stop()
     if receiver.failure is not None:
         raise receiver.failure
     if hello is None or estimate is None:
         return BoardReadings(uri, answer, wait_s)
     camera = f"{hello.camera.name} {hello.camera.width_px}x{hello.camera.height_px}"
     return BoardReadings(uri, answer, 0.0, camera, estimate.round_trip_ns, estimate.uncertainty_ns)
-
-
-class _Listener:
-    """A host that wants nothing but an answer."""
-
-    def session_began(self) -> None:
-        """See BoardListener."""
-
-    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """See BoardListener."""
 
 
 def _way(address: str) -> Answer:

@@ -3,35 +3,32 @@
 In a folder a frame's name is its stamp: `board/<ns>.jpg` and `host/<ns>.jpg`, ns on the host's clock.
 """
 
-import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event
 from typing import Final
 
 from common import now
 from common.camera.base import Camera
 from common.camera.imagefile import SUFFIXES, load
-from common.errors import DataError, UnavailableError
+from common.errors import DataError
 from common.frame import Frame, PixelFormat
 from common.link.base import Link
-from common.protocol.message import FrameMessage, Pacing
+from common.protocol.message import CameraDescription, FrameMessage
 from phone_host.calibration.timing.shots import Shot
 from phone_host.model import BoardFrame
 from phone_host.output.atomic import write_bytes
 from phone_host.output.listed import ListedFolder
 from phone_host.stereo.raw_images import EncodedImage
-from phone_host.stream.own_camera import Source
-from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.await_board import BoardPatience, await_board
+from phone_host.stream.demand_clock import DemandClock, has_own_time
+from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.receiver import Receiver
-from phone_host.stream.reception import refusal_text
-from phone_host.sync.fifo import FifoSettings
 
 _STEP_S: Final = 0.05
 _ENOUGH_BYTES: Final = 400 * 1024 * 1024
 """Half a minute of raw 640x480 images of both cameras; the memory of a phone."""
-
-_SLOTS: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,23 +44,35 @@ class Footage:
     host: tuple[Shot, ...]
 
 
-class _Keeper(PairQueue):
-    """Keeps every frame instead of pairing it."""
+class _Keeper:
+    """Keeps every frame of both cameras: a sink of the board's, and what the own camera delivers to."""
 
     def __init__(self) -> None:
-        super().__init__(FifoSettings(), None, 1)
         self.board: list[Shot] = []
         self.host: list[Shot] = []
         self.kept_bytes = 0
 
-    def free_slots(self) -> int:
-        """There is always room."""
-        return _SLOTS
+    def begin(self, camera: CameraDescription) -> None:
+        """See FrameSink; a later life's frames are kept behind those of the one before."""
 
-    def add_board(self, frame: BoardFrame) -> int:
+    def change_period(self, board_period_ns: int) -> None:
+        """See FrameSink."""
+
+    def void(self) -> None:
+        """See FrameSink."""
+
+    def room(self) -> None:
+        """There is always room."""
+
+    def objection(self, frame: BoardFrame) -> None:
+        """Every frame is wanted."""
+
+    def tick(self) -> None:
+        """See FrameSink."""
+
+    def add_board(self, frame: BoardFrame) -> None:
         """Keep a frame of the board."""
         self._keep(self.board, frame.marks.exposed_ns, frame.message, "board")
-        return frame.marks.exposed_ns
 
     def add_host(self, frame: Frame) -> None:
         """Keep a frame of the own camera, once the board's have begun."""
@@ -76,16 +85,6 @@ class _Keeper(PairQueue):
         if self.kept_bytes < _ENOUGH_BYTES and (not shots or exposed_ns > shots[-1].exposed_ns):
             shots.append(Shot(exposed_ns, image))
             self.kept_bytes += len(image.payload)
-
-
-class _Unmoved:
-    """A listener to whom nothing of the board matters."""
-
-    def session_began(self) -> None:
-        """See BoardListener."""
-
-    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """See BoardListener."""
 
 
 def film(
@@ -111,40 +110,46 @@ def film(
         UnavailableError: no board, or it does not talk to this host.
         DataError: a camera shows images on demand and so has no stamps.
     """
-    keeper = _Keeper()
-    source = Source(camera, keeper.add_host)
-    if source.on_demand:
+    pacing = camera.description.pacing
+    if not has_own_time(pacing):
         camera.close()
         for link in links:
             link.close()
         raise DataError("a camera with pace=demand has no time of its own", "use pace=clock")
-    receiver = Receiver(links, now.random_id(), keeper, _Unmoved())
+    keeper = _Keeper()
+    own = OwnCamera(camera, keeper.add_host, DemandClock(pacing))
+    receiver = Receiver(links, now.random_id(), keeper)
+
+    def frames_came() -> bool:
+        _check(receiver, own)
+        return bool(keeper.board)
+
     receiver.start()
-    source.start()
-    waiting = threading.Event()
-    began_ns = now.monotonic_ns()
+    own.start()
+    waiting = Event()
     try:
-        while not stop():
-            now_ns = now.monotonic_ns()
-            for failure in (receiver.failure, source.failure):
-                if failure is not None:
-                    raise failure
-            if receiver.hello is not None and receiver.hello.camera.pacing is Pacing.DEMAND:
-                raise DataError("the board's camera has pace=demand and so no time of its own", "use pace=clock")
-            if keeper.board:
-                done = (now_ns - keeper.board[0].exposed_ns) / 1e9 / seconds
-                advance(min(1.0, done))
-                if done >= 1.0 or receiver.ended or source.ended or keeper.kept_bytes >= _ENOUGH_BYTES:
-                    break
-            elif wait_ns is not None and now_ns - began_ns > wait_ns:
-                if receiver.refused is not None:
-                    raise UnavailableError(*refusal_text(receiver.refused))
-                raise UnavailableError(f"no board within {wait_ns / 1e9:g} s", "start board-agent there, check --link")
+        has_begun = await_board(receiver, BoardPatience(wait_ns, now.monotonic_ns()), frames_came, stop)
+        while has_begun and not stop():
+            _check(receiver, own)
+            done = (now.monotonic_ns() - keeper.board[0].exposed_ns) / 1e9 / seconds
+            advance(min(1.0, done))
+            if done >= 1.0 or receiver.ended or own.ended or keeper.kept_bytes >= _ENOUGH_BYTES:
+                break
             waiting.wait(_STEP_S)
     finally:
-        source.stop()
+        own.stop()
         receiver.stop()
     return Footage(tuple(keeper.board), tuple(keeper.host))
+
+
+def _check(receiver: Receiver, own: OwnCamera) -> None:
+    """Raise what has gone wrong in a thread, and DataError for a board whose stamps are no times."""
+    for failure in (receiver.failure, own.failure):
+        if failure is not None:
+            raise failure
+    hello = receiver.hello
+    if hello is not None and not has_own_time(hello.camera.pacing):
+        raise DataError("the board's camera has pace=demand and so no time of its own", "use pace=clock")
 
 
 def keep(footage: Footage, folder: Path) -> None:

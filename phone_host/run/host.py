@@ -10,12 +10,11 @@ from typing import Final
 
 from common import now
 from common.camera.base import Camera
-from common.errors import UnavailableError
 from common.imagesize import MOST_PIXELS
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.program.logs import event
-from common.protocol.message import Pacing, RefusalReason, Steering
+from common.protocol.message import Pacing, Steering
 from phone_host.measure.image_motion import MotionMeter
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.trust import Doubt
@@ -27,10 +26,11 @@ from phone_host.run.sinks import FunctionSink, Sink
 from phone_host.run.worker import Worker
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
-from phone_host.stream.own_camera import Source
+from phone_host.stream.await_board import BoardPatience
+from phone_host.stream.demand_clock import DemandClock
+from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.receiver import Receiver
-from phone_host.stream.reception import refusal_text
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Alignment, PhaseController, Whose
 
@@ -39,9 +39,6 @@ _LOG = logging.getLogger(__name__)
 _STEP_S: Final = 0.05
 _LAST_PARTNER_NS: Final = 1_000_000_000
 """After a stream's end the other one gets this long to deliver the last partners."""
-
-_BUSY_NS: Final = 4_000_000_000
-"""A board may take a host that crashed for alive for a moment; only after this long `busy` is believed."""
 
 _TRUST_NS: Final = 1_000_000_000
 _RECENT: Final = 60
@@ -110,22 +107,25 @@ class Host:
     ) -> None:
         self._settings = settings
         self._own = camera.description
-        on_demand = self._own.pacing is Pacing.DEMAND
+        demand = DemandClock(self._own.pacing)
         self.started_ns = now.monotonic_ns()
         self._motion = MotionMeter()
         self._files = FileSink(
-            settings.out, settings.save_every, waits=bool(settings.pairs) or on_demand, settings=settings.resolved
+            settings.out,
+            settings.save_every,
+            waits=bool(settings.pairs) or demand.paces_own_camera,
+            settings=settings.resolved,
         )
         self._sinks: tuple[Sink, ...] = (self._files, FunctionSink("motion", self._measure_motion), *sinks)
         self._queue = PairQueue(
             settings.fifo,
             settings.tolerance_ns,
             self._own.period_ns,
-            on_demand=on_demand,
+            demand=demand,
             time_offset_ns=settings.time_offset.offset_ns,
         )
-        self._camera = Source(camera, self._queue.add_host)
-        self._receiver = Receiver(links, now.random_id(), self._queue, self)
+        self._camera = OwnCamera(camera, self._queue.add_host, demand)
+        self._receiver = Receiver(links, now.random_id(), self._queue)
         interpolator = Interpolator() if settings.interpolate else None
         pipeline = Pipeline(core, settings.board_side, now.monotonic_ns, interpolator, settings.most_pixels)
         self._ledgerer = Ledgerer()
@@ -286,7 +286,7 @@ class Host:
         self._known_doubts = frozenset(found)
 
     def _watch(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
-        absent_since_ns = now.monotonic_ns()
+        patience = BoardPatience(self._settings.wait_ns, now.monotonic_ns())
         ending_since_ns: int | None = None
         while not self._worker.finished.wait(_STEP_S):
             now_ns = now.monotonic_ns()
@@ -297,9 +297,8 @@ class Host:
                 watch()
             if stop():
                 return EndReason.STOPPED
-            if self._receiver.connected or self._receiver.ended:
-                absent_since_ns = now_ns
-            self._check_presence(now_ns - absent_since_ns)
+            present = self._receiver.connected or self._receiver.ended
+            patience.look(now_ns, self._receiver.refused, present=present)
             if self._receiver.ended or self._camera.ended:
                 ending_since_ns = now_ns if ending_since_ns is None else ending_since_ns
                 if self._all_paired() or now_ns - ending_since_ns > _LAST_PARTNER_NS:
@@ -343,31 +342,8 @@ class Host:
         counts = self._queue.counts
         return self._receiver.ended and (counts.held_board == 0 or (self._camera.ended and counts.held_host == 0))
 
-    def _check_presence(self, absent_ns: int) -> None:
-        refused = self._receiver.refused
-        patience_ns = self._settings.wait_ns
-        if refused is not None:
-            patience_ns = max(patience_ns or 0, _BUSY_NS) if refused is RefusalReason.BUSY else 0
-        if patience_ns is None or absent_ns <= patience_ns:
-            return
-        if refused is not None:
-            raise UnavailableError(*refusal_text(refused))
-        raise UnavailableError(
-            f"no board within {patience_ns / 1e9:g} s",
-            "start board-agent there, check --link, or give --wait more seconds",
-        )
-
     def _raise_failures(self) -> None:
         of_sinks = (sink.failure for sink in self._sinks)
         for failure in (self._worker.failure, self._receiver.failure, self._camera.failure, *of_sinks):
             if failure is not None:
                 raise failure
-
-    def session_began(self) -> None:
-        """See BoardListener."""
-        self._camera.forget()
-
-    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """See BoardListener."""
-        if self._camera.on_demand:
-            self._camera.want(exposed_ns, index)

@@ -51,12 +51,10 @@ class Border:
     Args:
         account: of the links; doubts, steps and what was not believed are counted there.
         on_doubt: told when nothing from before this moment may be paired any more.
-        on_demand: whether the own camera shows images on demand; else a board whose stamps are mere labels has no part in the run.
     """
 
-    def __init__(self, account: LinkAccount, on_doubt: Callable[[], None], *, on_demand: bool = False) -> None:
+    def __init__(self, account: LinkAccount, on_doubt: Callable[[], None]) -> None:
         self._account = account
-        self._on_demand = on_demand
         self._on_doubt = on_doubt
         self._clock = LinkClocks(len(account.links))
         self._quarantine: Quarantine[Arrival] = Quarantine()
@@ -198,8 +196,6 @@ class Border:
         if frame.width_px > camera.width_px or frame.height_px > camera.height_px:
             return Disbelief.SIZE
         labelled, since_ns = camera.pacing is Pacing.DEMAND, self._clock.since_ns
-        if labelled and not self._on_demand:
-            return Disbelief.PACING
         if since_ns is not None and frame.marks.exposed_ns < since_ns and not labelled:
             return Disbelief.CLOCK
         arrived_ns = arrival.received_ns - estimate.offset_at(arrival.received_ns - estimate.offset_ns)

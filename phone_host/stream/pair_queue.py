@@ -10,10 +10,13 @@ from typing import Final, assert_never
 
 from common import now
 from common.frame import Frame
+from common.protocol.message import CameraDescription, Pacing
 from phone_host.model import BoardFrame, FramePair, PairCounts
+from phone_host.stream.demand_clock import DemandClock
 from phone_host.sync.fifo import Fifo, FifoSettings, Overflow
 from phone_host.sync.pairing import BoardOrphan, HostOrphan, OrphanReason, Outcome, Paired, Pairing, PairingSettings
 from phone_host.sync.phase import Phase, PhaseMeter
+from phone_host.sync.quarantine import Disbelief
 
 _SIDE_BYTES: Final = 64 * 1024 * 1024
 """Frames of each side wait for their partners, still encoded, in at most this much memory: 40 s of 50 KB JPEGs at 30 fps, more than any link delays."""
@@ -33,13 +36,13 @@ _SLOWEST_NS: Final = 60_000_000_000
 
 
 class PairQueue:
-    """Pairing and FIFO behind one lock.
+    """Pairing and FIFO behind one lock: the sink of a board's frames (FrameSink) in a run.
 
     Args:
         fifo: depth and overflow policy.
         tolerance_ns: greatest time skew; None for half of the longer frame period.
         host_period_ns: time between two frames of the own camera.
-        on_demand: whether the own camera shows images on demand.
+        demand: what stamps mean, and whom to tell of each board frame; None: the own camera has a clock.
         time_offset_ns: added to the board's stamps before they are compared with the host's.
         clock: monotonic, ns.
     """
@@ -50,7 +53,7 @@ class PairQueue:
         tolerance_ns: int | None,
         host_period_ns: int,
         *,
-        on_demand: bool = False,
+        demand: DemandClock | None = None,
         time_offset_ns: int = 0,
         clock: Callable[[], int] = now.monotonic_ns,
     ) -> None:
@@ -63,10 +66,8 @@ class PairQueue:
         self._pairing: Pairing[BoardFrame, Frame] | None = None
         self._changed = threading.Condition()
         self._closed = False
-        self._timeless = self.shows_on_demand = on_demand
+        self._demand = demand or DemandClock(Pacing.CLOCK)
         self._time_offset_ns = time_offset_ns
-        self._labelled = False
-        self._label_offset_ns: int | None = None
         self._meter: PhaseMeter | None = None
         self._newest: deque[BoardFrame] = deque(maxlen=_NEWEST)
         self._received = self._host_frames = self._paired = self._dropped = self._taken = 0
@@ -94,13 +95,13 @@ class PairQueue:
     def phase(self) -> Phase | None:
         """The two cameras' phase now; None while it is not known, and for images shown on demand."""
         with self._changed:
-            return None if self._meter is None or self._timeless else self._meter.phase
+            return None if self._meter is None or self._demand.is_timeless else self._meter.phase
 
     @property
     def has_phase(self) -> bool:
         """Whether the two rates have a phase at all."""
         with self._changed:
-            return self._meter is not None and self._meter.has_phase and not self._timeless
+            return self._meter is not None and self._meter.has_phase and not self._demand.is_timeless
 
     def restart_phase(self) -> None:
         """Measure the phase anew: a camera was steered."""
@@ -113,20 +114,20 @@ class PairQueue:
         with self._changed:
             return max(0, self._fifo.free - (self._pairing.held_board if self._pairing else 0))
 
-    def begin(self, board_period_ns: int, *, on_demand: bool) -> None:
-        """A board session begins: frames of an earlier one find no partner any more.
+    def room(self) -> int | None:
+        """See FrameSink: a queue that blocks, and a camera that waits for room, are held back; else pairs that find no place are dropped."""
+        held_back = self._demand.labels_board or self._settings.overflow is Overflow.BLOCK
+        return self.free_slots() if held_back else None
 
-        Args:
-            board_period_ns: time between two frames of the board's camera.
-            on_demand: its stamps count from its first image, so that not even the own camera's old stamps mean anything now.
-        """
+    def begin(self, camera: CameraDescription) -> None:
+        """A board session begins: frames of an earlier one find no partner any more; beside labels, not even the own camera's old ones do."""
+        self._demand.begin(camera.pacing)  # without the lock: it waits for an own image, which is delivered here
+        board_period_ns = camera.period_ns
         with self._changed:
-            self._timeless |= on_demand
-            self._labelled, self._label_offset_ns = on_demand, None
             self._meter = PhaseMeter(board_period_ns, self._host_period_ns)
             if self._pairing is not None:
                 self._settle(self._pairing.restart(OrphanReason.STREAM_ENDED))
-            if self._pairing is None or board_period_ns != self._board_period_ns or on_demand:
+            if self._pairing is None or board_period_ns != self._board_period_ns or self._demand.labels_board:
                 self._board_period_ns = board_period_ns
                 if self._pairing is not None:
                     self._settle(self._pairing.finish())
@@ -139,7 +140,7 @@ class PairQueue:
             self._delay_ns = _LEAST_WAIT_NS
             if self._meter is not None:
                 self._meter.restart()
-            if self._pairing is not None and not self._closed and not self._timeless:
+            if self._pairing is not None and not self._closed and not self._demand.is_timeless:
                 self._settle(self._pairing.void())
 
     def change_period(self, board_period_ns: int) -> None:
@@ -169,41 +170,37 @@ class PairQueue:
         """
         self._delay_ns = min(_SLOWEST_NS, max(age_ns * 5 // 4, self._delay_ns * 63 // 64))
 
-    def add_board(self, frame: BoardFrame) -> int:
-        """Take a frame of the board.
+    def objection(self, frame: BoardFrame) -> Disbelief | None:
+        """See FrameSink: labels have no partner beside a camera with a clock, and no own frame is kept for one that is too old."""
+        if self._demand.is_one_sided:
+            return Disbelief.PACING
+        age_ns = frame.received_ns - frame.marks.exposed_ns
+        if self._demand.labels_board or age_ns <= self.history_ns:
+            return None
+        self.note_age(age_ns)  # if the link has become so slow the next one finds its partner
+        return Disbelief.PAST
 
-        Returns:
-            The stamp by which it is paired, on the host's clock, ns.
-        """
+    def add_board(self, frame: BoardFrame) -> None:
+        """Take a frame of the board, and ask for its partner where the own camera waits for that."""
+        stamp_ns = self._demand.stamp_ns(frame.marks.exposed_ns + self._time_offset_ns, frame.offset_ns)
+        self._add_board(frame, stamp_ns)
+        self._demand.frame_came(stamp_ns, frame.message.sequence)
+
+    def _add_board(self, frame: BoardFrame, stamp_ns: int) -> None:
         with self._changed:
             assert self._pairing is not None
             self._received += 1
-            exposed_ns = self._stamp_of(frame)
             if self._closed:
                 self._count(self._board_orphans, OrphanReason.STREAM_ENDED.value)
-                return exposed_ns
+                return
             self.note_age(self._clock() - frame.marks.exposed_ns)  # the wait for an echo included
             self._board_bytes += len(frame.message.payload)
             self._newest.append(frame)
             if self._meter is not None:
-                self._meter.add_board(exposed_ns)
-            self._settle(self._pairing.add_board(exposed_ns, frame, self._clock()))
+                self._meter.add_board(stamp_ns)
+            self._settle(self._pairing.add_board(stamp_ns, frame, self._clock()))
             while self._board_bytes > _SIDE_BYTES or self._pairing.held_board > _SIDE_FRAMES:
                 self._settle(self._pairing.evict_oldest_board())
-            return exposed_ns
-
-    def _stamp_of(self, frame: BoardFrame) -> int:
-        """When a frame was exposed, on the host's clock.
-
-        Stamps of images shown on demand are labels, which the own camera's continue from the first one on: they all go by the first
-        one's clock offset, because a better estimate may move the others by more than a fast film's period.
-        """
-        exposed_ns = frame.marks.exposed_ns + self._time_offset_ns
-        if not self._labelled:
-            return exposed_ns
-        if self._label_offset_ns is None:
-            self._label_offset_ns = frame.offset_ns
-        return exposed_ns + self._label_offset_ns - frame.offset_ns
 
     def add_host(self, frame: Frame) -> None:
         """Take a frame of the own camera."""
@@ -249,8 +246,8 @@ class PairQueue:
 
     def _evict(self, now_ns: int) -> None:
         assert self._pairing is not None
-        if self._timeless:
-            return  # stamps of images shown on demand are labels; the wall clock says nothing about them
+        if self._demand.is_timeless:
+            return
         longer_ns = max(self._board_period_ns, self._host_period_ns)
         self._settle(self._pairing.evict_host(now_ns - max(_LEAST_WAIT_NS, self._delay_ns) - 2 * longer_ns))
         # A host frame is here as soon as its camera gave it; a board frame without one after this time never gets one.
@@ -285,8 +282,3 @@ class PairQueue:
     @staticmethod
     def _count(account: dict[str, int], reason: str) -> None:
         account[reason] = account.get(reason, 0) + 1
-
-    @property
-    def held_back_by_credit(self) -> bool:
-        """Whether a full FIFO holds the board back instead of dropping pairs."""
-        return self._settings.overflow is Overflow.BLOCK

@@ -15,12 +15,13 @@ from common.protocol.message import BoardHello, Ping, RefusalReason
 from common.protocol.session import Outgoing, connection_name
 from common.protocol.wire import VersionError, decode, encode_stamped
 from phone_host.measure.accounts import LinkAccount
-from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.corrections import Corrections
+from phone_host.stream.frame_sink import FrameSink
 from phone_host.stream.reception import BoardListener, LinkFacts, Reception
 from phone_host.sync.clock import ClockEstimate
 
 _LONGEST_WAIT_MS: Final = 50
-"""The pair queue's patience is checked at least this often."""
+"""Time passes for the sink at least this often."""
 
 _FAREWELL_NS: Final = 300_000_000
 """How long a leaving host waits for the board's last account: a few round trips of any usable link."""
@@ -32,11 +33,13 @@ class Receiver:
     Args:
         links: open links to one board, the preferred one first; closed by this.
         host_id: random id of this process's life.
-        queue: where frames go.
-        listener: told of sessions and frames.
+        sink: where frames go.
+        listener: told of sessions and frames beside the sink; None: nobody is.
     """
 
-    def __init__(self, links: Sequence[Link], host_id: str, queue: PairQueue, listener: BoardListener) -> None:
+    def __init__(
+        self, links: Sequence[Link], host_id: str, sink: FrameSink, listener: BoardListener | None = None
+    ) -> None:
         self._links = tuple(links)
         self._several = SeveralLinks(links)
         facts = [
@@ -47,11 +50,11 @@ class Receiver:
             )
             for number, link in enumerate(links)
         ]
-        self._reception = Reception(facts, host_id, queue, listener, self._send)
+        self._reception = Reception(facts, host_id, sink, self._send, listener)
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._waiter = Waiter([*(item for link in links for item in link.pollables), self._wake_read])
         self._stopping = False
-        self._later_ns = 0
+        self._corrections = Corrections()
         self._sleep, self._time_of_day = now.SleepWatch(), now.TimeOfDayWatch()
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
         self.failure: Exception | None = None
@@ -96,13 +99,13 @@ class Receiver:
         self._thread.start()
 
     def wake(self) -> None:
-        """Let the thread look at the queue's free places now; safe from any thread."""
+        """Let the thread look at the sink's room now; safe from any thread."""
         with suppress(BlockingIOError):  # then it has been told often enough
             os.write(self._wake_write, b"\0")
 
     def steer(self, later_ns: int) -> None:
-        """Ask the board's camera to expose later; safe from any thread."""
-        self._later_ns = later_ns
+        """Ask the board's camera to expose later, beside what it is asked already; safe from any thread."""
+        self._corrections.add(later_ns)
         self.wake()
 
     def stop(self) -> None:
@@ -154,8 +157,7 @@ class Receiver:
                 os.read(self._wake_read, 4096)
         now_ns = now.monotonic_ns()
         self._reception.tick(now_ns)
-        if self._later_ns:
-            later_ns, self._later_ns = self._later_ns, 0
+        if later_ns := self._corrections.take():
             self._reception.steer(later_ns, now_ns)
 
     def _watch_clock(self) -> None:

@@ -1,4 +1,4 @@
-"""The host's side of all that comes from a board: session, choice of the link, credit, border. Frames that are believed go to the pair queue.
+"""The host's side of all that comes from a board: session, choice of the link, credit, border. Frames that are believed go to a sink.
 
 No thread, no link and no clock of its own: messages and `now_ns` come in, what is to be said goes to `send`, so that it runs on simulated time, too.
 """
@@ -11,7 +11,7 @@ from typing import Final, Protocol
 from common.errors import UnavailableError
 from common.program.logs import event
 from common.protocol.host_session import HostSession
-from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Lane, Message, Pacing, RefusalReason, Rung
+from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Lane, Message, RefusalReason, Rung
 from common.protocol.session import (
     Accepted,
     Arrived,
@@ -32,11 +32,10 @@ from common.protocol.session import (
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount, link_names
 from phone_host.model import BoardFrame
 from phone_host.stream.border import Arrival, Border
-from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.frame_sink import FrameSink
 from phone_host.sync.choice import LinkChoice
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.flow import Flow
-from phone_host.sync.quarantine import Disbelief
 
 _LOG = logging.getLogger(__name__)
 
@@ -66,7 +65,7 @@ class BoardListener(Protocol):
         """A life of the board begins; nothing of the one before will follow."""
 
     def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """A frame has come: its exposure on the host's clock, and its number if the board shows images on demand."""
+        """A frame has come that the sink took: its exposure on the host's clock, and its number in the session."""
 
 
 class Reception:
@@ -75,21 +74,21 @@ class Reception:
     Args:
         links: what they are, the preferred one first.
         host_id: random id of this process's life.
-        queue: where frames go.
-        listener: told of sessions and frames.
+        sink: where frames go.
         send: takes what is to be said.
+        listener: told of sessions and frames beside the sink; None: nobody is.
     """
 
     def __init__(
         self,
         links: Sequence[LinkFacts],
         host_id: str,
-        queue: PairQueue,
-        listener: BoardListener,
+        sink: FrameSink,
         send: Callable[[Outgoing], None],
+        listener: BoardListener | None = None,
     ) -> None:
         self._links = tuple(links)
-        self._queue = queue
+        self._sink = sink
         self._listener = listener
         self._send = send
         self._session = HostSession(host_id, [link.dialled for link in links])
@@ -102,7 +101,7 @@ class Reception:
         self._turned_away: set[int] = set()
         self.tail_known = False
         self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
-        self._border = Border(self.account, queue.void, on_demand=queue.shows_on_demand)
+        self._border = Border(self.account, sink.void)
 
     def refused(self, now_ns: int) -> RefusalReason | None:
         """Why the board that was last heard does not talk to us; None when it does, or is silent now."""
@@ -172,12 +171,13 @@ class Reception:
             self._handle(self._session.tick(now_ns), now_ns)
             if len(self._links) > 1 and (best := self._choice.best(now_ns)) is not None:
                 self._handle(self._session.carry(best, now_ns), now_ns)
-        self._queue.tick()
+        self._sink.tick()
         self._grant(now_ns)
 
     def steer(self, later_ns: int, now_ns: int) -> None:
-        """Ask the board's camera to expose later."""
-        self._handle(self._session.steer(later_ns), now_ns)
+        """Ask the board's camera to expose later; what exceeds its period says nothing more. Without a board nobody is asked."""
+        if self._hello is not None:
+            self._handle(self._session.steer(later_ns % self._hello.camera.period_ns), now_ns)
 
     def slept(self, slept_ns: int, now_ns: int) -> None:
         """Take note that this machine has slept: its clock stood still, the board's and the cameras' went on."""
@@ -213,8 +213,8 @@ class Reception:
         carrier, hello = self._session.carrier, self._hello
         if carrier is None or hello is None or not self._border.takes_frames:
             return  # without a clock a frame could not be paired
-        if hello.camera.pacing is Pacing.DEMAND or self._queue.held_back_by_credit:
-            self._handle(self._session.grant(self._queue.free_slots()), now_ns)
+        if (room := self._sink.room()) is not None:
+            self._handle(self._session.grant(room), now_ns)
             return
         round_trip_ns = (self._border.round_trip_ns(carrier) or 0) if self._links[carrier].self_paced else None
         frames = self._flow.credit(self._session.outstanding, hello.camera.period_ns, round_trip_ns)
@@ -336,10 +336,11 @@ class Reception:
             self._current.vanished = False
         else:
             self.account.sessions.append(SessionAccount(hello.session, hello.counts, hello.counts))
-            self._listener.session_began()
-            self._queue.begin(hello.camera.period_ns, on_demand=hello.camera.pacing is Pacing.DEMAND)
+            if self._listener is not None:
+                self._listener.session_began()
+            self._sink.begin(hello.camera)
         self._current.rung = hello.rung
-        self._queue.change_period(hello.camera.period_ns)
+        self._sink.change_period(hello.camera.period_ns)
         if link != before:
             tally.carried += 1
         if accepted.resumed and before is not None and link != before:
@@ -358,7 +359,7 @@ class Reception:
         assert self._hello is not None
         self._hello = replace(self._hello, camera=replace(self._hello.camera, period_ns=rung.period_ns), rung=rung)
         self._current.rung = rung
-        self._queue.change_period(rung.period_ns)
+        self._sink.change_period(rung.period_ns)
         fps = round(1e9 / rung.period_ns, 2)
         _LOG.info(event("board_camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality))
 
@@ -374,22 +375,22 @@ class Reception:
             self._pass(*passed)
 
     def _pass(self, link: int, frame: BoardFrame) -> None:
-        """Give a frame that is believed to the pair queue."""
+        """Give a frame that is believed to the sink, if that wants it."""
         assert self._hello is not None
-        camera, message, marks = self._hello.camera, frame.message, frame.marks
-        age_ns = frame.received_ns - marks.exposed_ns
-        if camera.pacing is Pacing.CLOCK and age_ns > self._queue.history_ns:
-            self._current.disbelieved[Disbelief.PAST] += 1
-            self._queue.note_age(age_ns)  # if the link has become so slow the next one finds its partner
+        if (objection := self._sink.objection(frame)) is not None:
+            self._current.disbelieved[objection] += 1
             return
+        message, marks = frame.message, frame.marks
         transit_ns = frame.received_ns - marks.sent_ns
         self._choice.frame(link, transit_ns, frame.received_ns)
-        self._flow.arrived(transit_ns, marks.sent_ns - marks.grabbed_ns, camera.period_ns, frame.received_ns)
-        self.account.links[link].age.add(age_ns)
+        self._flow.arrived(
+            transit_ns, marks.sent_ns - marks.grabbed_ns, self._hello.camera.period_ns, frame.received_ns
+        )
+        self.account.links[link].age.add(frame.received_ns - marks.exposed_ns)
         self._border.passed(message)
-        stamp_ns = self._queue.add_board(frame)
-        on_demand = camera.pacing is Pacing.DEMAND
-        self._listener.frame_arrived(stamp_ns, message.sequence if on_demand else None)
+        self._sink.add_board(frame)
+        if self._listener is not None:
+            self._listener.frame_arrived(marks.exposed_ns, message.sequence)
 
 
 def refusal_text(reason: RefusalReason) -> tuple[str, str]:

@@ -28,7 +28,7 @@ _RECENT: Final = 32
 """A second of frames: a hitch makes the frames of so long wait for an echo, which takes a round trip of the link."""
 
 _HISTORY_NS: Final = 60_000_000_000
-"""No frame of the host's own camera is kept for longer (`pairqueue`)."""
+"""No frame of the host's own camera is kept for longer (`stream/pair_queue.py`)."""
 
 PATIENCE_NS: Final = 10_000_000_000
 """So long a frame waits for an echo: three times the round trip of the slowest link on which anything can be done."""

@@ -28,7 +28,7 @@ from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.children.board_process import board_process, free_port
-from phone_host.model import Disparity, RectifiedPair, Result
+from phone_host.model import BoardFrame, Disparity, RectifiedPair, Result
 from phone_host.run.host import Host, HostSettings
 from phone_host.run.sinks import FunctionSink
 from phone_host.stereo.core import StereoCore
@@ -98,12 +98,15 @@ class WatchedHost(Host):
             StereoCore(SlowMatcher()),
             [FunctionSink("bench", self._keep, waits=True)],
         )
+        take_in = self._queue.add_board
 
-    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """Take the age of each frame as it comes."""
-        now_ns = now.monotonic_ns()
-        self.link_ages.append((now_ns, now_ns - exposed_ns))
-        super().frame_arrived(exposed_ns, index)
+        def watched(frame: BoardFrame) -> None:
+            """Take the age of each frame as it comes."""
+            take_in(frame)
+            now_ns = now.monotonic_ns()
+            self.link_ages.append((now_ns, now_ns - frame.marks.exposed_ns))
+
+        self._queue.add_board = watched  # type: ignore[method-assign]
 
     def _keep(self, result: Result) -> None:
         self.ledgers.append(result.ledger)

@@ -186,14 +186,14 @@ def first_frame_ms(board: Board, webcam: Webcam) -> float:
     """Time from a host's dialling to its first frame, the camera at rest before, ms."""
     until(lambda: not webcam.streaming, "the camera rests")
     began_ns = time.monotonic_ns()
-    with closing(OurHost(board.guest.link, 1_000_000_000 // _FPS)) as host:
+    with closing(OurHost(board.guest.link)) as host:
         until(lambda: host.first_ns > 0, "a frame came")
     return (host.first_ns - began_ns) / 1e6
 
 
 def _counter(name: str, board: Board) -> Counter:
     if name == "board-agent":
-        return OurHost(board.guest.link, 1_000_000_000 // _FPS)
+        return OurHost(board.guest.link)
     return (Puller if name == "C program" else HttpReader)(board.guest.link)
 
 

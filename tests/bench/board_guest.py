@@ -26,10 +26,8 @@ from common.errors import UnavailableError
 from common.link.factory import open_link, parse_link
 from phone_host.measure.accounts import SessionAccount
 from phone_host.model import BoardFrame
-from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.receiver import Receiver
-from phone_host.sync.fifo import FifoSettings
-from tests.support.unheard import Unheard
+from tests.support.unkept import Unkept
 from tests.vm.guest import LINK_PORT, UNIT, Architecture, Guest, image_of
 
 ROOT: Final = Path(__file__).resolve().parents[2]
@@ -60,27 +58,24 @@ class OurHost:
 
     Args:
         address: of the board's link.
-        period_ns: of its camera, ns.
     """
 
-    def __init__(self, address: str, period_ns: int) -> None:
+    def __init__(self, address: str) -> None:
         self.frames = self.bytes = self.first_ns = 0
         self.ages_ns = array("q")
         counter = self
 
-        class Counting(PairQueue):
-            """Ends the frames' way."""
+        class Counting(Unkept):
+            """Counts the frames at the end of their way."""
 
-            def add_board(self, frame: BoardFrame) -> int:
+            def add_board(self, frame: BoardFrame) -> None:
                 counter.first_ns = counter.first_ns or frame.received_ns
                 counter.frames += 1
                 counter.bytes += len(frame.message.payload)
                 counter.ages_ns.append(frame.received_ns - frame.marks.exposed_ns)
-                return frame.marks.exposed_ns
 
         link = open_link(parse_link(address, listens_by_default=False))
-        queue = Counting(FifoSettings(), None, period_ns)
-        self._receiver = Receiver([link], now.random_id(), queue, Unheard())
+        self._receiver = Receiver([link], now.random_id(), Counting())
         self._receiver.start()
 
     def close(self) -> None:

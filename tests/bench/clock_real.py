@@ -13,15 +13,12 @@ import numpy as np
 from common import now
 from common.link.factory import open_link, parse_link
 from phone_host.children.board_process import board_process, free_port
-from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.receiver import Receiver
 from phone_host.sync.clock import ClockEstimate
-from phone_host.sync.fifo import FifoSettings
 from tests.bench.machine import Busyness, be_quiet, may_use_fifo
 from tests.bench.payloads import write_raw
-from tests.support.unheard import Unheard
+from tests.support.unkept import Unkept
 
-_PERIOD_NS = 33_000_000
 _LENGTH_S = 13.0
 _STEP_S = 0.02
 
@@ -110,9 +107,8 @@ def _measured(load: str, folder: Path, fps: int, runs: int, *, fifo: bool) -> Re
 
 def _session(address: str) -> Iterator[tuple[float, int, ClockEstimate]]:
     """A host that comes, learns and goes; (seconds since the first echo, host's time, estimate)."""
-    queue = PairQueue(FifoSettings(), None, _PERIOD_NS)
     link = open_link(parse_link(address, listens_by_default=False))
-    receiver = Receiver([link], now.random_id(), queue, Unheard())
+    receiver = Receiver([link], now.random_id(), Unkept())
     receiver.start()
     start_ns = 0
     while (age_s := (now.monotonic_ns() - start_ns) / 1e9) < _LENGTH_S or not start_ns:

@@ -16,12 +16,9 @@ from common.link.factory import open_link, parse_link
 from common.link.stream import StreamLink
 from common.protocol.framing import Side
 from common.protocol.message import FrameMessage, Pacing
-from phone_host.model import BoardFrame
-from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.receiver import Receiver
-from phone_host.sync.fifo import FifoSettings
 from tests.bench.link_job import Job, Tally
-from tests.support.unheard import Unheard
+from tests.support.unkept import Unkept
 
 _SLOTS = 8
 """Free places that the host tells of when frames go as fast as they can: more than one, so that the link is never idle."""
@@ -84,14 +81,8 @@ def receive_tandemscan(job: Job) -> Tally:
     """Our host: the receiver with session, clock and credit."""
     tally = job.tally()
 
-    class NoPairing(PairQueue):
-        """Ends the frames' way: pairing is no part of a link."""
-
-        def add_board(self, frame: BoardFrame) -> int:
-            return frame.marks.exposed_ns
-
-    queue = NoPairing(FifoSettings(_SLOTS), None, 1_000_000_000 // (job.fps or 30), on_demand=not job.fps)
-    receiver = Receiver([_open(job.address)], now.random_id(), queue, Unheard())
+    sink = Unkept(None if job.fps else _SLOTS)
+    receiver = Receiver([_open(job.address)], now.random_id(), sink)
     take_in = receiver._reception._accept_frame
 
     def stamped(frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:

@@ -56,7 +56,7 @@ def soak_board(folder: Path, minutes: float, tell: Callable[[float], None]) -> l
         webcam.plug(board.guest)
         board.guest.configure(f"v4l2:auto?size={_SIZE_PX[0]}x{_SIZE_PX[1]}&fps={_FPS}")
         pid = board.service_pid
-        with closing(OurHost(board.guest.link, _PERIOD_NS)) as receiver:
+        with closing(OurHost(board.guest.link)) as receiver:
             board.until_frames(receiver)
             time.sleep(min(_SETTLING_S, minutes * 30))
             settled, began, length_s = len(receiver.ages_ns), time.monotonic(), minutes * 60

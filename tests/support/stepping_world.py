@@ -92,7 +92,7 @@ class SteppingWorld:
         self._bound_ns = 0
         self.queue = PairQueue(FifoSettings(64, Overflow.DROP_OLDEST), None, PERIOD_NS, clock=self.host_clock)
         facts = [LinkFacts("tcp", dict(_NAMES), self_paced=False)]
-        self.reception = Reception(facts, "host", self.queue, self, self._host_says)
+        self.reception = Reception(facts, "host", self.queue, self._host_says, self)
         self._new_board()
         self.pairs = 0
         self.wrong: list[WrongPair] = []

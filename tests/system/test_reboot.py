@@ -10,12 +10,10 @@ from board_agent.agent import Agent
 from common import now
 from common.camera.factory import open_camera
 from common.link.factory import open_link, parse_link
-from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.receiver import Receiver
-from phone_host.sync.fifo import FifoSettings
 from tests.support.pictures import jpeg
 from tests.support.programs import until
-from tests.support.unheard import Unheard
+from tests.support.unkept import Unkept
 
 
 @contextmanager
@@ -41,8 +39,7 @@ def test_another_boot_is_another_clock(tmp_path: Path) -> None:
     folder, address = tmp_path / "film", f"ipc://{tmp_path}/board"
     folder.mkdir()
     (folder / "0.jpg").write_bytes(jpeg())
-    queue = PairQueue(FifoSettings(), None, 50_000_000)
-    receiver = Receiver([open_link(parse_link(address, listens_by_default=False))], now.random_id(), queue, Unheard())
+    receiver = Receiver([open_link(parse_link(address, listens_by_default=False))], now.random_id(), Unkept())
     receiver.start()
     clocks = []
     try:

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from common import now
 from common.frame import Frame, PixelFormat
 from common.ledger import BoardMarks
-from common.protocol.message import FrameMessage
+from common.protocol.message import CameraDescription, FrameMessage, Pacing
 from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, PairCounts
+from phone_host.stream.demand_clock import DemandClock
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.sync.fifo import FifoSettings, Overflow
 
@@ -34,10 +35,15 @@ def host_frame(sequence: int, exposed_ns: int, payload: bytes = b"") -> Frame:
     return Frame(sequence, stamp, stamp, 1, 1, PixelFormat.MJPEG, None, payload)
 
 
+def camera_of(period_ns: int, pacing: Pacing = Pacing.CLOCK) -> CameraDescription:
+    """A board's camera of that period."""
+    return CameraDescription("board's", 640, 480, PixelFormat.MJPEG, period_ns, pacing)
+
+
 def queue_of(depth: int = 1, overflow: Overflow = Overflow.DROP_OLDEST) -> PairQueue:
     """A queue whose board session has begun."""
     queue = PairQueue(FifoSettings(depth, overflow), None, PERIOD_NS)
-    queue.begin(PERIOD_NS, on_demand=False)
+    queue.begin(camera_of(PERIOD_NS))
     return queue
 
 
@@ -74,7 +80,7 @@ def test_account_holds_after_every_call(depth: int, overflow: Overflow, acts: li
             case "r":
                 queue.change_period(PERIOD_NS * (2 + step))
             case _:
-                queue.begin(PERIOD_NS + step, on_demand=False)
+                queue.begin(camera_of(PERIOD_NS + step))
         counts = queue.counts
         check(counts)
         assert counts.waiting <= depth
@@ -230,12 +236,12 @@ def test_a_new_session_orphans_what_the_old_one_left() -> None:
     queue = queue_of()
     start_ns = now.monotonic_ns()
     queue.add_board(board_frame(5, start_ns + 5 * PERIOD_NS))
-    queue.begin(PERIOD_NS, on_demand=False)
+    queue.begin(camera_of(PERIOD_NS))
     assert queue.counts.held_board == 0
     assert dict(queue.counts.board_orphans) == {"stream_ended": 1}
     queue.add_host(host_frame(5, start_ns + 5 * PERIOD_NS))
     assert queue.counts.held_host == 1
-    queue.begin(PERIOD_NS, on_demand=False)
+    queue.begin(camera_of(PERIOD_NS))
     queue.add_board(board_frame(0, start_ns + 5 * PERIOD_NS))  # older than the last one of the session before
     assert queue.counts.paired == 1
 
@@ -277,7 +283,7 @@ def test_the_end_releases_a_waiting_worker() -> None:
 def test_a_time_offset_is_taken_out_before_pairing(offset_ns: int) -> None:
     """Two cameras whose stamps of one moment differ by a known time pair as if they agreed, and the board's own marks stay as they were."""
     queue = PairQueue(FifoSettings(1, Overflow.DROP_OLDEST), 5 * MS, PERIOD_NS, time_offset_ns=offset_ns)
-    queue.begin(PERIOD_NS, on_demand=False)
+    queue.begin(camera_of(PERIOD_NS))
     start_ns = now.monotonic_ns()
     queue.add_host(host_frame(0, start_ns + offset_ns))
     queue.add_board(board_frame(0, start_ns))
@@ -289,17 +295,20 @@ def test_a_time_offset_is_taken_out_before_pairing(offset_ns: int) -> None:
 
 def test_a_better_clock_estimate_moves_no_label() -> None:
     """Images shown on demand are paired by number, however far the clock's estimate moves from one to the next."""
-    queue = PairQueue(FifoSettings(9, Overflow.DROP_NEWEST), None, 2 * MS, on_demand=True)
-    queue.begin(2 * MS, on_demand=True)
+    demand = DemandClock(Pacing.DEMAND)
+    queue = PairQueue(FifoSettings(9, Overflow.DROP_NEWEST), None, 2 * MS, demand=demand)
+    queue.begin(camera_of(2 * MS, Pacing.DEMAND))
     start_ns = now.monotonic_ns()
-    labels = []
     for number, offset_ns in enumerate((5 * MS, 0, -7 * MS, 3 * MS)):
         exposed_ns = start_ns + number * 2 * MS + offset_ns
         frame = replace(board_frame(number, exposed_ns), offset_ns=offset_ns)
-        labels.append(queue.add_board(frame))
-        queue.add_host(host_frame(number, labels[0] + number * 2 * MS))
-    assert labels == [start_ns + 5 * MS + number * 2 * MS for number in range(4)]
+        queue.add_board(frame)
+        queue.add_host(host_frame(number, start_ns + 5 * MS + number * 2 * MS))
     assert queue.counts.paired == 4
+    pairs = [queue.take() for _ in range(4)]
+    assert [(pair.board.message.sequence, pair.host.sequence, pair.time_skew_ns) for pair in pairs if pair] == [
+        (number, number, 0) for number in range(4)
+    ]
     check(queue.counts)
 
 
@@ -325,6 +334,6 @@ def test_tolerance_and_patience_follow_the_boards_rate() -> None:
 def test_a_tolerance_that_was_given_stays() -> None:
     """What the user asked for does not follow the rate."""
     queue = PairQueue(FifoSettings(1, Overflow.DROP_OLDEST), 3 * MS, PERIOD_NS)
-    queue.begin(PERIOD_NS, on_demand=False)
+    queue.begin(camera_of(PERIOD_NS))
     queue.change_period(4 * PERIOD_NS)
     assert queue.tolerance_ns == 3 * MS

@@ -10,23 +10,27 @@ from common.protocol.board_session import BoardSession
 from common.protocol.message import (
     BoardCounts,
     Bye,
+    CameraDescription,
     FrameMessage,
     HostHello,
     Knock,
     Lane,
     Message,
+    Pacing,
     Ping,
     Pong,
     Refusal,
     RefusalReason,
 )
 from common.protocol.session import MS, Outgoing, connection_name
+from phone_host.model import BoardFrame
+from phone_host.stream.frame_sink import FrameSink, NoFrames
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.reception import LinkFacts, Reception
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.quarantine import Disbelief
 from tests.support.session_world import CAMERA
-from tests.support.unheard import Unheard
+from tests.support.unkept import Unkept
 
 NAMES = {lane: connection_name(0, lane.name.encode()) for lane in Lane}
 
@@ -36,19 +40,24 @@ class Talk:
 
     Args:
         dialled: whether the host called the board.
+        sink: where frames go; None: to a pair queue beside an own camera with a clock.
+        camera: the board's.
     """
 
-    def __init__(self, *, dialled: bool = True) -> None:
+    def __init__(
+        self, *, dialled: bool = True, sink: FrameSink | None = None, camera: CameraDescription = CAMERA
+    ) -> None:
+        self.camera = camera
         self.now_ns = 10**12
         self.said: list[Outgoing] = []
         self.queue = PairQueue(FifoSettings(8), None, CAMERA.period_ns, clock=lambda: self.now_ns)
         facts = [LinkFacts("tcp", dict(NAMES) if dialled else {}, self_paced=False)]
-        self.reception = Reception(facts, "host", self.queue, Unheard(), self.said.append)
+        self.reception = Reception(facts, "host", sink or self.queue, self.said.append)
         self.begin("first")
 
     def begin(self, session: str) -> None:
         """A new life of the board."""
-        self.board = BoardSession(session, "boot", CAMERA)
+        self.board = BoardSession(session, "boot", self.camera)
         self.sent = 0
 
     def run(self, ticks: int = 20) -> None:
@@ -173,3 +182,71 @@ def test_frames_wait_while_an_echo_lies_and_come_back_by_themselves() -> None:
     assert talk.queue.counts.received == 2
     assert talk.reception.account.clock_steps == 0
     assert talk.reception.account.clock_doubts == 1
+
+
+class Choosy(Unkept):
+    """Wants no frame of an odd number."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.taken: list[int] = []
+        self.periods_ns: list[int] = []
+
+    def begin(self, camera: CameraDescription) -> None:
+        """A life of the board begins."""
+        self.periods_ns.append(camera.period_ns)
+
+    def objection(self, frame: BoardFrame) -> Disbelief | None:
+        """Whether the number is odd."""
+        return Disbelief.PAST if frame.message.sequence % 2 else None
+
+    def add_board(self, frame: BoardFrame) -> None:
+        """Note the number."""
+        self.taken.append(frame.message.sequence)
+
+
+def test_a_sink_gets_what_it_does_not_object_to() -> None:
+    """A frame that the sink has no use for is dropped and counted by the sink's reason; each life is told once, before its frames."""
+    sink = Choosy()
+    talk = Talk(sink=sink)
+    talk.run()
+    for _ in range(4):
+        talk.show(talk.frame())
+        talk.run()  # until an echo has proven it
+    assert sink.taken == [0, 2]
+    assert dict(talk.reception.account.disbelieved) == {Disbelief.PAST: 2}
+    assert sink.periods_ns == [CAMERA.period_ns]
+
+
+@pytest.mark.parametrize(("sink", "leave"), [(NoFrames(), 0), (Unkept(3), 3)])
+def test_a_board_sends_what_the_sink_has_room_for(sink: FrameSink, leave: int) -> None:
+    """The board's leave goes as far as the sink's room, and the clock is learnt also where there is none."""
+    talk = Talk(sink=sink)
+    talk.run()
+    sent = 0
+    while talk.board.has_credit:
+        talk.board.sent(talk.now_ns)
+        sent += 1
+    assert sent == leave
+    assert talk.reception.estimate is not None
+    assert talk.reception.hello is not None
+
+
+def test_labels_beside_a_clock_are_dropped_by_name() -> None:
+    """A board on demand has no part in a run whose own camera has a clock; with nothing else in the frame that is wrong, that is the reason."""
+    talk = Talk(camera=replace(CAMERA, pacing=Pacing.DEMAND))
+    talk.run()
+    talk.show(talk.frame())
+    assert dict(talk.reception.account.disbelieved) == {Disbelief.PACING: 1}
+    assert talk.queue.counts.received == 0
+
+
+def test_a_frame_older_than_its_partners_is_dropped_and_the_next_one_awaited() -> None:
+    """Own frames are kept for two seconds and two periods; a frame that is older has no partner, and lets them be kept for longer."""
+    talk = Talk()
+    talk.run(300)
+    for _ in range(2):
+        talk.show(talk.frame(marks=BoardMarks(talk.now_ns - 2_500 * MS, talk.now_ns - 2 * MS, talk.now_ns - MS)))
+        talk.run()
+    assert dict(talk.reception.account.disbelieved) == {Disbelief.PAST: 1}
+    assert talk.queue.counts.received == 1

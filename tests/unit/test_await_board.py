@@ -1,0 +1,141 @@
+"""Who waits for a board is told why there is none, each reason by an error of its own, and waits no longer than it helps."""
+
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from common import now
+from common.errors import AbsentBoardError, BusyBoardError, OtherVersionError, UnavailableError
+from common.link.factory import open_link, parse_link
+from common.protocol.message import Lane, RefusalReason
+from phone_host.stream.await_board import BoardPatience, await_board
+from phone_host.stream.frame_sink import NoFrames
+from phone_host.stream.receiver import Receiver
+
+S = 1_000_000_000
+LOOKS = 200_000
+
+
+def ends_after(patience_ns: int | None, refused: RefusalReason | None) -> tuple[int, UnavailableError] | None:
+    """The second in which patience with a board that was never there ends, and with what; None: not within a minute."""
+    patience = BoardPatience(patience_ns, 0)
+    for second in range(61):
+        try:
+            patience.look(second * S, refused, present=False)
+        except UnavailableError as error:
+            return second, error
+    return None
+
+
+@pytest.mark.parametrize(
+    ("patience_s", "refused", "ends_s", "kind"),
+    [
+        (3, None, 4, AbsentBoardError),
+        (0, None, 1, AbsentBoardError),
+        # A board may take a host that crashed for alive for a moment: busy is not believed for 4 s.
+        (0, RefusalReason.BUSY, 5, BusyBoardError),
+        (10, RefusalReason.BUSY, 11, BusyBoardError),
+        (None, RefusalReason.BUSY, 5, BusyBoardError),
+        # No waiting mends another version.
+        (10, RefusalReason.VERSION, 1, OtherVersionError),
+        (None, RefusalReason.VERSION, 1, OtherVersionError),
+    ],
+)
+def test_patience_ends_by_the_reason(
+    patience_s: int | None, refused: RefusalReason | None, ends_s: int, kind: type[UnavailableError]
+) -> None:
+    """An absent board is waited for as long as was asked, a busy one 4 s at least, one of another version not at all."""
+    ended = ends_after(None if patience_s is None else patience_s * S, refused)
+    assert ended is not None
+    second, error = ended
+    assert (second, type(error)) == (ends_s, kind)
+    assert error.problem
+    assert error.remedy
+
+
+def test_without_a_limit_an_absent_board_is_waited_for() -> None:
+    """No patience given: a silent board is waited for without end."""
+    assert ends_after(None, None) is None
+
+
+def test_patience_begins_anew_when_a_board_goes() -> None:
+    """The time in which the board was there does not count."""
+    patience = BoardPatience(3 * S, 0)
+    for second in range(20):
+        patience.look(second * S, None, present=True)
+    patience.look(22 * S, None, present=False)
+    with pytest.raises(AbsentBoardError, match="no board within 3 s"):
+        patience.look(23 * S, None, present=False)
+
+
+@contextmanager
+def receiver_at(folder: Path) -> Iterator[Receiver]:
+    """A receiver with a link at whose other end nobody is."""
+    receiver = Receiver([open_link(parse_link(f"ipc://{folder}/board", listens_by_default=False))], "host", NoFrames())
+    receiver.start()
+    try:
+        yield receiver
+    finally:
+        receiver.stop()
+
+
+def test_the_wait_ends_in_each_of_its_ways(tmp_path: Path) -> None:
+    """It ends when the board has given what is needed, when it is stopped, when time is up, and by the caller's own error."""
+    with receiver_at(tmp_path) as receiver:
+        answers = iter((False, False, True))
+        assert await_board(receiver, BoardPatience(None, 0), lambda: next(answers))
+        assert not await_board(receiver, BoardPatience(None, 0), lambda: False, lambda: True)
+        nowhere = BoardPatience(0, now.monotonic_ns() - 1, where="ipc://nowhere", remedy="look elsewhere")
+        with pytest.raises(AbsentBoardError, match="no board at ipc://nowhere within 0 s: look elsewhere"):
+            await_board(receiver, nowhere, lambda: False)
+        with pytest.raises(ZeroDivisionError):
+            await_board(receiver, BoardPatience(None, 0), lambda: bool(1 // 0))
+
+
+def test_a_receivers_failure_ends_the_wait(tmp_path: Path) -> None:
+    """What went wrong in the receiver's thread is raised where the board is waited for."""
+    with receiver_at(tmp_path) as receiver:
+        receiver.failure = OSError("gone")
+        with pytest.raises(OSError, match="gone"):
+            await_board(receiver, BoardPatience(None, 0), lambda: False)
+
+
+def test_a_refusal_that_ends_while_it_is_told_is_a_refusal(tmp_path: Path) -> None:
+    """The receiver's thread may take a refusal back at any moment: whoever waits sees one or none, and nothing in between."""
+    receiver = Receiver(
+        [open_link(parse_link(f"ipc://{tmp_path}/board", listens_by_default=False))], "host", NoFrames()
+    )
+    reception = receiver._reception
+    dialled = reception._links[0].dialled[Lane.CONTROL]
+    done, seen = threading.Event(), {True: 0, False: 0}
+
+    def flicker() -> None:
+        while not done.is_set():
+            reception.refuse_version(dialled, "another version", now.monotonic_ns())
+            reception._refused = None  # as when a board accepts
+
+    usual_s = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    thread = threading.Thread(target=flicker)
+    thread.start()
+    try:
+        for _ in range(LOOKS):
+            try:
+                BoardPatience(None, 0).look(now.monotonic_ns(), receiver.refused, present=False)
+            except OtherVersionError:
+                seen[True] += 1
+            else:
+                seen[False] += 1
+            if min(seen.values()) > 500:
+                break
+    finally:
+        done.set()
+        thread.join(60)
+        sys.setswitchinterval(usual_s)
+        receiver.start()
+        receiver.stop()
+    assert min(seen.values()) > 500, f"the threads never met: {seen}"
