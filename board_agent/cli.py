@@ -16,7 +16,8 @@ from board_agent.settings import ENVIRONMENT_PREFIX, SERVICE_SETTINGS, BoardSett
 from board_agent.status import StatusLine
 from common import now
 from common.camera.base import CameraHealth, health_values
-from common.camera.factory import EXAMPLE, open_camera, parse_camera
+from common.camera.factory import open_camera, parse_camera
+from common.camera.options import EXAMPLE
 from common.errors import SettingsError
 from common.keys import KeyFolder, change
 from common.keys import listing as keys_listing

@@ -5,15 +5,13 @@ from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl
 
 from common.camera.base import Camera
-from common.camera.options import exact
+from common.camera.options import EXAMPLE, exact
 from common.errors import SettingsError
 from common.protocol.message import Pacing
 
 if TYPE_CHECKING:
     from common.camera.replay import ReplaySettings
     from common.camera.v4l2_stream import V4l2Settings
-
-EXAMPLE = "v4l2:/dev/video0[?size=640x480&fps=30&format=mjpeg] or replay:PATH[?fps=30&loop=1&pace=clock|demand]"
 
 
 def open_camera(uri: str, clock: str, now_ns: int) -> Camera:

@@ -180,7 +180,7 @@ def _tell(
 
 def _settings(options: argparse.Namespace) -> "RunSettings":
     from phone_host.bench.runs import RunSettings  # noqa: PLC0415 - OpenCV, only now
-    from phone_host.stereo.match import MatcherName  # noqa: PLC0415
+    from phone_host.stereo.matcher_names import MatcherName  # noqa: PLC0415
     from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
 
     if not 0.5 <= options.seconds <= 3600:

@@ -30,7 +30,8 @@ from phone_host.run.host import Host, HostSettings
 from phone_host.scene.film import JPEG_QUALITY, Film, render_films
 from phone_host.scene.scene import DEMO_PERIOD_S, WEBCAM_LOOK, demo_scene, matched_rig
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.match import MatcherName, MatchSettings, create_matcher
+from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.sync.fifo import FifoSettings
 

@@ -1,22 +1,17 @@
 """Camera URI to camera, for the host: what `common` knows, and servers."""
 
-from typing import Final
-
 from common.camera import factory as common_factory
 from common.camera.base import Camera
 from common.frame import ImageSizeError
 from common.imagesize import MOST_PIXELS, require_pixels
-from phone_host.camera.http_uri import EXAMPLE as HTTP_EXAMPLE
 from phone_host.camera.http_uri import http_settings, is_http
-
-EXAMPLE: Final = f"{common_factory.EXAMPLE} or {HTTP_EXAMPLE}"
 
 
 def open_camera(uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXELS) -> Camera:
     """Open the camera that a URI names.
 
     Args:
-        uri: see EXAMPLE.
+        uri: as in `examples.EXAMPLE`.
         clock: name of this machine's clock, for the stamps.
         now_ns: CLOCK_MONOTONIC now, ns.
         most_pixels: a camera whose images have more is refused.

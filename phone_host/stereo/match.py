@@ -10,13 +10,13 @@ This module knows the matchers; the matchers do not know it.
 """
 
 from dataclasses import dataclass
-from enum import Enum
 from typing import Protocol, assert_never
 
 from common.errors import SettingsError
 from phone_host.model import Disparity, RectifiedPair
 from phone_host.stereo.match_block import BlockMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
+from phone_host.stereo.matcher_names import MatcherName
 
 
 class Matcher(Protocol):
@@ -35,16 +35,6 @@ class Matcher(Protocol):
             DataError: the two images differ in size, or are no uint8 images.
         """
         ...
-
-
-class MatcherName(Enum):
-    """The matchers by the name a user types.
-
-    BLOCK is the paper's: 8 x 8 sum of absolute differences, winner takes all. SGBM is semi-global matching, the default.
-    """
-
-    BLOCK = "block"
-    SGBM = "sgbm"
 
 
 @dataclass(frozen=True, slots=True)
