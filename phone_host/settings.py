@@ -13,7 +13,7 @@ from common.link.factory import parse_link
 from common.program.settings import Resolved, log_level, resolve
 from phone_host.camera.factory import check_camera
 from phone_host.declared_settings import PhoneHostSettings
-from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.matcher_names import matcher_named
 from phone_host.sync.fifo import FifoSettings
 
 ENVIRONMENT_PREFIX: Final = "PHONE_HOST"
@@ -40,9 +40,7 @@ def check(settings: PhoneHostSettings) -> None:
     if doubled := next((uri for uri in settings.link if settings.link.count(uri) > 1), None):
         raise SettingsError(f"link {doubled!r} is given twice", "give each link once")
     FifoSettings.parse(settings.fifo)
-    matchers = [name.value for name in MatcherName]
-    if settings.matcher not in matchers:
-        raise SettingsError(f"matcher {settings.matcher!r} is unknown", f"give {' or '.join(matchers)}")
+    matcher_named(settings.matcher)
     _check_megapixels(settings)
     if settings.align_phase not in {"", "either", "board", "host"}:
         raise SettingsError(f"align_phase is {settings.align_phase!r}", "give either, board or host, or nothing")

@@ -26,7 +26,7 @@ from phone_host.bench.tables import fit_lines, prediction_lines, regime_lines, r
 from phone_host.bench.trace import TracedRun, trace_json
 from phone_host.output.atomic import write_text
 from phone_host.output.listed import claim
-from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.matcher_names import matcher_named
 from phone_host.sync.fifo import FifoSettings
 
 _NOTHING_MEASURED = 4
@@ -105,11 +105,7 @@ def _tell(options: argparse.Namespace, results: Sequence[CaseResult], under: Con
 def _settings(options: argparse.Namespace) -> RunSettings:
     if not 0.5 <= options.seconds <= 3600:
         raise SettingsError(f"--seconds {options.seconds:g}", "give 0.5 to 3600")
-    if options.matcher not in {name.value for name in MatcherName}:
-        raise SettingsError(
-            f"--matcher {options.matcher!r} is unknown", f"give {' or '.join(name.value for name in MatcherName)}"
-        )
-    return RunSettings(MatcherName(options.matcher), FifoSettings.parse(options.fifo), options.seconds)
+    return RunSettings(matcher_named(options.matcher), FifoSettings.parse(options.fifo), options.seconds)
 
 
 def _make_folder(folder: Path) -> None:

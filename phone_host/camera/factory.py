@@ -1,10 +1,16 @@
 """Camera URI to camera, for the host: what `common` knows, and servers."""
 
+from typing import Final
+
 from common.camera import factory as common_factory
 from common.camera.base import Camera
 from common.frame import ImageSizeError
 from common.imagesize import MOST_PIXELS, require_pixels
+from common.program.extensions import named
 from phone_host.camera.http_uri import http_settings, is_http
+
+_HTTP: Final = "phone_host.camera.mjpeg_http:HttpCamera"
+"""TLS and all that comes with it are imported only where a server is asked for."""
 
 
 def open_camera(uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXELS) -> Camera:
@@ -37,9 +43,8 @@ def open_camera(uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXEL
 def _open(uri: str, clock: str, now_ns: int) -> Camera:
     if not is_http(uri):
         return common_factory.open_camera(uri, clock, now_ns)
-    from phone_host.camera.mjpeg_http import HttpCamera  # noqa: PLC0415 - TLS and all that only where it is of use
-
-    return HttpCamera(http_settings(uri, clock))
+    camera: Camera = named(_HTTP)(http_settings(uri, clock))
+    return camera
 
 
 def check_camera(uri: str) -> None:

@@ -35,4 +35,7 @@ def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
         help="x of the right principal point minus the left (default 0)",
     )
     parser.add_argument("--center", metavar="CX,CY", help="left principal point of rectified images")
-    parser.add_argument("--matcher", choices=[name.value for name in MatcherName], help="default sgbm")
+    own = " or ".join(name.value for name in MatcherName)
+    parser.add_argument(
+        "--matcher", metavar="NAME", help=f"{own}, or one that an installed package registers (default sgbm)"
+    )

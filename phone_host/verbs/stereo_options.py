@@ -9,7 +9,7 @@ from phone_host.model import Side, StereoGeometry
 from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings, create_matcher
-from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.matcher_names import matcher_named
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
 
@@ -32,10 +32,7 @@ def build_core(
         SettingsError: options that contradict each other.
         DataError: a bad rig.yaml.
     """
-    if matcher not in {name.value for name in MatcherName}:
-        raise SettingsError(
-            f"matcher {matcher!r} is unknown", f"give {' or '.join(name.value for name in MatcherName)}"
-        )
+    chosen = matcher_named(matcher)
     if not (math.isfinite(options.near) and options.near > 0):
         raise SettingsError(f"--near {options.near:g}", "give millimetres above 0")
     if calibration and options.rectified:
@@ -48,7 +45,7 @@ def build_core(
         if disparities is None:
             width_px = rectifier.rectification.width_px
             disparities = disparities_for_near(rectifier.geometry, options.near / 1000, width_px)
-        return StereoCore(create_matcher(MatchSettings(MatcherName(matcher), disparities)), rectifier), rig.board_side
+        return StereoCore(create_matcher(MatchSettings(chosen, disparities)), rectifier), rig.board_side
     if not options.rectified:
         return None, None
     if options.disparities is None:
@@ -56,7 +53,7 @@ def build_core(
             "--rectified without --disparities", "give the number of disparities, for example --disparities 64"
         )
     return StereoCore(
-        create_matcher(MatchSettings(MatcherName(matcher), options.disparities)),
+        create_matcher(MatchSettings(chosen, options.disparities)),
         None,
         rectified_geometry(options, size_px),
     ), None
