@@ -13,7 +13,6 @@ What stands there is a callable that makes the implementation; each registry say
 
 import importlib
 import inspect
-from importlib import util
 from typing import TYPE_CHECKING, Any
 
 from common.errors import SettingsError, TandemError
@@ -77,11 +76,6 @@ def make_registered(group: str, name: str, kind: type, *arguments: object) -> An
     if missing := sorted(member for member in _members(kind) if not _has(made, member)):
         raise SettingsError(f"{where} gave no {kind.__name__}: it has no {', '.join(missing)}", remedy)
     return made
-
-
-def is_installed(package: str) -> bool:
-    """Whether a package could be imported, without importing it."""
-    return util.find_spec(package) is not None
 
 
 def _only(group: str, name: str) -> "EntryPoint":

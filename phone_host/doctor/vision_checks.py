@@ -1,0 +1,102 @@
+"""What the doctor can only ask with numpy and OpenCV: a board, as a run does, and a rig. Imported when both were seen to work."""
+
+import threading
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from common import now
+from common.camera.factory import parse_camera
+from common.camera.v4l2_stream import V4l2Settings
+from common.errors import TandemError
+from common.keys import KeyFolder
+from common.link.factory import open_link, parse_link
+from common.protocol.message import RefusalReason
+from phone_host.camera.http_uri import is_http
+from phone_host.doctor.host_checks import Answer, BoardReadings, RigReadings
+from phone_host.model import Side
+from phone_host.output.rig_yaml import read_rig
+from phone_host.stereo.rectify import Rectifier
+from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.receiver import Receiver
+from phone_host.sync.fifo import FifoSettings
+
+_STEP_S: Final = 0.05
+
+
+def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
+    """Say hello as a host does, and leave again.
+
+    Args:
+        uri: of the link to the board.
+        wait_s: how long it is waited for, s.
+        keys: folder of this host's key and the boards that it knows.
+
+    Returns:
+        What it answered.
+
+    Raises:
+        TandemError: the link cannot be opened, or failed.
+    """
+    link = open_link(parse_link(uri, listens_by_default=False), keys)
+    receiver = Receiver([link], now.random_id(), PairQueue(FifoSettings(), None, 1), _Listener())
+    receiver.start()
+    pause = threading.Event()
+    deadline_ns = now.monotonic_ns() + round(wait_s * 1e9)
+    answer = Answer.SILENT
+    while answer is Answer.SILENT and now.monotonic_ns() < deadline_ns:
+        pause.wait(_STEP_S)
+        if receiver.hello is not None and receiver.estimate is not None:
+            answer = Answer.BOARD
+        elif receiver.refused is RefusalReason.VERSION:
+            answer = Answer.OTHER_VERSION
+    if answer is Answer.SILENT and receiver.refused is RefusalReason.BUSY:
+        answer = Answer.BUSY
+    hello, estimate = receiver.hello, receiver.estimate
+    receiver.stop()
+    if receiver.failure is not None:
+        raise receiver.failure
+    if hello is None or estimate is None:
+        return BoardReadings(uri, answer, wait_s)
+    camera = f"{hello.camera.name} {hello.camera.width_px}x{hello.camera.height_px}"
+    return BoardReadings(uri, answer, 0.0, camera, estimate.round_trip_ns, estimate.uncertainty_ns)
+
+
+class _Listener:
+    """A host that wants nothing but an answer."""
+
+    def session_began(self) -> None:
+        """See BoardListener."""
+
+    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
+        """See BoardListener."""
+
+
+def read_rig_readings(calibration: str, camera: str) -> RigReadings:
+    """Read a rig and make its rectification.
+
+    Args:
+        calibration: rig.yaml.
+        camera: URI of the own camera; empty: none is given.
+
+    Returns:
+        What it says, or what is wrong with it.
+
+    Raises:
+        SettingsError: the URI makes no sense.
+    """
+    try:
+        rig = read_rig(Path(calibration))
+        Rectifier(rig)
+    except TandemError as error:
+        return RigReadings(calibration, error.problem, error.remedy)
+    own = rig.right if rig.board_side is Side.LEFT else rig.left
+    asked = parse_camera(camera, "") if camera and not is_http(camera) else None
+    return RigReadings(
+        path=calibration,
+        rms_px=rig.rms_stereo_px,
+        baseline_m=float(np.linalg.norm(rig.t_right_left_m)),
+        host_size_px=(own.width_px, own.height_px),
+        asked_size_px=asked.wanted.size_px if isinstance(asked, V4l2Settings) else None,
+    )
