@@ -1,14 +1,25 @@
-"""What the board's owner may set."""
+"""What the board's owner may set, and which of it `run` could not use."""
 
+import argparse
 import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from board_agent.rate_control import ways
+from common.camera.factory import parse_camera
+from common.errors import SettingsError
 from common.keys import KeyFolder, default_folder
-from common.program.settings import setting
+from common.link.factory import parse_link
+from common.program.settings import Resolved, log_level, resolve, setting
 
 ENVIRONMENT_PREFIX = "BOARD_AGENT"
+
+LONGEST_S: Final = 1e9
+"""Of any time that is waited."""
+
+_HIGHEST_FPS: Final = 1000
+"""Of any camera URI."""
 
 SERVICE_SETTINGS: Final = Path("/etc/tandemscan/board-agent.toml")
 """What the package's service is run with."""
@@ -47,3 +58,39 @@ def key_folder(keys: str) -> KeyFolder:
         keys: the setting; empty for the usual place.
     """
     return KeyFolder(Path(keys).expanduser() if keys else default_folder(os.environ, service=True))
+
+
+def chosen_keys(options: argparse.Namespace) -> KeyFolder:
+    """Give the folder of keys of whoever is meant; without any choice that of the service, where it is installed."""
+    if not (options.config or options.keys) and SERVICE_SETTINGS.is_file():
+        options.config = SERVICE_SETTINGS
+    return key_folder(resolve_settings(options).values.keys)
+
+
+def resolve_settings(options: argparse.Namespace) -> Resolved[BoardSettings]:
+    """Work out the settings from file, environment and a verb's options."""
+    link = tuple(options.link) if options.link else None
+    adapt = None if options.adapt is None else tuple(way for way in options.adapt.split(",") if way)
+    given = {"camera": options.camera, "link": link, "keys": options.keys, "log_level": options.log_level}
+    given |= {"adapt": adapt, "least_fps": options.least_fps}
+    return resolve(BoardSettings, ENVIRONMENT_PREFIX, options.config, given)
+
+
+def check(settings: BoardSettings) -> None:
+    """Refuse values that `run` could not use, as far as that can be said without opening anything.
+
+    Raises:
+        SettingsError: one makes no sense.
+    """
+    log_level(settings.log_level)
+    if settings.camera:
+        parse_camera(settings.camera, "")
+    for uri in settings.link:
+        parse_link(uri, listens_by_default=True)
+    ways(settings.adapt)
+    if not 0 <= settings.least_fps <= _HIGHEST_FPS:
+        raise SettingsError(
+            f"least_fps is {settings.least_fps:g}", f"give frames per second up to {_HIGHEST_FPS}, 0 to keep the rate"
+        )
+    if not 0 <= settings.idle_after < LONGEST_S:
+        raise SettingsError(f"idle_after is {settings.idle_after}", "give seconds, 0 for never")

@@ -11,6 +11,7 @@ rights (setfsuid) would need ctypes, and would keep root's groups.
 """
 
 import errno
+import grp
 import os
 import pwd
 import stat
@@ -249,8 +250,6 @@ def is_open_to_others(status: os.stat_result) -> bool:
 
 
 def _is_own_group(status: os.stat_result) -> bool:
-    import grp  # noqa: PLC0415 - seldom
-
     try:
         user, group = pwd.getpwuid(status.st_uid), grp.getgrgid(status.st_gid)
     except KeyError:

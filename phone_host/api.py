@@ -38,7 +38,8 @@ from phone_host.report.run_json import build
 from phone_host.run.host import EndReason, Host, HostSettings
 from phone_host.settings import key_folder
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.match import Matcher, MatcherName, MatchSettings, create_matcher
+from phone_host.stereo.match import Matcher, MatchSettings, create_matcher
+from phone_host.stereo.matcher_names import matcher_named
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import DEFAULT_NEAR_M, disparities_for_near
 from phone_host.sync.fifo import FifoSettings
@@ -278,6 +279,7 @@ def _core(
 def _matcher(matcher: str | Matcher, disparities: int | None) -> Matcher:
     if not isinstance(matcher, str):
         return matcher
+    chosen = matcher_named(matcher)
     if disparities is None:
         raise SettingsError("rectified images without disparities", "give the number of disparities, for example 64")
-    return create_matcher(MatchSettings(MatcherName(matcher), disparities))
+    return create_matcher(MatchSettings(chosen, disparities))

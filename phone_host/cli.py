@@ -1,23 +1,43 @@
-"""phone-host: the host's command. Each verb is a module of its own and is imported only when it is asked for."""
+"""phone-host: the host's command. Every start knows the options of all verbs, which are light; what a verb does is imported when it runs."""
 
 import argparse
 import importlib
 import sys
 from collections.abc import Sequence
-from types import ModuleType
+from typing import Final, Protocol
 
 from common.program.commandline import ExamplesFirstParser, run_command
+from phone_host.verbs.calibrate import arguments as calibrate
+from phone_host.verbs.calibrate_time import arguments as calibrate_time
+from phone_host.verbs.demo import arguments as demo
+from phone_host.verbs.doctor import arguments as doctor
+from phone_host.verbs.keys import arguments as keys
+from phone_host.verbs.pair import arguments as pair
+from phone_host.verbs.run import arguments as run
+from phone_host.verbs.settings import arguments as settings
+from phone_host.verbs.stereo import arguments as stereo
 
-_VERBS = {
-    "demo": "both programs on this machine, a rendered scene with known truth, a full report",
-    "run": "pair a board's frames with the own camera's, compute depth, measure every delay",
-    "calibrate": "calibrate two cameras from pictures of a chessboard",
-    "calibrate-time": "measure what lies between the two cameras' stamps, with a screen, a lamp or a moving scene",
-    "stereo": "disparity and point cloud of one pair of images",
-    "pair": "get to know a board by the code that it shows",
-    "keys": "show or change this host's key and the boards that it knows",
-    "doctor": "check Python, camera, link, rig and disk",
-    "settings": "print each setting with its origin",
+
+class Arguments(Protocol):
+    """The light half of a verb: what help and the parser need."""
+
+    SUMMARY: str
+    EXAMPLES: str
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare the verb's options."""
+
+
+_VERBS: Final[dict[str, Arguments]] = {
+    "demo": demo,
+    "run": run,
+    "calibrate": calibrate,
+    "calibrate-time": calibrate_time,
+    "stereo": stereo,
+    "pair": pair,
+    "keys": keys,
+    "doctor": doctor,
+    "settings": settings,
 }
 
 _EXAMPLES = """examples:
@@ -37,34 +57,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout not to be had, 4 bad data, 130 interrupted.
     """
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    parser = _parser(next((word for word in given if not word.startswith("-")), ""))
-    return run_command(parser, given, _run)
+    return run_command(_parser(), arguments, _run)
 
 
 def _run(options: argparse.Namespace) -> int:
-    code: int = _module(options.verb).run(options)
+    """Import the command half of the verb, and run it. The only place that imports by a verb's name."""
+    command = importlib.import_module(f"phone_host.verbs.{options.verb.replace('-', '_')}.command")
+    code: int = command.run(options)
     return code
 
 
-def _parser(asked: str) -> argparse.ArgumentParser:
-    """Make the parser; only the verb that is asked for brings its options, so that no other one is imported."""
+def _parser() -> argparse.ArgumentParser:
     parser = ExamplesFirstParser("phone-host", description=_EXAMPLES)
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
-    for name, explanation in _VERBS.items():
-        if name != asked:
-            verbs.add_parser(name, help=explanation)
-            continue
-        module = _module(name)
-        verb = verbs.add_parser(name, help=explanation, description=f"examples:\n{module.EXAMPLES}")
-        module.add_arguments(verb)
+    for name, arguments in _VERBS.items():
+        verb = verbs.add_parser(name, help=arguments.SUMMARY, description=f"examples:\n{arguments.EXAMPLES}")
+        arguments.add_arguments(verb)
         verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
         verb.add_argument("--debug", action="store_true", help="show tracebacks")
     return parser
-
-
-def _module(verb: str) -> ModuleType:
-    return importlib.import_module(f"phone_host.verbs.{verb.replace('-', '_')}")
 
 
 if __name__ == "__main__":

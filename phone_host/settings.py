@@ -1,52 +1,29 @@
-"""What the host's owner may set once for all runs; every one is an option of `phone-host run` too."""
+"""The settings as they are meant: worked out from file, environment and options, and refused where `run` could not use them."""
 
+import argparse
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import fields
 from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError
-from common.imagesize import MEGAPIXEL, MOST_PIXELS
 from common.keys import KeyFolder, default_folder
 from common.link.factory import parse_link
-from common.program.settings import log_level, resolve, setting
+from common.program.settings import Resolved, log_level, resolve
 from phone_host.camera.factory import check_camera
+from phone_host.declared_settings import PhoneHostSettings
+from phone_host.stereo.matcher_names import matcher_named
+from phone_host.sync.fifo import FifoSettings
 
-ENVIRONMENT_PREFIX = "PHONE_HOST"
-
-_USUAL_MEGAPIXELS: Final = MOST_PIXELS // MEGAPIXEL
-MAX_MEGAPIXELS_HELP: Final = (
-    f"an image that claims to be larger is refused before it is decoded (1 = 2^20 px; default {_USUAL_MEGAPIXELS})"
-)
+ENVIRONMENT_PREFIX: Final = "PHONE_HOST"
 
 
-@dataclass(frozen=True, slots=True)
-class PhoneHostSettings:
-    """Settings of phone-host run, from a TOML file, the environment and options."""
-
-    link: tuple[str, ...] = setting(
-        (),
-        "links to the board; frames come over the best that is up, the first where some are alike; none: the last board that was used, the one"
-        " on the USB cable, one on this machine, or one that announces itself on the network",
-    )
-    camera: str = setting("", "own camera URI, for example replay:PATH?fps=30&loop=1")
-    calibration: str = setting("", "rig.yaml of the two cameras")
-    matcher: str = setting("sgbm", "stereo matcher")
-    tolerance: float = setting(0.0, "greatest time skew of a pair, ms; 0 = half of the longer frame period")
-    fifo: str = setting("1:drop-oldest", "DEPTH:POLICY of the queue before the stereo pipeline")
-    align_phase: str = setting(
-        "", "which camera is steered until both expose together: either, board or host; empty: none"
-    )
-    interpolate: bool = setting(default=False, doc="move the board's image to the host's moment along the optical flow")
-    keys: str = setting("", "folder of this machine's key and the boards that it knows; empty: ~/.config/tandemscan")
-    max_megapixels: int = setting(_USUAL_MEGAPIXELS, MAX_MEGAPIXELS_HELP)
-    log_level: str = setting("warning", "debug, info, warning or error")
-
-    @property
-    def most_pixels(self) -> int:
-        """The limit in pixels."""
-        return self.max_megapixels * MEGAPIXEL
+def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
+    """Work out the settings from file, environment and a verb's options, of which those count that bear a setting's name."""
+    given = {item.name: getattr(options, item.name, None) for item in fields(PhoneHostSettings)}
+    given["link"] = tuple(given["link"]) if given["link"] else None
+    return resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given)
 
 
 def check(settings: PhoneHostSettings) -> None:
@@ -55,9 +32,6 @@ def check(settings: PhoneHostSettings) -> None:
     Raises:
         SettingsError: one makes no sense.
     """
-    from phone_host.stereo.match import MatcherName  # noqa: PLC0415 - OpenCV, only now
-    from phone_host.sync.fifo import FifoSettings  # noqa: PLC0415
-
     log_level(settings.log_level)
     if settings.camera:
         check_camera(settings.camera)
@@ -66,9 +40,7 @@ def check(settings: PhoneHostSettings) -> None:
     if doubled := next((uri for uri in settings.link if settings.link.count(uri) > 1), None):
         raise SettingsError(f"link {doubled!r} is given twice", "give each link once")
     FifoSettings.parse(settings.fifo)
-    matchers = [name.value for name in MatcherName]
-    if settings.matcher not in matchers:
-        raise SettingsError(f"matcher {settings.matcher!r} is unknown", f"give {' or '.join(matchers)}")
+    matcher_named(settings.matcher)
     _check_megapixels(settings)
     if settings.align_phase not in {"", "either", "board", "host"}:
         raise SettingsError(f"align_phase is {settings.align_phase!r}", "give either, board or host, or nothing")

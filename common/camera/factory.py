@@ -1,19 +1,58 @@
-"""Camera URI to camera."""
+"""Camera URI to camera. The registry of cameras: each kind is imported when it is asked for.
 
-from fractions import Fraction
-from typing import TYPE_CHECKING
+Other packages' cameras are registered as entry points of the group `tandemscan.cameras`; the name is the URI's scheme, lower case. The entry
+point is a callable that takes one CameraRequest, opens the camera and gives a `common.camera.base.Camera`; for an option of no use it raises
+a SettingsError, for a device that cannot be had an UnavailableError.
+"""
+
+from dataclasses import dataclass
+from typing import Final
 from urllib.parse import parse_qsl
 
 from common.camera.base import Camera
-from common.camera.options import exact
+from common.camera.options import EXAMPLE
 from common.errors import SettingsError
-from common.protocol.message import Pacing
+from common.program.extensions import make_registered, named, registered_names
 
-if TYPE_CHECKING:
-    from common.camera.replay import ReplaySettings
-    from common.camera.v4l2_stream import V4l2Settings
+_CAMERAS: Final = "tandemscan.cameras"
 
-EXAMPLE = "v4l2:/dev/video0[?size=640x480&fps=30&format=mjpeg] or replay:PATH[?fps=30&loop=1&pace=clock|demand]"
+
+@dataclass(frozen=True, slots=True)
+class CameraRequest:
+    """A camera of another package that is to be opened.
+
+    Attributes:
+        uri: the whole of it, for errors.
+        path: what stands between the scheme and the options.
+        options: those behind the question mark, in their order.
+        clock: name of this machine's clock, for the stamps.
+        now_ns: CLOCK_MONOTONIC now, ns.
+    """
+
+    uri: str
+    path: str
+    options: tuple[tuple[str, str], ...]
+    clock: str
+    now_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """Where a kind of camera is found.
+
+    Attributes:
+        read: takes URI, path, options and clock, gives the settings.
+        open: takes the settings and CLOCK_MONOTONIC, ns, gives the camera.
+    """
+
+    read: str
+    open: str
+
+
+_KINDS: Final = {
+    "replay": _Kind("common.camera.replay_uri:replay_settings", "common.camera.replay:ReplayCamera"),
+    "v4l2": _Kind("common.camera.v4l2_uri:v4l2_settings", "common.camera.v4l2:V4l2Camera"),
+}
 
 
 def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
@@ -32,20 +71,17 @@ def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
         UnavailableError: there is no such device or folder.
         DataError: a replay's images are bad.
     """
-    settings = parse_camera(uri, clock)
-    if uri.startswith("replay:"):
-        from common.camera.replay import ReplayCamera, ReplaySettings  # noqa: PLC0415 - each kind only where it is of use
-
-        assert isinstance(settings, ReplaySettings)
-        return ReplayCamera(settings, now_ns)
-    from common.camera.v4l2 import V4l2Camera  # noqa: PLC0415 - ctypes and the kernel's structures
-    from common.camera.v4l2_stream import V4l2Settings  # noqa: PLC0415
-
-    assert isinstance(settings, V4l2Settings)
-    return V4l2Camera(settings, now_ns)
+    scheme, path, options = _parts(uri)
+    if scheme in _KINDS:
+        settings = _read(scheme, uri, path, options, clock)
+        camera: Camera = named(_KINDS[scheme].open)(settings, now_ns)
+        return camera
+    request = CameraRequest(uri, path, tuple(options.items()), clock, now_ns)
+    extension: Camera = make_registered(_CAMERAS, scheme, Camera, request)
+    return extension
 
 
-def parse_camera(uri: str, clock: str) -> "ReplaySettings | V4l2Settings":
+def parse_camera(uri: str, clock: str) -> object:
     """Read a camera URI without opening anything.
 
     Args:
@@ -53,20 +89,27 @@ def parse_camera(uri: str, clock: str) -> "ReplaySettings | V4l2Settings":
         clock: name of this machine's clock, for the stamps.
 
     Returns:
-        The settings of the camera that is meant.
+        The settings of the camera that is meant: ReplaySettings or V4l2Settings; None for another package's, which reads them when it opens.
 
     Raises:
         SettingsError: the URI makes no sense.
     """
-    scheme, found, rest = uri.partition(":")
-    if not found or scheme not in {"replay", "v4l2"} or (scheme == "replay" and not rest):
-        raise SettingsError(f"camera {uri!r} is of no known kind", f"give {EXAMPLE}")
-    path, options = _split(uri, rest)
-    if scheme == "v4l2":
-        from common.camera.v4l2_uri import v4l2_settings  # noqa: PLC0415 - as above
+    scheme, path, options = _parts(uri)
+    return _read(scheme, uri, path, options, clock) if scheme in _KINDS else None
 
-        return v4l2_settings(uri, path, options, clock)
-    return _replay_settings(uri, path, options, clock)
+
+def _read(scheme: str, uri: str, path: str, options: dict[str, str], clock: str) -> object:
+    settings: object = named(_KINDS[scheme].read)(uri, path, options, clock)
+    return settings
+
+
+def _parts(uri: str) -> tuple[str, str, dict[str, str]]:
+    """Part scheme, path and options; the scheme is one that is known."""
+    scheme, found, rest = uri.partition(":")
+    known = found and (scheme in _KINDS or scheme in registered_names(_CAMERAS))
+    if not known or (scheme == "replay" and not rest):
+        raise SettingsError(f"camera {uri!r} is of no known kind", f"give {EXAMPLE}")
+    return scheme, *_split(uri, rest)
 
 
 def _split(uri: str, rest: str) -> tuple[str, dict[str, str]]:
@@ -78,22 +121,3 @@ def _split(uri: str, rest: str) -> tuple[str, dict[str, str]]:
         return path, dict(parse_qsl(query, keep_blank_values=True, strict_parsing=True))
     except ValueError:
         raise SettingsError(f"camera {uri!r} has options {query!r}", f"give {EXAMPLE}") from None
-
-
-def _replay_settings(uri: str, path: str, options: dict[str, str], clock: str) -> "ReplaySettings":
-    from common.camera.replay import ReplaySettings  # noqa: PLC0415 - as above
-
-    if unknown := set(options) - {"fps", "loop", "pace", "phase_ms"}:
-        raise SettingsError(f"camera {uri!r} has an unknown option {min(unknown)!r}", f"give {EXAMPLE}")
-    try:
-        fps = exact(options.get("fps", "30"))
-        loop = {"0": False, "1": True}[options.get("loop", "0")]
-        pacing = Pacing[options.get("pace", "clock").upper()]
-        phase_ns = round(Fraction(options.get("phase_ms", "0")) * 1_000_000)
-    except (ValueError, ZeroDivisionError, KeyError):
-        raise SettingsError(f"camera {uri!r} has an option of no use", f"give {EXAMPLE}") from None
-    if not Fraction(1, 100) <= fps <= 1000:
-        raise SettingsError(f"camera {uri!r} has fps={options.get('fps')}", "give a rate between 0.01 and 1000")
-    if phase_ns and pacing is Pacing.DEMAND:
-        raise SettingsError(f"camera {uri!r} has phase_ms and pace=demand", "leave one out: demand knows no clock")
-    return ReplaySettings(path, fps, loop, pacing, clock, phase_ns)

@@ -1,8 +1,11 @@
-"""Numbers in the options of a camera URI. Bounded before they are computed with: `fps=1e999999999` is a billion digits to a fraction."""
+"""What a camera URI looks like, and the numbers in its options. They are bounded before they are computed with: `fps=1e999999999` is a billion digits to a fraction."""
 
 import re
 from fractions import Fraction
 from typing import Final
+
+EXAMPLE: Final = "v4l2:/dev/video0[?size=640x480&fps=30&format=mjpeg] or replay:PATH[?fps=30&loop=1&pace=clock|demand]"
+"""How the URI of a camera looks, for help and for errors."""
 
 _NUMBER: Final = re.compile(
     r"[+-]?\d{1,12}(\.\d{0,12})?(e[+-]?\d{1,2})?|[+-]?\.\d{1,12}|\d{1,12}/\d{1,12}", re.ASCII | re.IGNORECASE

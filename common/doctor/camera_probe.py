@@ -8,7 +8,6 @@ from typing import Final
 
 from common import now
 from common.camera.factory import open_camera, parse_camera
-from common.camera.replay import ReplaySettings
 from common.camera.v4l2_device import Device, capture_nodes, lasting_name, video_nodes
 from common.camera.v4l2_formats import Wanted, choose
 from common.camera.v4l2_stream import Stream, V4l2Settings
@@ -55,8 +54,8 @@ def examine_camera(uri: str, account: Account, unit: Unit) -> list[Finding]:
         SettingsError: the URI makes no sense.
     """
     settings = parse_camera(uri, "")
-    if isinstance(settings, ReplaySettings):
-        return [_replay(uri)]
+    if not isinstance(settings, V4l2Settings):
+        return [_opened(uri)]
     nodes = video_nodes()
     if settings.path:
         path = lasting_name(Path(settings.path))
@@ -68,7 +67,7 @@ def examine_camera(uri: str, account: Account, unit: Unit) -> list[Finding]:
     return list(_examine(path, settings, account, unit))
 
 
-def _replay(uri: str) -> Finding:
+def _opened(uri: str) -> Finding:
     try:
         camera = open_camera(uri, "", now.monotonic_ns())
     except TandemError as error:

@@ -11,9 +11,10 @@ heard is said until it is answered.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from common.frame import Buffer
+from common.keys import KeyFolder
 from common.protocol.message import Lane
 
 
@@ -95,3 +96,20 @@ class Link(Protocol):
 
     def close(self) -> None:
         """Give what was handed over a moment to leave, then let go of everything."""
+
+
+@runtime_checkable
+class TakesNewHosts(Protocol):
+    """What a link offers besides that can let in new hosts by a code."""
+
+    @property
+    def endpoint(self) -> str:
+        """Where it listens."""
+
+    def open_door(self, links: Sequence[str], keys: KeyFolder) -> None:
+        """Take in new hosts by a code, for all secured links of this board.
+
+        Args:
+            links: the secured links' `endpoint`s.
+            keys: the board's.
+        """

@@ -10,7 +10,6 @@ greets a board, which holds no secret. Where the kernel does not say (not Linux)
 import os
 import pwd
 import stat
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -131,39 +130,6 @@ def owner_of(path: str) -> str:
         return _name(os.lstat(path).st_uid)
     except OSError:
         return "somebody"
-
-
-def runtime_folder(environment: Mapping[str, str]) -> Path:
-    """A folder of this user's alone for sockets: $XDG_RUNTIME_DIR, else one in the folder of temporary files.
-
-    Args:
-        environment: of the process.
-
-    Raises:
-        UnavailableError: there is none, and somebody else's lies where it would be made.
-    """
-    given = Path(environment.get("XDG_RUNTIME_DIR", ""))
-    with suppress(OSError):
-        if given.is_absolute() and _is_own(given.stat()):
-            return given
-    import tempfile  # noqa: PLC0415 - slow to load, and no board needs it
-
-    folder = Path(tempfile.gettempdir()) / f"tandemscan-{os.geteuid()}"
-    try:
-        with suppress(FileExistsError):
-            folder.mkdir(mode=0o700)
-        if _is_own(folder.lstat()):
-            return folder
-    except OSError as error:
-        raise UnavailableError(f"{folder} cannot be made ({error.strerror})", "set XDG_RUNTIME_DIR or TMPDIR") from None
-    raise UnavailableError(
-        f"{folder} is not a folder of this user's alone (it belongs to {owner_of(str(folder))})",
-        "remove it, or set XDG_RUNTIME_DIR to a folder of your own with mode 0700",
-    )
-
-
-def _is_own(status: os.stat_result) -> bool:
-    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.geteuid() and not status.st_mode & 0o077
 
 
 def _refused(path: str, why: str, uid: int) -> UnavailableError:

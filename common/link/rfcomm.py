@@ -17,12 +17,14 @@ from enum import Enum
 from itertools import count
 from pathlib import Path
 from typing import Final
+from urllib.parse import unquote
 
-from common.errors import MissingDeviceError, UnavailableError
+from common.errors import MissingDeviceError, SettingsError, UnavailableError
 from common.frame import Buffer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.sdp import PSM, channel_in, query
 from common.link.stream import Opening, StreamLink
+from common.link.uri import LinkRequest
 from common.program.logs import event
 from common.protocol.framing import Side
 from common.protocol.message import Lane
@@ -310,6 +312,28 @@ class RfcommListener:
         stream = self._streams.pop(prefix)
         self._epoll.unregister(stream.pollables[0].fileno())
         stream.close()
+
+
+def open_rfcomm(request: LinkRequest) -> RfcommDialler | RfcommListener:
+    """Open a Bluetooth link.
+
+    Args:
+        request: what to open; the address is `rfcomm://DEVICE[/CHANNEL]`.
+
+    Raises:
+        SettingsError: there is no device to dial, or something to listen on that is no adapter's address.
+        UnavailableError: Bluetooth or the adapter cannot be had.
+    """
+    uri = request.uri
+    device, _, number = uri.address.removeprefix("rfcomm://").partition("/")
+    device, channel = unquote(device), int(number or 0)
+    if not uri.listens:
+        if device == ANYONE:
+            raise SettingsError(f"link {uri.address!r} names no device to connect to", "give its name or address")
+        return RfcommDialler(uri.address, device, channel, unpaired=uri.unpaired, waits=request.waits)
+    if device != ANYONE and not is_address(device):
+        raise SettingsError(f"link {uri.address!r} cannot be listened on", "give rfcomm://* or an adapter's address")
+    return RfcommListener(uri.address, device, channel, unpaired=uri.unpaired, waits=request.waits)
 
 
 def _address_of(name: str) -> str:

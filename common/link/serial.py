@@ -11,8 +11,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
+import serial
+
 from common.errors import MissingDeviceError, TakenError, UnavailableError
 from common.link.stream import StreamLink
+from common.link.uri import LinkRequest
 from common.protocol.framing import Side
 
 DEFAULT_BAUD: Final = 115200
@@ -41,8 +44,6 @@ class SerialLine:
     """
 
     def __init__(self, path: str, baud: int) -> None:
-        import serial  # noqa: PLC0415 - 30 ms that other links need not wait for
-
         self._port = serial.Serial(baudrate=baud, timeout=0, write_timeout=0, exclusive=True)
         self._port.port = path
         try:
@@ -109,6 +110,20 @@ class SerialLink(StreamLink):
         super().__init__("serial", side, lambda: SerialLine(path, baud), waits=waits)
 
 
+def open_serial(request: LinkRequest) -> SerialLink:
+    """Open a serial link.
+
+    Args:
+        request: what to open; the address is `serial:DEVICE`.
+
+    Raises:
+        UnavailableError: the device cannot be had; MissingDeviceError where it is not there.
+    """
+    uri = request.uri
+    path = uri.address.removeprefix("serial:")
+    return SerialLink(path, uri.baud or DEFAULT_BAUD, listens=uri.listens, waits=request.waits)
+
+
 def _make_raw(descriptor: int) -> None:
     """Set what pyserial leaves: no break handling, and a read that tells "nothing there" (EAGAIN) from "line lost" (b"").
 
@@ -150,7 +165,7 @@ def _others(path: str) -> str:
     """The serial ports that are there, as a hint."""
     if sys.platform != "linux":  # list_ports raises ImportError on systems that it does not know, Android among them
         return ""
-    from serial.tools import list_ports  # noqa: PLC0415 - only for the error message
+    from serial.tools import list_ports  # noqa: PLC0415 - ImportError where its platform is unknown
 
     ports = sorted(port.device for port in list_ports.comports() if port.device != path and "ttyS" not in port.device)
     return f" (there: {', '.join(ports)})" if ports else ""

@@ -13,7 +13,7 @@ import zmq
 from common import now
 from common.errors import UnavailableError
 from common.frame import Buffer
-from common.keys import KeyFolder, Peer
+from common.keys import KeyFolder, OwnKey, Peer
 from common.link import gate
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.dialled import Dialled
@@ -163,13 +163,9 @@ class ZeroMqListener(_AlwaysReady):
             check_folder(path, trusted_users(owner))
             free_path(path)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._guard = _guard(self._context, keys) if keys else None
         self._socket = self._context.socket(zmq.ROUTER)
         _configure(self._socket, _most_bytes(board=board))
-        if own:
-            from common.link.curve import secure_listener  # noqa: PLC0415 - as in _guard
-
-            secure_listener(self._socket, own)
+        self._guard = _guarded(self._context, self._socket, keys, own) if keys and own else None
         self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # a vanished host is told of instead of swallowing frames
         before = os.umask(0o177)  # an ipc path is for its owner only
         try:
@@ -200,7 +196,7 @@ class ZeroMqListener(_AlwaysReady):
             DataError: the files of keys are bad.
             UnavailableError: they cannot be used.
         """
-        from common.link.enrolment_door import Door  # noqa: PLC0415 - as in _guard
+        from common.link.enrolment_door import Door  # noqa: PLC0415 - as in _guarded
 
         assert self._guard is not None, "an open link has no door"
         self._door = Door(self._context, links, keys, self._guard)
@@ -283,7 +279,7 @@ class ZeroMqDialer(_AlwaysReady):
             sock = self._context.socket(zmq.DEALER)
             _configure(sock, _most_bytes(board=board))
             if own and peer:
-                from common.link.curve import secure_dialler  # noqa: PLC0415 - as in _guard
+                from common.link.curve import secure_dialler  # noqa: PLC0415 - as in _guarded
 
                 secure_dialler(sock, own, peer)
             try:
@@ -349,7 +345,11 @@ class ZeroMqDialer(_AlwaysReady):
         self._context.destroy(linger=_LINGER_MS)
 
 
-def _guard(context: "zmq.Context[zmq.Socket[bytes]]", keys: KeyFolder) -> "Guard":
-    from common.link.curve import Guard  # noqa: PLC0415 - an open link does not pay for keys: half a second of a board's start
+def _guarded(
+    context: "zmq.Context[zmq.Socket[bytes]]", sock: "zmq.Socket[bytes]", keys: KeyFolder, own: OwnKey
+) -> "Guard":
+    """Let a socket that is not bound yet take in known keys only."""
+    from common.link.curve import Guard, secure_listener  # noqa: PLC0415 - an open link does not pay for keys: half a second of a board's start
 
+    secure_listener(sock, own)
     return Guard(context, keys)

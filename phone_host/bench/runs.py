@@ -31,7 +31,8 @@ from phone_host.run.sinks import FunctionSink
 from phone_host.scene.film import JPEG_QUALITY, Film, render_films
 from phone_host.scene.scene import DEMO_PERIOD_S, WEBCAM_LOOK, demo_scene, matched_rig
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.match import MatcherName, MatchSettings, create_matcher
+from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.matcher_names import AnyMatcher
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.sync.fifo import FifoSettings
 
@@ -90,7 +91,7 @@ class RunSettings:
         seconds: length of each run after its warm-up, s.
     """
 
-    matcher: MatcherName
+    matcher: AnyMatcher
     fifo: FifoSettings
     seconds: float
 
@@ -214,7 +215,7 @@ def after_warm_up(ledgers: Sequence[PairLedger]) -> tuple[tuple[PairLedger, ...]
     return tuple(ledgers[first:]), (ledgers[-1].done_ns - ledgers[first - 1].done_ns) / 1e9
 
 
-def _core(size: Size, matcher: MatcherName) -> StereoCore:
+def _core(size: Size, matcher: AnyMatcher) -> StereoCore:
     rig = rig_of(size)
     focal_px, cx_px, cy_px = (float(rig.left.matrix[at]) for at in ((0, 0), (0, 2), (1, 2)))
     geometry = StereoGeometry(focal_px, -float(rig.t_right_left_m[0]), cx_px, cy_px)

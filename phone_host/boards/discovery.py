@@ -3,23 +3,20 @@
 Only what greets as ZeroMQ does counts as a board's port; whether it is the right board its key decides, not an answer on the network.
 """
 
-import ipaddress
 import socket
 import sys
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, suppress
-from dataclasses import dataclass
+from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
 from common import now
 from common.errors import TandemError, UnavailableError
 from common.files import opened_folder, read_file, replacing_in
-
-SERVICE: Final = "_tandemscan._tcp.local."
-"""As deploy/board/tandemscan.service.xml announces it."""
+from phone_host.boards.found import LISTEN_S, Found
 
 GADGET: Final = "tcp://192.168.7.2:5555"
 """A BeagleBone on its USB cable."""
@@ -31,23 +28,7 @@ _MOST_BYTES: Final = 4096
 _ANSWER_S: Final = 0.7
 """A board on a cable or in the same house answers within a few ms; a lost first packet of TCP is repeated after a second, and met next time."""
 
-_LISTEN_S: Final = 2.5
-"""A second question follows the first one after a second, and answers are delayed by up to 120 ms (RFC 6762, sections 5.2 and 6)."""
-
 _GREETING_BYTES: Final = 10
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """A board that answers.
-
-    Attributes:
-        name: for people; empty where nobody told it.
-        link: its link.
-    """
-
-    name: str
-    link: str
 
 
 def find_board(state: Path, now_s: Callable[[], float], wait_s: float | None) -> str:
@@ -129,46 +110,14 @@ def _greets(link: str) -> bool:
 
 
 def _why_not() -> str:
-    try:
-        import zeroconf  # noqa: F401, PLC0415 - optional
-    except ImportError:
-        return ", for which the package zeroconf is missing"
-    return ""
+    return "" if find_spec("zeroconf") else ", for which the package zeroconf is missing"
 
 
 def _announced() -> list[Found]:
-    """Listen for boards that announce themselves, by name."""
+    """Listen for boards that announce themselves; without zeroconf they get the time all the same, and are not heard."""
     try:
-        from zeroconf import ServiceBrowser, ServiceStateChange, Zeroconf  # noqa: PLC0415 - optional, slow to load
+        from phone_host.boards.announced import announced  # noqa: PLC0415 - zeroconf is optional and slow to load, and seldom asked
     except ImportError:
-        threading.Event().wait(_LISTEN_S)
+        threading.Event().wait(LISTEN_S)
         return []
-    names: set[str] = set()
-
-    def heard(*, name: str, state_change: ServiceStateChange, **_: object) -> None:
-        if state_change is ServiceStateChange.Added:
-            names.add(name)
-
-    try:
-        network = Zeroconf()
-    except OSError:  # no network at all
-        threading.Event().wait(_LISTEN_S)
-        return []
-    with closing(network):
-        ServiceBrowser(network, SERVICE, handlers=[heard])
-        threading.Event().wait(_LISTEN_S)
-        found = []
-        for name in sorted(names):
-            info = network.get_service_info(SERVICE, name, timeout=round(_LISTEN_S * 1000))
-            for address in info.parsed_addresses() if info else ():
-                if info is not None and info.port and not _needs_scope(address):
-                    host = f"[{address}]" if ":" in address else address
-                    found.append(Found(name.removesuffix(f".{SERVICE}"), f"tcp://{host}:{info.port}"))
-                    break
-    return found
-
-
-def _needs_scope(address: str) -> bool:
-    """Whether an address means nothing without the name of a network card, which a link cannot give."""
-    read = ipaddress.ip_address(address.partition("%")[0])
-    return read.version == 6 and read.is_link_local
+    return announced()

@@ -6,17 +6,18 @@ from common.camera import factory as common_factory
 from common.camera.base import Camera
 from common.frame import ImageSizeError
 from common.imagesize import MOST_PIXELS, require_pixels
-from phone_host.camera.http_uri import EXAMPLE as HTTP_EXAMPLE
+from common.program.extensions import named
 from phone_host.camera.http_uri import http_settings, is_http
 
-EXAMPLE: Final = f"{common_factory.EXAMPLE} or {HTTP_EXAMPLE}"
+_HTTP: Final = "phone_host.camera.mjpeg_http:HttpCamera"
+"""TLS and all that comes with it are imported only where a server is asked for."""
 
 
 def open_camera(uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXELS) -> Camera:
     """Open the camera that a URI names.
 
     Args:
-        uri: see EXAMPLE.
+        uri: as in `examples.EXAMPLE`.
         clock: name of this machine's clock, for the stamps.
         now_ns: CLOCK_MONOTONIC now, ns.
         most_pixels: a camera whose images have more is refused.
@@ -42,9 +43,8 @@ def open_camera(uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXEL
 def _open(uri: str, clock: str, now_ns: int) -> Camera:
     if not is_http(uri):
         return common_factory.open_camera(uri, clock, now_ns)
-    from phone_host.camera.mjpeg_http import HttpCamera  # noqa: PLC0415 - TLS and all that only where it is of use
-
-    return HttpCamera(http_settings(uri, clock))
+    camera: Camera = named(_HTTP)(http_settings(uri, clock))
+    return camera
 
 
 def check_camera(uri: str) -> None:

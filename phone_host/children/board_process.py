@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import UnavailableError
-from common.link.ipc import runtime_folder
+from common.link.ipc_folder import runtime_folder
 from common.program.commandline import INTERRUPTED
 from phone_host.children.child_process import GOODBYE_S, child_process
 

@@ -14,16 +14,16 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from common import now
-from common.camera.factory import parse_camera
+from common.camera.v4l2_device import capture_nodes
 from common.doctor import machine
 from common.doctor.access import check_access
 from common.doctor.camera_probe import examine_camera
 from common.doctor.finding import Finding, Verdict, fail, ok
 from common.doctor.machine_checks import check_bluetooth, check_clocks, check_disk, check_power, check_usb_log
 from common.doctor.unit_check import Unit
-from common.errors import AbsentBoardError, BusyBoardError, OtherVersionError, TandemError, UnavailableError
+from common.errors import TandemError, UnavailableError
 from common.keys import KeyFolder
-from common.link.factory import open_link, parse_link
+from common.link.factory import parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import is_http
@@ -32,7 +32,6 @@ from phone_host.doctor.host_checks import (
     Answer,
     BoardReadings,
     Package,
-    RigReadings,
     check_board,
     check_out,
     check_package,
@@ -97,7 +96,9 @@ def examine(question: Question) -> list[Finding]:
     for uri in question.links:
         findings += _examine_board(uri, question.wait_s, question.keys, works=works)
     if question.calibration and works:
-        findings.append(check_rig(_read_rig(question)))
+        from phone_host.doctor.vision_checks import read_rig_readings  # noqa: PLC0415 - numpy and OpenCV, seen to work
+
+        findings.append(check_rig(read_rig_readings(question.calibration, question.camera)))
     findings += check_clocks(machine.read_clocks(Path(__file__).parent))
     disk = machine.read_disk(question.out)
     findings += [*check_out(str(question.out), writable=os.access(disk.path, os.W_OK)), check_disk(disk)]
@@ -144,8 +145,6 @@ def _server(uri: str) -> Finding:
 
 
 def _cameras() -> Finding:
-    from common.camera.v4l2_device import capture_nodes  # noqa: PLC0415 - ctypes and the kernel's structures only here
-
     nodes = capture_nodes()
     text = f"{', '.join(map(str, nodes))}; give one with --camera" if nodes else "no camera of this machine is seen"
     return ok("camera", text)
@@ -155,7 +154,7 @@ def _ports() -> Finding:
     if sys.platform != "linux":
         return check_ports((), f"{sys.platform} shows none")
     try:
-        from serial.tools import list_ports  # noqa: PLC0415 - optional
+        from serial.tools import list_ports  # noqa: PLC0415 - optional, and an ImportError where its platform is unknown
     except ImportError as error:
         return check_ports((), str(error))
     found = sorted(port for port in list_ports.comports() if "ttyS" not in port.device)
@@ -170,43 +169,15 @@ def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> 
         findings.append(check_access("permission", node, machine.own_account()))
     if not works:
         return [*findings, check_board(BoardReadings(uri, _way(address), 0.0))]
+    from phone_host.doctor.vision_checks import ask_board  # noqa: PLC0415 - numpy and OpenCV, seen to work
+
     try:
-        board = _ask_board(uri, wait_s, keys)
+        board = ask_board(uri, wait_s, keys)
     except TandemError as error:
         return [*findings, Finding("board", Verdict.FAIL, error.problem, error.remedy)]
     if board.answer is Answer.SILENT:
         board = BoardReadings(board.uri, _way(address), board.waited_s)
     return [*findings, check_board(board)]
-
-
-def _ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
-    """Say hello as a host does, and leave again."""
-    from phone_host.stream.await_board import BoardPatience, await_board  # noqa: PLC0415 - numpy, seen to work
-    from phone_host.stream.frame_sink import NoFrames  # noqa: PLC0415
-    from phone_host.stream.receiver import Receiver  # noqa: PLC0415
-
-    link = open_link(parse_link(uri, listens_by_default=False), keys)
-    receiver = Receiver([link], now.random_id(), NoFrames())
-    patience = BoardPatience(round(wait_s * 1e9), now.monotonic_ns())
-    answer = Answer.BOARD
-    receiver.start()
-    try:
-        await_board(receiver, patience, lambda: receiver.hello is not None and receiver.estimate is not None)
-    except AbsentBoardError:
-        answer = Answer.SILENT
-    except BusyBoardError:
-        answer = Answer.BUSY
-    except OtherVersionError:
-        answer = Answer.OTHER_VERSION
-    finally:
-        hello, estimate = receiver.hello, receiver.estimate
-        receiver.stop()
-    if receiver.failure is not None:
-        raise receiver.failure
-    if hello is None or estimate is None:
-        return BoardReadings(uri, answer, wait_s)
-    camera = f"{hello.camera.name} {hello.camera.width_px}x{hello.camera.height_px}"
-    return BoardReadings(uri, answer, 0.0, camera, estimate.round_trip_ns, estimate.uncertainty_ns)
 
 
 def _way(address: str) -> Answer:
@@ -223,27 +194,3 @@ def _way(address: str) -> Answer:
     except OSError:
         return Answer.NO_WAY
     return Answer.SILENT
-
-
-def _read_rig(question: Question) -> RigReadings:
-    import numpy as np  # noqa: PLC0415 - seen to work
-
-    from common.camera.v4l2_stream import V4l2Settings  # noqa: PLC0415
-    from phone_host.model import Side  # noqa: PLC0415
-    from phone_host.output.rig_yaml import read_rig  # noqa: PLC0415
-    from phone_host.stereo.rectify import Rectifier  # noqa: PLC0415
-
-    try:
-        rig = read_rig(Path(question.calibration))
-        Rectifier(rig)
-    except TandemError as error:
-        return RigReadings(question.calibration, error.problem, error.remedy)
-    own = rig.right if rig.board_side is Side.LEFT else rig.left
-    asked = parse_camera(question.camera, "") if question.camera and not is_http(question.camera) else None
-    return RigReadings(
-        path=question.calibration,
-        rms_px=rig.rms_stereo_px,
-        baseline_m=float(np.linalg.norm(rig.t_right_left_m)),
-        host_size_px=(own.width_px, own.height_px),
-        asked_size_px=asked.wanted.size_px if isinstance(asked, V4l2Settings) else None,
-    )

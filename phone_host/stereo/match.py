@@ -6,17 +6,21 @@ Rules that every matcher keeps (tests/contract/test_matcher.py):
 - any N >= 1 and any image size, down to 1 x 1 and narrower than N;
 - the result depends on the pair alone: not on earlier pairs, not on the number of OpenCV's threads.
 
-This module knows the matchers; the matchers do not know it.
+This module is the registry of matchers: it knows them, they do not know it.
+
+Other packages' matchers are registered as entry points of the group `tandemscan.matchers`; the name is what a user types. The entry point is
+a callable that takes the number of disparities (an int, 1 or more) and gives a `Matcher`, which keeps the rules above.
 """
 
 from dataclasses import dataclass
-from enum import Enum
 from typing import Protocol, assert_never
 
 from common.errors import SettingsError
+from common.program.extensions import make_registered
 from phone_host.model import Disparity, RectifiedPair
 from phone_host.stereo.match_block import BlockMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
+from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher
 
 
 class Matcher(Protocol):
@@ -37,16 +41,6 @@ class Matcher(Protocol):
         ...
 
 
-class MatcherName(Enum):
-    """The matchers by the name a user types.
-
-    BLOCK is the paper's: 8 x 8 sum of absolute differences, winner takes all. SGBM is semi-global matching, the default.
-    """
-
-    BLOCK = "block"
-    SGBM = "sgbm"
-
-
 @dataclass(frozen=True, slots=True)
 class MatchSettings:
     """What a matcher is built from.
@@ -59,7 +53,7 @@ class MatchSettings:
         SettingsError: disparities below 1.
     """
 
-    matcher: MatcherName = MatcherName.SGBM
+    matcher: AnyMatcher = MatcherName.SGBM
     disparities: int = 64
 
     def __post_init__(self) -> None:
@@ -78,11 +72,17 @@ def create_matcher(settings: MatchSettings) -> Matcher:
 
     Returns:
         The matcher.
+
+    Raises:
+        SettingsError: another package's matcher cannot be loaded or does not fit.
     """
     match settings.matcher:
         case MatcherName.BLOCK:
             return BlockMatcher(settings.disparities)
         case MatcherName.SGBM:
             return SgbmMatcher(settings.disparities)
+        case RegisteredMatcher(name):
+            registered: Matcher = make_registered(MATCHERS, name, Matcher, settings.disparities)
+            return registered
         case _:
             assert_never(settings.matcher)

@@ -12,10 +12,6 @@ from numpy.typing import NDArray
 
 from phone_host.model import CloudImage, Disparity, StereoGeometry
 
-DEFAULT_NEAR_M = 0.3
-"""Nearest depth looked for where nobody says otherwise, m: the near end of hand-held scanners (Structure Sensor 0.35 m,
-RealSense D435 0.28 m). Nearer costs time: the number of disparities goes with 1 / z."""
-
 _DISPARITY_STEP = 16  # StereoSGBM wants multiples of 16; vector registers of 8-bit costs do as well.
 
 # Depths above this would overflow float32 in x and y; no such disparity is a measurement.

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from common.errors import SettingsError, UnavailableError
+from phone_host.output.listed import claim
 
 
 def require_folder(out: Path) -> None:
@@ -27,8 +28,6 @@ def claim_names(folder: Path, out: Path, *names: str) -> None:
     Raises:
         UnavailableError: such a file is not from an earlier run, or the folder cannot be written to.
     """
-    from phone_host.output.listed import claim  # noqa: PLC0415 - most verbs end before they write
-
     try:
         claim(folder, *names)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The options that name a stereo core, shared by the verbs that need one, and what they make of them."""
+"""The stereo core that a verb's options name, as `stereo_arguments` declares them."""
 
 import argparse
 import math
@@ -8,39 +8,10 @@ from common.errors import SettingsError
 from phone_host.model import Side, StereoGeometry
 from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.match import MatcherName, MatchSettings, create_matcher
+from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.matcher_names import matcher_named
 from phone_host.stereo.rectify import Rectifier
-from phone_host.stereo.reproject import DEFAULT_NEAR_M, disparities_for_near
-
-_DEFAULT_NEAR_MM = DEFAULT_NEAR_M * 1000
-
-
-def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare --calibration, --rectified and what goes with them."""
-    parser.add_argument(
-        "--calibration", metavar="rig.yaml", help="the two cameras' calibration, from phone-host calibrate"
-    )
-    parser.add_argument("--rectified", action="store_true", help="the images come rectified")
-    parser.add_argument(
-        "--disparities", type=int, metavar="N", help="search 0 <= d < N (with a rig the default follows from --near)"
-    )
-    parser.add_argument(
-        "--near",
-        type=float,
-        default=_DEFAULT_NEAR_MM,
-        metavar="MM",
-        help=f"nearest depth with --calibration (default {_DEFAULT_NEAR_MM:g})",
-    )
-    parser.add_argument("--focal", type=float, metavar="PX", help="focal length of rectified images")
-    parser.add_argument("--baseline", type=float, metavar="MM", help="baseline of rectified images")
-    parser.add_argument(
-        "--doffs",
-        type=float,
-        metavar="PX",
-        help="x of the right principal point minus the left (default 0)",
-    )
-    parser.add_argument("--center", metavar="CX,CY", help="left principal point of rectified images")
-    parser.add_argument("--matcher", choices=[name.value for name in MatcherName], help="default sgbm")
+from phone_host.stereo.reproject import disparities_for_near
 
 
 def build_core(
@@ -49,7 +20,7 @@ def build_core(
     """Make the core that the options name.
 
     Args:
-        options: of add_stereo_arguments.
+        options: as `add_stereo_arguments` declares them.
         calibration: path of rig.yaml; empty for none.
         matcher: the matcher's name.
         size_px: width and height of images that come rectified.
@@ -61,10 +32,7 @@ def build_core(
         SettingsError: options that contradict each other.
         DataError: a bad rig.yaml.
     """
-    if matcher not in {name.value for name in MatcherName}:
-        raise SettingsError(
-            f"matcher {matcher!r} is unknown", f"give {' or '.join(name.value for name in MatcherName)}"
-        )
+    chosen = matcher_named(matcher)
     if not (math.isfinite(options.near) and options.near > 0):
         raise SettingsError(f"--near {options.near:g}", "give millimetres above 0")
     if calibration and options.rectified:
@@ -77,7 +45,7 @@ def build_core(
         if disparities is None:
             width_px = rectifier.rectification.width_px
             disparities = disparities_for_near(rectifier.geometry, options.near / 1000, width_px)
-        return StereoCore(create_matcher(MatchSettings(MatcherName(matcher), disparities)), rectifier), rig.board_side
+        return StereoCore(create_matcher(MatchSettings(chosen, disparities)), rectifier), rig.board_side
     if not options.rectified:
         return None, None
     if options.disparities is None:
@@ -85,7 +53,7 @@ def build_core(
             "--rectified without --disparities", "give the number of disparities, for example --disparities 64"
         )
     return StereoCore(
-        create_matcher(MatchSettings(MatcherName(matcher), options.disparities)),
+        create_matcher(MatchSettings(chosen, options.disparities)),
         None,
         rectified_geometry(options, size_px),
     ), None

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from common.errors import DataError, SettingsError
 from phone_host.model import RectifiedPair
-from phone_host.stereo.match import MatcherName, MatchSettings, create_matcher
+from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.matcher_names import MatcherName
 from tests.support.planes import noise, plane
 
 MATCHERS = [

@@ -17,10 +17,11 @@ from common.protocol.wire import MAX_PAYLOAD_BYTES
 from phone_host.camera.factory import check_camera
 from phone_host.camera.jpegs import MAX_IMAGE_BYTES, JpegStream
 from phone_host.camera.jpegs import Whole as WholeImage
+from phone_host.declared_settings import PhoneHostSettings
 from phone_host.output.pfm import read_pfm
 from phone_host.output.ply import read_ply
 from phone_host.output.rig_yaml import read_rig
-from phone_host.settings import PhoneHostSettings, check
+from phone_host.settings import check
 from phone_host.stereo.images import decode_file, examine
 from tests.fuzz.target import is_one_line
 from tests.support.bombs import SMALL_BOMB, black_png, progressive

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from phone_host.boards.discovery import SERVICE, remember
+from phone_host.boards.discovery import remember
+from phone_host.boards.found import SERVICE
 from tests.support.numbered import write_film
 from tests.support.programs import PATIENCE_S
 

@@ -19,7 +19,8 @@ from phone_host.model import BoardFrame, FramePair, Image, Side
 from phone_host.run.pipeline import Pipeline
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import enlarged
-from phone_host.stereo.match import MatcherName, MatchSettings, create_matcher
+from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.matcher_names import MatcherName
 from tests.support.pictures import encoded
 from tests.support.planes import Plane, plane
 

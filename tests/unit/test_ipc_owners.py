@@ -17,7 +17,7 @@ import zmq
 from common.errors import SettingsError, TakenError, UnavailableError
 from common.link.base import Incoming, Link
 from common.link.factory import open_link, parse_link
-from common.link.ipc import runtime_folder
+from common.link.ipc_folder import runtime_folder
 
 NOBODY = 65534
 PATIENCE_S = 30.0

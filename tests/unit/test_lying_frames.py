@@ -15,7 +15,8 @@ from phone_host.model import BoardFrame, FramePair, Side
 from phone_host.run.pipeline import Pipeline
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
-from phone_host.stereo.match import MatcherName, MatchSettings, create_matcher
+from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.matcher_names import MatcherName
 from tests.support import bombs
 from tests.support.pictures import encoded, jpeg, picture
 

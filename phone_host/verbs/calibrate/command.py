@@ -3,52 +3,31 @@
 import argparse
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
 
 from common.errors import DataError
+from phone_host.calibration.board_pairs import Calibration, Rejected
+from phone_host.calibration.board_views import BoardViews, look_for_boards
+from phone_host.calibration.calibrate import calibrate
+from phone_host.calibration.target import Board, parse_board
+from phone_host.calibration.verdict import Verdict, judge
+from phone_host.calibration.view_files import ViewFiles, pair_files
+from phone_host.model import Side
+from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
-from phone_host.settings import MAX_MEGAPIXELS_HELP
+from phone_host.output.rig_yaml import write_rig
+from phone_host.settings import most_pixels
 from phone_host.verbs.output_folders import claim_names, require_file, unwritable
-
-if TYPE_CHECKING:
-    from phone_host.calibration.board_pairs import Calibration, Rejected
-    from phone_host.calibration.board_views import BoardViews
-    from phone_host.calibration.target import Board
-    from phone_host.calibration.view_files import ViewFiles
-
-EXAMPLES = """  phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml
-  phone-host calibrate 'views/left*.png' 'views/right*.png' --board 9x6 --square 25mm --out rig.yaml --json
-"""
 
 _CHECK_FAILED = 4
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's options."""
-    parser.add_argument("left", metavar="LEFT", help="images of the left camera: a folder or a quoted glob")
-    parser.add_argument("right", metavar="RIGHT", help="images of the right camera, paired by the number in the name")
-    parser.add_argument("--board", required=True, metavar="9x6", help="inner corners of the chessboard: columns x rows")
-    parser.add_argument(
-        "--square", required=True, metavar="25mm", help="side of a square: 25mm, 2.5cm, 0.025m (bare number: mm)"
-    )
-    parser.add_argument(
-        "--board-side", choices=("left", "right"), default="left", help="which camera hangs on the board (default left)"
-    )
-    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="rig.yaml", help="the calibration; report.json goes beside it"
-    )
-
-
 def run(options: argparse.Namespace) -> int:
     """Find the board in all pairs, calibrate, judge, write."""
-    from phone_host.calibration.calibrate import calibrate  # noqa: PLC0415
-    from phone_host.calibration.target import parse_board  # noqa: PLC0415
-    from phone_host.calibration.verdict import Verdict, judge  # noqa: PLC0415
-    from phone_host.calibration.view_files import pair_files  # noqa: PLC0415
-    from phone_host.model import Side  # noqa: PLC0415 - OpenCV, only now
-    from phone_host.settings import most_pixels  # noqa: PLC0415
-
     board = parse_board(options.board, options.square)
     require_file(options.out)
     files = pair_files(options.left, options.right)
@@ -79,20 +58,15 @@ def run(options: argparse.Namespace) -> int:
     return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
 
 
-def _look(files: "ViewFiles", board: "Board", limit: int) -> "BoardViews":
+def _look(files: ViewFiles, board: Board, limit: int) -> BoardViews:
     """Search all images, with a progress bar when someone watches."""
-    from rich.console import Console  # noqa: PLC0415
-    from rich.progress import Progress  # noqa: PLC0415
-
-    from phone_host.calibration.board_views import look_for_boards  # noqa: PLC0415
-
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("looking for the board", total=len(files.pairs))
         return look_for_boards(files, board, lambda: progress.advance(task), limit)
 
 
-def _pairs(files: "ViewFiles", rejected: tuple["Rejected", ...], used: int) -> dict[str, Any]:
+def _pairs(files: ViewFiles, rejected: tuple[Rejected, ...], used: int) -> dict[str, Any]:
     return {
         "found": len(files.pairs),
         "used": used,
@@ -101,7 +75,7 @@ def _pairs(files: "ViewFiles", rejected: tuple["Rejected", ...], used: int) -> d
     }
 
 
-def _failed(files: "ViewFiles", views: "BoardViews", error: DataError) -> dict[str, Any]:
+def _failed(files: ViewFiles, views: BoardViews, error: DataError) -> dict[str, Any]:
     """The report when there is no rig at all."""
     return {
         "pairs": _pairs(files, views.rejected, 0),
@@ -111,9 +85,7 @@ def _failed(files: "ViewFiles", views: "BoardViews", error: DataError) -> dict[s
     }
 
 
-def _figures(calibration: "Calibration") -> dict[str, Any]:
-    import numpy as np  # noqa: PLC0415
-
+def _figures(calibration: Calibration) -> dict[str, Any]:
     rig, vertical = calibration.rig, calibration.vertical_px
     known = calibration.obstacle is None
     return {
@@ -158,10 +130,8 @@ def _figures(calibration: "Calibration") -> dict[str, Any]:
     }
 
 
-def _write_rig(out: Path, calibration: "Calibration | None") -> None:
+def _write_rig(out: Path, calibration: Calibration | None) -> None:
     """Write rig.yaml; where there is no rig, or none that can be rectified, one of an earlier run must not be taken for it."""
-    from phone_host.output.rig_yaml import write_rig  # noqa: PLC0415
-
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         if calibration is None or calibration.rectification is None:
@@ -173,19 +143,17 @@ def _write_rig(out: Path, calibration: "Calibration | None") -> None:
 
 
 def _write_report(out: Path, report: dict[str, Any]) -> None:
-    from phone_host.output.atomic import write_text  # noqa: PLC0415
-
     try:
         write_text(out.with_name("report.json"), json_text(report, indent=2) + "\n")
     except OSError as error:
         raise unwritable(out, error) from error
 
 
-def _rejections(rejected: tuple["Rejected", ...]) -> str:
+def _rejections(rejected: tuple[Rejected, ...]) -> str:
     return "\n".join(f"{each.name:>8}  rejected: {each.reason.value} ({each.detail})" for each in rejected)
 
 
-def _summary(report: dict[str, Any], calibration: "Calibration", rejected: tuple["Rejected", ...], out: Path) -> str:
+def _summary(report: dict[str, Any], calibration: Calibration, rejected: tuple[Rejected, ...], out: Path) -> str:
     rows = [f"{'pair':>8}  {'left px':>8} {'right px':>8} {'vertical px':>11}"]
     rows += [f"{u.name:>8}  {u.left_px:8.3f} {u.right_px:8.3f} {u.vertical_px:11.3f}" for u in calibration.used]
     if rejected:

@@ -9,51 +9,23 @@ from pathlib import Path
 
 from common.errors import DataError, SettingsError, UnavailableError
 from common.keys import KeyFolder, Peer
+from common.link.enrolment_door import pairing_address
 from common.link.factory import needs_keys, parse_link
 from common.protocol.enrolment_code import CODE_DIGITS, read_code
+from phone_host.boards.discovery import find_aloud
+from phone_host.boards.enrolment import PairingCall
 from phone_host.boards.udev_rule import RULES, find_usb_board, write_rule
-
-EXAMPLES = """  phone-host pair
-  phone-host pair --link tcp://192.168.7.2:5555
-  phone-host pair --link tcp://raspberrypi.local:5555 --code 123456        (the code that `board-agent pair` shows)
-  sudo phone-host pair --udev                              (names the board on the USB cable: /dev/tandemscan-board)
-
-`sudo board-agent pair` on the board shows a code of six digits; it stands in no log.
-"""
+from phone_host.settings import chosen_keys
 
 _TRIES = 3
 _PATIENCE_S = 20.0
 """A board that is not named is looked for so long: it is there, since its owner stands before it."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's options."""
-    parser.add_argument(
-        "--link",
-        metavar="URI",
-        help="the board: tcp://HOST:PORT, or serial:DEVICE for --udev (default: it is looked for)",
-    )
-    parser.add_argument("--code", metavar="DIGITS", help="the code, if the board shows it already")
-    parser.add_argument(
-        "--pairing-port", type=int, metavar="PORT", help="the board's door (default: the port behind the link's)"
-    )
-    parser.add_argument(
-        "--udev",
-        action="store_true",
-        help=f"write {RULES} for the board on the USB cable: by its vendor, product and serial number it gets the names"
-        " /dev/tandemscan-board and tandemscan0; this names the device and authenticates nobody; needs root",
-    )
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
-    parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
-
-
 def run(options: argparse.Namespace) -> int:
     """Pair; asks for the code on the terminal."""
     if options.udev:
         return _name_device(options)
-    from phone_host.boards.discovery import find_aloud  # noqa: PLC0415
-    from phone_host.settings import chosen_keys  # noqa: PLC0415
-
     keys = chosen_keys(options.config, options.keys)
     link = parse_link(options.link or find_aloud(keys.path, _PATIENCE_S), listens_by_default=False)
     if not link.address.startswith("tcp://") or link.listens:
@@ -90,8 +62,6 @@ def _name_device(options: argparse.Namespace) -> int:
 
 def _paired(keys: KeyFolder, door: tuple[str, int], link: str, given: str | None) -> Peer:
     """Pair; who mistypes on a terminal is asked again."""
-    from phone_host.boards.enrolment import PairingCall  # noqa: PLC0415 - slow to load
-
     tries = 1
     while True:
         call = PairingCall(door, keys)
@@ -106,8 +76,6 @@ def _paired(keys: KeyFolder, door: tuple[str, int], link: str, given: str | None
 
 
 def _door(address: str, port: int | None) -> tuple[str, int]:
-    from common.link.enrolment_door import pairing_address  # noqa: PLC0415 - ZeroMQ, only now
-
     if port is None:
         return pairing_address(address)
     if not 1 <= port <= 65535:

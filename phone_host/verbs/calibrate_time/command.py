@@ -3,9 +3,13 @@
 import argparse
 import math
 import sys
+from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
 
 from common import now
 from common.errors import SettingsError
@@ -16,46 +20,26 @@ from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level
 from common.program.signals import StopSignals
 from common.stamp import HOST_CLOCK
-from phone_host.camera.factory import EXAMPLE, open_camera
+from phone_host.boards.discovery import find_aloud
+from phone_host.calibration.misfit_plot import misfit_svg
+from phone_host.calibration.timing.lamp import Brightness, brightness, measure_lamp
+from phone_host.calibration.timing.scene import measure_scene
+from phone_host.calibration.timing.screen import PatternReader, counted, measure_screen
+from phone_host.calibration.timing.screen_page import pattern_page
+from phone_host.calibration.timing.shots import Measured, Times, require_shots, to_seconds
+from phone_host.camera.examples import EXAMPLE
+from phone_host.camera.factory import open_camera
+from phone_host.model import Image, Rig
+from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
+from phone_host.output.rig_yaml import read_rig, write_time_offset
+from phone_host.recording.footage import Footage, film, keep, read
 from phone_host.settings import key_folder
+from phone_host.stereo.raw_images import decode_frame
+from phone_host.stereo.rectify import Rectifier
 from phone_host.verbs.output_folders import claim_names, require_file, require_folder, unwritable
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from phone_host.calibration.timing.shots import Measured, Times
-    from phone_host.model import Image, Rig
-    from phone_host.recording.footage import Footage
-
 _Reading = TypeVar("_Reading")
-
-EXAMPLES = """  phone-host calibrate-time --pattern pattern.html     (open it full screen in a browser, in view of both cameras)
-  phone-host calibrate-time --by screen --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
-  phone-host calibrate-time --by lamp --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
-  phone-host calibrate-time --by scene --frames timing --calibration rig.yaml --out timing
-"""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's options."""
-    parser.add_argument("--pattern", type=Path, metavar="FILE.html", help="write the screen's page, and nothing else")
-    parser.add_argument(
-        "--by",
-        choices=("screen", "lamp", "scene"),
-        default="screen",
-        help="what both cameras film: the page of --pattern, a lamp or LED switched at irregular moments, or, with a calibrated rig,"
-        " anything with texture that moves up and down (default screen)",
-    )
-    parser.add_argument("--link", metavar="URI", help="the board (default: the one that is found, as for run)")
-    parser.add_argument("--keys", default="", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
-    parser.add_argument("--camera", metavar="URI", help=f"the own camera: {EXAMPLE}")
-    parser.add_argument("--frames", type=Path, metavar="DIR", help="instead of both: frames kept by an earlier run")
-    parser.add_argument("--seconds", type=float, default=20.0, metavar="S", help="how long to film (default 20)")
-    parser.add_argument("--wait", type=float, metavar="S", help="wait this long for an absent board, then exit 3")
-    parser.add_argument("--calibration", type=Path, metavar="rig.yaml", help="gets the result; needed for --by scene")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for report.json and time-offset.svg")
-    parser.add_argument("--keep", action="store_true", help="keep the frames in --out, for --frames")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -63,8 +47,6 @@ def run(options: argparse.Namespace) -> int:
     if options.pattern is not None:
         return _write_pattern(options)
     _check(options)
-    from phone_host.output.rig_yaml import read_rig  # noqa: PLC0415 - OpenCV, only now
-
     logs.set_up(log_level("warning"))
     rig = None if options.calibration is None else read_rig(options.calibration)
     if options.out is not None:
@@ -99,9 +81,6 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _write_pattern(options: argparse.Namespace) -> int:
-    from phone_host.calibration.timing.screen_page import pattern_page  # noqa: PLC0415
-    from phone_host.output.atomic import write_text  # noqa: PLC0415
-
     require_file(options.pattern, "--pattern")
     try:
         options.pattern.parent.mkdir(parents=True, exist_ok=True)
@@ -112,21 +91,15 @@ def _write_pattern(options: argparse.Namespace) -> int:
     return 0
 
 
-def _progress(text: str) -> "tuple[Any, Callable[[float], None]]":
+def _progress(text: str) -> tuple[Any, Callable[[float], None]]:
     """A progress bar of shares, on stderr when someone watches."""
-    from rich.console import Console  # noqa: PLC0415
-    from rich.progress import Progress  # noqa: PLC0415
-
     console = Console(stderr=True)
     progress = Progress(console=console, transient=True, disable=not console.is_terminal)
     task = progress.add_task(text, total=1.0)
     return progress, lambda share: progress.update(task, completed=share)
 
 
-def _footage(options: argparse.Namespace, signals: StopSignals) -> "Footage":
-    from phone_host.boards.discovery import find_aloud  # noqa: PLC0415
-    from phone_host.recording.footage import film, keep, read  # noqa: PLC0415
-
+def _footage(options: argparse.Namespace, signals: StopSignals) -> Footage:
     if options.frames is not None:
         return read(options.frames)
     camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns())
@@ -146,17 +119,11 @@ def _footage(options: argparse.Namespace, signals: StopSignals) -> "Footage":
     return footage
 
 
-def _measure(by: str, footage: "Footage", rig: "Rig | None") -> "Measured":
-    from phone_host.calibration.timing.shots import require_shots, to_seconds  # noqa: PLC0415
-    from phone_host.stereo.raw_images import decode_frame  # noqa: PLC0415
-
+def _measure(by: str, footage: Footage, rig: Rig | None) -> Measured:
     require_shots(len(footage.board), len(footage.host))
     progress, advance = _progress("measuring")
     with progress:
         if by == "scene":
-            from phone_host.calibration.timing.scene import measure_scene  # noqa: PLC0415
-            from phone_host.stereo.rectify import Rectifier  # noqa: PLC0415
-
             assert rig is not None
             look = lambda shot: decode_frame(shot.image)  # noqa: E731 - shorter than a function of one line
             return measure_scene(footage.board, footage.host, Rectifier(rig), look, advance)
@@ -164,33 +131,24 @@ def _measure(by: str, footage: "Footage", rig: "Rig | None") -> "Measured":
         return (_by_lamp if by == "lamp" else _by_screen)(footage, board_s, host_s, advance)
 
 
-def _by_lamp(footage: "Footage", board_s: "Times", host_s: "Times", advance: "Callable[[float], None]") -> "Measured":
-    import numpy as np  # noqa: PLC0415
-
-    from phone_host.calibration.timing.lamp import Brightness, brightness, measure_lamp  # noqa: PLC0415
-
+def _by_lamp(footage: Footage, board_s: Times, host_s: Times, advance: Callable[[float], None]) -> Measured:
     board, host = _seen(footage, board_s, host_s, brightness, advance)
     return measure_lamp(*(Brightness(seconds, np.array(levels)) for seconds, levels in (board, host)))
 
 
-def _by_screen(footage: "Footage", board_s: "Times", host_s: "Times", advance: "Callable[[float], None]") -> "Measured":
-    from phone_host.calibration.timing.screen import PatternReader, counted, measure_screen  # noqa: PLC0415
-
+def _by_screen(footage: Footage, board_s: Times, host_s: Times, advance: Callable[[float], None]) -> Measured:
     board, host = _seen(footage, board_s, host_s, PatternReader().read, advance)
     return measure_screen(counted(*board), counted(*host))
 
 
 def _seen(
-    footage: "Footage",
-    board_s: "Times",
-    host_s: "Times",
-    read: "Callable[[Image], _Reading]",
-    advance: "Callable[[float], None]",
-) -> "list[tuple[Times, list[_Reading]]]":
+    footage: Footage,
+    board_s: Times,
+    host_s: Times,
+    read: Callable[[Image], _Reading],
+    advance: Callable[[float], None],
+) -> list[tuple[Times, list[_Reading]]]:
     """What was read in each camera's images, with their times; a spoiled image is left out as if it had been lost."""
-    from phone_host.calibration.timing.shots import require_shots  # noqa: PLC0415
-    from phone_host.stereo.raw_images import decode_frame  # noqa: PLC0415
-
     done, sides = 0, []
     for shots, seconds in ((footage.board, board_s), (footage.host, host_s)):
         whole: list[int] = []
@@ -206,7 +164,7 @@ def _seen(
     return sides
 
 
-def _report(options: argparse.Namespace, measured: "Measured", footage: "Footage") -> dict[str, Any]:
+def _report(options: argparse.Namespace, measured: Measured, footage: Footage) -> dict[str, Any]:
     return {
         "method": measured.method.value,
         "time_offset_ns": measured.offset.offset_ns,
@@ -218,11 +176,7 @@ def _report(options: argparse.Namespace, measured: "Measured", footage: "Footage
     }
 
 
-def _store(options: argparse.Namespace, measured: "Measured", report: dict[str, Any]) -> None:
-    from phone_host.calibration.misfit_plot import misfit_svg  # noqa: PLC0415
-    from phone_host.output.atomic import write_text  # noqa: PLC0415
-    from phone_host.output.rig_yaml import write_time_offset  # noqa: PLC0415
-
+def _store(options: argparse.Namespace, measured: Measured, report: dict[str, Any]) -> None:
     where, option = options.out, "--out"
     try:
         if options.out is not None:

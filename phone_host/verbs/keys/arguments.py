@@ -1,12 +1,9 @@
-"""phone-host keys: this host's public key and the boards that it knows."""
+"""The options of phone-host keys: light, for every start of the command imports them."""
 
 import argparse
 from pathlib import Path
 
-from common import now
-from common.errors import SettingsError
-from common.keys import change, listing
-from phone_host.settings import chosen_keys
+SUMMARY = "show or change this host's key and the boards that it knows"
 
 EXAMPLES = """  phone-host keys
   phone-host keys --forget beaglebone
@@ -23,15 +20,3 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument("--add", nargs=3, metavar=("NAME", "LINK", "KEY"), help="trust a board without pairing")
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
     parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
-
-
-def run(options: argparse.Namespace) -> int:
-    """Change what is asked for and print what there is."""
-    folder = chosen_keys(options.config, options.keys)
-    name, address, key = options.add or ("", "", "")
-    if options.add and not address.startswith("tcp://"):
-        raise SettingsError(f"{address!r} is no tcp link", "give tcp://HOST:PORT")
-    add = (name, key) if options.add else None
-    change(folder, forget=options.forget, new=options.new, add=add, address=address, when=now.wall_time())
-    print(listing(folder, as_json=options.json))
-    return 0

@@ -3,23 +3,25 @@
 import argparse
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from common import now
 from common.errors import SettingsError
+from phone_host.model import CloudImage, Disparity, RectifiedPair
+from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
-from phone_host.settings import MAX_MEGAPIXELS_HELP
+from phone_host.output.listed import ListedFolder
+from phone_host.output.pfm import write_pfm
+from phone_host.output.ply import write_ply
+from phone_host.output.preview import write_preview
+from phone_host.settings import most_pixels
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.images import decode_files, open_image, require_same_size, size_text
+from phone_host.stereo.reproject import disparities_for_near, nearest_depth_m
 from phone_host.verbs.output_folders import require_folder, unwritable
-
-if TYPE_CHECKING:
-    from phone_host.model import CloudImage, Disparity, RectifiedPair
-    from phone_host.stereo.core import StereoCore
-
-EXAMPLES = """  phone-host stereo left.png right.png --calibration rig.yaml --out scan
-  phone-host stereo im0.png im1.png --rectified --disparities 64 --out scan          (no focal length: no cloud.ply)
-  phone-host stereo im0.png im1.png --rectified --disparities 80 --focal 994.978 --baseline 193.001 \\
-      --doffs 31.086 --center 311.193,254.877 --out scan
-"""
+from phone_host.verbs.stereo_options import build_core
 
 _DEFAULT_MATCHER = "sgbm"
 # Of a textured scene both cameras see more than 90 % is matched; below a third the pair itself is wrong far more often than
@@ -27,25 +29,8 @@ _DEFAULT_MATCHER = "sgbm"
 _LOW_DENSITY = 0.33
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's options."""
-    from phone_host.verbs.stereo_options import add_stereo_arguments  # noqa: PLC0415 - brings OpenCV in with its use
-
-    parser.add_argument("left", type=Path, metavar="LEFT", help="image of the left camera, any format, 8 or 16 bit")
-    parser.add_argument("right", type=Path, metavar="RIGHT", help="image of the right camera")
-    add_stereo_arguments(parser)
-    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for the results, made if missing"
-    )
-
-
 def run(options: argparse.Namespace) -> int:
     """Read, rectify or pass, match, reproject, write."""
-    from phone_host.settings import most_pixels  # noqa: PLC0415
-    from phone_host.stereo.images import decode_files, open_image, require_same_size, size_text  # noqa: PLC0415 - OpenCV, only now
-    from phone_host.verbs.stereo_options import build_core  # noqa: PLC0415
-
     if not options.calibration and not options.rectified:
         raise SettingsError(
             "neither --calibration nor --rectified is given",
@@ -108,12 +93,8 @@ class _StopWatch:
         return {stage: round(ns / 1e6, 3) for stage, ns in laps}
 
 
-def _figures(options: argparse.Namespace, core: "StereoCore", disparity: "Disparity") -> dict[str, Any]:
+def _figures(options: argparse.Namespace, core: StereoCore, disparity: Disparity) -> dict[str, Any]:
     """Geometry, number of disparities, density and what the user should know about them."""
-    import numpy as np  # noqa: PLC0415
-
-    from phone_host.stereo.reproject import disparities_for_near, nearest_depth_m  # noqa: PLC0415
-
     geometry, width_px = core.geometry, disparity.shape[1]
     count = options.disparities
     warnings = []
@@ -143,8 +124,6 @@ def _figures(options: argparse.Namespace, core: "StereoCore", disparity: "Dispar
 
 def _clear(out: Path, *, has_cloud: bool) -> None:
     """Remove an earlier run's results, or they might be taken for this one's."""
-    from phone_host.output.listed import ListedFolder  # noqa: PLC0415
-
     try:
         folder = ListedFolder(out, r"disparity\.(pfm|png)|cloud\.ply|report\.json")
         folder.add("disparity.pfm", "disparity.png", *(["cloud.ply"] if has_cloud else []), "report.json")
@@ -153,12 +132,8 @@ def _clear(out: Path, *, has_cloud: bool) -> None:
         raise unwritable(out, error) from error
 
 
-def _write(out: Path, pair: "RectifiedPair", disparity: "Disparity", cloud: "CloudImage | None") -> int | None:
+def _write(out: Path, pair: RectifiedPair, disparity: Disparity, cloud: CloudImage | None) -> int | None:
     """Write all but the report; the number of points, or None without a cloud."""
-    from phone_host.output.pfm import write_pfm  # noqa: PLC0415
-    from phone_host.output.ply import write_ply  # noqa: PLC0415
-    from phone_host.output.preview import write_preview  # noqa: PLC0415
-
     try:
         out.mkdir(parents=True, exist_ok=True)
         write_pfm(out / "disparity.pfm", disparity)
@@ -171,8 +146,6 @@ def _write(out: Path, pair: "RectifiedPair", disparity: "Disparity", cloud: "Clo
 
 
 def _write_report(out: Path, report: dict[str, Any]) -> None:
-    from phone_host.output.atomic import write_text  # noqa: PLC0415
-
     try:
         write_text(out / "report.json", json_text(report, indent=2) + "\n")
     except OSError as error:

@@ -1,12 +1,12 @@
-"""phone-host settings: print each setting with its origin."""
+"""The options of phone-host settings: light, for every start of the command imports them."""
 
 import argparse
 from dataclasses import fields
 from pathlib import Path
 
-from common.program.settings import listing
-from phone_host.settings import PhoneHostSettings, check
-from phone_host.verbs.run import resolve_settings
+from phone_host.declared_settings import PhoneHostSettings
+
+SUMMARY = "print each setting with its origin"
 
 EXAMPLES = """  phone-host settings
   phone-host settings --config host.toml --tolerance 5
@@ -29,11 +29,3 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             metavar=item.name.rpartition("_")[2].upper(),
             help=item.metadata["doc"].replace("%", "%%"),
         )
-
-
-def run(options: argparse.Namespace) -> int:
-    """Print the settings; those that `run` would refuse are refused here too."""
-    resolved = resolve_settings(options)
-    check(resolved.values)
-    print(listing(resolved, as_json=options.json))
-    return 0

@@ -5,51 +5,34 @@ import json
 import sys
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import Progress
 
 from common.errors import SettingsError, UnavailableError
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.signals import StopSignals
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from phone_host.demo.demonstration import DepthErrors
-    from phone_host.model import Rig
-    from phone_host.scene.film import Film
-    from phone_host.scene.scene import Scene
-
-EXAMPLES = """  phone-host demo
-  phone-host demo --seconds 30 --out scan-demo
-"""
+from phone_host.children.board_process import socket_folder
+from phone_host.demo.demo_page import demo_page
+from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, truth_json
+from phone_host.model import Rig
+from phone_host.output.atomic import write_text
+from phone_host.output.listed import ListedFolder
+from phone_host.output.rig_yaml import write_rig
+from phone_host.report.run_json import build
+from phone_host.report.summary import summary
+from phone_host.run.file_sink import NAMES, PAIR_FILES
+from phone_host.run.terminal_view import LiveTable
+from phone_host.scene.film import Film, render_film
+from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
+from phone_host.stereo.rectify import rectify_rig
 
 _CHECK_FAILED = 4
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's options."""
-    parser.add_argument("--seconds", type=float, default=12.0, metavar="S", help="how long to stream (default 12)")
-    parser.add_argument(
-        "--out", type=Path, default=Path("out/demo"), metavar="DIR", help="folder for results (default out/demo)"
-    )
-
-
 def run(options: argparse.Namespace) -> int:
     """Render, stream, measure, compare with the truth."""
-    from rich.console import Console  # noqa: PLC0415 - OpenCV and rich, only now
-
-    from phone_host.children.board_process import socket_folder  # noqa: PLC0415 - as below
-    from phone_host.demo.demo_page import demo_page  # noqa: PLC0415
-    from phone_host.demo.demonstration import DemoRun, truth_json  # noqa: PLC0415
-    from phone_host.output.atomic import write_text  # noqa: PLC0415
-    from phone_host.output.rig_yaml import write_rig  # noqa: PLC0415
-    from phone_host.report.run_json import build  # noqa: PLC0415
-    from phone_host.report.summary import summary  # noqa: PLC0415
-    from phone_host.run.terminal_view import LiveTable  # noqa: PLC0415
-    from phone_host.scene.scene import demo_scene, unlike_rig  # noqa: PLC0415
-    from phone_host.stereo.rectify import rectify_rig  # noqa: PLC0415
-
     if not 1 <= options.seconds <= 3600:
         raise SettingsError(f"--seconds {options.seconds:g}", "give 1 to 3600")
     logs.set_up(30)
@@ -98,9 +81,6 @@ def _clear(out: Path) -> None:
         UnavailableError: something that is not ours is.
         OSError: the folder cannot be used.
     """
-    from phone_host.output.listed import ListedFolder  # noqa: PLC0415 - as in run
-    from phone_host.run.file_sink import NAMES, PAIR_FILES  # noqa: PLC0415
-
     names = rf"{NAMES}|rig\.yaml|cloud\.ply|disparity\.png"
     folder = ListedFolder(out, names, kept="film", inner=PAIR_FILES)
     folder.add("film", "rig.yaml", "cloud.ply", "disparity.png", "index.html")
@@ -111,19 +91,13 @@ class _StoppedError(Exception):
     """The way out of a rendering that is not wanted any more."""
 
 
-def _render(scene: "Scene", rig: "Rig", folder: Path, console: "Console", signals: StopSignals) -> "Film":
+def _render(scene: Scene, rig: Rig, folder: Path, console: Console, signals: StopSignals) -> Film:
     """Render the film with a progress bar.
 
     Raises:
         _StoppedError: a signal came.
         OSError: the folder cannot be written to.
     """
-    from rich.progress import Progress  # noqa: PLC0415
-
-    from phone_host.demo.demonstration import FPS  # noqa: PLC0415
-    from phone_host.scene.film import render_film  # noqa: PLC0415
-    from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK  # noqa: PLC0415
-
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("rendering a moving scene for two cameras", total=2 * FPS * DEMO_PERIOD_S)
 
@@ -136,7 +110,7 @@ def _render(scene: "Scene", rig: "Rig", folder: Path, console: "Console", signal
         return render_film(scene, rig, looks, folder, fps=FPS, seconds=DEMO_PERIOD_S, advance=advance)
 
 
-def _closing(out: Path, film: "Film", errors: "DepthErrors") -> str:
+def _closing(out: Path, film: Film, errors: DepthErrors) -> str:
     board = f"board-agent run --camera '{film.replay_uri(film.left)}'"
     host = f"phone-host run --camera '{film.replay_uri(film.right)}' --calibration {out}/rig.yaml --out scan"
     if not errors.pairs:

@@ -1,0 +1,18 @@
+"""board-agent keys: show or change this board's key and its hosts."""
+
+import argparse
+import sys
+
+from board_agent.settings import chosen_keys
+from common import now
+from common.keys import change, listing
+
+
+def run(options: argparse.Namespace) -> int:
+    """Change what is asked for and print what there is."""
+    folder = chosen_keys(options)
+    change(folder, forget=options.forget, new=options.new, add=options.add, address="", when=now.wall_time())
+    print(listing(folder, as_json=options.json))
+    if options.new:
+        print("board-agent: a running service keeps its old key until it is restarted", file=sys.stderr)
+    return 0

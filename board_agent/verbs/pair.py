@@ -1,0 +1,28 @@
+"""board-agent pair: show a code with which a new host may connect."""
+
+import argparse
+import json
+import sys
+
+from board_agent.enrolment import NOBODY, absence, follow
+from board_agent.settings import LONGEST_S, chosen_keys
+from common.errors import SettingsError
+
+
+def run(options: argparse.Namespace) -> int:
+    """Show the code until a host has proved it."""
+    if not 0 < options.seconds < LONGEST_S:
+        raise SettingsError(f"--seconds {options.seconds:g}", "give seconds, more than 0")
+    name, keys = "", chosen_keys(options)
+    for state in follow(keys, options.seconds):
+        if state == NOBODY:
+            print(f"board-agent: waiting: {absence(keys)}", file=sys.stderr)
+        if state.problem:
+            print(f"board-agent: waiting: {state.problem}: stop what uses that port, or move the link", file=sys.stderr)
+        name = state.paired
+        if state.code and not name:
+            asks = f"{state.asking} asks; " if state.asking else ""
+            words = f"{state.address}: {asks}type this code on the host: {state.code}"
+            print(words, file=sys.stderr if options.json else None, flush=True)
+    print(json.dumps({"paired": name}) if options.json else f"paired with {name}")
+    return 0

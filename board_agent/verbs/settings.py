@@ -1,0 +1,14 @@
+"""board-agent settings: print each setting with its origin."""
+
+import argparse
+
+from board_agent.settings import check, resolve_settings
+from common.program.settings import listing
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the settings; those that `run` would refuse are refused here too."""
+    resolved = resolve_settings(options)
+    check(resolved.values)
+    print(listing(resolved, as_json=options.json))
+    return 0

@@ -1,0 +1,40 @@
+"""The options of a `replay:` URI."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from common.camera.options import EXAMPLE, exact
+from common.camera.replay import ReplaySettings
+from common.errors import SettingsError
+from common.protocol.message import Pacing
+
+
+def replay_settings(uri: str, path: str, options: Mapping[str, str], clock: str) -> ReplaySettings:
+    """Read the options of a camera URI.
+
+    Args:
+        uri: the whole of it, for errors.
+        path: folder, glob or file.
+        options: those behind the question mark.
+        clock: name of the clock of the stamps.
+
+    Returns:
+        The settings.
+
+    Raises:
+        SettingsError: an option is unknown or makes no sense.
+    """
+    if unknown := set(options) - {"fps", "loop", "pace", "phase_ms"}:
+        raise SettingsError(f"camera {uri!r} has an unknown option {min(unknown)!r}", f"give {EXAMPLE}")
+    try:
+        fps = exact(options.get("fps", "30"))
+        loop = {"0": False, "1": True}[options.get("loop", "0")]
+        pacing = Pacing[options.get("pace", "clock").upper()]
+        phase_ns = round(Fraction(options.get("phase_ms", "0")) * 1_000_000)
+    except (ValueError, ZeroDivisionError, KeyError):
+        raise SettingsError(f"camera {uri!r} has an option of no use", f"give {EXAMPLE}") from None
+    if not Fraction(1, 100) <= fps <= 1000:
+        raise SettingsError(f"camera {uri!r} has fps={options.get('fps')}", "give a rate between 0.01 and 1000")
+    if phase_ns and pacing is Pacing.DEMAND:
+        raise SettingsError(f"camera {uri!r} has phase_ms and pace=demand", "leave one out: demand knows no clock")
+    return ReplaySettings(path, fps, loop, pacing, clock, phase_ns)

@@ -1,0 +1,170 @@
+"""Link URIs: what the user names, read and checked without opening anything."""
+
+import ipaddress
+from dataclasses import dataclass
+from typing import Final
+from urllib.parse import parse_qsl, urlsplit
+
+from common.errors import SettingsError
+from common.keys import KeyFolder
+from common.program.extensions import registered_names
+
+LINKS: Final = "tandemscan.links"
+"""Entry points of other packages' links; see `factory`."""
+
+OWN_SCHEMES: Final = frozenset({"tcp", "ipc", "serial", "rfcomm"})
+
+_MAX_BAUD = 20_000_000
+"""The fastest adapters reach 12 Mbaud."""
+
+_MAX_CHANNEL = 30
+"""RFCOMM has channels 1 to 30."""
+
+_MORE_OPTIONS = {
+    "serial": ", and baud=N",
+    "rfcomm": ", and unpaired=1",
+    "tcp": ", and insecure=1",
+    "ipc": ", and owner=USER",
+}
+
+_EXAMPLES = "give tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE"
+
+
+@dataclass(frozen=True, slots=True)
+class LinkUri:
+    """A link as the user named it.
+
+    Attributes:
+        address: what the transport takes, without options.
+        listens: whether this side waits to be dialled.
+        baud: speed of a serial port that has one; None: the usual.
+        unpaired: whether Bluetooth devices will do that were never paired with.
+        insecure: whether a tcp link is to be open to everybody on every network.
+        owner: user whose an ipc link's other end may be, beside this one and root; empty for nobody.
+        extension: name under which an installed package registers this kind of link; empty: it is one of ours.
+        options: for an extension, the query without `bind` and `connect`.
+    """
+
+    address: str
+    listens: bool
+    baud: int | None = None
+    unpaired: bool = False
+    insecure: bool = False
+    owner: str = ""
+    extension: str = ""
+    options: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class LinkRequest:
+    """A link that is to be opened; all that a transport is told.
+
+    Attributes:
+        uri: what to open.
+        keys: this machine's key and those that it trusts; None where only open links can be had.
+        board: whether this side is the board, which over tcp and ipc takes no images.
+        waits: whether a device that is missing is waited for.
+    """
+
+    uri: LinkUri
+    keys: KeyFolder | None = None
+    board: bool = False
+    waits: bool = False
+
+
+def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
+    """Read a link URI.
+
+    Args:
+        uri: `tcp://HOST:PORT`, `ipc://PATH`, `serial:DEVICE` or `rfcomm://DEVICE[/CHANNEL]`, with `?bind=1` or `?connect=1` to swap who
+            listens; a serial port also takes `baud=N`, a Bluetooth device `unpaired=1`, tcp `insecure=1`: no keys, whoever reaches the
+            address sees the camera; ipc `owner=USER`: that user's end is trusted as one's own is.
+        listens_by_default: true on the board, which binds; false on the host, which connects.
+
+    Returns:
+        The link that is meant.
+
+    Raises:
+        SettingsError: the URI makes no sense.
+    """
+    address, _, query = uri.partition("?")
+    is_serial = address.startswith("serial:")
+    scheme, found, rest = address.partition(":" if is_serial else "://")
+    if scheme not in OWN_SCHEMES and (extension := _extension(uri, listens_by_default=listens_by_default)):
+        return extension
+    if not found or scheme not in OWN_SCHEMES or not rest:
+        raise SettingsError(f"link {uri!r} is of no known kind", _EXAMPLES)
+    if scheme == "tcp":
+        _check_port(uri, address)
+    if scheme == "rfcomm":
+        _check_channel(uri, rest)
+    if scheme == "ipc" and rest.startswith(
+        "@"
+    ):  # Linux's abstract names have no owner and no mode: whoever knows one connects
+        raise SettingsError(f"link {uri!r} names no path", "give one, for example ipc://$XDG_RUNTIME_DIR/board")
+    options = dict(parse_qsl(query, keep_blank_values=True))
+    baud = _baud(uri, options.pop("baud")) if is_serial and "baud" in options else None
+    unpaired = scheme == "rfcomm" and options.get("unpaired") == "1"
+    if unpaired:
+        del options["unpaired"]
+    insecure = scheme == "tcp" and options.get("insecure") == "1" and bool(options.pop("insecure"))
+    owner = options.pop("owner") if scheme == "ipc" and options.get("owner") else ""
+    unknown = set(options) - {"bind", "connect"}
+    if unknown or set(options.values()) - {"1"} or len(options) > 1:
+        raise SettingsError(
+            f"link {uri!r} has options {query!r}",
+            "?bind=1 and ?connect=1 are the only ones, one at a time" + _MORE_OPTIONS.get(scheme, ""),
+        )
+    return LinkUri(address, listens_by_default if not options else "bind" in options, baud, unpaired, insecure, owner)
+
+
+def needs_keys(uri: LinkUri) -> bool:
+    """Whether a link is for known keys only: tcp that other machines can reach, unless it is said to be insecure."""
+    if not uri.address.startswith("tcp://") or uri.insecure:
+        return False
+    host = uri.address.removeprefix("tcp://").rpartition(":")[0].strip("[]")
+    try:
+        return not (host == "localhost" or ipaddress.ip_address(host).is_loopback)
+    except ValueError:  # a name, an interface, *
+        return True
+
+
+def _extension(uri: str, *, listens_by_default: bool) -> LinkUri | None:
+    """Read a URI whose scheme an installed package registers; None if none does."""
+    address, _, query = uri.partition("?")
+    scheme, found, rest = address.partition(":")
+    if not found or not rest.strip("/") or scheme not in registered_names(LINKS):
+        return None
+    options = dict(parse_qsl(query, keep_blank_values=True))
+    sides = {side: options.pop(side) for side in ("bind", "connect") if side in options}
+    if len(sides) > 1 or set(sides.values()) - {"1"}:
+        raise SettingsError(f"link {uri!r} has options {query!r}", "give ?bind=1 or ?connect=1")
+    listens = "bind" in sides if sides else listens_by_default
+    return LinkUri(address, listens, extension=scheme, options=tuple(options.items()))
+
+
+def _check_port(uri: str, address: str) -> None:
+    try:
+        port = urlsplit(address.replace("*", "0.0.0.0")).port  # noqa: S104 - only to parse it
+    except ValueError:
+        port = None
+    if port is None or not 1 <= port <= 65535:
+        raise SettingsError(f"link {uri!r} names no port", "give one, for example tcp://127.0.0.1:5555")
+    if address.startswith("tcp://:"):
+        raise SettingsError(
+            f"link {uri!r} names no host", "give its name or address, or * to listen on every interface"
+        )
+
+
+def _check_channel(uri: str, rest: str) -> None:
+    device, slash, channel = rest.partition("/")
+    if not device:
+        raise SettingsError(f"link {uri!r} names no device", "give its address or name, or * to listen")
+    if slash and not (channel.isascii() and channel.isdigit() and 1 <= int(channel) <= _MAX_CHANNEL):
+        raise SettingsError(f"link {uri!r} has the channel {channel!r}", f"leave it out, or give 1 to {_MAX_CHANNEL}")
+
+
+def _baud(uri: str, text: str) -> int:
+    if not text.isascii() or not text.isdigit() or not 0 < int(text) <= _MAX_BAUD:
+        raise SettingsError(f"link {uri!r} has a baud rate of {text!r}", "give a number, for example ?baud=115200")
+    return int(text)

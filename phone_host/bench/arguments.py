@@ -1,0 +1,56 @@
+"""The options of delay-bench: light, for help needs no OpenCV."""
+
+import argparse
+from pathlib import Path
+
+EXAMPLES = """examples:
+  delay-bench
+  delay-bench --links tcp,ipc,serial --size 320x240,640x480 --quality 50,80 --fps 15,30 --seconds 20 --out bench
+  delay-bench --emulate usb-serial,bluetooth,wifi --size 320x240 --quality 50 --fps 10 --out interfaces
+  delay-bench --links tcp://192.168.7.2:5555 --seconds 30 --json
+  delay-bench --size 320x240,640x480 --predict size=1280x720,fps=30 --predict link=bluetooth,processing=4
+  delay-bench --emulate list
+
+Runs a board-agent process and the host for each link, size, quality and rate, and prints each delay's p50, p95, p99 and maximum. The
+first second of each run is left out of the statistics. A board elsewhere is measured with what its own camera shows: its size, quality and
+rate cannot be set from here. --out gets
+delay-bench.json, delay-bench.html (plots, the queueing model beside the measurement), delay-bench.svg and trace.json for Perfetto.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's options."""
+    parser.add_argument(
+        "--links",
+        default="",
+        metavar="NAMES",
+        help="tcp, ipc, serial (over a pseudo terminal), rfcomm, or URIs of boards (default: every kind that is there)",
+    )
+    parser.add_argument(
+        "--emulate", default="", metavar="NAMES", help="let links behave as these interfaces; `list` shows them"
+    )
+    parser.add_argument(
+        "--size", default="320x240,640x480", metavar="SIZES", help="image sizes (default 320x240,640x480)"
+    )
+    parser.add_argument("--quality", default="80", metavar="PERCENTS", help="JPEG qualities (default 80)")
+    parser.add_argument("--fps", default="15,30", metavar="RATES", help="frames per second (default 15,30)")
+    parser.add_argument(
+        "--seconds", type=float, default=4.0, metavar="S", help="length of each run after its warm-up (default 4)"
+    )
+    parser.add_argument(
+        "--predict",
+        action="append",
+        default=[],
+        metavar="CHANGES",
+        help="predict a setting that is not run, for example fps=60,size=640x480,kB=40,fifo=4:block,processing=0.5,link=wifi",
+    )
+    parser.add_argument("--matcher", default="sgbm", metavar="NAME", help="stereo matcher (default sgbm)")
+    parser.add_argument(
+        "--fifo",
+        default="1:drop-oldest",
+        metavar="DEPTH:POLICY",
+        help="queue before the matcher: drop-oldest, drop-newest or block (default 1:drop-oldest)",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder for delay-bench.json, delay-bench.html and trace.json"
+    )

@@ -1,0 +1,149 @@
+"""What delay-bench does: the delays of every link and stage, measured on this machine."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from common.errors import SettingsError, UnavailableError
+from common.program import logs
+from common.program.commandline import INTERRUPTED
+from common.program.signals import StopSignals
+from phone_host.bench.analysis import Analysis, analyse
+from phone_host.bench.cases import Interface, cases, interfaces, parse_links, parse_qualities, parse_rates, parse_sizes
+from phone_host.bench.changes import parse_changes
+from phone_host.bench.emulate import parse_profiles
+from phone_host.bench.links import obstacle
+from phone_host.bench.matrix import measure, remote_cases
+from phone_host.bench.page import figure, page
+from phone_host.bench.report import PERCENTILES, Conditions, as_json, conditions, grouped
+from phone_host.bench.runs import CaseResult, RunSettings
+from phone_host.bench.tables import fit_lines, prediction_lines, regime_lines, rows, summary_line
+from phone_host.bench.trace import TracedRun, trace_json
+from phone_host.output.atomic import write_text
+from phone_host.output.listed import claim
+from phone_host.stereo.matcher_names import matcher_named
+from phone_host.sync.fifo import FifoSettings
+
+_NOTHING_MEASURED = 4
+_FILES = ("delay-bench.json", "delay-bench.html", "trace.json", "delay-bench.svg")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the cases that are asked for, print their delays, write the files."""
+    settings, changes = _settings(options), parse_changes(options.predict)
+    asked = _interfaces(options)
+    matrix = parse_sizes(options.size), parse_qualities(options.quality), parse_rates(options.fps)
+    here, not_run = _available(asked)
+    if options.out is not None:
+        _make_folder(options.out)
+    logs.set_up(30)
+    signals = StopSignals()
+    boards = remote_cases([interface for interface in here if interface.is_remote], signals)
+    for case in boards:
+        print(
+            f"delay-bench: {case.interface} shows {case.images}; its camera is not set from here: "
+            "--size, --quality and --fps do not count there",
+            file=sys.stderr,
+        )
+    planned = (*cases([interface for interface in here if not interface.is_remote], *matrix), *boards)
+    outcome = measure(planned, settings, signals)
+    _tell(options, outcome.results, conditions(settings, not_run), analyse(outcome.results, settings.fifo, changes))
+    if outcome.failure is not None:
+        raise outcome.failure
+    if signals.stop:
+        how = "interrupted" if signals.interrupted else "stopped"
+        print(f"delay-bench: {how} after {len(outcome.results)} of {len(planned)} runs", file=sys.stderr)
+        return INTERRUPTED if signals.interrupted else 0
+    return 0 if all(result.ledgers for result in outcome.results) else _NOTHING_MEASURED
+
+
+def _interfaces(options: argparse.Namespace) -> tuple[Interface, ...]:
+    """What the options ask for."""
+    links = parse_links(options.links) if options.links else ()
+    return interfaces(links, parse_profiles(options.emulate) if options.emulate else ())
+
+
+def _available(asked: Sequence[Interface]) -> tuple[list[Interface], list[tuple[Interface, str]]]:
+    """Those that can be had here, and the others with the reason, which is said at once."""
+    here, not_run = [], []
+    for interface in asked:
+        reason = obstacle(interface)
+        if reason:
+            print(f"delay-bench: {interface} is not run: {reason}", file=sys.stderr)
+            not_run.append((interface, reason))
+        else:
+            here.append(interface)
+    if not here:
+        raise UnavailableError("none of the links can be had here", "name others with --links")
+    return here, not_run
+
+
+def _tell(options: argparse.Namespace, results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> None:
+    """Print the table or the object, and write the files."""
+    report = as_json(results, under, analysis)
+    if options.json:
+        print(json.dumps(report))
+    else:
+        _print(results, under, analysis)
+    if options.out is None:
+        return
+    files = {
+        "delay-bench.json": json.dumps(report, indent=1) + "\n",
+        "delay-bench.html": page(results, under, analysis),
+        "trace.json": trace_json([TracedRun(str(result.case), result.ledgers) for result in results]),
+    }
+    if any(result.ledgers for result in results):
+        files["delay-bench.svg"] = figure(results, under)
+    _write(options.out, files)
+
+
+def _settings(options: argparse.Namespace) -> RunSettings:
+    if not 0.5 <= options.seconds <= 3600:
+        raise SettingsError(f"--seconds {options.seconds:g}", "give 0.5 to 3600")
+    return RunSettings(matcher_named(options.matcher), FifoSettings.parse(options.fifo), options.seconds)
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        claim(folder, *_FILES)
+    except OSError as error:
+        raise UnavailableError(
+            f"results folder {folder} cannot be used ({error.strerror})", "give another with --out"
+        ) from None
+
+
+def _write(out: Path, files: dict[str, str]) -> None:
+    try:
+        for name, text in files.items():
+            write_text(out / name, text)
+    except OSError as error:
+        raise UnavailableError(
+            f"results in {out} cannot be written ({error.strerror})", "make room or give another folder with --out"
+        ) from None
+
+
+def _print(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> None:
+    """A table for each kind of images, stage by stage, the interfaces below each other."""
+    console = Console(highlight=False)
+    console.print(f"{under.machine}, {under.date}, matcher {under.matcher}", soft_wrap=True)
+    for group in grouped(results):
+        table = Table(title=f"{group[0].case.images}, delays in ms", title_justify="left")
+        table.add_column("stage")
+        table.add_column("link", overflow="fold")  # a board's URI is long, and its end is what tells it from another
+        for name in PERCENTILES:
+            table.add_column(name, justify="right")
+        for row in rows(group):
+            table.add_row(*row)
+        console.print(table)
+        for result in group:
+            console.print(f"{result.case.interface}: {summary_line(result)}", soft_wrap=True)
+            for line in regime_lines(result, under.fifo):
+                console.print(f"  {line}", soft_wrap=True)
+        console.print()
+    for line in (*fit_lines(analysis), *prediction_lines(analysis)):
+        console.print(line, soft_wrap=True)

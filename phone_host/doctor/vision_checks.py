@@ -1,0 +1,87 @@
+"""What the doctor can only ask with numpy and OpenCV: a board, as a run does, and a rig. Imported when both were seen to work."""
+
+from pathlib import Path
+
+import numpy as np
+
+from common import now
+from common.camera.factory import parse_camera
+from common.camera.v4l2_stream import V4l2Settings
+from common.errors import AbsentBoardError, BusyBoardError, OtherVersionError, TandemError
+from common.keys import KeyFolder
+from common.link.factory import open_link, parse_link
+from phone_host.camera.http_uri import is_http
+from phone_host.doctor.host_checks import Answer, BoardReadings, RigReadings
+from phone_host.model import Side
+from phone_host.output.rig_yaml import read_rig
+from phone_host.stereo.rectify import Rectifier
+from phone_host.stream.await_board import BoardPatience, await_board
+from phone_host.stream.frame_sink import NoFrames
+from phone_host.stream.receiver import Receiver
+
+
+def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
+    """Say hello as a host does, and leave again.
+
+    Args:
+        uri: of the link to the board.
+        wait_s: how long it is waited for, s.
+        keys: folder of this host's key and the boards that it knows.
+
+    Returns:
+        What it answered.
+
+    Raises:
+        TandemError: the link cannot be opened, or failed.
+    """
+    link = open_link(parse_link(uri, listens_by_default=False), keys)
+    receiver = Receiver([link], now.random_id(), NoFrames())
+    patience = BoardPatience(round(wait_s * 1e9), now.monotonic_ns())
+    answer = Answer.BOARD
+    receiver.start()
+    try:
+        await_board(receiver, patience, lambda: receiver.hello is not None and receiver.estimate is not None)
+    except AbsentBoardError:
+        answer = Answer.SILENT
+    except BusyBoardError:
+        answer = Answer.BUSY
+    except OtherVersionError:
+        answer = Answer.OTHER_VERSION
+    finally:
+        hello, estimate = receiver.hello, receiver.estimate
+        receiver.stop()
+    if receiver.failure is not None:
+        raise receiver.failure
+    if hello is None or estimate is None:
+        return BoardReadings(uri, answer, wait_s)
+    camera = f"{hello.camera.name} {hello.camera.width_px}x{hello.camera.height_px}"
+    return BoardReadings(uri, answer, 0.0, camera, estimate.round_trip_ns, estimate.uncertainty_ns)
+
+
+def read_rig_readings(calibration: str, camera: str) -> RigReadings:
+    """Read a rig and make its rectification.
+
+    Args:
+        calibration: rig.yaml.
+        camera: URI of the own camera; empty: none is given.
+
+    Returns:
+        What it says, or what is wrong with it.
+
+    Raises:
+        SettingsError: the URI makes no sense.
+    """
+    try:
+        rig = read_rig(Path(calibration))
+        Rectifier(rig)
+    except TandemError as error:
+        return RigReadings(calibration, error.problem, error.remedy)
+    own = rig.right if rig.board_side is Side.LEFT else rig.left
+    asked = parse_camera(camera, "") if camera and not is_http(camera) else None
+    return RigReadings(
+        path=calibration,
+        rms_px=rig.rms_stereo_px,
+        baseline_m=float(np.linalg.norm(rig.t_right_left_m)),
+        host_size_px=(own.width_px, own.height_px),
+        asked_size_px=asked.wanted.size_px if isinstance(asked, V4l2Settings) else None,
+    )

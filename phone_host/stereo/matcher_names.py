@@ -1,0 +1,53 @@
+"""The matchers by name, ours and those of other packages. Light: settings and help need the names, not the algorithms."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from common.errors import SettingsError
+from common.program.extensions import registered_names
+
+MATCHERS: Final = "tandemscan.matchers"
+"""Entry points of other packages' matchers; see `match`."""
+
+
+class MatcherName(Enum):
+    """The matchers by the name a user types.
+
+    BLOCK is the paper's: 8 x 8 sum of absolute differences, winner takes all. SGBM is semi-global matching, the default.
+    """
+
+    BLOCK = "block"
+    SGBM = "sgbm"
+
+
+@dataclass(frozen=True, slots=True)
+class RegisteredMatcher:
+    """A matcher that an installed package registers.
+
+    Attributes:
+        value: the name under which it does.
+    """
+
+    value: str
+
+
+AnyMatcher = MatcherName | RegisteredMatcher
+
+
+def matcher_named(text: str) -> AnyMatcher:
+    """Find the matcher that a user names, without loading it.
+
+    Args:
+        text: the name.
+
+    Raises:
+        SettingsError: there is none of that name.
+    """
+    own = [name.value for name in MatcherName]
+    if text in own:
+        return MatcherName(text)
+    registered = registered_names(MATCHERS)
+    if text in registered:
+        return RegisteredMatcher(text)
+    raise SettingsError(f"matcher {text!r} is unknown", f"give {' or '.join((*own, *registered))}")

@@ -1,0 +1,1 @@
+"""phone-host calibrate: its options, light, and what it does with them."""

@@ -1,0 +1,29 @@
+"""The options of phone-host calibrate: light, for every start of the command imports them."""
+
+import argparse
+from pathlib import Path
+
+from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
+
+SUMMARY = "calibrate two cameras from pictures of a chessboard"
+
+EXAMPLES = """  phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml
+  phone-host calibrate 'views/left*.png' 'views/right*.png' --board 9x6 --square 25mm --out rig.yaml --json
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's options."""
+    parser.add_argument("left", metavar="LEFT", help="images of the left camera: a folder or a quoted glob")
+    parser.add_argument("right", metavar="RIGHT", help="images of the right camera, paired by the number in the name")
+    parser.add_argument("--board", required=True, metavar="9x6", help="inner corners of the chessboard: columns x rows")
+    parser.add_argument(
+        "--square", required=True, metavar="25mm", help="side of a square: 25mm, 2.5cm, 0.025m (bare number: mm)"
+    )
+    parser.add_argument(
+        "--board-side", choices=("left", "right"), default="left", help="which camera hangs on the board (default left)"
+    )
+    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="rig.yaml", help="the calibration; report.json goes beside it"
+    )

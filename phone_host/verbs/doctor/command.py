@@ -1,0 +1,23 @@
+"""phone-host doctor: check Python, camera, link, rig and disk."""
+
+import argparse
+import json
+import math
+
+from common.doctor.finding import exit_code, table, values
+from common.errors import SettingsError
+from phone_host.doctor.host_doctor import Question, examine
+from phone_host.settings import key_folder, resolve_settings
+
+
+def run(options: argparse.Namespace) -> int:
+    """Check, and print what was found."""
+    if not (math.isfinite(options.wait) and options.wait >= 0):
+        raise SettingsError(f"--wait {options.wait}", "give seconds, 0 or more")
+    settings = resolve_settings(options).values
+    question = Question(
+        settings.camera, settings.link, settings.calibration, options.out, options.wait, key_folder(settings.keys)
+    )
+    findings = examine(question)
+    print(json.dumps(values(findings)) if options.json else table(findings))
+    return exit_code(findings)

@@ -1,0 +1,20 @@
+"""phone-host keys: this host's public key and the boards that it knows."""
+
+import argparse
+
+from common import now
+from common.errors import SettingsError
+from common.keys import change, listing
+from phone_host.settings import chosen_keys
+
+
+def run(options: argparse.Namespace) -> int:
+    """Change what is asked for and print what there is."""
+    folder = chosen_keys(options.config, options.keys)
+    name, address, key = options.add or ("", "", "")
+    if options.add and not address.startswith("tcp://"):
+        raise SettingsError(f"{address!r} is no tcp link", "give tcp://HOST:PORT")
+    add = (name, key) if options.add else None
+    change(folder, forget=options.forget, new=options.new, add=add, address=address, when=now.wall_time())
+    print(listing(folder, as_json=options.json))
+    return 0

@@ -1,0 +1,1 @@
+"""phone-host pair: its options, light, and what it does with them."""

@@ -1,0 +1,76 @@
+"""The options of phone-host run: light, for every start of the command imports them."""
+
+import argparse
+from pathlib import Path
+
+from phone_host.camera.examples import EXAMPLE
+from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
+from phone_host.verbs.stereo_arguments import add_stereo_arguments
+
+SUMMARY = "pair a board's frames with the own camera's, compute depth, measure every delay"
+
+EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --calibration rig.yaml --out scan
+  phone-host run --link ipc://$XDG_RUNTIME_DIR/board --camera 'replay:right?pace=demand' --rectified --disparities 64 --pairs 20 --out scan
+  phone-host run --link tcp://192.168.7.2:5555 --camera 'http://127.0.0.1:8080/video?latency_ms=120' --calibration rig.yaml --out scan
+  phone-host run --link serial:/dev/ttyACM0 --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --out scan
+  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --align-phase        (both cameras expose together)
+  phone-host run --camera 'replay:right?loop=1' --pairs 300 --json        (no depth: pairs and delays only)
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's options."""
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
+    parser.add_argument(
+        "--link",
+        action="append",
+        metavar="URI",
+        help="the board: tcp://HOST:PORT, ipc://PATH[?owner=USER], serial:DEVICE or rfcomm://DEVICE (default: the board is looked for); may be given again:"
+        " frames come over the best link that is up",
+    )
+    parser.add_argument("--camera", metavar="URI", help=f"the own camera: {EXAMPLE}")
+    add_stereo_arguments(parser)
+    parser.add_argument(
+        "--board-side", choices=("left", "right"), help="which view the board's camera is (default left, or the rig's)"
+    )
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        metavar="MS",
+        help="greatest time skew of a pair (default: half of the longer frame period)",
+    )
+    parser.add_argument(
+        "--fifo", metavar="DEPTH:POLICY", help="drop-oldest, drop-newest or block (default 1:drop-oldest)"
+    )
+    parser.add_argument(
+        "--align-phase",
+        nargs="?",
+        const="either",
+        choices=("either", "board", "host"),
+        help="steer a camera until both expose together; which one may be steered (default either)",
+    )
+    parser.add_argument(
+        "--interpolate",
+        action="store_true",
+        default=None,
+        help="move the board's image to the host's moment along the optical flow, where no camera can be steered",
+    )
+    parser.add_argument(
+        "--pairs", type=int, default=0, metavar="N", help="end after N pairs; fewer when the stream ends: exit 4"
+    )
+    parser.add_argument(
+        "--wait", type=float, metavar="S", help="wait this long for an absent board, then exit 3 (default: for ever)"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder for delays.jsonl, report.json, index.html and saved pairs"
+    )
+    parser.add_argument(
+        "--save-every",
+        type=int,
+        default=30,
+        metavar="N",
+        help="save every Nth pair from the first on; 0: none (default 30)",
+    )
+    parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
+    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
+    parser.add_argument("--log-level", choices=("debug", "info", "warning", "error"), help="how much to log to stderr")

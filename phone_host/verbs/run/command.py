@@ -1,0 +1,132 @@
+"""phone-host run: pair a board's frames with the own camera's, compute depth, measure every delay."""
+
+import argparse
+import json
+import math
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+
+from common import now
+from common.errors import SettingsError
+from common.link.factory import open_links, parse_link, tell_insecure
+from common.program import logs
+from common.program.commandline import INTERRUPTED
+from common.program.settings import Resolved, log_level, with_origins
+from common.program.signals import StopSignals
+from common.stamp import HOST_CLOCK
+from phone_host.boards.discovery import find_aloud, remember
+from phone_host.camera.examples import EXAMPLE
+from phone_host.camera.factory import open_camera
+from phone_host.declared_settings import PhoneHostSettings
+from phone_host.model import Side, TimeOffset
+from phone_host.report.run_json import build
+from phone_host.report.run_page import run_page
+from phone_host.report.summary import summary
+from phone_host.run.file_sink import NAMES
+from phone_host.run.host import EndReason, Host, HostSettings
+from phone_host.run.terminal_view import LiveTable
+from phone_host.settings import check, key_folder, resolve_settings
+from phone_host.stereo.core import StereoCore
+from phone_host.sync.fifo import FifoSettings
+from phone_host.sync.phase import Whose
+from phone_host.verbs.output_folders import spare_inputs
+from phone_host.verbs.stereo_options import build_core
+
+_CHECK_FAILED = 4
+
+
+def replayed(uri: str) -> str:
+    """The path of a camera that replays images; empty for any other."""
+    return uri.removeprefix("replay:").partition("?")[0] if uri.startswith("replay:") else ""
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run until stopped, the pairs are reached or a stream ends."""
+    resolved = resolve_settings(options)
+    settings = resolved.values
+    check(settings)
+    logs.set_up(log_level(settings.log_level))
+    if not settings.camera:
+        raise SettingsError("no own camera is given", f"use --camera {EXAMPLE}")
+    _check_numbers(options)
+    if options.out is not None:
+        inputs = {"--camera": replayed(settings.camera), "--calibration": settings.calibration}
+        spare_inputs(options.out, NAMES, {what: Path(path) for what, path in inputs.items() if path})
+    fifo = FifoSettings.parse(settings.fifo)
+    camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
+    core, board_side = _core(options, settings, (camera.description.width_px, camera.description.height_px))
+    keys = key_folder(settings.keys)
+    named = settings.link or (find_aloud(keys.path, options.wait),)
+    uris = [parse_link(uri, listens_by_default=False) for uri in named]
+    for uri in uris:
+        tell_insecure(uri)
+    links = open_links(uris, keys)
+    signals = StopSignals()
+    host = Host(_host_settings(options, resolved, fifo, board_side, core), camera, links, core)
+    live = LiveTable(host.snapshot, pairs=options.pairs) if sys.stderr.isatty() else None
+    with live or nullcontext():
+        try:
+            ended = host.run(lambda: signals.stop, live.refresh if live else None)
+        except BaseException:
+            host.write_report(build(host.snapshot("failed")))
+            raise
+    if host.has_met_board and len(named) == 1 and "?" not in named[0] and named[0].startswith("tcp://"):
+        remember(keys.path, named[0])
+    snapshot = host.snapshot(ended.value)
+    report = build(snapshot)
+    page = run_page(snapshot, host.last, board_side, host.sample()) if options.out else ""
+    complete = host.write_report(report, page)
+    print(json.dumps(report) if options.json else summary(snapshot))
+    if signals.interrupted:
+        return INTERRUPTED
+    too_few = options.pairs and ended is EndReason.STREAM_ENDED
+    return _CHECK_FAILED if too_few or not complete else 0
+
+
+def _core(
+    options: argparse.Namespace, settings: PhoneHostSettings, size_px: tuple[int, int]
+) -> tuple[StereoCore | None, Side]:
+    """The stereo core, if any, and the side of the board's camera: as the option says, else as the rig does, else left."""
+    core, rig_side = build_core(options, settings.calibration, settings.matcher, size_px)
+    board_side = Side(options.board_side) if options.board_side else rig_side or Side.LEFT
+    if rig_side not in {None, board_side}:
+        raise SettingsError(
+            f"--board-side {board_side.value} contradicts {settings.calibration}",
+            "leave it out, or calibrate with the board there",
+        )
+    if core is None:
+        print("phone-host: no --calibration and not --rectified: pairs and delays only, no depth", file=sys.stderr)
+    return core, board_side
+
+
+def _host_settings(
+    options: argparse.Namespace,
+    resolved: Resolved[PhoneHostSettings],
+    fifo: FifoSettings,
+    board_side: Side,
+    core: StereoCore | None,
+) -> HostSettings:
+    settings = resolved.values
+    return HostSettings(
+        resolved=with_origins(resolved, vars(options)),
+        board_side=board_side,
+        tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
+        fifo=fifo,
+        pairs=options.pairs,
+        wait_ns=None if options.wait is None else round(options.wait * 1e9),
+        out=options.out,
+        save_every=options.save_every,
+        time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
+        interpolate=settings.interpolate,
+        most_pixels=settings.most_pixels,
+        steered=frozenset(whose for whose in Whose if settings.align_phase in {"either", whose.value}),
+    )
+
+
+def _check_numbers(options: argparse.Namespace) -> None:
+    for name, value in (("--pairs", options.pairs), ("--save-every", options.save_every)):
+        if value < 0:
+            raise SettingsError(f"{name} {value}", "give 0 or more")
+    if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
+        raise SettingsError(f"--wait {options.wait}", "give seconds, 0 or more; leave it out to wait for ever")

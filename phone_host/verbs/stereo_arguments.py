@@ -1,0 +1,41 @@
+"""The options that name a stereo core, shared by the verbs that need one. Light: arguments halves import it."""
+
+import argparse
+from typing import Final
+
+from phone_host.stereo.matcher_names import MatcherName
+
+_DEFAULT_NEAR_MM: Final = 300.0
+"""Nearest depth looked for where nobody says otherwise, mm: the near end of hand-held scanners (Structure Sensor 350 mm,
+RealSense D435 280 mm). Nearer costs time: the number of disparities goes with 1 / z."""
+
+
+def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare --calibration, --rectified and what goes with them."""
+    parser.add_argument(
+        "--calibration", metavar="rig.yaml", help="the two cameras' calibration, from phone-host calibrate"
+    )
+    parser.add_argument("--rectified", action="store_true", help="the images come rectified")
+    parser.add_argument(
+        "--disparities", type=int, metavar="N", help="search 0 <= d < N (with a rig the default follows from --near)"
+    )
+    parser.add_argument(
+        "--near",
+        type=float,
+        default=_DEFAULT_NEAR_MM,
+        metavar="MM",
+        help=f"nearest depth with --calibration (default {_DEFAULT_NEAR_MM:g})",
+    )
+    parser.add_argument("--focal", type=float, metavar="PX", help="focal length of rectified images")
+    parser.add_argument("--baseline", type=float, metavar="MM", help="baseline of rectified images")
+    parser.add_argument(
+        "--doffs",
+        type=float,
+        metavar="PX",
+        help="x of the right principal point minus the left (default 0)",
+    )
+    parser.add_argument("--center", metavar="CX,CY", help="left principal point of rectified images")
+    own = " or ".join(name.value for name in MatcherName)
+    parser.add_argument(
+        "--matcher", metavar="NAME", help=f"{own}, or one that an installed package registers (default sgbm)"
+    )

@@ -1,0 +1,80 @@
+"""What a start costs: help and the board's start import no more than they need."""
+
+import json
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+HEAVY = {"numpy", "cv2", "rich", "zmq", "msgpack", "serial", "zeroconf", "asyncio", "importlib.metadata"}
+
+HELP_MS = 150.0
+"""CPU of `phone-host --help`: a command that answers within a tenth of a second or two feels instant, also where it is started by others."""
+
+
+def loaded_by(module: str, *arguments: str) -> set[str]:
+    """The modules that a command has loaded when it ends."""
+    code = (
+        "import contextlib, io, json, sys\n"
+        f"from {module} import main\n"
+        "with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):\n"
+        f"    main({list(arguments)!r})\n"
+        "print(json.dumps(sorted(sys.modules)))\n"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", code], check=True, capture_output=True, text=True, cwd=ROOT)
+    return set(json.loads(done.stdout))
+
+
+@pytest.mark.parametrize(
+    ("module", "arguments"),
+    [
+        ("phone_host.cli", ["--help"]),
+        ("phone_host.cli", ["run", "--help"]),
+        ("phone_host.cli", ["stereo", "--help"]),
+        ("phone_host.cli", ["settings"]),
+        ("phone_host.bench.cli", ["--help"]),
+        ("phone_host.bench.cli", ["--emulate", "list"]),
+        ("board_agent.cli", ["run", "--help"]),
+        ("board_agent.cli", ["settings"]),
+    ],
+)
+def test_help_and_settings_load_nothing_heavy(module: str, arguments: list[str]) -> None:
+    """Help, settings and lists need neither numpy nor OpenCV, rich, ZeroMQ or a search for other packages."""
+    assert loaded_by(module, *arguments) & HEAVY == set()
+
+
+@pytest.mark.parametrize(
+    ("link", "camera", "unwanted"),
+    [
+        (
+            "ipc://{folder}/link",
+            "v4l2:{folder}/none",
+            {"common.camera.replay", "common.link.serial", "common.link.rfcomm"},
+        ),
+        ("serial:{folder}/none", "replay:{folder}", {"common.camera.v4l2", "common.link.zeromq", "common.link.rfcomm"}),
+    ],
+)
+def test_the_board_loads_what_it_was_asked_for(link: str, camera: str, unwanted: set[str], tmp_path: Path) -> None:
+    """board-agent run loads the kinds of link and camera that it was asked for, and neither the others nor what keys and extensions need."""
+    (tmp_path / "1.pgm").write_bytes(b"P5 2 2 255\nabcd")
+    chosen = ["--link", link.format(folder=tmp_path), "--camera", camera.format(folder=tmp_path)]
+    loaded = loaded_by("board_agent.cli", "run", *chosen)
+    assert loaded & {*unwanted, "common.link.curve", "board_agent.enrolment", "importlib.metadata", "asyncio"} == set()
+
+
+def test_help_costs_little() -> None:
+    """`phone-host --help` takes less than 150 ms of CPU; the best of five, for what others do on the machine is not its cost."""
+    taken_ms = []
+    for _ in range(5):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run(
+            [sys.executable, "-P", "-m", "phone_host.cli", "--help"], check=True, capture_output=True, cwd=ROOT
+        )
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        used_s = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+        taken_ms.append(used_s * 1000)
+    assert min(taken_ms) < HELP_MS
