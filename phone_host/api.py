@@ -29,6 +29,7 @@ from common.link.factory import open_links, parse_link, tell_insecure
 from common.protocol.message import Pacing
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import open_camera
+from phone_host.declared_settings import NEAR_M
 from phone_host.measure.delays import Series
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
@@ -41,7 +42,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import Matcher, MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import matcher_named
 from phone_host.stereo.rectify import Rectifier
-from phone_host.stereo.reproject import DEFAULT_NEAR_M, disparities_for_near
+from phone_host.stereo.reproject import disparities_for_near
 from phone_host.sync.fifo import FifoSettings
 
 __all__ = ["Result", "RunSnapshot", "Scanner", "StereoGeometry", "open_scanner"]
@@ -57,7 +58,7 @@ def open_scanner(
     geometry: StereoGeometry | None = None,
     matcher: str | Matcher = "sgbm",
     disparities: int | None = None,
-    near_m: float = DEFAULT_NEAR_M,
+    near_m: float = NEAR_M,
     board_side: str | None = None,
     fifo: str = "1:drop-oldest",
     tolerance_ms: float | None = None,

@@ -15,6 +15,10 @@ MAX_MEGAPIXELS_HELP: Final = (
 )
 
 
+NEAR_M: Final = 0.3
+"""Nearest depth that is searched where nobody says another, m."""
+
+
 @dataclass(frozen=True, slots=True)
 class PhoneHostSettings:
     """Settings of phone-host run, from a TOML file, the environment and options."""

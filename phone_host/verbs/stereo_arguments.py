@@ -3,9 +3,10 @@
 import argparse
 from typing import Final
 
+from phone_host.declared_settings import NEAR_M
 from phone_host.stereo.matcher_names import MatcherName
 
-_DEFAULT_NEAR_MM: Final = 300.0
+_DEFAULT_NEAR_MM: Final = NEAR_M * 1000
 """Nearest depth looked for where nobody says otherwise, mm: the near end of hand-held scanners (Structure Sensor 350 mm,
 RealSense D435 280 mm). Nearer costs time: the number of disparities goes with 1 / z."""
 
