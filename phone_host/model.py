@@ -64,8 +64,8 @@ class Side(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Camera:
-    """Intrinsics of one camera, OpenCV's pinhole model with its distortion polynomial.
+class CameraModel:
+    """How one camera projects: OpenCV's pinhole model with its distortion polynomial. The device itself is `common.camera.base.Camera`.
 
     Attributes:
         width_px: image width, px.
@@ -105,8 +105,8 @@ class Rig:
     (OpenCV's R and T of stereoCalibrate).
 
     Attributes:
-        left: the reference camera.
-        right: the other one.
+        left: model of the reference camera.
+        right: of the other one.
         R_right_left: (3, 3) float64 rotation.
         t_right_left_m: (3,) float64 translation, m; its x is negative when the right camera stands to the right.
         board_side: which of the two hangs on the board.
@@ -116,8 +116,8 @@ class Rig:
         time_offset: between the two cameras' stamps.
     """
 
-    left: Camera
-    right: Camera
+    left: CameraModel
+    right: CameraModel
     R_right_left: NDArray[np.float64]
     t_right_left_m: NDArray[np.float64]
     board_side: Side = Side.LEFT

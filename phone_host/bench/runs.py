@@ -25,7 +25,7 @@ from phone_host.bench.relay import RelayAccount
 from phone_host.children.board_process import BoardAccount
 from phone_host.demo.demonstration import NEAR_M
 from phone_host.measure.accounts import LinkAccount
-from phone_host.model import Camera, PairCounts, Result, Rig, StereoGeometry
+from phone_host.model import CameraModel, PairCounts, Result, Rig, StereoGeometry
 from phone_host.run.host import Host, HostSettings
 from phone_host.run.sinks import FunctionSink
 from phone_host.scene.film import JPEG_QUALITY, Film, render_films
@@ -102,8 +102,8 @@ def rig_of(size: Size) -> Rig:
     focal_px = float(full.left.matrix[0, 0]) * size.width_px / full.left.width_px
     centre_px = ((size.width_px - 1) / 2, (size.height_px - 1) / 2)
     matrix = np.array([[focal_px, 0.0, centre_px[0]], [0.0, focal_px, centre_px[1]], [0.0, 0.0, 1.0]])
-    camera = Camera(size.width_px, size.height_px, matrix, np.zeros(5))
-    return replace(full, left=camera, right=camera)
+    model = CameraModel(size.width_px, size.height_px, matrix, np.zeros(5))
+    return replace(full, left=model, right=model)
 
 
 def render(size: Size, qualities: Sequence[int], folder: Path, advance: Callable[[], None]) -> dict[int, Film]:

@@ -35,7 +35,7 @@ from phone_host.calibration.calibrate_alone import (
     with_poses,
 )
 from phone_host.calibration.target import Board, Corners
-from phone_host.model import Camera, Rectification, Rig, Side
+from phone_host.model import CameraModel, Rectification, Rig, Side
 from phone_host.stereo.rectify import rectify_points, rectify_rig
 
 Sizes = tuple[tuple[int, int], tuple[int, int]]
@@ -287,7 +287,7 @@ def _summed_up(
 
 def _rig(state: BundleState, sizes_px: Sizes) -> Rig:
     left, right = (
-        Camera(*size, *camera_arrays(parameters))
+        CameraModel(*size, *camera_arrays(parameters))
         for size, parameters in zip(sizes_px, (state.left, state.right), strict=True)
     )
     rotation = np.asarray(cv2.Rodrigues(state.rotation)[0], dtype=np.float64)

@@ -2,7 +2,7 @@
 
 Stamp: the arrival of an image's first byte minus the calibrated latency. The first byte of the image, not of its part's header: some servers write
 the next boundary together with the image before it, a period early. A slow consumer never builds up a backlog: an image that a newer one replaces
-before it was read is told of as skipped.
+before it was read is told of as skipped. When the server is called, given up and tried again, `common/camera/life.py` says; the thread does it.
 """
 
 import logging
@@ -12,7 +12,8 @@ from contextlib import suppress
 from typing import Final
 
 from common import now
-from common.camera.base import CameraHealth, CameraState, Grab, Mode, Offers, Skipped, Spoiled
+from common.camera.base import CameraHealth, Grab, Mode, Offers, Skipped, Spoiled
+from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Phase, Step, Unwanted
 from common.camera.v4l2_stamps import RateMeter
 from common.errors import TandemError, UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat
@@ -27,24 +28,31 @@ from phone_host.camera.jpegs import JpegStream, Whole
 
 _LOG = logging.getLogger(__name__)
 
-_FAR_FUTURE: Final = 2**63 - 1
 _S: Final = 1_000_000_000
-
-_OPEN_NS: Final = 10 * _S
-"""A phone whose camera has to wake up takes some seconds until its first image."""
 
 _MEASURE_FRAMES: Final = 9
 _MEASURE_NS: Final = 3 * _S
 """The period is the median of eight distances; a camera so slow that these take longer is measured by what came until then."""
 
 _PATIENCE_S: Final = 5.0
-_STALL_PERIODS: Final = 10
-_LEAST_STALL_NS: Final = 2 * _S
-"""Wi-Fi holds packets up for a second now and then; after ten periods, two seconds at least, without an image the connection is made anew."""
 
-_FIRST_PAUSE_S: Final = 0.1
-_LONGEST_PAUSE_S: Final = 1.0
-"""Between two attempts: doubled each time; a phone that is back is found within a second (DESIGN, section 7)."""
+_LIFE: Final = LifeSettings(
+    # A phone whose camera has to wake up takes some seconds until its first image.
+    start_ns=10 * _S,
+    # Wi-Fi holds packets up for a second now and then; after ten periods, two seconds at least, without an image the connection is made anew.
+    first_frame_ns=2 * _S,
+    silence_ns=2 * _S,
+    silence_periods=10,
+    # Between two attempts: doubled each time; a phone that is back is found within a second (DESIGN, section 7).
+    lost_rest_ns=_S // 10,
+    rest_ns=_S // 10,
+    longest_rest_ns=_S,
+    # The phone may rest, too.
+    unwanted=Unwanted.IS_CLOSED,
+)
+
+_LONGEST_WAIT_S: Final = 3600.0
+"""A lock's time-out has a limit; the far future lies beyond it."""
 
 _MOST_PENDING: Final = 64
 
@@ -64,7 +72,8 @@ class HttpCamera:
         self._lock = threading.Condition()
         self._pending: list[Grab] = []
         self._connection: Connection | None = None
-        self._closing = self._resting = self._answered = False
+        self._life = Life(_LIFE, now.monotonic_ns())
+        self._is_told_lost = False
         self._problem: TandemError | None = None
         self._failure: Exception | None = None
         self._sequence = 0
@@ -72,8 +81,7 @@ class HttpCamera:
         self._size_px = self._asked_px = (0, 0)
         self._rate, self._arrivals = RateMeter(), Arrivals()
         self._faults: dict[FrameFault, int] = {}
-        self._stalls = self._failures = self._returned = self._turns = 0
-        self._state = CameraState.GONE
+        self._turns = 0
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._thread = threading.Thread(target=self._run, name="mjpeg", daemon=True)
         self._thread.start()
@@ -106,7 +114,7 @@ class HttpCamera:
     def due_ns(self, now_ns: int) -> int:
         """Never by time alone."""
         del now_ns
-        return _FAR_FUTURE
+        return NEVER_NS
 
     def read(self, now_ns: int) -> list[Grab]:
         """Give what has come: at most one frame, the newest."""
@@ -132,12 +140,13 @@ class HttpCamera:
     def health(self) -> CameraHealth:
         """How it has fared; `failures`: connections that broke, were refused or held no stream."""
         with self._lock:
+            counts = self._life.counts
             return CameraHealth(
-                state=CameraState.PAUSED if self._resting else self._state,
+                state=self._life.state,
                 faults=tuple(self._faults.items()),
-                stalls=self._stalls,
-                failures=self._failures,
-                returned=self._returned,
+                stalls=counts.lost[Loss.STALLED],
+                failures=counts.refused + sum(counts.lost.values()),
+                returned=counts.returned,
                 period_ns=self._rate.period_ns,
                 latency_ns=self._settings.latency_ns,
                 latency_uncertainty_ns=self._settings.latency_uncertainty_ns,
@@ -153,20 +162,20 @@ class HttpCamera:
     def pause(self) -> None:
         """Close the connection: the phone may rest."""
         with self._lock:
-            self._resting = True
-            self._drop()
+            if self._life.pause() is Step.CLOSE:
+                self._drop()
 
     def resume(self, now_ns: int) -> None:
         """Connect again."""
-        del now_ns
         with self._lock:
-            self._resting = False
+            self._life.resume(now_ns)
             self._lock.notify_all()
 
     def close(self) -> None:
         """Close the connection and end the thread; again is harmless."""
         with self._lock:
-            was_open, self._closing = not self._closing, True
+            was_open = not self._life.is_ended
+            self._life.end()
             self._drop()
             self._lock.notify_all()
         # Looking up a name cannot be cut short: then the thread ends by itself later, and touches nothing that was closed.
@@ -182,10 +191,10 @@ class HttpCamera:
 
     def _measure(self) -> int:
         """Wait for the first images; gives their period, ns. What came meanwhile is forgotten."""
-        until_ns = now.monotonic_ns() + _OPEN_NS
         with self._lock:
             while True:
                 now_ns = now.monotonic_ns()
+                gives_up = self._life.gives_up(now_ns)
                 if (failure := self._failure or self._problem) is not None:
                     raise failure
                 slow = self._sequence >= 2 and now_ns - self._first_ns >= _MEASURE_NS
@@ -196,16 +205,17 @@ class HttpCamera:
                     self._pending.clear()
                     self._faults.clear()
                     self._rate, self._arrivals = RateMeter(), Arrivals()
+                    self._life.accept()
                     return max(1, period_ns)
-                if now_ns >= until_ns:
+                if gives_up:
                     raise self._no_images()
                 self._lock.wait(0.05)
 
     def _no_images(self) -> UnavailableError:
-        shown, patience_s = self._settings.shown, _OPEN_NS // _S
+        shown, patience_s = self._settings.shown, _LIFE.start_ns // _S
         if self._sequence:
             return UnavailableError(f"camera {shown} sent one image in {patience_s} s", "give the video's own address")
-        if not self._answered:
+        if not self._life.counts.opened:
             return UnavailableError(f"camera {shown} does not answer", "check that both are in one network")
         return UnavailableError(
             f"camera {shown} sent no JPEG image within {patience_s} s", "give the address of an MJPEG stream"
@@ -215,93 +225,106 @@ class HttpCamera:
 
     def _run(self) -> None:
         try:
-            pause_s = _FIRST_PAUSE_S
-            while not self._is_closing():
-                came, problem = self._visit()
-                pause_s = _FIRST_PAUSE_S if came else min(_LONGEST_PAUSE_S, 2 * pause_s)
-                self._lost(problem)
-                with self._lock:
-                    if not self._closing:
-                        self._lock.wait(pause_s)
+            while self._is_to_open():
+                self._visit()
         except Exception as error:  # noqa: BLE001 - a thread's root: whoever reads is told
             with self._lock:
                 self._failure = error
                 self._tell()
 
-    def _visit(self) -> tuple[bool, str]:
-        """One connection from its beginning to its end; gives whether an image came, and why it ended."""
+    def _is_to_open(self) -> bool:
+        """Wait until a connection is to be made; gives whether one is, else all is over."""
+        with self._lock:
+            while not self._life.is_ended:
+                now_ns = now.monotonic_ns()
+                if self._life.due(now_ns) is Step.OPEN:
+                    return True
+                self._lock.wait(min(_LONGEST_WAIT_S, max(0, self._life.due_ns - now_ns) / _S))
+            return False
+
+    def _visit(self) -> None:
+        """One connection from its beginning to its end."""
         try:
             connection = Connection(self._settings, _PATIENCE_S)
         except TandemError as error:
             with self._lock:
                 self._problem = error
-            return False, str(error)
+                self._life.refused(now.monotonic_ns())
+                self._tell_lost(str(error))
+            return
         try:
-            if not self._take_over(connection):
-                return False, "nobody listens"
-            return self._stream(connection)
+            if self._take_over(connection):
+                self._stream(connection)
         finally:
             with self._lock:
                 self._connection = None
             connection.close()
-
-    def _is_closing(self) -> bool:
-        """Whether to end; waits here while nobody listens."""
         with self._lock:
-            while self._resting and not self._closing:
-                self._lock.wait()
-            return self._closing
+            self._life.closed()
 
     def _take_over(self, connection: Connection) -> bool:
+        """Begin to listen; gives whether anybody still wants it."""
         with self._lock:
-            if self._closing or self._resting:
+            if self._life.opened(now.monotonic_ns(), self._rate.period_ns or 0) is Step.CLOSE:
                 return False
-            self._connection, self._answered = connection, True
+            self._connection = connection
             self._rate.restart()
             self._arrivals.restart()
             return True
 
-    def _stream(self, connection: Connection) -> tuple[bool, str]:
-        """Read one connection; gives whether an image came, and why it ended."""
-        stream, came, latest_ns = JpegStream(), False, now.monotonic_ns()
-        while (now_ns := now.monotonic_ns()) - latest_ns <= self._stall_ns():
+    def _stream(self, connection: Connection) -> None:
+        """Read one connection until it is lost, or to be closed."""
+        stream = JpegStream()
+        while (patience_s := self._patience_s()) > 0:
             try:
-                data = connection.read(self._stall_ns() / _S)
+                data = connection.read(patience_s)
             except TimeoutError:
-                break
+                self._lose(Loss.STALLED, "no image came any more")
+                return
             except OSError as error:
-                return came, f"the connection broke ({error.strerror or error})"
+                self._lose(Loss.FAILED, f"the connection broke ({error.strerror or error})")
+                return
             if not data:
-                return came, "the stream ended"
-            now_ns = now.monotonic_ns()
-            for found in stream.feed(data, now_ns):
+                self._lose(Loss.FAILED, "the stream ended")
+                return
+            for found in stream.feed(data, now.monotonic_ns()):
                 if isinstance(found, Whole):
-                    came, latest_ns = True, now_ns
                     self._deliver(found)
                 else:
                     self._spoil(found.fault)
-        with self._lock:
-            self._stalls += 1
-        return came, "no image came any more"
 
-    def _stall_ns(self) -> int:
-        return max(_LEAST_STALL_NS if self._heard_ns else _OPEN_NS, _STALL_PERIODS * (self._rate.period_ns or 0))
+    def _patience_s(self) -> float:
+        """How long the next bytes may take; 0: the camera is given up."""
+        with self._lock:
+            now_ns = now.monotonic_ns()
+            if self._life.due(now_ns) is Step.CLOSE:
+                self._tell_lost("no image came any more")
+            return max(0, self._life.due_ns - now_ns) / _S if self._life.phase is Phase.STREAMING else 0.0
+
+    def _lose(self, loss: Loss, problem: str) -> None:
+        with self._lock:
+            if self._life.lost(loss, now.monotonic_ns()) is Step.CLOSE:
+                self._tell_lost(problem)
+
+    def _tell_lost(self, problem: str) -> None:
+        if self._life.is_lost and self._life.is_wanted and not self._is_told_lost:
+            self._is_told_lost = True
+            _LOG.warning(event("camera_lost", camera=self._settings.shown, problem=problem))
 
     def _deliver(self, image: Whole) -> None:
         with self._lock:
-            if self._closing or self._resting:
+            if self._life.phase is not Phase.STREAMING:
                 return
+            self._life.heard(now.monotonic_ns(), self._rate.period_ns or 0)
             size_px = image.width_px, image.height_px
             self._note_size(size_px)
             if self._asked_px not in {size_px, (0, 0)}:
                 self._spoil(FrameFault.OTHER_SIZE)
                 return
             sequence, self._sequence = self._sequence, self._sequence + 1
-            if self._state is not CameraState.RUNNING:
-                self._returned += self._heard_ns > 0
-                if self._heard_ns:
-                    _LOG.info(event("camera_back", camera=self._settings.shown))
-                self._state = CameraState.RUNNING
+            if self._is_told_lost and not self._life.is_lost:
+                self._is_told_lost = False
+                _LOG.info(event("camera_back", camera=self._settings.shown))
             self._first_ns, self._heard_ns = self._first_ns or image.began_ns, image.began_ns
             self._rate.add(image.began_ns, sequence)
             self._arrivals.add(sequence, image.began_ns)
@@ -322,7 +345,7 @@ class HttpCamera:
 
     def _spoil(self, fault: FrameFault) -> None:
         with self._lock:
-            if self._closing or self._resting:
+            if self._life.phase is not Phase.STREAMING:
                 return
             self._faults[fault] = self._faults.get(fault, 0) + 1
             sequence, self._sequence = self._sequence, self._sequence + 1
@@ -348,16 +371,7 @@ class HttpCamera:
         self._tell()
 
     def _tell(self) -> None:
-        if not self._closing:
+        if not self._life.is_ended:
             with suppress(BlockingIOError):
                 os.write(self._wake_write, b"\0")
         self._lock.notify_all()
-
-    def _lost(self, problem: str) -> None:
-        with self._lock:
-            if self._closing or self._resting:
-                return
-            self._failures += 1
-            if self._state is CameraState.RUNNING:
-                _LOG.warning(event("camera_lost", camera=self._settings.shown, problem=problem))
-            self._state = CameraState.GONE

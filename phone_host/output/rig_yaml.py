@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from common.files import read_whole
-from phone_host.model import Camera, Rectification, Rig, Side, TimeOffset
+from phone_host.model import CameraModel, Rectification, Rig, Side, TimeOffset
 from phone_host.output.atomic import write_text
 
 _DISTORTION_LENGTHS = (4, 5, 8, 12, 14)  # those OpenCV's model defines
@@ -101,8 +101,8 @@ def read_rig(path: Path) -> Rig:
         DataError: the file is missing or no FileStorage YAML, or a key is missing or makes no sense; names file and key.
     """
     reader = _Reader(path)
-    left = reader.camera("left_image_width", "left_image_height", "M1", "D1")
-    right = reader.camera("right_image_width", "right_image_height", "M2", "D2")
+    left = reader.camera_model("left_image_width", "left_image_height", "M1", "D1")
+    right = reader.camera_model("right_image_width", "right_image_height", "M2", "D2")
     side = reader.text("board_side", Side.LEFT.value)
     if side not in {choice.value for choice in Side}:
         raise reader.problem("board_side", f"is {side!r}", "write left or right")
@@ -178,7 +178,7 @@ class _Reader:
             raise self.problem(key, f"is {'x'.join(map(str, matrix.shape))}", f"it must be {shape[0]}x{shape[1]}")
         return matrix
 
-    def camera(self, width_key: str, height_key: str, matrix_key: str, distortion_key: str) -> Camera:
+    def camera_model(self, width_key: str, height_key: str, matrix_key: str, distortion_key: str) -> CameraModel:
         """One camera."""
         matrix = self._shaped(matrix_key, (3, 3))
         if not (matrix[0, 0] > 0 and matrix[1, 1] > 0) or not np.array_equal(matrix[2], [0, 0, 1]):
@@ -189,7 +189,7 @@ class _Reader:
         if min(distortion.shape) != 1 or distortion.size not in _DISTORTION_LENGTHS:
             lengths = ", ".join(map(str, _DISTORTION_LENGTHS))
             raise self.problem(distortion_key, f"has {distortion.size} values", f"OpenCV's models have {lengths}")
-        return Camera(self.size(width_key), self.size(height_key), matrix, distortion.reshape(-1))
+        return CameraModel(self.size(width_key), self.size(height_key), matrix, distortion.reshape(-1))
 
     def size(self, key: str) -> int:
         """An image's width or height."""

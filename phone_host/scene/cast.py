@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import Camera
+from phone_host.model import CameraModel
 from phone_host.scene.scene_model import Body, Box, Floats, Plane, Pose, Shape, Sphere, Vector
 
 FACES = 8
@@ -44,45 +44,45 @@ class Hits:
     surface: NDArray[np.int16]
 
 
-def pixel_rays(camera: Camera) -> NDArray[np.float64]:
+def pixel_rays(model: CameraModel) -> NDArray[np.float64]:
     """Directions in the camera's axes through all pixel centres, distortion undone.
 
     Args:
-        camera: intrinsics; the distortion must be invertible inside the image.
+        model: intrinsics of the camera; the distortion must be invertible inside the image.
 
     Returns:
         (3, H, W) float64 with z = 1.
     """
-    x, y = np.meshgrid(np.arange(camera.width_px, dtype=np.float64), np.arange(camera.height_px, dtype=np.float64))
-    return rays_through(camera, x.ravel(), y.ravel()).reshape(3, *x.shape)
+    x, y = np.meshgrid(np.arange(model.width_px, dtype=np.float64), np.arange(model.height_px, dtype=np.float64))
+    return rays_through(model, x.ravel(), y.ravel()).reshape(3, *x.shape)
 
 
-def rays_through(camera: Camera, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+def rays_through(model: CameraModel, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
     """Directions in the camera's axes through given places of its image.
 
     Args:
-        camera: intrinsics.
+        model: intrinsics of the camera.
         x: (N,) px.
         y: (N,) px.
 
     Returns:
         (3, N) float64 with z = 1.
     """
-    k = camera.matrix
-    if not np.any(camera.distortion):
+    k = model.matrix
+    if not np.any(model.distortion):
         y_unit = (y - k[1, 2]) / k[1, 1]
         return np.stack([(x - k[0, 2] - k[0, 1] * y_unit) / k[0, 0], y_unit, np.ones_like(x)])
     pixels = np.stack([x, y], axis=1)[:, None, :]
-    unit = cv2.undistortPointsIter(pixels, k, camera.distortion, np.eye(3), np.eye(3), _UNDISTORT_UNTIL)[:, 0]
+    unit = cv2.undistortPointsIter(pixels, k, model.distortion, np.eye(3), np.eye(3), _UNDISTORT_UNTIL)[:, 0]
     return np.stack([unit[:, 0], unit[:, 1], np.ones_like(x)])
 
 
-def project(points_m: Floats, camera: Camera, pose: Pose) -> NDArray[np.float64]:
+def project(points_m: Floats, model: CameraModel, pose: Pose) -> NDArray[np.float64]:
     """Pixel coordinates of points in the scene's axes, distortion included.
 
     Args:
         points_m: (3, N) float64.
-        camera: intrinsics.
+        model: intrinsics of the camera.
         pose: where the camera stands.
 
     Returns:
@@ -93,9 +93,7 @@ def project(points_m: Floats, camera: Camera, pose: Pose) -> NDArray[np.float64]
     pixels = np.full((2, points_m.shape[1]), np.nan)
     if np.any(ahead):
         seen = np.ascontiguousarray(local[:, ahead].T)
-        pixels[:, ahead] = cv2.projectPoints(seen, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)[0][
-            :, 0
-        ].T
+        pixels[:, ahead] = cv2.projectPoints(seen, np.zeros(3), np.zeros(3), model.matrix, model.distortion)[0][:, 0].T
     return pixels
 
 

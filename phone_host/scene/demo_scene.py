@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from phone_host.model import Camera, Rig, StereoGeometry
+from phone_host.model import CameraModel, Rig, StereoGeometry
 from phone_host.scene.scene_model import (
     Body,
     Box,
@@ -29,8 +29,8 @@ FOCAL_PX = 525.0
 def matched_rig() -> Rig:
     """Two ideal pinhole cameras of 640x480, f = 525 px, 100 mm apart, already rectified: for accuracy tests."""
     matrix = np.array([[FOCAL_PX, 0.0, 319.5], [0.0, FOCAL_PX, 239.5], [0.0, 0.0, 1.0]])
-    camera = Camera(640, 480, matrix, np.zeros(5))
-    return Rig(camera, camera, np.eye(3), np.array([-BASELINE_M, 0.0, 0.0]))
+    model = CameraModel(640, 480, matrix, np.zeros(5))
+    return Rig(model, model, np.eye(3), np.array([-BASELINE_M, 0.0, 0.0]))
 
 
 def matched_view() -> RectifiedView:
@@ -43,13 +43,13 @@ def unlike_rig() -> Rig:
 
     The phone is turned by about 1.5 degrees and stands 100 mm to the right, a little higher and farther back.
     """
-    webcam = Camera(
+    webcam = CameraModel(
         640,
         480,
         np.array([[525.0, 0.0, 316.8], [0.0, 526.2, 243.1], [0.0, 0.0, 1.0]]),
         np.array([-0.24, 0.085, 0.0006, -0.0004, -0.012]),
     )
-    phone = Camera(
+    phone = CameraModel(
         800,
         600,
         np.array([[702.5, 0.0, 404.6], [0.0, 701.1, 296.2], [0.0, 0.0, 1.0]]),

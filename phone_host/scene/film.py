@@ -8,7 +8,7 @@ from typing import Final
 
 import cv2
 
-from phone_host.model import Camera, Rig
+from phone_host.model import CameraModel, Rig
 from phone_host.output.atomic import write_bytes
 from phone_host.scene.scene import Look, Renderer, Scene, rig_poses
 
@@ -112,15 +112,15 @@ def render_films(
     poses = rig_poses(rig)
     left = {quality: film.left for quality, film in films.items()}
     right = {quality: film.right for quality, film in films.items()}
-    for camera, pose, look, targets in ((rig.left, poses[0], looks[0], left), (rig.right, poses[1], looks[1], right)):
+    for model, pose, look, targets in ((rig.left, poses[0], looks[0], left), (rig.right, poses[1], looks[1], right)):
         times_s = [index / fps for index in range(round(fps * seconds))]
-        _render(Renderer(scene, camera, pose, look), camera, targets, times_s, advance)
+        _render(Renderer(scene, model, pose, look), model, targets, times_s, advance)
     return tuple(films.values())
 
 
 def _render(
     renderer: Renderer,
-    camera: Camera,
+    model: CameraModel,
     targets: Mapping[int, Path],
     times_s: Sequence[float],
     advance: Callable[[], None],
@@ -132,7 +132,7 @@ def _render(
     digits = len(str(len(times_s)))
     for index, time_s in enumerate(times_s):
         image = renderer.frame(time_s)
-        assert image.shape == (camera.height_px, camera.width_px, 3)
+        assert image.shape == (model.height_px, model.width_px, 3)
         for quality, target in targets.items():
             done, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
             assert done

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import Camera, Image
+from phone_host.model import CameraModel, Image
 from phone_host.scene.cast import FACES, NOTHING, PART, Hits, cast, cast_one, dot, pixel_rays, to_body
 from phone_host.scene.scene_model import Body, Floats, Look, Plane, Pose, Scene
 from phone_host.scene.shade import albedo, may_darken, shadow_balls, surface_light, surface_normals
@@ -48,18 +48,18 @@ class Renderer:
 
     Args:
         scene: bodies with their paths.
-        camera: intrinsics, distortion included.
+        model: intrinsics of the camera, distortion included.
         pose: where the camera stands.
         look: its sensor.
     """
 
-    def __init__(self, scene: Scene, camera: Camera, pose: Pose, look: Look | None = None) -> None:
+    def __init__(self, scene: Scene, model: CameraModel, pose: Pose, look: Look | None = None) -> None:
         self._scene = scene
         self._look = Look() if look is None else look
-        self._size = (camera.height_px, camera.width_px)
-        self._focal_px = float(camera.matrix[0, 0] + camera.matrix[1, 1]) / 2.0
+        self._size = (model.height_px, model.width_px)
+        self._focal_px = float(model.matrix[0, 0] + model.matrix[1, 1]) / 2.0
         self._centre = pose.centre_m.astype(np.float32)
-        rays = np.tensordot(pose.R_camera_scene.T, pixel_rays(camera), axes=1)
+        rays = np.tensordot(pose.R_camera_scene.T, pixel_rays(model), axes=1)
         self._rays = rays.astype(np.float32).reshape(3, -1)
         self._steps = tuple(np.gradient(rays, axis=axis).astype(np.float32).reshape(3, -1) for axis in (2, 1))
         self._block_rays, self._block_angle = _blocks(rays)
@@ -269,12 +269,14 @@ class Renderer:
         return self._noise[y : y + self._size[0], x : x + self._size[1]].reshape(-1, 3)
 
 
-def render(scene: Scene, camera: Camera, pose: Pose | None = None, look: Look | None = None, t_s: float = 0.0) -> Image:
+def render(
+    scene: Scene, model: CameraModel, pose: Pose | None = None, look: Look | None = None, t_s: float = 0.0
+) -> Image:
     """One image of a scene; for a film, keep a `Renderer`.
 
     Args:
         scene: what to see.
-        camera: intrinsics, distortion included.
+        model: intrinsics of the camera, distortion included.
         pose: where the camera stands; the scene's origin when left out.
         look: its sensor; a noise-free one when left out.
         t_s: seconds on the scene's clock.
@@ -282,7 +284,7 @@ def render(scene: Scene, camera: Camera, pose: Pose | None = None, look: Look | 
     Returns:
         (H, W, 3) uint8 BGR.
     """
-    return Renderer(scene.at(t_s), camera, Pose() if pose is None else pose, look).frame(t_s)
+    return Renderer(scene.at(t_s), model, Pose() if pose is None else pose, look).frame(t_s)
 
 
 def _by_body(surface: NDArray[np.int16], at: Flat) -> Iterator[tuple[int, Flat]]:

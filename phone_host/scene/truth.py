@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import Camera
+from phone_host.model import CameraModel
 from phone_host.scene.cast import FACES, cast, pixel_rays, project, rays_through
 from phone_host.scene.scene_model import Floats, Pose, RectifiedView, Scene
 
@@ -41,7 +41,7 @@ class Truth:
         return self.body < 0
 
 
-def rectified_cameras(view: RectifiedView) -> tuple[tuple[Camera, Pose], tuple[Camera, Pose]]:
+def rectified_cameras(view: RectifiedView) -> tuple[tuple[CameraModel, Pose], tuple[CameraModel, Pose]]:
     """The two ideal cameras of a rectified geometry; rendering both gives a perfectly rectified pair.
 
     Args:
@@ -59,12 +59,15 @@ def rectified_cameras(view: RectifiedView) -> tuple[tuple[Camera, Pose], tuple[C
     ideal = np.zeros(5)
     turn = view.R_rectified_left
     return (
-        (Camera(view.width_px, view.height_px, matrix, ideal), Pose(turn)),
-        (Camera(view.width_px, view.height_px, shifted, ideal), Pose(turn, turn.T @ [geometry.baseline_m, 0.0, 0.0])),
+        (CameraModel(view.width_px, view.height_px, matrix, ideal), Pose(turn)),
+        (
+            CameraModel(view.width_px, view.height_px, shifted, ideal),
+            Pose(turn, turn.T @ [geometry.baseline_m, 0.0, 0.0]),
+        ),
     )
 
 
-def truth(scene: Scene, view: RectifiedView, sensors: tuple[tuple[Camera, Pose], ...] = ()) -> Truth:
+def truth(scene: Scene, view: RectifiedView, sensors: tuple[tuple[CameraModel, Pose], ...] = ()) -> Truth:
     """Exact depth, disparity and visibility for the rectified left image.
 
     Args:
@@ -91,8 +94,8 @@ def truth(scene: Scene, view: RectifiedView, sensors: tuple[tuple[Camera, Pose],
     clear = back.depth > 1.0 - _SAME_POINT
     x_right = found % view.width_px - disparity[found]
     inside = (x_right >= 0.0) & (x_right <= view.width_px - 1)
-    for camera, pose in sensors:
-        inside &= _inside(points, camera, pose)
+    for model, pose in sensors:
+        inside &= _inside(points, model, pose)
     visible, hidden = np.zeros((2, rays.shape[1]), dtype=np.bool_)
     visible[found] = clear & inside
     hidden[found] = ~clear
@@ -105,18 +108,18 @@ def truth(scene: Scene, view: RectifiedView, sensors: tuple[tuple[Camera, Pose],
     )
 
 
-def _inside(points: Floats, camera: Camera, pose: Pose) -> NDArray[np.bool_]:
+def _inside(points: Floats, model: CameraModel, pose: Pose) -> NDArray[np.bool_]:
     """Whether points (3, N) fall on the sensor."""
-    x, y = project(points, camera, pose)
+    x, y = project(points, model, pose)
     # Far outside the image the distortion polynomial folds back into it; no such point is farther from the axis than
     # the farthest corner.
     local = pose.R_camera_scene @ (points - pose.centre_m[:, None])
-    right, bottom = camera.width_px - 1.0, camera.height_px - 1.0
-    corners = rays_through(camera, np.array([0.0, right, 0.0, right]), np.array([0.0, 0.0, bottom, bottom]))
+    right, bottom = model.width_px - 1.0, model.height_px - 1.0
+    corners = rays_through(model, np.array([0.0, right, 0.0, right]), np.array([0.0, 0.0, bottom, bottom]))
     edge = np.hypot(corners[0], corners[1]).max()
     near_axis = np.hypot(local[0], local[1]) <= edge * local[2]
     with np.errstate(invalid="ignore"):
         inside: NDArray[np.bool_] = (
-            near_axis & (x >= 0.0) & (x <= camera.width_px - 1) & (y >= 0.0) & (y <= camera.height_px - 1)
+            near_axis & (x >= 0.0) & (x <= model.width_px - 1) & (y >= 0.0) & (y <= model.height_px - 1)
         )
     return inside

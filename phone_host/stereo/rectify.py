@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from common.imagesize import size_text
-from phone_host.model import Camera, Image, Rectification, RectifiedPair, Rig, Side, StereoGeometry
+from phone_host.model import CameraModel, Image, Rectification, RectifiedPair, Rig, Side, StereoGeometry
 from phone_host.stereo.images import size_px
 
 Matrix = NDArray[np.float64]
@@ -65,7 +65,7 @@ def rectify_rig(rig: Rig) -> Rectification:
             f"turn the cameras towards the same scene and {_RECALIBRATE}",
         )
     geometry = StereoGeometry(focal_px, baseline_m, cx_px=float(-focal_px * x0), cy_px=float(-focal_px * y0))
-    camera = np.array([[focal_px, 0, geometry.cx_px, 0], [0, focal_px, geometry.cy_px, 0], [0, 0, 1, 0]])
+    projection = np.array([[focal_px, 0, geometry.cx_px, 0], [0, focal_px, geometry.cy_px, 0], [0, 0, 1, 0]])
     shift = np.zeros((3, 4))
     shift[0, 3] = -focal_px * baseline_m
     to_metres = np.array(
@@ -82,27 +82,27 @@ def rectify_rig(rig: Rig) -> Rectification:
         height_px,
         R_left=left_rotation,
         R_right=right_rotation,
-        P_left=camera,
-        P_right=camera + shift,
+        P_left=projection,
+        P_right=projection + shift,
         Q=to_metres,
     )
 
 
 def rectify_points(
-    points_px: NDArray[np.floating], camera: Camera, rotation: Matrix, geometry: StereoGeometry
+    points_px: NDArray[np.floating], model: CameraModel, rotation: Matrix, geometry: StereoGeometry
 ) -> NDArray[np.float64]:
     """Where measured points of one camera stand in its rectified image.
 
     Args:
         points_px: (N, 2), px, in the camera's own image.
-        camera: its model.
+        model: of the camera.
         rotation: (3, 3) from the camera's axes to the rectified ones (`R_left` or `R_right`).
         geometry: of the rectified pair.
 
     Returns:
         (N, 2) float64, px.
     """
-    slopes = _rectified_slopes(points_px, camera, rotation)
+    slopes = _rectified_slopes(points_px, model, rotation)
     points: NDArray[np.float64] = slopes * geometry.focal_px + np.array([geometry.cx_px, geometry.cy_px])
     return points
 
@@ -139,11 +139,11 @@ class Rectifier:
         Raises:
             DataError: an image has another size than its camera in the rig.
         """
-        for found_px, camera, side in ((left_px, self.rig.left, Side.LEFT), (right_px, self.rig.right, Side.RIGHT)):
-            if found_px != (camera.width_px, camera.height_px):
+        for found_px, model, side in ((left_px, self.rig.left, Side.LEFT), (right_px, self.rig.right, Side.RIGHT)):
+            if found_px != (model.width_px, model.height_px):
                 raise DataError(
                     f"the {side.value} image is {size_text(found_px)} px, rig.yaml was calibrated for"
-                    f" {camera.width_px}x{camera.height_px}",
+                    f" {model.width_px}x{model.height_px}",
                     "use the resolution of the calibration, or calibrate again at this one",
                 )
 
@@ -167,12 +167,12 @@ class Rectifier:
 class _Remap:
     """One camera's way from its own image to the rectified one."""
 
-    def __init__(self, camera: Camera, rotation: Matrix, rectification: Rectification) -> None:
+    def __init__(self, model: CameraModel, rotation: Matrix, rectification: Rectification) -> None:
         size = (rectification.width_px, rectification.height_px)
         projection = rectification.P_left[:, :3]  # P_right's first three columns are the same
-        x, y = cv2.initUndistortRectifyMap(camera.matrix, camera.distortion, rotation, projection, size, cv2.CV_32FC1)
+        x, y = cv2.initUndistortRectifyMap(model.matrix, model.distortion, rotation, projection, size, cv2.CV_32FC1)
         # Bilinear interpolation reads 2 x 2 pixels; a camera twice as fine as the result would alias: average it down first.
-        self._shrink = max(1, int(_mean_focal_px(camera) / rectification.geometry.focal_px + 1e-6))
+        self._shrink = max(1, int(_mean_focal_px(model) / rectification.geometry.focal_px + 1e-6))
         if self._shrink > 1:
             x, y = ((axis + 0.5) / self._shrink - 0.5 for axis in (x, y))
         self._whole, self._fraction = cv2.convertMaps(
@@ -223,26 +223,26 @@ def _shortest_turn(source: Matrix, target: Matrix) -> Matrix:
     return np.asarray(cv2.Rodrigues(vector)[0], dtype=np.float64)
 
 
-def _mean_focal_px(camera: Camera) -> float:
-    return float(camera.matrix[0, 0] + camera.matrix[1, 1]) / 2
+def _mean_focal_px(model: CameraModel) -> float:
+    return float(model.matrix[0, 0] + model.matrix[1, 1]) / 2
 
 
-def _rectified_slopes(points_px: NDArray[np.floating], camera: Camera, rotation: Matrix) -> NDArray[np.float64]:
+def _rectified_slopes(points_px: NDArray[np.floating], model: CameraModel, rotation: Matrix) -> NDArray[np.float64]:
     """(N, 2) slopes x / z and y / z in the rectified axes."""
     points = np.asarray(points_px, dtype=np.float64).reshape(-1, 1, 2)
-    slopes = cv2.undistortPointsIter(points, camera.matrix, camera.distortion, rotation, np.eye(3), _UNDISTORT)
+    slopes = cv2.undistortPointsIter(points, model.matrix, model.distortion, rotation, np.eye(3), _UNDISTORT)
     return np.asarray(slopes, dtype=np.float64).reshape(-1, 2)
 
 
-def _filled_window(camera: Camera, rotation: Matrix, side: Side) -> tuple[float, float, float, float]:
+def _filled_window(model: CameraModel, rotation: Matrix, side: Side) -> tuple[float, float, float, float]:
     """x0, y0, x1, y1 in slopes: a rectangle in the rectified view that the camera's image fills wholly.
 
     The four edges of the image, followed through the model, bound the view; the rectangle takes the innermost point of each.
     """
     for share in _FIELD_SHARES:
-        edges = _edges_px(camera, share)
-        slopes = _rectified_slopes(edges.reshape(-1, 2), camera, rotation)
-        if _round_trip_error_px(slopes, edges.reshape(-1, 2), camera, rotation) > _ROUND_TRIP_LIMIT_PX:
+        edges = _edges_px(model, share)
+        slopes = _rectified_slopes(edges.reshape(-1, 2), model, rotation)
+        if _round_trip_error_px(slopes, edges.reshape(-1, 2), model, rotation) > _ROUND_TRIP_LIMIT_PX:
             continue
         top, right, bottom, left = slopes.reshape(4, -1, 2)
         return (
@@ -254,22 +254,22 @@ def _filled_window(camera: Camera, rotation: Matrix, side: Side) -> tuple[float,
     )
 
 
-def _edges_px(camera: Camera, share: float) -> NDArray[np.float64]:
+def _edges_px(model: CameraModel, share: float) -> NDArray[np.float64]:
     """(4, N, 2): points along the top, right, bottom and left edge of the image, drawn in to `share` of it."""
     ends = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64) - 0.5
     along = np.linspace(0, 1, _SAMPLES_PER_EDGE)[:, np.newaxis]
-    extent = np.array([camera.width_px - 1, camera.height_px - 1], dtype=np.float64)
+    extent = np.array([model.width_px - 1, model.height_px - 1], dtype=np.float64)
     edges = [a * (1 - along) + b * along for a, b in zip(ends, np.roll(ends, -1, axis=0), strict=True)]
     return (np.array(edges) * share + 0.5) * extent
 
 
 def _round_trip_error_px(
-    slopes: NDArray[np.float64], points_px: NDArray[np.float64], camera: Camera, rotation: Matrix
+    slopes: NDArray[np.float64], points_px: NDArray[np.float64], model: CameraModel, rotation: Matrix
 ) -> float:
     """Largest distance between points and their slopes projected back; NaN-safe (NaN gives infinity)."""
     rays = np.column_stack([slopes, np.ones(len(slopes))]) @ rotation  # rows: rotation.T @ ray
     if not np.all(rays[:, 2] > 0):
         return math.inf
-    back, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)
+    back, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), model.matrix, model.distortion)
     error = np.abs(np.asarray(back).reshape(-1, 2) - points_px).max()
     return float(error) if math.isfinite(error) else math.inf

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.target import Board
-from phone_host.model import Camera, Image, Rig
+from phone_host.model import CameraModel, Image, Rig
 from tests.support.rigs import project_points
 
 BOARD = Board(9, 6, 0.025)
@@ -42,18 +42,18 @@ def exact_pairs(rig: Rig, board_poses: NDArray[np.float64], noise_px: float = 0.
 
 
 def render_board(
-    camera: Camera, rotation: NDArray[np.float64], translation_m: NDArray[np.float64], board: Board = BOARD
+    model: CameraModel, rotation: NDArray[np.float64], translation_m: NDArray[np.float64], board: Board = BOARD
 ) -> Image:
     """What a camera sees of a board at a pose in its own axes: white paper with a rim of one square, grey around it."""
     fine, coarse = 3, 4  # rays per pixel and direction; pixels per solved ray: linear between them is 0.003 px off
-    steps_x = (np.arange(camera.width_px // coarse) + 0.5) * coarse - 0.5
-    steps_y = (np.arange(camera.height_px // coarse) + 0.5) * coarse - 0.5
+    steps_x = (np.arange(model.width_px // coarse) + 0.5) * coarse - 0.5
+    steps_y = (np.arange(model.height_px // coarse) + 0.5) * coarse - 0.5
     columns, rows = np.meshgrid(steps_x, steps_y)
     pixels = np.column_stack([columns.ravel(), rows.ravel()])[:, np.newaxis]
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-10)
-    slopes = cv2.undistortPointsIter(pixels, camera.matrix, camera.distortion, np.eye(3), np.eye(3), criteria)
+    slopes = cv2.undistortPointsIter(pixels, model.matrix, model.distortion, np.eye(3), np.eye(3), criteria)
     grid = np.asarray(slopes, dtype=np.float64).reshape(*columns.shape, 2)
-    fine_size = (camera.width_px * fine, camera.height_px * fine)
+    fine_size = (model.width_px * fine, model.height_px * fine)
     dense = cv2.resize(grid, fine_size, interpolation=cv2.INTER_LINEAR)
     # Rays into the board's axes, cut with its plane z = 0.
     rays = np.dstack([dense, np.ones(dense.shape[:2])]) @ rotation
@@ -65,7 +65,7 @@ def render_board(
     inside = (x >= 0) & (x < board.columns + 1) & (y >= 0) & (y < board.rows + 1)
     paper = (x >= -1) & (x < board.columns + 2) & (y >= -1) & (y < board.rows + 2)
     value = np.where(inside & black, 20.0, np.where(paper, 230.0, 120.0)).astype(np.float32)
-    size = (camera.width_px, camera.height_px)
+    size = (model.width_px, model.height_px)
     image: Image = np.rint(cv2.resize(value, size, interpolation=cv2.INTER_AREA)).astype(np.uint8)
     return image
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import Camera, Rig
+from phone_host.model import CameraModel, Rig
 
 
 def unlike_rig(right_centre_m: tuple[float, float, float] = (0.1, 0.004, -0.006), turn: float = 1.0) -> Rig:
@@ -16,13 +16,13 @@ def unlike_rig(right_centre_m: tuple[float, float, float] = (0.1, 0.004, -0.006)
         right_centre_m: the right camera's centre in the left one's axes, m.
         turn: factor on the rotation between the two.
     """
-    left = Camera(
+    left = CameraModel(
         640,
         480,
         np.array([[525.0, 0, 315], [0, 527, 243], [0, 0, 1]]),
         np.array([-0.25, 0.08, 0.001, -0.0005, 0.01]),
     )
-    right = Camera(
+    right = CameraModel(
         1280,
         720,
         np.array([[1130.0, 0, 652], [0, 1128, 351], [0, 0, 1]]),
@@ -60,6 +60,6 @@ def points_seen_by_both(rig: Rig, count: int, seed: int) -> SeenPoints:
     return SeenPoints(points[seen], left[seen], right[seen])
 
 
-def _inside(points_px: NDArray[np.float64], camera: Camera) -> NDArray[np.bool_]:
-    limit = np.array([camera.width_px - 1, camera.height_px - 1])
+def _inside(points_px: NDArray[np.float64], model: CameraModel) -> NDArray[np.bool_]:
+    limit = np.array([model.width_px - 1, model.height_px - 1])
     return np.asarray(((points_px >= 0) & (points_px <= limit)).all(axis=1))

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
-from phone_host.model import Camera, Image, Rectification, Rig, Side
+from phone_host.model import CameraModel, Image, Rectification, Rig, Side
 from phone_host.stereo.rectify import Rectifier, rectify_points, rectify_rig
 from tests.support.rigs import points_seen_by_both, unlike_rig
 
@@ -55,18 +55,18 @@ def test_every_pixel_of_the_window_comes_from_inside_both_images(
     assert pair.left.shape == pair.right.shape
     assert pair.left.min() == 255
     assert pair.right.min() == 255
-    for camera, rotation in ((rig.left, rectifier.rectification.R_left), (rig.right, rectifier.rectification.R_right)):
-        assert _source_margin_px(camera, rotation, rectifier.rectification) >= -0.01
+    for model, rotation in ((rig.left, rectifier.rectification.R_left), (rig.right, rectifier.rectification.R_right)):
+        assert _source_margin_px(model, rotation, rectifier.rectification) >= -0.01
 
 
-def _source_margin_px(camera: Camera, rotation: np.ndarray, r: Rectification) -> float:
+def _source_margin_px(model: CameraModel, rotation: np.ndarray, r: Rectification) -> float:
     """How far inside the camera's image the window's outermost source pixel lies."""
     columns, rows = np.meshgrid(np.arange(r.width_px), np.arange(r.height_px))
     pixels = np.column_stack([columns.ravel(), rows.ravel(), np.ones(columns.size)])
     rays = pixels @ np.linalg.inv(r.P_left[:, :3]).T @ rotation
-    source = np.asarray(cv2.projectPoints(rays, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)[0])
+    source = np.asarray(cv2.projectPoints(rays, np.zeros(3), np.zeros(3), model.matrix, model.distortion)[0])
     source = source.reshape(-1, 2)
-    beyond = source - np.array([camera.width_px - 1, camera.height_px - 1])
+    beyond = source - np.array([model.width_px - 1, model.height_px - 1])
     return float(min(source.min(), -beyond.max()))
 
 
@@ -98,19 +98,19 @@ def test_images_of_a_textured_plane_agree() -> None:
 
 def _render_plane(rig: Rig, side: Side, rectifier: Rectifier, depth_m: float) -> Image:
     """The camera's view of a smooth texture on a plane at z = depth in the rectified left axes, ray by ray."""
-    camera = rig.left if side is Side.LEFT else rig.right
+    model = rig.left if side is Side.LEFT else rig.right
     r = rectifier.rectification
     rotation = r.R_left if side is Side.LEFT else r.R_right
     origin_x = 0.0 if side is Side.LEFT else r.geometry.baseline_m
-    columns, rows = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
+    columns, rows = np.meshgrid(np.arange(model.width_px), np.arange(model.height_px))
     pixels = np.column_stack([columns.ravel(), rows.ravel()]).astype(np.float64)[:, np.newaxis]
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-12)
     slopes = np.asarray(
-        cv2.undistortPointsIter(pixels, camera.matrix, camera.distortion, rotation, np.eye(3), criteria)
+        cv2.undistortPointsIter(pixels, model.matrix, model.distortion, rotation, np.eye(3), criteria)
     ).reshape(-1, 2)
     x, y = slopes[:, 0] * depth_m + origin_x, slopes[:, 1] * depth_m
     value = 128 + 50 * np.sin(x * 60) * np.cos(y * 45) + 50 * np.sin(x * 23 + y * 37)
-    image: Image = np.rint(value).reshape(camera.height_px, camera.width_px).astype(np.uint8)
+    image: Image = np.rint(value).reshape(model.height_px, model.width_px).astype(np.uint8)
     return image
 
 

@@ -161,17 +161,17 @@ def test_unlike_cameras_are_unlike() -> None:
 def test_rays_undo_the_distortion(side: int) -> None:
     """Projecting a point on a pixel's ray gives that pixel back within a millionth of a pixel, corners included."""
     rig = unlike_rig()
-    camera, pose = (rig.left, rig.right)[side], rig_poses(rig)[side]
-    rays = pixel_rays(camera).reshape(3, -1)
+    model, pose = (rig.left, rig.right)[side], rig_poses(rig)[side]
+    rays = pixel_rays(model).reshape(3, -1)
     points = pose.centre_m[:, None] + pose.R_camera_scene.T @ (1.3 * rays)
-    x, y = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
-    assert np.max(np.abs(project(points, camera, pose) - np.stack([x.ravel(), y.ravel()]))) < 1e-6
+    x, y = np.meshgrid(np.arange(model.width_px), np.arange(model.height_px))
+    assert np.max(np.abs(project(points, model, pose) - np.stack([x.ravel(), y.ravel()]))) < 1e-6
 
 
 def test_points_behind_a_camera_have_no_pixel() -> None:
     """A point behind the camera is seen nowhere."""
-    camera = rectified_cameras(SMALL_VIEW)[0][0]
-    assert np.isnan(project(np.array([[0.0], [0.0], [-1.0]]), camera, Pose())).all()
+    model = rectified_cameras(SMALL_VIEW)[0][0]
+    assert np.isnan(project(np.array([[0.0], [0.0], [-1.0]]), model, Pose())).all()
 
 
 def test_images_of_both_cameras_show_the_same_surface() -> None:
@@ -179,7 +179,7 @@ def test_images_of_both_cameras_show_the_same_surface() -> None:
     scene = demo_scene().at(0.4)
     view = matched_view()
     found = truth(scene, view)
-    left, right = (grey(render(scene, camera, pose)) for camera, pose in rectified_cameras(view))
+    left, right = (grey(render(scene, model, pose)) for model, pose in rectified_cameras(view))
     x, y = np.meshgrid(np.arange(640, dtype=np.float32), np.arange(480, dtype=np.float32))
     moved = cv2.remap(right, (x - found.disparity_px).astype(np.float32), y, cv2.INTER_CUBIC)
     # Pixels at the border of two surfaces mix both; they are left out.
@@ -200,12 +200,12 @@ def test_each_camera_of_the_unlike_rig_sees_points_where_they_project() -> None:
     white = Texture(light_bgr=(1.0, 1.0, 1.0), dark_bgr=(1.0, 1.0, 1.0), contrast=0.0)
     for place in ((-0.25, 0.18, 1.0), (0.3, -0.2, 1.2)):
         scene = Scene((Body("wall", Plane(), (0.0, 0.0, 3.0), plain), Body("ball", Sphere(0.02), place, white)))
-        for camera, pose in zip((rig.left, rig.right), rig_poses(rig), strict=True):
+        for model, pose in zip((rig.left, rig.right), rig_poses(rig), strict=True):
             # The lamp stands behind each camera, so that the whole disc is lit alike.
             light = replace(scene.light, lamp_bgr=(0.0, 0.0, 0.0), sky_bgr=(1.0, 1.0, 1.0))
-            image = grey(render(replace(scene, light=light, void_bgr=(0.0, 0.0, 0.0)), camera, pose))
+            image = grey(render(replace(scene, light=light, void_bgr=(0.0, 0.0, 0.0)), model, pose))
             y, x = np.nonzero(image > 60)
-            expected = project(np.array([place]).T, camera, pose)[:, 0]
+            expected = project(np.array([place]).T, model, pose)[:, 0]
             # A ball's image is an ellipse whose middle lies within r^2 tan / f of the centre's image: below 0.1 px here.
             assert np.hypot(x.mean() - expected[0], y.mean() - expected[1]) < 0.25
 
@@ -220,12 +220,12 @@ def test_sensors_limit_what_counts_as_visible() -> None:
     assert 0.3 < limited.visible.sum() / free.visible.sum() < 0.8
     v, u = np.nonzero(limited.visible)
     points = np.stack([(u - 449.5) / 525.0, (v - 349.5) / 525.0, np.ones(u.size)])
-    for camera, pose in sensors:
-        x, y = project(points, camera, pose)
+    for model, pose in sensors:
+        x, y = project(points, model, pose)
         assert x.min() >= 0.0
         assert y.min() >= 0.0
-        assert x.max() <= camera.width_px - 1
-        assert y.max() <= camera.height_px - 1
+        assert x.max() <= model.width_px - 1
+        assert y.max() <= model.height_px - 1
 
 
 def test_doffs_shifts_disparity_and_right_camera() -> None:
@@ -252,11 +252,11 @@ def test_bodies_follow_their_paths(t_s: float) -> None:
 
 def test_texture_moves_with_its_body() -> None:
     """A ball seen from a camera that moves along with it looks the same, up to rounding: light and texture are its own."""
-    camera = rectified_cameras(SMALL_VIEW)[0][0]
+    model = rectified_cameras(SMALL_VIEW)[0][0]
     first = Scene((Body("ball", Sphere(0.2), (0.0, 0.0, 1.0)),))
     second = Scene((Body("ball", Sphere(0.2), (0.25, -0.125, 1.5)),))
-    here = render(first, camera).astype(int)
-    there = render(second, camera, Pose(np.eye(3), np.array([0.25, -0.125, 0.5]))).astype(int)
+    here = render(first, model).astype(int)
+    there = render(second, model, Pose(np.eye(3), np.array([0.25, -0.125, 0.5]))).astype(int)
     assert np.max(np.abs(here - there)) <= 1
 
 
@@ -286,16 +286,16 @@ def test_film_is_repeatable_and_periodic() -> None:
 
 def test_look_is_the_curve_it_says() -> None:
     """Gain, offset, gamma and noise act as 255 * gain * light ** (1 / gamma) + offset + noise."""
-    camera = rectified_cameras(SMALL_VIEW)[0][0]
+    model = rectified_cameras(SMALL_VIEW)[0][0]
     void = Scene((), void_bgr=(0.25, 0.25, 0.25))
     look = Look(gain_bgr=(0.5, 1.0, 1.2), offset=5.0)
     # sqrt(0.25) = 0.5.
-    assert np.array_equal(np.unique(render(void, camera, look=look).reshape(-1, 3), axis=0), [[69, 132, 158]])
-    noisy = render(void, camera, look=replace(look, noise_sigma=3.0, seed=4)).astype(float)
+    assert np.array_equal(np.unique(render(void, model, look=look).reshape(-1, 3), axis=0), [[69, 132, 158]])
+    noisy = render(void, model, look=replace(look, noise_sigma=3.0, seed=4)).astype(float)
     assert noisy.std(axis=(0, 1)) == pytest.approx([3.0, 3.0, 3.0], rel=0.1)
-    cubic = render(void, camera, look=Look(gamma=3.0))
+    cubic = render(void, model, look=Look(gamma=3.0))
     assert np.unique(cubic).tolist() == [round(255.0 * 0.25 ** (1.0 / 3.0))]
-    dark_corner = render(void, camera, look=Look(vignetting=0.36))
+    dark_corner = render(void, model, look=Look(vignetting=0.36))
     # Corner: 0.25 * (1 - 0.36) = 0.16, its root 0.4.
     assert dark_corner[0, 0, 0] == round(255.0 * 0.4)
 
@@ -303,11 +303,11 @@ def test_look_is_the_curve_it_says() -> None:
 def test_texture_does_not_alias() -> None:
     """Moving the camera by half a pixel changes a wall's image as a shift does: no detail beyond what pixels can hold."""
     view = matched_view()
-    camera, _ = rectified_cameras(view)[0]
+    model, _ = rectified_cameras(view)[0]
     scene = plane_scene(2.0)
-    here = grey(render(scene, camera))
+    here = grey(render(scene, model))
     # Half a pixel at 2 m is 2 / 525 / 2 m.
-    there = grey(render(scene, camera, Pose(np.eye(3), np.array([2.0 / FOCAL_PX / 2.0, 0.0, 0.0]))))
+    there = grey(render(scene, model, Pose(np.eye(3), np.array([2.0 / FOCAL_PX / 2.0, 0.0, 0.0]))))
     spectrum = np.fft.rfft(here, axis=1) * np.exp(2j * np.pi * np.fft.rfftfreq(640) * 0.5)
     shifted = np.fft.irfft(spectrum, 640, axis=1)
     rms = float(np.sqrt(np.mean((shifted - there)[:, 40:-40] ** 2)))
@@ -318,8 +318,8 @@ def test_texture_is_rich_on_every_body() -> None:
     """On every body of the demo the image has detail in nearly every window of 9 x 9 pixels."""
     scene, view = demo_scene(), matched_view()
     found = truth(scene, view)
-    camera, pose = rectified_cameras(view)[0]
-    image = grey(render(scene, camera, pose))
+    model, pose = rectified_cameras(view)[0]
+    image = grey(render(scene, model, pose))
     mean, square = cv2.blur(image, (9, 9)), cv2.blur(image * image, (9, 9))
     deviation = np.sqrt(np.maximum(square - mean * mean, 0.0))
     for index, body in enumerate(scene.bodies):
@@ -345,7 +345,7 @@ def errors_of_default_matcher(scene: Scene, looks: tuple[Look, Look]) -> tuple[f
     rig = unlike_rig()
     rectifier = Rectifier(rig)
     cameras = tuple(zip((rig.left, rig.right), rig_poses(rig), strict=True))
-    left, right = (render(scene, camera, pose, look) for (camera, pose), look in zip(cameras, looks, strict=True))
+    left, right = (render(scene, model, pose, look) for (model, pose), look in zip(cameras, looks, strict=True))
     pair: RectifiedPair = rectifier.rectify(left, right)
     disparity = create_matcher(MatchSettings(disparities=96)).match(pair)
     made = rectifier.rectification

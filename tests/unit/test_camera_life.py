@@ -1,0 +1,441 @@
+"""When a camera is opened, given up and tried again, without a device: the automaton alone, for both kinds of camera that live by it."""
+
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.camera.base import CameraState
+from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Phase, Step, Unwanted
+
+S = 1_000_000_000
+DEVICE = LifeSettings(
+    start_ns=3 * S,
+    first_frame_ns=3 * S,
+    silence_ns=S,
+    silence_periods=10,
+    lost_rest_ns=0,
+    rest_ns=S // 5,
+    longest_rest_ns=S // 5,
+    unwanted=Unwanted.STAYS_OPEN,
+    look_ns=S,
+)
+SERVER = replace(
+    DEVICE,
+    start_ns=10 * S,
+    first_frame_ns=2 * S,
+    silence_ns=2 * S,
+    lost_rest_ns=S // 10,
+    rest_ns=S // 10,
+    longest_rest_ns=S,
+    unwanted=Unwanted.IS_CLOSED,
+    look_ns=NEVER_NS,
+)
+BOTH = pytest.mark.parametrize("settings", [DEVICE, SERVER], ids=["device", "server"])
+
+
+def opened(settings: LifeSettings, now_ns: int = 0, period_ns: int = 0) -> Life:
+    """A camera that was opened and accepted."""
+    life = Life(settings, now_ns)
+    assert life.due(now_ns) is Step.OPEN
+    assert life.opened(now_ns, period_ns) is Step.NONE
+    life.accept()
+    return life
+
+
+@BOTH
+def test_it_is_opened_at_once_and_once(settings: LifeSettings) -> None:
+    """A new life is opened at its first moment, and not a second time while the outcome is awaited."""
+    life = Life(settings, 5)
+    assert life.due_ns == 5
+    assert life.due(5) is Step.OPEN
+    assert life.due(5 + 100 * S) is Step.NONE
+    assert life.due_ns == NEVER_NS
+
+
+@BOTH
+def test_a_start_is_given_up(settings: LifeSettings) -> None:
+    """Before it is accepted a camera is given up when it is refused, or when its first time is over; afterwards never, and its loss at the start is no news."""
+    silent = Life(settings, 0)
+    silent.due(0)
+    silent.opened(0)
+    assert not silent.gives_up(settings.start_ns - 1)
+    assert silent.gives_up(settings.start_ns)
+    silent.lost(Loss.FAILED, 1)
+    assert not silent.is_lost
+    assert silent.state is CameraState.GONE
+    refused = Life(settings, 0)
+    refused.due(0)
+    refused.refused(0)
+    assert refused.gives_up(0)
+    assert not opened(settings).gives_up(100 * S)
+
+
+@BOTH
+def test_silence_is_a_stall(settings: LifeSettings) -> None:
+    """Without a frame for the patience of its kind an open camera is closed, and tried again after a rest; a frame in time puts that off."""
+    life = opened(settings)
+    life.heard(S)
+    assert life.due(S + settings.silence_ns - 1) is Step.NONE
+    life.heard(2 * S)
+    stall_ns = 2 * S + settings.silence_ns
+    assert life.due_ns == stall_ns
+    assert life.due(stall_ns) is Step.CLOSE
+    assert life.counts.lost == {Loss.STALLED: 1, Loss.FAILED: 0, Loss.UNPLUGGED: 0}
+    assert life.state is CameraState.GONE
+    assert life.due(100 * S) is Step.NONE  # nothing before it is closed
+    life.closed()
+    assert life.due_ns == stall_ns + settings.rest_ns
+    assert life.due(life.due_ns) is Step.OPEN
+
+
+@pytest.mark.parametrize(("period_ns", "patience_ns"), [(0, S), (S // 30, S), (S // 2, 5 * S)])
+def test_a_slow_camera_is_given_ten_periods(period_ns: int, patience_ns: int) -> None:
+    """A camera of long periods may be silent for ten of them."""
+    life = opened(DEVICE)
+    life.heard(7, period_ns)
+    assert life.due_ns == 7 + patience_ns
+
+
+@BOTH
+def test_the_first_frame_may_take_longer(settings: LifeSettings) -> None:
+    """The very first frame gets the time of the start, that after a later opening its own."""
+    life = Life(settings, 0)
+    life.due(0)
+    life.opened(0)
+    assert life.due_ns == settings.start_ns
+    life.accept()
+    life.heard(1)
+    life.lost(Loss.FAILED, 2)
+    life.closed()
+    again_ns = life.due_ns
+    life.due(again_ns)
+    life.opened(again_ns)
+    assert life.due_ns == again_ns + settings.first_frame_ns
+
+
+def test_a_lost_device_is_tried_at_once_then_five_times_a_second() -> None:
+    """A device that gave frames and failed is opened again at once, and each refusal is followed by a fifth of a second of rest."""
+    life = opened(DEVICE)
+    life.heard(S)
+    life.lost(Loss.UNPLUGGED, 2 * S)
+    life.closed()
+    tries_ns = refusals(life, 4)
+    assert tries_ns == [2 * S, 2 * S + S // 5, 2 * S + 2 * S // 5, 2 * S + 3 * S // 5]
+
+
+def test_a_lost_server_is_tried_ever_more_rarely() -> None:
+    """A server's rests are 0.1 s, then doubled with each refusal up to a second; a frame makes them short again."""
+    life = opened(SERVER)
+    life.heard(S)
+    life.lost(Loss.FAILED, S)
+    life.closed()
+    tenths = [(try_ns - S) * 10 // S for try_ns in refusals(life, 7)]
+    assert tenths == [1, 1 + 2, 3 + 4, 7 + 8, 15 + 10, 25 + 10, 35 + 10]
+    now_ns = life.due_ns
+    life.due(now_ns)
+    life.opened(now_ns)
+    life.heard(now_ns)
+    life.lost(Loss.FAILED, now_ns)
+    life.closed()
+    assert life.due_ns == now_ns + S // 10
+
+
+def refusals(life: Life, count: int) -> list[int]:
+    """Refuse so many openings; gives when they were tried."""
+    tries_ns = []
+    for _ in range(count):
+        tries_ns.append(life.due_ns)
+        assert life.due(life.due_ns) is Step.OPEN
+        life.refused(tries_ns[-1])
+    return tries_ns
+
+
+@BOTH
+def test_a_listener_ends_the_rest(settings: LifeSettings) -> None:
+    """Whoever comes while a lost camera rests is served at once."""
+    life = Life(settings, 0)
+    now_ns = refusals(life, 5)[-1] + 1
+    assert life.due(now_ns) is Step.NONE
+    life.pause()
+    assert life.resume(now_ns) is Step.NONE
+    assert life.resume(now_ns) is Step.NONE
+    assert life.due(now_ns) is Step.OPEN
+
+
+def test_a_camera_that_opens_and_fails_at_once_is_not_opened_without_a_rest() -> None:
+    """A device that can be opened and fails before its first frame gets the rest of one that was refused."""
+    life = opened(DEVICE)
+    life.lost(Loss.FAILED, 1)
+    life.closed()
+    assert life.due_ns == 1 + S // 5
+
+
+@BOTH
+def test_it_is_back_with_its_first_frame(settings: LifeSettings) -> None:
+    """A lost camera stays lost through openings that give no frame, and is back, once, with the first frame."""
+    life = opened(settings)
+    for _ in range(3):
+        life.lost(Loss.FAILED, life.due_ns - 1)
+        life.closed()
+        now_ns = life.due_ns
+        life.due(now_ns)
+        life.opened(now_ns)
+        assert life.is_lost
+        assert life.counts.returned == 0
+    life.heard(life.due_ns - 1)
+    assert not life.is_lost
+    assert life.state is CameraState.RUNNING
+    assert (life.counts.lost[Loss.FAILED], life.counts.returned) == (3, 1)
+
+
+def test_a_device_that_nobody_wants_stays_open_and_is_looked_for() -> None:
+    """A paused device is switched off, looked for at once and then every second, and switched on by the next listener; lost meanwhile, it is back when opened."""
+    life = opened(DEVICE)
+    assert life.pause() is Step.STOP
+    assert life.pause() is Step.NONE
+    states = [life.state]
+    assert [life.due(now_ns) for now_ns in (4, 4 + S - 1, 4 + S)] == [Step.LOOK, Step.NONE, Step.LOOK]
+    assert life.lost(Loss.UNPLUGGED, 2 * S) is Step.CLOSE
+    life.closed()
+    states.append(life.state)
+    assert states == [CameraState.PAUSED, CameraState.GONE]
+    now_ns = life.due_ns
+    assert life.due(now_ns) is Step.OPEN
+    assert not life.is_wanted
+    assert life.opened(now_ns) is Step.NONE
+    assert life.counts.returned == 1
+    assert life.resume(3 * S) is Step.START
+    assert life.due_ns == 3 * S + DEVICE.first_frame_ns
+
+
+def test_a_server_that_nobody_wants_is_closed_and_left_alone() -> None:
+    """A paused server is closed, not tried again, not counted as lost, and called at once for the next listener, even while it is still being closed."""
+    life = opened(SERVER)
+    life.heard(1)
+    assert life.pause() is Step.CLOSE
+    assert life.lost(Loss.FAILED, 2) is Step.NONE  # the interrupted connection ends
+    assert life.resume(3) is Step.NONE
+    assert life.pause() is Step.NONE
+    life.closed()
+    assert life.due_ns == NEVER_NS
+    assert life.state is CameraState.PAUSED
+    life.resume(4)
+    assert life.due(4) is Step.OPEN
+    life.pause()
+    assert life.opened(5) is Step.CLOSE  # nobody wants it any more
+    assert sum(life.counts.lost.values()) == 0
+
+
+@BOTH
+def test_a_steered_camera_is_off_until_its_moment(settings: LifeSettings) -> None:
+    """Steered, a camera is off until the moment that was named, may be steered again before, and is no stall meanwhile."""
+    life = opened(settings)
+    assert life.steer(50 * S) is Step.STOP
+    assert life.steer(60 * S) is Step.STOP
+    assert life.due(60 * S - 1) is Step.NONE
+    assert life.due(60 * S) is Step.START
+    assert life.phase is Phase.STREAMING
+    life.lost(Loss.FAILED, 60 * S)
+    assert life.steer(61 * S) is Step.NONE
+
+
+@BOTH
+def test_a_camera_is_renewed_without_a_rest(settings: LifeSettings) -> None:
+    """A camera that is to be another is closed and opened at once, and that is no loss."""
+    life = opened(settings)
+    assert life.renew(9) is Step.CLOSE
+    life.closed()
+    assert life.due(9) is Step.OPEN
+    assert life.renew(9) is Step.NONE
+    assert not life.is_lost
+
+
+@BOTH
+def test_the_end_is_the_end(settings: LifeSettings) -> None:
+    """An ended camera is closed and never opened again; one that was being opened is closed when it is open."""
+    life = opened(settings)
+    assert life.end() is Step.CLOSE
+    life.closed()
+    assert life.end() is Step.NONE
+    assert life.due(100 * S) is Step.NONE
+    late = Life(settings, 0)
+    late.due(0)
+    late.end()
+    assert late.opened(1) is Step.CLOSE
+
+
+class Chance(Enum):
+    """What may happen."""
+
+    TIME = "time"
+    FRAME = "frame"
+    FAILURE = "failure"
+    UNPLUGGED = "unplugged"
+    OPENED = "opened"
+    REFUSED = "refused"
+    CLOSED = "closed"
+    PAUSE = "pause"
+    RESUME = "resume"
+    STEER = "steer"
+    RENEW = "renew"
+    ACCEPT = "accept"
+    END = "end"
+
+
+@dataclass(slots=True)
+class World:
+    """A camera and its shell, which does as it is told, late.
+
+    Attributes:
+        life: the automaton.
+        now_ns: the time.
+        is_open: whether the device is; None: being opened.
+        is_closing: whether CLOSE was told and is not done.
+        tries: openings that were told.
+        rests_until_ns: before which no opening may be told.
+        was_heard: whether a frame came since it was opened.
+    """
+
+    settings: LifeSettings
+    life: Life = field(init=False)
+    now_ns: int = 0
+    is_open: bool | None = False
+    is_closing: bool = False
+    tries: int = 0
+    rests_until_ns: int = 0
+    was_heard: bool = False
+
+    def __post_init__(self) -> None:
+        self.life = Life(self.settings, 0)
+
+    def obey(self, step: Step) -> None:
+        """Begin what was told."""
+        match step:
+            case Step.OPEN:
+                assert self.is_open is False, "two openings without a close"
+                assert self.now_ns >= self.rests_until_ns, "an opening before its rest was over"
+                self.is_open, self.was_heard = None, False
+                self.tries += 1
+            case Step.CLOSE:
+                assert self.is_open
+                assert not self.is_closing
+                self.is_closing = True
+            case Step.START | Step.STOP | Step.LOOK:
+                assert self.is_open
+                assert not self.is_closing
+            case Step.NONE:
+                pass
+
+    def rest(self) -> None:
+        """An attempt without a frame has ended."""
+        self.rests_until_ns = self.now_ns + self.settings.rest_ns
+
+    def lose(self, loss: Loss) -> None:
+        """The device fails."""
+        step = self.life.lost(loss, self.now_ns)
+        if step is Step.CLOSE and not self.was_heard:
+            self.rest()
+        self.obey(step)
+
+    def report(self, chance: Chance) -> None:
+        """An outcome, if one is awaited."""
+        if chance is Chance.CLOSED and self.is_closing:
+            self.is_open = self.is_closing = False
+            self.life.closed()
+        elif chance is Chance.OPENED and self.is_open is None:
+            self.is_open = True
+            self.obey(self.life.opened(self.now_ns, S // 30))
+        elif chance is Chance.REFUSED and self.is_open is None:
+            self.is_open = False
+            self.life.refused(self.now_ns)
+            self.rest()
+        elif chance is Chance.FRAME and self.is_open:
+            self.was_heard |= self.life.phase is Phase.STREAMING
+            self.life.heard(self.now_ns, S // 30)
+
+    def order(self, chance: Chance) -> None:
+        """Something the owner wants; it ends a rest."""
+        match chance:
+            case Chance.PAUSE:
+                self.obey(self.life.pause())
+            case Chance.RESUME:
+                self.rests_until_ns = 0
+                self.obey(self.life.resume(self.now_ns))
+            case Chance.STEER:
+                self.obey(self.life.steer(self.now_ns + S // 7))
+            case Chance.RENEW:
+                step = self.life.renew(self.now_ns)
+                self.rests_until_ns = 0 if step is Step.CLOSE else self.rests_until_ns
+                self.obey(step)
+            case Chance.ACCEPT:
+                self.life.accept()
+            case _:
+                self.obey(self.life.end())
+
+    def let(self, chance: Chance, wait_ns: int) -> None:
+        """Let this happen, and then what time brings."""
+        match chance:
+            case Chance.TIME:
+                self.now_ns += wait_ns
+            case Chance.FAILURE:
+                self.lose(Loss.FAILED)
+            case Chance.UNPLUGGED:
+                self.lose(Loss.UNPLUGGED)
+            case Chance.OPENED | Chance.REFUSED | Chance.CLOSED | Chance.FRAME:
+                self.report(chance)
+            case _:
+                self.order(chance)
+        step = self.life.due(self.now_ns)
+        if step is Step.CLOSE and not self.was_heard:
+            self.rest()
+        self.obey(step)
+
+    def check(self) -> None:
+        """What holds at any moment."""
+        counts, life = self.life.counts, self.life
+        assert self.tries == counts.refused + counts.opened + (self.is_open is None)
+        ended = sum(counts.lost.values()) + counts.released
+        assert counts.opened == ended + (bool(self.is_open) and not self.is_closing)
+        assert counts.returned <= sum(counts.lost.values()) + counts.refused
+        assert life.due_ns > self.now_ns
+        assert (life.state is CameraState.RUNNING) <= life.is_wanted
+
+
+HAPPENINGS = st.lists(
+    st.tuples(
+        st.sampled_from([*Chance] + 3 * [Chance.TIME, Chance.OPENED, Chance.CLOSED]),
+        st.integers(1, 4 * S) | st.sampled_from([S // 10, S // 5, S, 2 * S, 10 * S]),
+    ),
+    max_size=60,
+)
+
+
+@BOTH
+@given(happenings=HAPPENINGS)
+def test_whatever_happens(settings: LifeSettings, happenings: list[tuple[Chance, int]]) -> None:
+    """In any order of events: never two openings without a close, never an opening before its rest is over, and all counts add up."""
+    world = World(settings)
+    for chance, wait_ns in happenings:
+        world.let(chance, wait_ns)
+        world.check()
+
+
+@BOTH
+@given(happenings=HAPPENINGS)
+def test_silence_always_ends_in_a_retry(settings: LifeSettings, happenings: list[tuple[Chance, int]]) -> None:
+    """Whatever happened before: a camera that is wanted and then silent is opened again within its patience and the longest rest."""
+    world = World(settings)
+    for chance, wait_ns in happenings:
+        if chance is not Chance.END:
+            world.let(chance, wait_ns)
+    world.let(Chance.RESUME, 0)
+    for pending in (Chance.CLOSED, Chance.OPENED):
+        world.let(pending, 0)
+    tries, until_ns = world.tries, world.now_ns + 2 * settings.start_ns + settings.longest_rest_ns
+    while world.tries == tries:
+        assert world.life.due_ns <= until_ns
+        world.let(Chance.TIME, world.life.due_ns - world.now_ns)
+        world.let(Chance.CLOSED, 0)
