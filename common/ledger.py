@@ -8,7 +8,7 @@ import json
 from dataclasses import asdict, dataclass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StageTimes:
     """How long each stage of processing took, ns, in the order in which they run; together at most the processing delay."""
 
@@ -20,7 +20,7 @@ class StageTimes:
     write: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BoardMarks:
     """A frame's marks on one clock: its exposure mid-point, its dequeue from the driver, the moment before its first byte was written (ns)."""
 
@@ -31,10 +31,10 @@ class BoardMarks:
     def moved_to(self, sent_ns: int) -> "BoardMarks":
         """Express the marks on another clock on which `sent` is known; differences stay as they are."""
         shift = sent_ns - self.sent_ns
-        return BoardMarks(self.exposed_ns + shift, self.grabbed_ns + shift, sent_ns)
+        return BoardMarks(exposed_ns=self.exposed_ns + shift, grabbed_ns=self.grabbed_ns + shift, sent_ns=sent_ns)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PairLedger:
     """Everything measured about one pair. All marks in ns on the host's clock; the delays are defined in DESIGN, section 4.
 

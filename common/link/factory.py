@@ -29,7 +29,7 @@ _MORE_OPTIONS = {
 _EXAMPLES = "give tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LinkUri:
     """A link as the user named it.
 
@@ -91,7 +91,14 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
             f"link {uri!r} has options {query!r}",
             "?bind=1 and ?connect=1 are the only ones, one at a time" + _MORE_OPTIONS.get(scheme, ""),
         )
-    return LinkUri(address, listens_by_default if not options else "bind" in options, baud, unpaired, insecure, owner)
+    return LinkUri(
+        address=address,
+        listens=listens_by_default if not options else "bind" in options,
+        baud=baud,
+        unpaired=unpaired,
+        insecure=insecure,
+        owner=owner,
+    )
 
 
 def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = False, waits: bool = False) -> Link:

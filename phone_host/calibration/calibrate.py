@@ -109,7 +109,10 @@ def _agreed_start(
     poses; the median over the pairs does not care how wild the wild ones are.
     """
     candidates = [_relative(a, b) for a, b in zip(left.poses, right.poses, strict=True)]
-    states = [BundleState(left.parameters, right.parameters, r, t, left.poses) for r, t in candidates]
+    states = [
+        BundleState(left=left.parameters, right=right.parameters, rotation=r, translation_m=t, poses=left.poses)
+        for r, t in candidates
+    ]
     errors = np.array(
         [
             [
@@ -266,7 +269,7 @@ def _summed_up(
     else:
         vertical = np.array([_vertical_errors_px(pair, rig, rectification) for pair in pairs])
     used = tuple(
-        Used(pair.name, float(a), float(b), _rms(v))
+        Used(name=pair.name, left_px=float(a), right_px=float(b), vertical_px=_rms(v))
         for pair, a, b, v in zip(pairs, *result.view_rms_px(), vertical, strict=True)
     )
     return Calibration(
@@ -286,12 +289,14 @@ def _summed_up(
 
 
 def _rig(state: BundleState, sizes_px: Sizes) -> Rig:
-    left, right = (
-        CameraModel(*size, *camera_arrays(parameters))
-        for size, parameters in zip(sizes_px, (state.left, state.right), strict=True)
-    )
+    left, right = _model(sizes_px[0], state.left), _model(sizes_px[1], state.right)
     rotation = np.asarray(cv2.Rodrigues(state.rotation)[0], dtype=np.float64)
     return Rig(left, right, rotation, state.translation_m)
+
+
+def _model(size_px: tuple[int, int], parameters: Vector) -> CameraModel:
+    matrix, distortion = camera_arrays(parameters)
+    return CameraModel(width_px=size_px[0], height_px=size_px[1], matrix=matrix, distortion=distortion)
 
 
 def _alone_rms_px(pairs: list[BoardPair], side: Side, points_m: Vector, parameters: Vector) -> float:

@@ -38,7 +38,7 @@ _CHECK_EVERY: Final = 15
 _BOARD_PATIENCE_NS: Final = 10_000_000_000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CheckedPair:
     """One pair kept for the comparison with the truth.
 
@@ -55,7 +55,7 @@ class CheckedPair:
     right_index: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DepthErrors:
     """How far the measured depth is from the truth, over all checked pairs and all pixels that both cameras see.
 
@@ -178,8 +178,10 @@ class DemoRun:
             return
         host_exposed_ns = ledger.board.exposed_ns - ledger.time_skew_ns
         # The board's stamp is known on this clock to some 50 us; the images are 1 / 15 s apart.
-        indices = (self._film.index_at(ledger.board.exposed_ns), self._film.index_at(host_exposed_ns))
-        self._checked.append(CheckedPair(processed, ledger, *indices))
+        left_index, right_index = self._film.index_at(ledger.board.exposed_ns), self._film.index_at(host_exposed_ns)
+        self._checked.append(
+            CheckedPair(processed=processed, ledger=ledger, left_index=left_index, right_index=right_index)
+        )
         if len(self._checked) > _CHECKED_PAIRS:
             del self._checked[0]
 
@@ -198,7 +200,19 @@ def _errors(
 ) -> DepthErrors:
     nan = float("nan")
     if not pairs:
-        return DepthErrors(0, 0, nan, nan, nan, nan, nan, nan, nan, nan, wrong)
+        return DepthErrors(
+            pairs=0,
+            pixels=0,
+            density=nan,
+            disparity_px=nan,
+            outliers=nan,
+            depth_mm=nan,
+            depth_p95_mm=nan,
+            depth_percent=nan,
+            at_1_m_mm=nan,
+            at_2_m_mm=nan,
+            wrong_pairs=wrong,
+        )
     off_px, depth_m, measured_m = (np.concatenate(part) for part in (disparity_errors, depths, measured))
     found = np.isfinite(measured_m)
     off_px, depth_m, off_mm = np.abs(off_px[found]), depth_m[found], np.abs(measured_m[found] - depth_m[found]) * 1000

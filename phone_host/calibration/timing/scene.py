@@ -57,7 +57,7 @@ _HUBER_PX: Final = 0.5
 _REMEDY: Final = "move something with texture up and down, quickly, in view of both cameras"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Rows:
     """Features seen by both cameras.
 
@@ -156,7 +156,13 @@ def _rows(
     moving = np.abs(table[:, 0]) > _MOVES_PX_S
     if moving.sum() < _LEAST_MOVING or len(np.unique(table[moving, 4])) < _LEAST_INSTANTS:
         raise DataError("no motion up or down was seen by both cameras", _REMEDY)
-    return Rows(table[:, 0], table[:, 1], table[:, 3], table[:, 4].astype(np.int64), table[:, 2])
+    return Rows(
+        velocity_px_s=table[:, 0],
+        difference_px=table[:, 1],
+        stamps_s=table[:, 3],
+        instant=table[:, 4].astype(np.int64),
+        row=table[:, 2],
+    )
 
 
 def _grey(image: Image) -> Image:
