@@ -179,7 +179,11 @@ def _misfits(
     usual = float(np.median(errors))
     by_error = errors / max(_OUTLIER_FACTOR * usual, _OUTLIER_FLOOR_PX)
     found = [
-        (by_error[index], index, _misfit(pairs[index], result.state, points_m, float(errors[index]), usual))
+        (
+            by_error[index],
+            index,
+            _misfit(pairs[index], result.state, points_m, error_px=float(errors[index]), usual_px=usual),
+        )
         for index in np.flatnonzero(by_error > 1)
     ]
     try:
@@ -221,7 +225,7 @@ def _grows(parameters: Vector, size_px: tuple[int, int]) -> bool:
     return bool((1 + 3 * k1 * radii**2 + 5 * k2 * radii**4 + 7 * k3 * radii**6 > 0).all())
 
 
-def _misfit(pair: BoardPair, state: BundleState, points_m: Vector, error_px: float, usual_px: float) -> Rejected:
+def _misfit(pair: BoardPair, state: BundleState, points_m: Vector, *, error_px: float, usual_px: float) -> Rejected:
     """Say why a pair does not fit: each view on its own tells whether corners jump or the board moved."""
     own = {
         side: rms_px(own_errors_px(points_m, corners_of(pair, side), parameters))

@@ -156,7 +156,9 @@ class DemoRun:
             depths.append(exact.depth_m[exact.visible])
             measured.append(pair.processed.cloud[..., 2][exact.visible])
         wrong = sum(pair.left_index != pair.right_index for pair in self._checked)
-        return _errors(len(self._checked), wrong, disparity_errors, depths, measured)
+        return _errors(
+            pairs=len(self._checked), wrong=wrong, disparity_errors=disparity_errors, depths=depths, measured=measured
+        )
 
     def write_pictures(self, out: Path) -> None:
         """Write cloud.ply and disparity.png of the newest kept pair.
@@ -196,7 +198,7 @@ def truth_json(errors: DepthErrors) -> dict[str, float | int | None]:
 
 
 def _errors(
-    pairs: int, wrong: int, disparity_errors: list[np.ndarray], depths: list[np.ndarray], measured: list[np.ndarray]
+    *, pairs: int, wrong: int, disparity_errors: list[np.ndarray], depths: list[np.ndarray], measured: list[np.ndarray]
 ) -> DepthErrors:
     nan = float("nan")
     if not pairs:
