@@ -51,7 +51,7 @@ _CAMERA_RETRY_MS: Final = 500
 """A camera that was missing at the start is found within this time, half of what recovery may take; a look at /dev costs a board 7 ms."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
     """One life of the agent.
 
@@ -203,7 +203,11 @@ class Agent:
         self._outbox.discard(DropReason.STOPPED)
         self._part()
         return Summary(
-            self._session.session, self._outbox.counts, self._garbage, self._camera_ended, self._camera.health
+            session=self._session.session,
+            counts=self._outbox.counts,
+            garbage=self._garbage,
+            ended=self._camera_ended,
+            camera=self._camera.health,
         )
 
     def _due_ns(self, now_ns: int) -> int:

@@ -25,7 +25,7 @@ _MOST_AGENTS: Final = 16
 _MOST_BYTES: Final = 4096
 """More is no state of a door: addresses of 16 links and names of 64 letters."""
 
-NOBODY: Final = DoorState("", "", "", "", 0)
+NOBODY: Final = DoorState(address="", code="", asking="", paired="", failed=0)
 """No agent answers: none is running, or it waits for its camera and has opened no link yet."""
 
 

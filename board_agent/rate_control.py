@@ -118,7 +118,15 @@ class RateControl:
     def rung(self) -> Rung:
         """Where that is on the ladder."""
         mode, last = self.mode, len(self._modes) - 1
-        return Rung(self._index, last, self._changes, mode.period_ns, mode.quality, *mode.size_px)
+        return Rung(
+            index=self._index,
+            last=last,
+            changes=self._changes,
+            period_ns=mode.period_ns,
+            quality=mode.quality,
+            width_px=mode.size_px[0],
+            height_px=mode.size_px[1],
+        )
 
     def is_due(self, now_ns: int) -> bool:
         """Whether `update` wants to be called: ten times a second is enough.

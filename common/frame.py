@@ -64,7 +64,7 @@ NOT_AS_SAID = frozenset(
 """Faults of images that are not what their headers say: no camera or cable makes them by losing an end."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
     """One image and what the camera says of it.
 

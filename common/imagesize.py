@@ -45,7 +45,7 @@ class ImageKind(Enum):
     WEBP = "WebP"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ImageHead:
     """What an image's header says.
 
@@ -169,7 +169,7 @@ def _head(data: bytes, name: str) -> ImageHead:
     if data.startswith(b"RIFF") and data[8:12] == b"WEBP":
         return _webp_head(data, name)
     if found := PNM_HEADER.match(data):
-        return ImageHead(ImageKind.PNM, int(found[2]), int(found[3]), found.end())
+        return ImageHead(kind=ImageKind.PNM, width_px=int(found[2]), height_px=int(found[3]), body_at=found.end())
     raise SpoiledImageError(FrameFault.NO_START, f"{name} is no image of a known kind", _KNOWN)
 
 
@@ -211,7 +211,13 @@ def _jpeg_head(data: bytes, name: str) -> ImageHead:
             body_at = at + 2 + int.from_bytes(data[at + 2 : at + 4], "big")
             # Only the largest component must have a block for each 8x8 px; the others may be coarser.
             blocks = (-(-size_px[0] // 8)) * (-(-size_px[1] // 8))
-            return ImageHead(ImageKind.JPEG, *size_px, body_at, blocks * _BLOCK_BITS.get(process, 0) // 8)
+            return ImageHead(
+                kind=ImageKind.JPEG,
+                width_px=size_px[0],
+                height_px=size_px[1],
+                body_at=body_at,
+                least_bytes=blocks * _BLOCK_BITS.get(process, 0) // 8,
+            )
     raise SpoiledImageError(FrameFault.NO_END, f"{name} is cut short: it is a JPEG without an image", _COPY)
 
 
@@ -286,7 +292,13 @@ def _png_head(data: bytes, name: str) -> ImageHead:
     if kind != b"IHDR" or length != 13 or colour not in _CHANNELS or bits not in {1, 2, 4, 8, 16}:
         raise SpoiledImageError(FrameFault.NO_START, f"{name} is a PNG without a sound header", _COPY)
     row_bytes = (width_px * bits * _CHANNELS[colour] + 7) // 8
-    return ImageHead(ImageKind.PNG, width_px, height_px, 33, height_px * row_bytes // _DEFLATE_RATIO)
+    return ImageHead(
+        kind=ImageKind.PNG,
+        width_px=width_px,
+        height_px=height_px,
+        body_at=33,
+        least_bytes=height_px * row_bytes // _DEFLATE_RATIO,
+    )
 
 
 def _pixel_chunks(data: bytes, head: ImageHead, name: str) -> bytes:
@@ -331,7 +343,7 @@ def _bmp_head(data: bytes) -> ImageHead:
     """BITMAPCOREHEADER or BITMAPINFOHEADER behind a BITMAPFILEHEADER (wingdi.h); a negative height means rows from the top down."""
     (header_bytes,) = struct.unpack_from("<I", data, 14)
     width_px, height_px = struct.unpack_from("<HH" if header_bytes == 12 else "<ii", data, 18)
-    return ImageHead(ImageKind.BMP, abs(width_px), abs(height_px))
+    return ImageHead(kind=ImageKind.BMP, width_px=abs(width_px), height_px=abs(height_px))
 
 
 _TIFF_KINDS: Final = {b"II*\0": ("<", False), b"MM\0*": (">", False), b"II+\0": ("<", True), b"MM\0+": (">", True)}
@@ -370,7 +382,7 @@ def _tiff_head(data: bytes, name: str) -> ImageHead:
             "save it upright, without that tag",
         )
     block_pixels = values[_TILE_WIDTH] * values[_TILE_HEIGHT]
-    return ImageHead(ImageKind.TIFF, values[_WIDTH], values[_HEIGHT], block_pixels=block_pixels)
+    return ImageHead(kind=ImageKind.TIFF, width_px=values[_WIDTH], height_px=values[_HEIGHT], block_pixels=block_pixels)
 
 
 def _webp_head(data: bytes, name: str) -> ImageHead:
@@ -379,13 +391,13 @@ def _webp_head(data: bytes, name: str) -> ImageHead:
     if kind == b"VP8 ":
         start, width, height = struct.unpack_from("<3sHH", data, 23)
         if start == b"\x9d\x01\x2a":
-            return ImageHead(ImageKind.WEBP, width & 0x3FFF, height & 0x3FFF)
+            return ImageHead(kind=ImageKind.WEBP, width_px=width & 0x3FFF, height_px=height & 0x3FFF)
     elif kind == b"VP8L":
         signature, bits = struct.unpack_from("<BI", data, 20)
         if signature == 0x2F:
-            return ImageHead(ImageKind.WEBP, (bits & 0x3FFF) + 1, (bits >> 14 & 0x3FFF) + 1)
+            return ImageHead(kind=ImageKind.WEBP, width_px=(bits & 0x3FFF) + 1, height_px=(bits >> 14 & 0x3FFF) + 1)
     elif kind == b"VP8X":
         packed = struct.unpack_from("<6s", data, 24)[0]
         width_px, height_px = (int.from_bytes(packed[at : at + 3], "little") + 1 for at in (0, 3))
-        return ImageHead(ImageKind.WEBP, width_px, height_px)
+        return ImageHead(kind=ImageKind.WEBP, width_px=width_px, height_px=height_px)
     raise SpoiledImageError(FrameFault.NO_START, f"{name} is a WebP without a sound header", _COPY)

@@ -44,7 +44,7 @@ _LOCK_STEP_S: Final = 0.05
 """Who changes the folder holds it for some ms. A service that was taken over may hold it for ever."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Peer:
     """A machine that this one trusts.
 
@@ -416,7 +416,7 @@ def change(
     if forget is not None:
         folder.forget(forget)
     if add is not None:
-        folder.add(Peer(add[0], add[1], when, address))
+        folder.add(Peer(name=add[0], key=add[1], added=when, address=address))
 
 
 def listing(folder: KeyFolder, *, as_json: bool) -> str:

@@ -5,10 +5,10 @@ their differences on the board's own clock. So end-to-end is the sum of the dela
 """
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StageTimes:
     """How long each stage of processing took, ns, in the order in which they run; together at most the processing delay."""
 
@@ -20,7 +20,7 @@ class StageTimes:
     write: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BoardMarks:
     """A frame's marks on one clock: its exposure mid-point, its dequeue from the driver, the moment before its first byte was written (ns)."""
 
@@ -31,10 +31,10 @@ class BoardMarks:
     def moved_to(self, sent_ns: int) -> "BoardMarks":
         """Express the marks on another clock on which `sent` is known; differences stay as they are."""
         shift = sent_ns - self.sent_ns
-        return BoardMarks(self.exposed_ns + shift, self.grabbed_ns + shift, sent_ns)
+        return BoardMarks(exposed_ns=self.exposed_ns + shift, grabbed_ns=self.grabbed_ns + shift, sent_ns=sent_ns)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HostMarks:
     """The marks of the host's own frame, on its own clock: exposure mid-point and dequeue from the driver (ns)."""
 
@@ -42,7 +42,7 @@ class HostMarks:
     grabbed_ns: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PairLedger:
     """Everything measured about one pair. All marks in ns on the host's clock; the delays are defined in DESIGN, section 4.
 
@@ -82,7 +82,7 @@ class PairLedger:
     time_skew_ns: int
     offset_ns: int
     uncertainty_ns: int
-    host: HostMarks = field(kw_only=True)
+    host: HostMarks
 
     @property
     def capture_ns(self) -> int:

@@ -63,7 +63,7 @@ class Side(Enum):
         return Side.RIGHT if self is Side.LEFT else Side.LEFT
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CameraModel:
     """How one camera projects: OpenCV's pinhole model with its distortion polynomial. The device itself is `common.camera.base.Camera`.
 

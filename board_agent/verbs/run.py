@@ -62,7 +62,7 @@ def _serve(settings: BoardSettings, signals: StopSignals) -> Summary:
         else:
             camera = open_camera(settings.camera, clock, now.monotonic_ns())
         if camera is None:
-            return Summary(session, BoardCounts(), 0, ended=False, camera=CameraHealth())
+            return Summary(session=session, counts=BoardCounts(), garbage=0, ended=False, camera=CameraHealth())
         opened.enter_context(closing(camera))
         for uri in uris:
             tell_insecure(uri)

@@ -14,7 +14,7 @@ from common.imagesize import ImageHead, ImageKind, read_head
 from common.protocol.wire import MAX_PAYLOAD_BYTES, MAX_SIZE_PX
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ImageFile:
     """An image file's bytes as they are sent, and what their header says.
 
@@ -96,9 +96,13 @@ def _parse(path: Path, data: bytes) -> ImageFile:
         raise DataError(error.problem, _REMEDY) from None
     match head.kind:
         case ImageKind.JPEG:
-            return ImageFile(PixelFormat.MJPEG, *head.size_px, data)
+            return ImageFile(
+                pixel_format=PixelFormat.MJPEG, width_px=head.width_px, height_px=head.height_px, payload=data
+            )
         case ImageKind.PNG:
-            return ImageFile(PixelFormat.PNG, *head.size_px, data)
+            return ImageFile(
+                pixel_format=PixelFormat.PNG, width_px=head.width_px, height_px=head.height_px, payload=data
+            )
         case ImageKind.PNM if data[1:2] in b"56":
             return _from_pnm(path, head, data)
         case _:
@@ -119,7 +123,7 @@ def _from_pnm(path: Path, head: ImageHead, data: bytes) -> ImageFile:
     lines = b"".join(b"\0" + body[y * row : (y + 1) * row] for y in range(height_px))  # filter type 0, PNG 1.2, 6.2
     ihdr = struct.pack(">IIBBBBB", width_px, height_px, 8 * depth, 0 if channels == 1 else 2, 0, 0, 0)
     png = b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", ihdr) + _chunk(b"IDAT", zlib.compress(lines, 1)) + _chunk(b"IEND", b"")
-    return ImageFile(PixelFormat.PNG, width_px, height_px, png)
+    return ImageFile(pixel_format=PixelFormat.PNG, width_px=width_px, height_px=height_px, payload=png)
 
 
 def _chunk(kind: bytes, body: bytes) -> bytes:

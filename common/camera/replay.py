@@ -22,7 +22,7 @@ _CACHE_BYTES: Final = 64 * 1024 * 1024
 """Files are kept in memory up to here: a tenth of a BeagleBone's RAM, and no disk delay in the measured path for short clips."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ReplaySettings:
     """What to show, and when.
 
@@ -118,9 +118,16 @@ class ReplayCamera:
         first = self._check_alike()
         self._period_ns = self._step // self._rate
         name = Path(settings.path).name
-        size = (first.width_px, first.height_px, first.pixel_format)
         steering = Steering.GRID if settings.pacing is Pacing.CLOCK else Steering.NONE
-        self.description = CameraDescription(f"replay {name}", *size, self._period_ns, settings.pacing, steering)
+        self.description = CameraDescription(
+            name=f"replay {name}",
+            width_px=first.width_px,
+            height_px=first.height_px,
+            pixel_format=first.pixel_format,
+            period_ns=self._period_ns,
+            pacing=settings.pacing,
+            steering=steering,
+        )
         self._phase_ns = settings.phase_ns
         strides = _STRIDES if settings.pacing is Pacing.CLOCK else ()
         self.offers = Offers(tuple(self._period_ns * stride for stride in strides))
@@ -211,7 +218,14 @@ class ReplayCamera:
         exposed = Stamp(self._time_of(index), self._settings.clock)
         grabbed = Stamp(now_ns, self._settings.clock)
         return Frame(
-            sequence, exposed, grabbed, image.width_px, image.height_px, image.pixel_format, None, image.payload
+            sequence=sequence,
+            exposed=exposed,
+            grabbed=grabbed,
+            width_px=image.width_px,
+            height_px=image.height_px,
+            pixel_format=image.pixel_format,
+            exposure_ns=None,
+            payload=image.payload,
         )
 
     def _time_of(self, index: int) -> int:

@@ -37,4 +37,4 @@ def replay_settings(uri: str, path: str, options: Mapping[str, str], clock: str)
         raise SettingsError(f"camera {uri!r} has fps={options.get('fps')}", "give a rate between 0.01 and 1000")
     if phase_ns and pacing is Pacing.DEMAND:
         raise SettingsError(f"camera {uri!r} has phase_ms and pace=demand", "leave one out: demand knows no clock")
-    return ReplaySettings(path, fps, loop, pacing, clock, phase_ns)
+    return ReplaySettings(path=path, fps=fps, loop=loop, pacing=pacing, clock=clock, phase_ns=phase_ns)

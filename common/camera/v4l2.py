@@ -90,7 +90,13 @@ class V4l2Camera:
             wanted = Wanted(stream.choice.size_px, settings.wanted.fps, stream.choice.pixel_format)
             self._settings = replace(settings, wanted=wanted)
             self.description = CameraDescription(
-                stream.name, width_px, height_px, stream.pixel_format, stream.period_ns, Pacing.CLOCK, Steering.RESTART
+                name=stream.name,
+                width_px=width_px,
+                height_px=height_px,
+                pixel_format=stream.pixel_format,
+                period_ns=stream.period_ns,
+                pacing=Pacing.CLOCK,
+                steering=Steering.RESTART,
             )
             self._rates_hz = {stream.period_ns: settings.wanted.fps}
             self._rates_hz |= {int(1_000_000_000 / rate_hz): rate_hz for rate_hz in stream.slower_hz}

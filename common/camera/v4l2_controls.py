@@ -28,7 +28,7 @@ class Axis(Enum):
     FOCUS = "focus"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Control:
     """One control of a camera, as its driver describes it.
 

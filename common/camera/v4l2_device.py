@@ -47,7 +47,7 @@ class Identity:
         return self.capabilities & wanted == wanted
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PixelFormatSet:
     """What the driver made of a format.
 
@@ -223,7 +223,12 @@ class Device:
         ioctl(self.fd, shape.s_fmt, item)
         pix = item.pix
         row_bytes, size_px = int(pix.bytesperline), (int(pix.width), int(pix.height))
-        return PixelFormatSet(abi.fourcc_name(pix.pixelformat), size_px, row_bytes, int(pix.sizeimage))
+        return PixelFormatSet(
+            letters=abi.fourcc_name(pix.pixelformat),
+            size_px=size_px,
+            row_bytes=row_bytes,
+            image_bytes=int(pix.sizeimage),
+        )
 
     def set_rate(self, rate_hz: Fraction) -> Fraction | None:
         """Set the frame rate, Hz, and give what the driver made of it; None where it does not tell."""
@@ -246,9 +251,20 @@ class Device:
         query = abi.ControlQuery(id=abi.CTRL_FLAG_NEXT_CTRL)
         while len(found) < _MOST_ITEMS and self._enumerate(abi.QUERY_EXT_CTRL, query):
             if query.type != abi.CTRL_TYPE_CTRL_CLASS and not query.flags & abi.CTRL_FLAG_DISABLED:
-                limits = (query.minimum, query.maximum, query.step, query.default_value)
                 menu = tuple(self._menu(query)) if query.type == abi.CTRL_TYPE_MENU else ()
-                found.append(Control(query.id, _text(query.name), query.type, *limits, query.flags, menu))
+                found.append(
+                    Control(
+                        id=query.id,
+                        name=_text(query.name),
+                        kind=query.type,
+                        minimum=query.minimum,
+                        maximum=query.maximum,
+                        step=query.step,
+                        default=query.default_value,
+                        flags=query.flags,
+                        menu=menu,
+                    )
+                )
             query.id |= abi.CTRL_FLAG_NEXT_CTRL
         return tuple(found)
 

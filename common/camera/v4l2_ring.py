@@ -13,7 +13,7 @@ RING_BUFFERS: Final = 4
 """Least that never starves a driver: one is being filled, one is next, one is read here, one spare for a late reader. DESIGN's issue asks for 4."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Filled:
     """A buffer that the driver has filled; it must be given back.
 
@@ -88,7 +88,13 @@ class Ring:
         except BlockingIOError:
             return None
         stamp_ns = buffer.seconds * 1_000_000_000 + buffer.microseconds * 1000
-        return Filled(buffer.index, buffer.bytesused, buffer.flags, stamp_ns, buffer.sequence)
+        return Filled(
+            index=buffer.index,
+            used_bytes=buffer.bytesused,
+            flags=buffer.flags,
+            stamp_ns=stamp_ns,
+            sequence=buffer.sequence,
+        )
 
     def give_back(self, index: int) -> None:
         """Let the driver fill a buffer again."""

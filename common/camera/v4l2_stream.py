@@ -284,14 +284,14 @@ class Stream:
         exposed = Stamp(self._exposed_ns(filled, grabbed_ns), clock)
         width_px, height_px = self.choice.size_px
         return Frame(
-            sequence,
-            exposed,
-            Stamp(grabbed_ns, clock),
-            width_px,
-            height_px,
-            self._packing.sent_as,
-            self.controls.exposure_ns,
-            payload,
+            sequence=sequence,
+            exposed=exposed,
+            grabbed=Stamp(grabbed_ns, clock),
+            width_px=width_px,
+            height_px=height_px,
+            pixel_format=self._packing.sent_as,
+            exposure_ns=self.controls.exposure_ns,
+            payload=payload,
         )
 
     def _fault(self, filled: Filled, view: memoryview) -> FrameFault | None:

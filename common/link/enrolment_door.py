@@ -44,7 +44,7 @@ _LAST_PORT: Final = 65535
 CONTROL_PREFIX: Final = "pairing-"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DoorState:
     """What `board-agent pair` is told.
 
@@ -85,7 +85,10 @@ class DoorState:
             raise ProtocolError("that is no state of a door", "update the board's programs")
         if not all(value.isprintable() for value in fields if isinstance(value, str)):
             raise ProtocolError("a state of a door would command a terminal", "look at who runs the board's service")
-        return DoorState(*fields)
+        address, code, asking, paired, failed, *problem = fields
+        return DoorState(
+            address=address, code=code, asking=asking, paired=paired, failed=failed, problem="".join(problem)
+        )
 
 
 class Door:
@@ -116,7 +119,9 @@ class Door:
         self._bind_control(keys.path / f"{CONTROL_PREFIX}{clean_name(_as_given(links[0]).removeprefix('tcp://'))}")
         self._is_open = False
         self._owner_until_ns = 0
-        self._state = self._before = DoorState(", ".join(map(_as_given, links)), "", "", "", 0)
+        self._state = self._before = DoorState(
+            address=", ".join(map(_as_given, links)), code="", asking="", paired="", failed=0
+        )
         self._told_code = -1
         self._askers, self._strangers, self._troubles = Seldom(), Seldom(), Seldom()
         self.due_ns = 0
@@ -217,7 +222,7 @@ class Door:
 
     def _take_in(self, host: Identity, address: str) -> bool:
         try:
-            peer = self._keys.add(Peer(host.name, z85.encode(host.key).decode(), now.wall_time()))
+            peer = self._keys.add(Peer(name=host.name, key=z85.encode(host.key).decode(), added=now.wall_time()))
         except TandemError as error:
             _LOG.error(event("pairing_not_kept", host=clean_name(host.name), problem=error))
             return False

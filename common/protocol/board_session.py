@@ -190,7 +190,7 @@ class BoardSession:
         host.heard(connection, now_ns)
         match message:
             case Ping(wave, t0_ns):
-                return [Outgoing(connection, Pong(wave, t0_ns, now_ns, now_ns))]
+                return [Outgoing(connection, Pong(wave=wave, t0_ns=t0_ns, t1_ns=now_ns, t2_ns=now_ns))]
             case Credit(below_index):
                 host.below_index = max(host.below_index, below_index)
                 return []
@@ -252,9 +252,18 @@ class BoardSession:
         """
         assert self._host is not None
         assert self._host.frames is not None
-        marks = BoardMarks(frame.exposed.ns, frame.grabbed.ns, frame.grabbed.ns)
-        size = (frame.width_px, frame.height_px, frame.pixel_format)
-        message = FrameMessage(self.session, self._sent, frame.sequence, *size, frame.exposure_ns, marks, frame.payload)
+        marks = BoardMarks(exposed_ns=frame.exposed.ns, grabbed_ns=frame.grabbed.ns, sent_ns=frame.grabbed.ns)
+        message = FrameMessage(
+            session=self.session,
+            sent_index=self._sent,
+            sequence=frame.sequence,
+            width_px=frame.width_px,
+            height_px=frame.height_px,
+            pixel_format=frame.pixel_format,
+            exposure_ns=frame.exposure_ns,
+            marks=marks,
+            payload=frame.payload,
+        )
         return Outgoing(self._host.frames, message)
 
     def sent(self, now_ns: int) -> None:
@@ -323,5 +332,7 @@ class BoardSession:
             host.frames = connection
         else:
             host.controls[connection[0]] = connection
-        told = BoardHello(self.session, self._boot_id, self._camera, counts, self._rung)
+        told = BoardHello(
+            session=self.session, boot_id=self._boot_id, camera=self._camera, counts=counts, rung=self._rung
+        )
         return [Outgoing(connection, told)]

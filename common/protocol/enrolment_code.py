@@ -95,7 +95,9 @@ def new_code(chance: Callable[[int], bytes]) -> int:
 class _Proof:
     """One side's part in an attempt: its commitments, and the check of the other's."""
 
-    def __init__(self, side: Side, host: Identity, board: Identity, code: int, chance: Callable[[int], bytes]) -> None:
+    def __init__(
+        self, *, side: Side, host: Identity, board: Identity, code: int, chance: Callable[[int], bytes]
+    ) -> None:
         self._side = side
         self._other = Side.BOARD if side is Side.HOST else Side.HOST
         self._context = _context(host, board)
@@ -160,7 +162,7 @@ class Asking:
     def begin(self, code: int) -> Begin:
         """Begin the proof, with what was typed; only after `Shown` has come, be it over another connection."""
         assert self.board is not None
-        self._proof = _Proof(Side.HOST, self._host, self.board, code, self._chance)
+        self._proof = _Proof(side=Side.HOST, host=self._host, board=self.board, code=code, chance=self._chance)
         self._expects = Commit
         return Begin(self._host, self._proof.commit().commitment)
 
@@ -310,7 +312,7 @@ class Desk:
         if isinstance(word, Ask):
             self._code_until_ns = now_ns + CODE_LIFE_NS
             return [ShowCode(code, word.host.name), Say(connection, Shown(self._board))]
-        proof = _Proof(Side.BOARD, word.host, self._board, code, self._chance)
+        proof = _Proof(side=Side.BOARD, host=word.host, board=self._board, code=code, chance=self._chance)
         proof.keep(Commit(0, word.commitment))
         self._attempt = _Attempt(connection, word.host, proof, now_ns + PROOF_NS)
         return [Say(connection, proof.commit())]

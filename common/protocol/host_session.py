@@ -387,7 +387,7 @@ class HostSession:
             return [Counted(hello.counts, ended=False, lost=lost)]
         self._carrier, self._pending, self._streams = path, False, True
         stream.hello, stream.changes = hello, hello.rung.changes
-        return [Accepted(hello, resumed, lost, path.link)]
+        return [Accepted(hello=hello, resumed=resumed, lost=lost, link=path.link)]
 
     def _take_frame(self, path: HostPath, frame: FrameMessage, now_ns: int) -> list[Output]:
         stream = self._stream

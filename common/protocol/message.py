@@ -63,7 +63,7 @@ class BoardCounts:
     dropped: tuple[tuple[DropReason, int], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CameraDescription:
     """What a host must know of the board's camera.
 
@@ -91,7 +91,7 @@ class CameraDescription:
         return self.pacing is Pacing.DEMAND or self.steering is Steering.GRID
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Rung:
     """How far the board has lowered what its camera gives, so that the link carries it.
 
@@ -122,7 +122,7 @@ class HostHello:
     lane: Lane
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BoardHello:
     """Board: accepted. Frames will be numbered from `counts.sent` on."""
 
@@ -158,7 +158,7 @@ class Credit:
     below_index: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FrameMessage:
     """Board: one frame. Marks are on the board's clock."""
 
@@ -181,7 +181,7 @@ class Ping:
     t0_ns: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Pong:
     """Board: the echo; `t1_ns` on arrival, `t2_ns` just before sending, both on the board's clock."""
 

@@ -46,7 +46,7 @@ _MOST_REMEMBERED: Final = 4096
 _NUMBERS: Final = 1 << 16
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class _UnderWay:
     """A unit that was written, with the state of delivery at that moment."""
 
@@ -136,9 +136,19 @@ class Window:
         if alone:
             self._first_sent_ns = self._delivered_ns = self._progress_ns = now_ns
         self._under_way_bytes += size_bytes
-        state = (self._delivered_bytes, self._delivered_ns, self._first_sent_ns)
         starved = self._delivered_bytes < self._starved_until_bytes
-        self._under_way.append(_UnderWay(number, size_bytes, now_ns, *state, alone, starved))
+        self._under_way.append(
+            _UnderWay(
+                number=number,
+                size_bytes=size_bytes,
+                sent_ns=now_ns,
+                delivered_bytes=self._delivered_bytes,
+                delivered_ns=self._delivered_ns,
+                first_sent_ns=self._first_sent_ns,
+                alone=alone,
+                starved=starved,
+            )
+        )
         if len(self._under_way) > _MOST_REMEMBERED:
             self._forget(self._under_way.popleft())
 

@@ -43,7 +43,7 @@ class Outgoing:
     message: Message
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Accepted:
     """Host: the board sends its frames over that link from now on.
 
@@ -110,7 +110,7 @@ class Stale:
     reason: StaleReason
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Echo:
     """Host: one clock echo. t0, t3 on the host's clock, t1, t2 on the board's; ns. Waves are numbered for each link."""
 

@@ -135,7 +135,7 @@ class Waves:
         return [] if swift and ping is not None else self._given(), ping
 
     def _echo(self, pong: Pong, now_ns: int) -> Echo:
-        return Echo(pong.wave, pong.t0_ns, pong.t1_ns, pong.t2_ns, now_ns, self._link)
+        return Echo(wave=pong.wave, t0_ns=pong.t0_ns, t1_ns=pong.t1_ns, t2_ns=pong.t2_ns, t3_ns=now_ns, link=self._link)
 
     def _given(self) -> list[Echo]:
         echoes, self._kept = self._kept, []

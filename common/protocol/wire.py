@@ -207,7 +207,7 @@ def _fields(message: Message) -> list[Any]:  # noqa: C901, PLR0911, PLR0912 - on
     match message:
         case HostHello(host_id, lane):
             return [host_id, lane.value]
-        case BoardHello(session, boot_id, camera, counts, rung):
+        case BoardHello(session=session, boot_id=boot_id, camera=camera, counts=counts, rung=rung):
             return [session, boot_id, *_camera_fields(camera), *_counts_fields(counts), *_rung_fields(rung)]
         case Knock(lane, session):
             return [lane.value, session]
@@ -223,7 +223,7 @@ def _fields(message: Message) -> list[Any]:  # noqa: C901, PLR0911, PLR0912 - on
         case Ping(wave, t0_ns):
             # As long as its answer: on a serial line 18 bytes more one way would make the clock wrong by 0.14 ms (640 kbit/s).
             return [wave, _NS, _NS, t0_ns]
-        case Pong(wave, t0_ns, t1_ns, t2_ns):
+        case Pong(wave=wave, t0_ns=t0_ns, t1_ns=t1_ns, t2_ns=t2_ns):
             return [wave, t0_ns, t1_ns, t2_ns]
         case Status(session, counts, rung):
             return [session, *_counts_fields(counts), *_rung_fields(rung)]
@@ -274,13 +274,19 @@ def _read(kind: type, reader: "_Reader") -> Message:  # noqa: PLR0911 - one line
         )  # filling in the middle
         return Ping(wave, t0_ns)
     if kind is Pong:
-        return Pong(reader.count(), reader.time_ns(), reader.time_ns(), reader.time_ns())
+        return Pong(wave=reader.count(), t0_ns=reader.time_ns(), t1_ns=reader.time_ns(), t2_ns=reader.time_ns())
     if kind is Credit:
         return Credit(reader.count())
     if kind is HostHello:
         return HostHello(reader.text(), reader.enum(Lane))
     if kind is BoardHello:
-        return BoardHello(reader.text(), reader.text(), reader.camera(), reader.counts(), reader.rung())
+        return BoardHello(
+            session=reader.text(),
+            boot_id=reader.text(),
+            camera=reader.camera(),
+            counts=reader.counts(),
+            rung=reader.rung(),
+        )
     if kind is Knock:
         return Knock(reader.enum(Lane), reader.text())
     if kind is Refusal:
@@ -312,10 +318,20 @@ def _read_frame(items: list[Any], payload: Buffer) -> FrameMessage:
         value = numbers[at]
         if (type(value) is not int or not low <= value <= high) and not (at == _EXPOSURE_AT and value is None):
             raise _bad(f"a frame's number {at} is no integer in {low}..{high}")
-    sent_index, sequence, width_px, height_px, encoding, exposure_ns, *times_ns = numbers
-    marks = BoardMarks(*times_ns)
+    sent_index, sequence, width_px, height_px, encoding, exposure_ns, exposed_ns, grabbed_ns, sent_ns = numbers
+    marks = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=grabbed_ns, sent_ns=sent_ns)
     pixel_format = _PIXEL_FORMATS[encoding]
-    return FrameMessage(session, sent_index, sequence, width_px, height_px, pixel_format, exposure_ns, marks, payload)
+    return FrameMessage(
+        session=session,
+        sent_index=sent_index,
+        sequence=sequence,
+        width_px=width_px,
+        height_px=height_px,
+        pixel_format=pixel_format,
+        exposure_ns=exposure_ns,
+        marks=marks,
+        payload=payload,
+    )
 
 
 class _Reader:
@@ -360,13 +376,13 @@ class _Reader:
     def camera(self) -> CameraDescription:
         name, width_px, height_px = self.text(), self.size_px(), self.size_px()
         return CameraDescription(
-            name,
-            width_px,
-            height_px,
-            self.choice(_PIXEL_FORMATS),
-            self._integer(1, _MAX_PERIOD_NS),
-            self.enum(Pacing),
-            self.enum(Steering),
+            name=name,
+            width_px=width_px,
+            height_px=height_px,
+            pixel_format=self.choice(_PIXEL_FORMATS),
+            period_ns=self._integer(1, _MAX_PERIOD_NS),
+            pacing=self.enum(Pacing),
+            steering=self.enum(Steering),
         )
 
     def counts(self) -> BoardCounts:
@@ -380,8 +396,16 @@ class _Reader:
 
     def rung(self) -> Rung:
         index, last, changes, period_ns = self.count(), self.count(), self.count(), self._integer(1, _MAX_PERIOD_NS)
-        size = [self.count(), self._integer(0, MAX_SIZE_PX), self._integer(0, MAX_SIZE_PX)]
-        return Rung(index, last, changes, period_ns, *size)
+        quality, width_px, height_px = self.count(), self._integer(0, MAX_SIZE_PX), self._integer(0, MAX_SIZE_PX)
+        return Rung(
+            index=index,
+            last=last,
+            changes=changes,
+            period_ns=period_ns,
+            quality=quality,
+            width_px=width_px,
+            height_px=height_px,
+        )
 
     def _next(self) -> Any:  # noqa: ANN401 - whatever msgpack found; every caller checks it
         if self._at >= len(self._items):

@@ -73,7 +73,7 @@ class Checked:
     queues: Figures | Unknown
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Errors:
     """How far predictions were from measurements, relative, 0 = not at all; NaN without predictions. Runs of a few pairs are left out.
 
@@ -191,10 +191,17 @@ def typical_and_slow(result: CaseResult) -> tuple[int, int]:
 def _errors(runs: Sequence[tuple[Checked, Figures | Unknown]]) -> Errors:
     pairs = [(one.measured, said) for one, said in runs if isinstance(said, Figures) and one.pairs >= _ENOUGH_PAIRS]
     if not pairs:
-        return Errors(0, *[float("nan")] * 4)
+        none = float("nan")
+        return Errors(runs=0, rate=none, worst_rate=none, end_to_end=none, worst_end_to_end=none)
     rate = np.abs([said.pairs_per_s / seen.pairs_per_s - 1.0 for seen, said in pairs])
     delay = np.abs([said.end_to_end_p50_ns / seen.end_to_end_p50_ns - 1.0 for seen, said in pairs])
-    return Errors(len(pairs), float(np.median(rate)), float(rate.max()), float(np.median(delay)), float(delay.max()))
+    return Errors(
+        runs=len(pairs),
+        rate=float(np.median(rate)),
+        worst_rate=float(rate.max()),
+        end_to_end=float(np.median(delay)),
+        worst_end_to_end=float(delay.max()),
+    )
 
 
 def _cell(result: CaseResult, fifo: FifoSettings) -> Cell:

@@ -118,7 +118,7 @@ class Predicted:
 
 
 def serve(
-    queued_ns: Values, service_ns: Values, depth: int, overflow: Overflow, wake_ns: Values | None = None
+    *, queued_ns: Values, service_ns: Values, depth: int, overflow: Overflow, wake_ns: Values | None = None
 ) -> Served:
     """Run one worker behind one bounded FIFO.
 
@@ -198,7 +198,9 @@ def predict(setting: Setting, frames: int, random: np.random.Generator) -> Predi
         index += 1
     chosen = np.array(sent)
     fifo = setting.fifo
-    served = serve(queued_ns[chosen], service_ns, fifo.depth, fifo.overflow, wake_ns)
+    served = serve(
+        queued_ns=queued_ns[chosen], service_ns=service_ns, depth=fifo.depth, overflow=fifo.overflow, wake_ns=wake_ns
+    )
     # What is taken after the last arrival was not pushed out because nothing followed: the stream goes on in truth.
     done = np.flatnonzero(served.start_ns <= queued_ns[chosen[-1]])
     pair = chosen[done]

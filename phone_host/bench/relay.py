@@ -37,7 +37,7 @@ _DIAL_AGAIN_NS: Final = 100_000_000
 """While the board is not there, connections of the host wait unaccepted: one that were taken and closed would look to it like a peer that hangs up."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RelayAccount:
     """What a relay says at its end.
 
@@ -125,7 +125,13 @@ class Relay:
             self._to_host.lost_bytes + self._to_board.lost_bytes,
             self._to_host.stalls + self._to_board.stalls,
         )
-        return RelayAccount(moved[0], moved[1], lost, stalls, used.ru_utime + used.ru_stime)
+        return RelayAccount(
+            to_host_bytes=moved[0],
+            to_board_bytes=moved[1],
+            lost_bytes=lost,
+            stalls=stalls,
+            cpu_s=used.ru_utime + used.ru_stime,
+        )
 
     def _step(self, wake: socket.socket) -> None:
         # An end whose peer is not being read feels it by not being read itself.

@@ -20,7 +20,7 @@ from phone_host.sync.fifo import FifoSettings
 PERCENTILES: Final = ("p50", "p95", "p99", "max")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Conditions:
     """Under what the figures were measured.
 
@@ -46,12 +46,12 @@ def conditions(settings: RunSettings, not_run: Sequence[tuple[Interface, str]]) 
     versions = f"Python {platform.python_version()}, pyzmq {zmq.pyzmq_version()}, libzmq {zmq.zmq_version()}"
     system = f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}"
     return Conditions(
-        f"{system}, {versions}",
-        now.wall_time(),
-        settings.matcher.value,
-        settings.fifo,
-        settings.seconds,
-        tuple(not_run),
+        machine=f"{system}, {versions}",
+        date=now.wall_time(),
+        matcher=settings.matcher.value,
+        fifo=settings.fifo,
+        seconds=settings.seconds,
+        not_run=tuple(not_run),
     )
 
 

@@ -45,7 +45,7 @@ PATIENCE_NS: Final = 15_000_000_000
 """For the board process to come up and the first pair to be done, on a small and busy machine."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CaseResult:
     """One measured combination.
 
@@ -102,7 +102,7 @@ def rig_of(size: Size) -> Rig:
     focal_px = float(full.left.matrix[0, 0]) * size.width_px / full.left.width_px
     centre_px = ((size.width_px - 1) / 2, (size.height_px - 1) / 2)
     matrix = np.array([[focal_px, 0.0, centre_px[0]], [0.0, focal_px, centre_px[1]], [0.0, 0.0, 1.0]])
-    model = CameraModel(size.width_px, size.height_px, matrix, np.zeros(5))
+    model = CameraModel(width_px=size.width_px, height_px=size.height_px, matrix=matrix, distortion=np.zeros(5))
     return replace(full, left=model, right=model)
 
 
@@ -181,8 +181,19 @@ def run_case(
     estimate = run.estimate
     uncertainty_ns = float("nan") if estimate is None else float(estimate.uncertainty_ns)
     bound_ns = float("nan") if estimate is None else float(estimate.bound_ns)
-    accounts = (run.link, run.counts, run.processed, run.undecodable, relay)
-    return CaseResult(case, kept, measured_s, uncertainty_ns, bound_ns, board, *accounts)
+    return CaseResult(
+        case=case,
+        ledgers=kept,
+        measured_s=measured_s,
+        uncertainty_ns=uncertainty_ns,
+        bound_ns=bound_ns,
+        board=board,
+        link=run.link,
+        counts=run.counts,
+        processed=run.processed,
+        undecodable=run.undecodable,
+        relay=relay,
+    )
 
 
 def _finished(host: Host, ends: Ends, seconds: float, stop: Callable[[], bool]) -> Callable[[], bool]:

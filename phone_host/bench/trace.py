@@ -131,7 +131,7 @@ def _pair(
     # Propagation carries the clock estimate's error, which may exceed a delay of some µs: nothing is received before it is sent.
     for index, (kind, (start_ns, end_ns)) in enumerate(zip(_KINDS, pairwise(accumulate(marks, max)), strict=True)):
         place = {"pid": pids[kind.on_board], "tid": lanes.place(index, start_ns, end_ns)}
-        yield _slice(kind.name, start_ns - zero_ns, end_ns - start_ns, place, about)
+        yield _slice(kind.name, start_ns=start_ns - zero_ns, length_ns=end_ns - start_ns, place=place, about=about)
         if kind.name == "propagation":
             yield _flow("s", flow, start_ns - zero_ns, place)
         if kind.name == "pairing":
@@ -142,12 +142,18 @@ def _pair(
         # The last one, write, ends with processing; between the others hardly anything passes.
         begin_ns = ledger.done_ns - length_ns if stage.name == "write" else at_ns
         place = {"pid": pids[0], "tid": _tid(len(_KINDS) - 1, 0)}
-        yield _slice(stage.name, begin_ns - zero_ns, length_ns, place, {"sequence": ledger.sequence})
+        yield _slice(
+            stage.name,
+            start_ns=begin_ns - zero_ns,
+            length_ns=length_ns,
+            place=place,
+            about={"sequence": ledger.sequence},
+        )
         at_ns += length_ns
 
 
 def _slice(
-    name: str, start_ns: int, length_ns: int, place: Mapping[str, int], about: Mapping[str, object]
+    name: str, *, start_ns: int, length_ns: int, place: Mapping[str, int], about: Mapping[str, object]
 ) -> dict[str, object]:
     times = {"ts": start_ns / 1e3, "dur": length_ns / 1e3}
     return {"name": name, "cat": "delay", "ph": "X", **times, **place, "args": about}

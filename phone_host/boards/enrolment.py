@@ -93,7 +93,9 @@ class PairingCall:
         board = self._asking.board
         assert board is not None
         assert self._asking.proved
-        return self._keys.add(Peer(board.name, z85.encode(board.key).decode(), now.wall_time(), link))
+        return self._keys.add(
+            Peer(name=board.name, key=z85.encode(board.key).decode(), added=now.wall_time(), address=link)
+        )
 
     @contextmanager
     def _line(self) -> "Iterator[_Line]":

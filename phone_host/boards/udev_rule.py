@@ -22,7 +22,7 @@ _SERIAL: Final = re.compile(r"[0-9A-Za-z._:-]{1,126}")
 """126 characters are the most that a USB string descriptor holds. Without `*?[|"\\` and blanks, which udev understands in its own way (udev(7))."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class UsbBoard:
     """A board on a USB cable.
 
@@ -116,8 +116,13 @@ def _usb_device(port: Path) -> UsbBoard | None:
     """The USB device to which a port belongs; None where it belongs to none."""
     for folder in (port / "device").resolve().parents:
         if (folder / "idVendor").is_file():
-            names = ("idVendor", "idProduct", "serial", "manufacturer")
-            return UsbBoard(port.name, *(_attribute(folder / name) for name in names))
+            return UsbBoard(
+                device=port.name,
+                vendor=_attribute(folder / "idVendor"),
+                product=_attribute(folder / "idProduct"),
+                serial=_attribute(folder / "serial"),
+                manufacturer=_attribute(folder / "manufacturer"),
+            )
     return None
 
 

@@ -47,7 +47,7 @@ class BundleView:
     right_px: Vector
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class BundleState:
     """All that is estimated.
 
@@ -66,7 +66,7 @@ class BundleState:
     poses: Vector
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class BundleResult:
     """The optimum and how sure it is.
 
@@ -131,7 +131,12 @@ def adjust(
     direction = np.zeros(_GLOBALS)
     direction[_RIG.stop - 3 :] = state.translation_m / np.linalg.norm(state.translation_m)
     variance = float(direction[free] @ covariance @ direction[free])
-    return BundleResult(state, errors[0], errors[1], float(np.sqrt(max(variance, 0.0))))
+    return BundleResult(
+        state=state,
+        left_errors_px=errors[0],
+        right_errors_px=errors[1],
+        baseline_sigma_m=float(np.sqrt(max(variance, 0.0))),
+    )
 
 
 def project_view(state: BundleState, pose: Vector, points_m: Vector) -> tuple[Vector, Vector]:

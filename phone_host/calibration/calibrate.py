@@ -109,7 +109,10 @@ def _agreed_start(
     poses; the median over the pairs does not care how wild the wild ones are.
     """
     candidates = [_relative(a, b) for a, b in zip(left.poses, right.poses, strict=True)]
-    states = [BundleState(left.parameters, right.parameters, r, t, left.poses) for r, t in candidates]
+    states = [
+        BundleState(left=left.parameters, right=right.parameters, rotation=r, translation_m=t, poses=left.poses)
+        for r, t in candidates
+    ]
     errors = np.array(
         [
             [
@@ -176,7 +179,11 @@ def _misfits(
     usual = float(np.median(errors))
     by_error = errors / max(_OUTLIER_FACTOR * usual, _OUTLIER_FLOOR_PX)
     found = [
-        (by_error[index], index, _misfit(pairs[index], result.state, points_m, float(errors[index]), usual))
+        (
+            by_error[index],
+            index,
+            _misfit(pairs[index], result.state, points_m, error_px=float(errors[index]), usual_px=usual),
+        )
         for index in np.flatnonzero(by_error > 1)
     ]
     try:
@@ -218,7 +225,7 @@ def _grows(parameters: Vector, size_px: tuple[int, int]) -> bool:
     return bool((1 + 3 * k1 * radii**2 + 5 * k2 * radii**4 + 7 * k3 * radii**6 > 0).all())
 
 
-def _misfit(pair: BoardPair, state: BundleState, points_m: Vector, error_px: float, usual_px: float) -> Rejected:
+def _misfit(pair: BoardPair, state: BundleState, points_m: Vector, *, error_px: float, usual_px: float) -> Rejected:
     """Say why a pair does not fit: each view on its own tells whether corners jump or the board moved."""
     own = {
         side: rms_px(own_errors_px(points_m, corners_of(pair, side), parameters))
@@ -266,7 +273,7 @@ def _summed_up(
     else:
         vertical = np.array([_vertical_errors_px(pair, rig, rectification) for pair in pairs])
     used = tuple(
-        Used(pair.name, float(a), float(b), _rms(v))
+        Used(name=pair.name, left_px=float(a), right_px=float(b), vertical_px=_rms(v))
         for pair, a, b, v in zip(pairs, *result.view_rms_px(), vertical, strict=True)
     )
     return Calibration(
@@ -286,12 +293,14 @@ def _summed_up(
 
 
 def _rig(state: BundleState, sizes_px: Sizes) -> Rig:
-    left, right = (
-        CameraModel(*size, *camera_arrays(parameters))
-        for size, parameters in zip(sizes_px, (state.left, state.right), strict=True)
-    )
+    left, right = _model(sizes_px[0], state.left), _model(sizes_px[1], state.right)
     rotation = np.asarray(cv2.Rodrigues(state.rotation)[0], dtype=np.float64)
     return Rig(left, right, rotation, state.translation_m)
+
+
+def _model(size_px: tuple[int, int], parameters: Vector) -> CameraModel:
+    matrix, distortion = camera_arrays(parameters)
+    return CameraModel(width_px=size_px[0], height_px=size_px[1], matrix=matrix, distortion=distortion)
 
 
 def _alone_rms_px(pairs: list[BoardPair], side: Side, points_m: Vector, parameters: Vector) -> float:

@@ -17,7 +17,7 @@ _LONGEST_MS: Final = 10_000
 _OURS: Final = ("latency_ms", "latency_uncertainty_ms", "verify")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HttpSettings:
     """Which server, and what is known of its delay.
 
@@ -88,16 +88,16 @@ def http_settings(uri: str, clock: str) -> HttpSettings:
             "give both, or neither and measure the time offset: phone-host calibrate-time",
         )
     return HttpSettings(
-        secure,
-        host,
-        port or (443 if secure else 80),
-        target + (f"?{theirs}" if theirs else ""),
-        user,
-        password,
-        _time(uri, ours, "latency_ms"),
-        _time(uri, ours, "latency_uncertainty_ms"),
-        _truth(uri, ours.get("verify", "1")),
-        clock,
+        secure=secure,
+        host=host,
+        port=port or (443 if secure else 80),
+        target=target + (f"?{theirs}" if theirs else ""),
+        user=user,
+        password=password,
+        latency_ns=_time(uri, ours, "latency_ms"),
+        latency_uncertainty_ns=_time(uri, ours, "latency_uncertainty_ms"),
+        verify=_truth(uri, ours.get("verify", "1")),
+        clock=clock,
     )
 
 

@@ -91,7 +91,12 @@ class HttpCamera:
             self.close()
             raise
         self.description = CameraDescription(
-            f"mjpeg {settings.host}", *self._asked_px, PixelFormat.MJPEG, period_ns, Pacing.CLOCK
+            name=f"mjpeg {settings.host}",
+            width_px=self._asked_px[0],
+            height_px=self._asked_px[1],
+            pixel_format=PixelFormat.MJPEG,
+            period_ns=period_ns,
+            pacing=Pacing.CLOCK,
         )
         size = size_text(self._asked_px)
         latency = "unknown" if settings.latency_ns is None else f"{settings.latency_ns / 1e6:g}"
@@ -331,7 +336,16 @@ class HttpCamera:
             clock = self._settings.clock
             exposed = Stamp(image.began_ns - (self._settings.latency_ns or 0), clock)
             grabbed = Stamp(image.ended_ns, clock)
-            frame = Frame(sequence, exposed, grabbed, *size_px, PixelFormat.MJPEG, None, image.payload)
+            frame = Frame(
+                sequence=sequence,
+                exposed=exposed,
+                grabbed=grabbed,
+                width_px=image.width_px,
+                height_px=image.height_px,
+                pixel_format=PixelFormat.MJPEG,
+                exposure_ns=None,
+                payload=image.payload,
+            )
             self._replace_waiting()
             self._add(frame)
 

@@ -39,7 +39,7 @@ _CHECK_EVERY: Final = 15
 _BOARD_PATIENCE_NS: Final = 10_000_000_000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CheckedPair:
     """One pair kept for the comparison with the truth.
 
@@ -56,7 +56,7 @@ class CheckedPair:
     right_index: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DepthErrors:
     """How far the measured depth is from the truth, over all checked pairs and all pixels that both cameras see.
 
@@ -157,7 +157,9 @@ class DemoRun:
             depths.append(exact.depth_m[exact.visible])
             measured.append(pair.processed.cloud[..., 2][exact.visible])
         wrong = sum(pair.left_index != pair.right_index for pair in self._checked)
-        return _errors(len(self._checked), wrong, disparity_errors, depths, measured)
+        return _errors(
+            pairs=len(self._checked), wrong=wrong, disparity_errors=disparity_errors, depths=depths, measured=measured
+        )
 
     def write_pictures(self, out: Path) -> None:
         """Write cloud.ply and disparity.png of the newest kept pair.
@@ -178,9 +180,14 @@ class DemoRun:
         self.ledgers.append(ledger)
         if (len(self.ledgers) - 1) % _CHECK_EVERY:
             return
-            # The board's stamp is known on this clock to some 50 us; the images are 1 / 15 s apart.
-        indices = (self._film.index_at(ledger.board.exposed_ns), self._film.index_at(ledger.host.exposed_ns))
-        self._checked.append(CheckedPair(processed, ledger, *indices))
+        # The board's stamp is known on this clock to some 50 us; the images are 1 / 15 s apart.
+        left_index, right_index = (
+            self._film.index_at(ledger.board.exposed_ns),
+            self._film.index_at(ledger.host.exposed_ns),
+        )
+        self._checked.append(
+            CheckedPair(processed=processed, ledger=ledger, left_index=left_index, right_index=right_index)
+        )
         if len(self._checked) > _CHECKED_PAIRS:
             del self._checked[0]
 
@@ -195,11 +202,23 @@ def truth_json(errors: DepthErrors) -> dict[str, float | int | None]:
 
 
 def _errors(
-    pairs: int, wrong: int, disparity_errors: list[np.ndarray], depths: list[np.ndarray], measured: list[np.ndarray]
+    *, pairs: int, wrong: int, disparity_errors: list[np.ndarray], depths: list[np.ndarray], measured: list[np.ndarray]
 ) -> DepthErrors:
     nan = float("nan")
     if not pairs:
-        return DepthErrors(0, 0, nan, nan, nan, nan, nan, nan, nan, nan, wrong)
+        return DepthErrors(
+            pairs=0,
+            pixels=0,
+            density=nan,
+            disparity_px=nan,
+            outliers=nan,
+            depth_mm=nan,
+            depth_p95_mm=nan,
+            depth_percent=nan,
+            at_1_m_mm=nan,
+            at_2_m_mm=nan,
+            wrong_pairs=wrong,
+        )
     off_px, depth_m, measured_m = (np.concatenate(part) for part in (disparity_errors, depths, measured))
     found = np.isfinite(measured_m)
     off_px, depth_m, off_mm = np.abs(off_px[found]), depth_m[found], np.abs(measured_m[found] - depth_m[found]) * 1000

@@ -189,7 +189,12 @@ class _Reader:
         if min(distortion.shape) != 1 or distortion.size not in _DISTORTION_LENGTHS:
             lengths = ", ".join(map(str, _DISTORTION_LENGTHS))
             raise self.problem(distortion_key, f"has {distortion.size} values", f"OpenCV's models have {lengths}")
-        return CameraModel(self.size(width_key), self.size(height_key), matrix, distortion.reshape(-1))
+        return CameraModel(
+            width_px=self.size(width_key),
+            height_px=self.size(height_key),
+            matrix=matrix,
+            distortion=distortion.reshape(-1),
+        )
 
     def size(self, key: str) -> int:
         """An image's width or height."""

@@ -91,7 +91,7 @@ class Ledgerer:
             time_skew_ns=pair.time_skew_ns,
             offset_ns=board.offset_ns,
             uncertainty_ns=board.uncertainty_ns,
-            host=HostMarks(pair.host.exposed.ns, pair.host.grabbed.ns),
+            host=HostMarks(exposed_ns=pair.host.exposed.ns, grabbed_ns=pair.host.grabbed.ns),
         )
         with self._lock:
             self._delays.add(ledger)

@@ -29,7 +29,7 @@ FOCAL_PX = 525.0
 def matched_rig() -> Rig:
     """Two ideal pinhole cameras of 640x480, f = 525 px, 100 mm apart, already rectified: for accuracy tests."""
     matrix = np.array([[FOCAL_PX, 0.0, 319.5], [0.0, FOCAL_PX, 239.5], [0.0, 0.0, 1.0]])
-    model = CameraModel(640, 480, matrix, np.zeros(5))
+    model = CameraModel(width_px=640, height_px=480, matrix=matrix, distortion=np.zeros(5))
     return Rig(model, model, np.eye(3), np.array([-BASELINE_M, 0.0, 0.0]))
 
 
@@ -44,16 +44,16 @@ def unlike_rig() -> Rig:
     The phone is turned by about 1.5 degrees and stands 100 mm to the right, a little higher and farther back.
     """
     webcam = CameraModel(
-        640,
-        480,
-        np.array([[525.0, 0.0, 316.8], [0.0, 526.2, 243.1], [0.0, 0.0, 1.0]]),
-        np.array([-0.24, 0.085, 0.0006, -0.0004, -0.012]),
+        width_px=640,
+        height_px=480,
+        matrix=np.array([[525.0, 0.0, 316.8], [0.0, 526.2, 243.1], [0.0, 0.0, 1.0]]),
+        distortion=np.array([-0.24, 0.085, 0.0006, -0.0004, -0.012]),
     )
     phone = CameraModel(
-        800,
-        600,
-        np.array([[702.5, 0.0, 404.6], [0.0, 701.1, 296.2], [0.0, 0.0, 1.0]]),
-        np.array([0.065, -0.14, -0.0005, 0.0007, 0.05]),
+        width_px=800,
+        height_px=600,
+        matrix=np.array([[702.5, 0.0, 404.6], [0.0, 701.1, 296.2], [0.0, 0.0, 1.0]]),
+        distortion=np.array([0.065, -0.14, -0.0005, 0.0007, 0.05]),
     )
     turn = rotation((0.3, 1.0, 0.45), math.radians(-1.5))
     centre = np.array([0.0998, -0.004, -0.005])

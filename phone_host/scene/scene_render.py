@@ -106,7 +106,7 @@ class Renderer:
             rays, depth = self._rays[:, at], hits.depth[at]
             points = self._centre[:, None] + depth * rays
             normals = surface_normals(bodies[index], points, -rays)
-            reflectance[:, at] = self._reflectance(bodies[index], depth, rays, normals, at)
+            reflectance[:, at] = self._reflectance(bodies[index], depth=depth, rays=rays, normals=normals, pixels=at)
             levels[at] = self._develop(reflectance[:, at] * self._light(bodies[index], still, points, normals), at)
         self._smooth_edges(still, hits.surface, None, levels)
         return _Still(hits, reflectance, levels)
@@ -148,7 +148,7 @@ class Renderer:
             points = self._centre[:, None] + depth * rays
             normals = surface_normals(bodies[index], points, -rays)
             if index in self._moving:
-                reflectance = self._reflectance(bodies[index], depth, rays, normals, at)
+                reflectance = self._reflectance(bodies[index], depth=depth, rays=rays, normals=normals, pixels=at)
             else:
                 reflectance = self._still.reflectance[:, at]
             levels[at] = self._develop(reflectance * self._light(bodies[index], bodies, points, normals), at)
@@ -162,7 +162,7 @@ class Renderer:
         )
         return surface_light(self._scene.light, casters, points, normals)
 
-    def _reflectance(self, body: Body, depth: Floats, rays: Floats, normals: Floats, pixels: Flat) -> Floats:
+    def _reflectance(self, body: Body, *, depth: Floats, rays: Floats, normals: Floats, pixels: Flat) -> Floats:
         """Reflectance (3, N) as a pixel averages it.
 
         A pixel's footprint on a slanted surface is long and narrow. A round filter as wide as it is long would wash a table

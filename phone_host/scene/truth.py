@@ -17,7 +17,7 @@ from phone_host.scene.scene_model import Floats, Pose, RectifiedView, Scene
 _SAME_POINT = 1e-9
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Truth:
     """Truth per pixel of the rectified left image, (H, W) each.
 
@@ -59,9 +59,9 @@ def rectified_cameras(view: RectifiedView) -> tuple[tuple[CameraModel, Pose], tu
     ideal = np.zeros(5)
     turn = view.R_rectified_left
     return (
-        (CameraModel(view.width_px, view.height_px, matrix, ideal), Pose(turn)),
+        (CameraModel(width_px=view.width_px, height_px=view.height_px, matrix=matrix, distortion=ideal), Pose(turn)),
         (
-            CameraModel(view.width_px, view.height_px, shifted, ideal),
+            CameraModel(width_px=view.width_px, height_px=view.height_px, matrix=shifted, distortion=ideal),
             Pose(turn, turn.T @ [geometry.baseline_m, 0.0, 0.0]),
         ),
     )
@@ -100,11 +100,11 @@ def truth(scene: Scene, view: RectifiedView, sensors: tuple[tuple[CameraModel, P
     visible[found] = clear & inside
     hidden[found] = ~clear
     return Truth(
-        depth.reshape(shape),
-        disparity.reshape(shape),
-        visible.reshape(shape),
-        hidden.reshape(shape),
-        (hits.surface // FACES).reshape(shape),
+        depth_m=depth.reshape(shape),
+        disparity_px=disparity.reshape(shape),
+        visible=visible.reshape(shape),
+        hidden=hidden.reshape(shape),
+        body=(hits.surface // FACES).reshape(shape),
     )
 
 

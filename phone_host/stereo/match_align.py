@@ -80,7 +80,7 @@ def vertical_offset_px(left: Image, right: Image, disparity: Disparity) -> float
     used = np.isfinite(disparity) & (column >= 0)
     low = offset = high = 0.0
     for _ in range(NEWTON_STEPS):
-        guesses, weights = _window_offsets(left, right, column, row + np.float32(offset), used)
+        guesses, weights = _window_offsets(left, right, column=column, row=row + np.float32(offset), used=used)
         if guesses.size < LEAST_WINDOWS:
             return 0.0
         low, offset, high = (offset + quartile for quartile in _weighted_quartiles(guesses, weights))
@@ -88,7 +88,7 @@ def vertical_offset_px(left: Image, right: Image, disparity: Disparity) -> float
 
 
 def _window_offsets(
-    left: Image, right: Image, column: NDArray[np.float32], row: NDArray[np.float32], used: NDArray[np.bool_]
+    left: Image, right: Image, *, column: NDArray[np.float32], row: NDArray[np.float32], used: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """The remaining offset of each window with texture, px, and its weight; the right image is read at (column, row)."""
     there = np.asarray(cv2.remap(right, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)

@@ -165,7 +165,7 @@ def over_time(
     y = Linear(low - edge if low < 0.0 else 0.0, high + edge, height_px - BOTTOM_PX, TOP_PX)
     parts = [axes(x, y, (width_px, height_px), "time, s")]
     if band_ns is not None:
-        parts.append(_band(time_s, band_ns, x, y, quantity.colour))
+        parts.append(_band(time_s=time_s, half_ns=band_ns, x=x, y=y, colour=quantity.colour))
     # More dots than three for every pixel add ink, not knowledge; extremes stay.
     keep = np.flatnonzero(known)
     if keep.size > 3 * width_px:
@@ -315,7 +315,7 @@ def _strip(quantity: Quantity, px: Callable[[float], float], top: float, width_p
     )
 
 
-def _band(time_s: Values, half_ns: Values, x: Linear, y: Linear, colour: int) -> str:
+def _band(*, time_s: Values, half_ns: Values, x: Linear, y: Linear, colour: int) -> str:
     known = np.flatnonzero(np.isfinite(half_ns))
     if known.size < 2:
         return ""

@@ -57,7 +57,7 @@ class Spacing:
     count: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Belief:
     """What is believed of the offset at the reference, ns, and of the skew.
 
@@ -140,7 +140,7 @@ def believe(rows: list[Allowed], spacing: Spacing, middle_ns: float, prior_skew:
         centre = (row.low_ns + row.high_ns) / 2 + shift
         offset_error = max(offset_error, centre + rest * there / 2 - offset, offset - centre + rest * back / 2)
         skew_error = max(skew_error, abs(row.skew - skew))
-    return Belief(offset, skew, offset_error, skew_error, best)
+    return Belief(offset_ns=offset, skew=skew, offset_error_ns=offset_error, skew_error=skew_error, best=best)
 
 
 def _crossing(a: Allowed, b: Allowed) -> Allowed:

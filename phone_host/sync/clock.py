@@ -69,7 +69,7 @@ class HostTime:
     bound_ns: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ClockEstimate:
     """The relation of two clocks near a moment.
 
@@ -223,16 +223,16 @@ class _Learned:
         # Low rises with the skew and high does too (all facts are past): the extremes lie at the ends.
         low_ns, high_ns = math.floor(rows[0].low_ns), math.ceil(rows[-1].high_ns)
         return ClockEstimate(
-            reference_ns,
-            origin_ns + offset_ns,
-            belief.skew,
-            belief.skew_error,
-            min(error, max(high_ns - offset_ns, offset_ns - low_ns)),
-            min(wave.round_trip_ns for wave in self.waves),
-            origin_ns + low_ns,
-            origin_ns + high_ns,
-            rows[0].skew,
-            rows[-1].skew,
+            reference_ns=reference_ns,
+            offset_ns=origin_ns + offset_ns,
+            skew=belief.skew,
+            skew_uncertainty=belief.skew_error,
+            uncertainty_ns=min(error, max(high_ns - offset_ns, offset_ns - low_ns)),
+            round_trip_ns=min(wave.round_trip_ns for wave in self.waves),
+            low_ns=origin_ns + low_ns,
+            high_ns=origin_ns + high_ns,
+            skew_low=rows[0].skew,
+            skew_high=rows[-1].skew,
         )
 
     def _first_spacing(self, rows: list[Allowed]) -> Spacing:

@@ -157,7 +157,7 @@ class Correction:
     later_ns: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Alignment:
     """What the steering has come to, for reports.
 
@@ -213,7 +213,13 @@ class PhaseController:
     @property
     def alignment(self) -> Alignment:
         """How it stands."""
-        return Alignment(self._state, self._words, self._corrections, self._before_ns, self._after_ns)
+        return Alignment(
+            state=self._state,
+            words=self._words,
+            corrections=self._corrections,
+            before_ns=self._before_ns,
+            after_ns=self._after_ns,
+        )
 
     def update(self, now_ns: int, phase: Phase | None) -> Correction | None:
         """Look at the phase; to be called a few times a second.

@@ -67,7 +67,7 @@ def send_tandemscan(job: Job) -> Tally:
             return grabs
 
     pacing = Pacing.CLOCK if job.fps else Pacing.DEMAND
-    settings = ReplaySettings(str(job.folder), Fraction(job.fps or 30), loop=True, pacing=pacing)
+    settings = ReplaySettings(path=str(job.folder), fps=Fraction(job.fps or 30), loop=True, pacing=pacing)
     camera = Metered(settings, now.monotonic_ns())
     link = _open_tcp(job.address, listens=True)
     reader, writer = socket.socketpair()

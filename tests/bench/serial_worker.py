@@ -123,7 +123,7 @@ def send_ours(device: str, frames: int, payload: bytes) -> dict[str, float]:
     poller = zmq.Poller()
     poller.register(link.pollables[0], zmq.POLLIN)
     connection, sent, ended, before = b"", 0, False, 0.0
-    marks = BoardMarks(0, 0, 0)
+    marks = BoardMarks(exposed_ns=0, grabbed_ns=0, sent_ns=0)
     while not ended:
         wait_ns = link.due_ns - now.monotonic_ns()
         poller.poll(min(1000, max(0, -(-wait_ns // 1_000_000))))
@@ -133,7 +133,17 @@ def send_ours(device: str, frames: int, payload: bytes) -> dict[str, float]:
             elif isinstance(incoming, Packet):
                 ended = True
         while connection and sent < frames and link.ready(connection):
-            message = FrameMessage("session", sent, sent, 640, 480, PixelFormat.MJPEG, None, marks, payload)
+            message = FrameMessage(
+                session="session",
+                sent_index=sent,
+                sequence=sent,
+                width_px=640,
+                height_px=480,
+                pixel_format=PixelFormat.MJPEG,
+                exposure_ns=None,
+                marks=marks,
+                payload=payload,
+            )
             header, body = encode_stamped(message, now.monotonic_ns)
             if link.send(connection, header, body) is SendResult.SENT:
                 sent += 1

@@ -100,10 +100,20 @@ def test_a_hundred_thousand_mutated_packets() -> None:
 def test_of_a_hundred_thousand_frames_with_flipped_bits_none_comes_altered() -> None:
     """Of 10^5 frames with one to eight bits flipped none comes altered, and the sound frame behind every tenth of them always comes."""
     chance, pair = random.Random(14), Pair()
-    marks = BoardMarks(10**12, 10**12 + 1, 10**12 + 2)
+    marks = BoardMarks(exposed_ns=10**12, grabbed_ns=10**12 + 1, sent_ns=10**12 + 2)
     for number in range(100_000):
         payload = chance.randbytes(chance.randrange(1, 200))
-        message = FrameMessage("s", number, number, 640, 480, PixelFormat.MJPEG, None, marks, payload)
+        message = FrameMessage(
+            session="s",
+            sent_index=number,
+            sequence=number,
+            width_px=640,
+            height_px=480,
+            pixel_format=PixelFormat.MJPEG,
+            exposure_ns=None,
+            marks=marks,
+            payload=payload,
+        )
         header, _ = encode(message)
         data = bytearray(pair.written(header, payload))
         for bit in chance.sample(range(8 * len(data)), chance.randint(1, 8)):

@@ -90,7 +90,15 @@ def _control(data: bytes) -> Control:
     ]
     menu = tuple((words[7] & 7 | k, "item") for k in range(words[8] & 3))
     return Control(
-        known[words[0] % len(known)], "name", words[1] & 7, words[2], words[3], words[4], words[5], words[6], menu
+        id=known[words[0] % len(known)],
+        name="name",
+        kind=words[1] & 7,
+        minimum=words[2],
+        maximum=words[3],
+        step=words[4],
+        default=words[5],
+        flags=words[6],
+        menu=menu,
     )
 
 

@@ -53,18 +53,35 @@ from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES, decode, en
 from common.protocol.zap import KEY_BYTES, deny, read_request
 from phone_host.sync.clock import ClockEstimator
 
-_CAMERA = CameraDescription("webcam", 640, 480, PixelFormat.MJPEG, 33_333_333, Pacing.CLOCK)
-_RUNG = Rung(2, 5, 3, 66_666_666, 50, 320, 240)
+_CAMERA = CameraDescription(
+    name="webcam",
+    width_px=640,
+    height_px=480,
+    pixel_format=PixelFormat.MJPEG,
+    period_ns=33_333_333,
+    pacing=Pacing.CLOCK,
+)
+_RUNG = Rung(index=2, last=5, changes=3, period_ns=66_666_666, quality=50, width_px=320, height_px=240)
 _COUNTS = BoardCounts(9, 5, ((DropReason.REPLACED, 3), (DropReason.NO_HOST, 1)))
-_MARKS = BoardMarks(10**12, 10**12 + 5 * 10**6, 10**12 + 6 * 10**6)
+_MARKS = BoardMarks(exposed_ns=10**12, grabbed_ns=10**12 + 5 * 10**6, sent_ns=10**12 + 6 * 10**6)
 SOUND_MESSAGES: tuple[Message, ...] = (
     HostHello("0123456789abcdef", Lane.FRAMES),
-    BoardHello("s", "boot", _CAMERA, _COUNTS, _RUNG),
+    BoardHello(session="s", boot_id="boot", camera=_CAMERA, counts=_COUNTS, rung=_RUNG),
     Knock(Lane.CONTROL, "s"),
     Credit(7),
-    FrameMessage("s", 5, 7, 640, 480, PixelFormat.MJPEG, 10**7, _MARKS, b""),
+    FrameMessage(
+        session="s",
+        sent_index=5,
+        sequence=7,
+        width_px=640,
+        height_px=480,
+        pixel_format=PixelFormat.MJPEG,
+        exposure_ns=10**7,
+        marks=_MARKS,
+        payload=b"",
+    ),
     Ping(1, 0),
-    Pong(1, 10**12, 10**12, 10**12),
+    Pong(wave=1, t0_ns=10**12, t1_ns=10**12, t2_ns=10**12),
     Status("s", _COUNTS, _RUNG),
     End("s", _COUNTS),
 )
@@ -209,7 +226,9 @@ def session(data: bytes) -> None:
 
 def session_seeds() -> list[bytes]:
     hello = encode(SOUND_MESSAGES[1])[0]
-    pongs = [b"c" + encode(Pong(wave, 10**12, 5 * 10**9, 5 * 10**9 + 1000))[0] for wave in range(1, 5)]
+    pongs = [
+        b"c" + encode(Pong(wave=wave, t0_ns=10**12, t1_ns=5 * 10**9, t2_ns=5 * 10**9 + 1000))[0] for wave in range(1, 5)
+    ]
     said = [
         b"f" + hello,
         b"c" + hello,

@@ -23,7 +23,14 @@ _UNIT_BYTES = 256 + 11
 
 _BITS_PER_BYTE = 10
 _LANES = {lane: connection_name(0, lane.name.encode()) for lane in (Lane.CONTROL, Lane.FRAMES)}
-_CAMERA = CameraDescription("simulated", 640, 480, PixelFormat.MJPEG, 33 * MS, Pacing.CLOCK)
+_CAMERA = CameraDescription(
+    name="simulated",
+    width_px=640,
+    height_px=480,
+    pixel_format=PixelFormat.MJPEG,
+    period_ns=33 * MS,
+    pacing=Pacing.CLOCK,
+)
 
 
 class DriftingClocks:
@@ -164,7 +171,9 @@ def waves(
         At the end of each wave: host's time, and the wave's echoes.
     """
     session, now_ns = HostSession("host", [_LANES]), clocks.start_ns
-    hello = BoardHello("board", "boot", _CAMERA, BoardCounts(), Rung(period_ns=_CAMERA.period_ns))
+    hello = BoardHello(
+        session="board", boot_id="boot", camera=_CAMERA, counts=BoardCounts(), rung=Rung(period_ns=_CAMERA.period_ns)
+    )
     for lane in _LANES.values():
         session.receive(lane, hello, now_ns)
     under_way: list[tuple[int, Pong]] = []
@@ -187,5 +196,5 @@ def waves(
                 t1_ns = t0_ns + round(delays.there(first, age_ns))
                 t2_ns = t1_ns + round(20 * US + chance.expovariate(1 / (10 * US)))
                 t3_ns = t2_ns + round(delays.back(first, age_ns)) + 1
-                pong = Pong(output.message.wave, t0_ns, clocks.board(t1_ns), clocks.board(t2_ns))
+                pong = Pong(wave=output.message.wave, t0_ns=t0_ns, t1_ns=clocks.board(t1_ns), t2_ns=clocks.board(t2_ns))
                 under_way.append((t3_ns, pong))

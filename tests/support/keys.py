@@ -16,6 +16,6 @@ def acquainted(folder: Path, address: str) -> tuple[KeyFolder, KeyFolder]:
         The listener's folder and the dialler's.
     """
     listener, dialler = KeyFolder(folder / "listener-keys"), KeyFolder(folder / "dialler-keys")
-    dialler.add(Peer("listener", listener.own().public, "2026-01-01T00:00:00+0000", address))
-    listener.add(Peer("dialler", dialler.own().public, "2026-01-01T00:00:00+0000"))
+    dialler.add(Peer(name="listener", key=listener.own().public, added="2026-01-01T00:00:00+0000", address=address))
+    listener.add(Peer(name="dialler", key=dialler.own().public, added="2026-01-01T00:00:00+0000"))
     return listener, dialler

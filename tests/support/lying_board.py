@@ -43,7 +43,9 @@ class LyingCamera(ReplayCamera):
     """
 
     def __init__(self, folder: Path, fps: int, lies: Sequence[Lie], size_px: tuple[int, int] | None = None) -> None:
-        super().__init__(ReplaySettings(str(folder), Fraction(fps), loop=True, clock="board"), now.monotonic_ns())
+        super().__init__(
+            ReplaySettings(path=str(folder), fps=Fraction(fps), loop=True, clock="board"), now.monotonic_ns()
+        )
         if size_px is not None:
             self.description = replace(self.description, width_px=size_px[0], height_px=size_px[1])
         self._lies = itertools.cycle(lies) if lies else None

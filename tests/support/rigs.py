@@ -17,16 +17,16 @@ def unlike_rig(right_centre_m: tuple[float, float, float] = (0.1, 0.004, -0.006)
         turn: factor on the rotation between the two.
     """
     left = CameraModel(
-        640,
-        480,
-        np.array([[525.0, 0, 315], [0, 527, 243], [0, 0, 1]]),
-        np.array([-0.25, 0.08, 0.001, -0.0005, 0.01]),
+        width_px=640,
+        height_px=480,
+        matrix=np.array([[525.0, 0, 315], [0, 527, 243], [0, 0, 1]]),
+        distortion=np.array([-0.25, 0.08, 0.001, -0.0005, 0.01]),
     )
     right = CameraModel(
-        1280,
-        720,
-        np.array([[1130.0, 0, 652], [0, 1128, 351], [0, 0, 1]]),
-        np.array([0.12, -0.3, -0.001, 0.0008, 0.1]),
+        width_px=1280,
+        height_px=720,
+        matrix=np.array([[1130.0, 0, 652], [0, 1128, 351], [0, 0, 1]]),
+        distortion=np.array([0.12, -0.3, -0.001, 0.0008, 0.1]),
     )
     rotation = np.asarray(cv2.Rodrigues(np.array([0.02, -0.05, 0.03]) * turn)[0], dtype=np.float64)
     return Rig(left, right, rotation, -rotation @ np.array(right_centre_m))

@@ -42,7 +42,14 @@ from common.protocol.session import (
 )
 from common.stamp import Stamp
 
-CAMERA = CameraDescription("simulated", 640, 480, PixelFormat.MJPEG, 33 * MS, Pacing.CLOCK)
+CAMERA = CameraDescription(
+    name="simulated",
+    width_px=640,
+    height_px=480,
+    pixel_format=PixelFormat.MJPEG,
+    period_ns=33 * MS,
+    pacing=Pacing.CLOCK,
+)
 STEP_NS = 20 * MS
 
 Place = tuple[int, Lane]
@@ -210,7 +217,16 @@ class World:
         if self.camera_runs and self.board.has_credit:
             stamp = Stamp(self.now_ns, "board")
             index = self.sent[self.board.session]
-            frame = Frame(index, stamp, stamp, 640, 480, PixelFormat.MJPEG, None, b"")
+            frame = Frame(
+                sequence=index,
+                exposed=stamp,
+                grabbed=stamp,
+                width_px=640,
+                height_px=480,
+                pixel_format=PixelFormat.MJPEG,
+                exposure_ns=None,
+                payload=b"",
+            )
             if self._board_sends(self.board.send(frame)):
                 self.board.sent(self.now_ns)
                 self.clocks[self.board.session, index] = self.boot_id
@@ -291,7 +307,7 @@ class World:
             match output:
                 case Outgoing(connection, message):
                     self._host_sends(host, connection, message)
-                case Accepted(hello, resumed, lost, link):
+                case Accepted(hello=hello, resumed=resumed, lost=lost, link=link):
                     host.carriers.append(link)
                     assert lost >= 0
                     assert resumed == (host.board_session == hello.session)
@@ -341,7 +357,17 @@ class World:
 
 def frame(session: str, sent_index: int) -> FrameMessage:
     """A frame as it was once sent."""
-    return FrameMessage(session, sent_index, 0, 1, 1, PixelFormat.MJPEG, None, BoardMarks(0, 0, 0), b"")
+    return FrameMessage(
+        session=session,
+        sent_index=sent_index,
+        sequence=0,
+        width_px=1,
+        height_px=1,
+        pixel_format=PixelFormat.MJPEG,
+        exposure_ns=None,
+        marks=BoardMarks(exposed_ns=0, grabbed_ns=0, sent_ns=0),
+        payload=b"",
+    )
 
 
 def _dialled(place: Place) -> bytes:

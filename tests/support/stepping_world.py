@@ -34,7 +34,14 @@ PERIOD_NS: Final = 33_333_333
 _STEP_NS: Final = 5 * MS
 _BOARD_GRABS_NS: Final = 4 * MS
 _HOST_PHASE_NS: Final = 3 * MS
-_CAMERA = CameraDescription("simulated", 640, 480, PixelFormat.MJPEG, PERIOD_NS, Pacing.CLOCK)
+_CAMERA = CameraDescription(
+    name="simulated",
+    width_px=640,
+    height_px=480,
+    pixel_format=PixelFormat.MJPEG,
+    period_ns=PERIOD_NS,
+    pacing=Pacing.CLOCK,
+)
 _NAMES: Final = {lane: connection_name(0, lane.name.encode()) for lane in Lane}
 
 
@@ -182,9 +189,20 @@ class SteppingWorld:
         board_ns = self.board_clock()
         self._exposed[self._board.session, 10**9 + self._sequence] = self.true_ns - _BOARD_GRABS_NS
         self._apart_at_sending[self._board.session, 10**9 + self._sequence] = self._apart_ns + 2 * PERIOD_NS
-        marks = BoardMarks(board_ns - _BOARD_GRABS_NS + by_ns, board_ns + by_ns, board_ns + by_ns)
-        size = (640, 480, PixelFormat.MJPEG)
-        return FrameMessage(self._board.session, self._sent, 10**9 + self._sequence, *size, None, marks, b"")
+        marks = BoardMarks(
+            exposed_ns=board_ns - _BOARD_GRABS_NS + by_ns, grabbed_ns=board_ns + by_ns, sent_ns=board_ns + by_ns
+        )
+        return FrameMessage(
+            session=self._board.session,
+            sent_index=self._sent,
+            sequence=10**9 + self._sequence,
+            width_px=640,
+            height_px=480,
+            pixel_format=PixelFormat.MJPEG,
+            exposure_ns=None,
+            marks=marks,
+            payload=b"",
+        )
 
     # What is watched.
 
@@ -277,7 +295,16 @@ class SteppingWorld:
             if self.true_ns > self.board.asleep_until_ns:
                 exposed = Stamp(self._board_shot_ns + self.board.shift_ns, "board")
                 grabbed = exposed.plus(_BOARD_GRABS_NS)
-                self._outbox = Frame(self._sequence, exposed, grabbed, 640, 480, PixelFormat.MJPEG, None, b"")
+                self._outbox = Frame(
+                    sequence=self._sequence,
+                    exposed=exposed,
+                    grabbed=grabbed,
+                    width_px=640,
+                    height_px=480,
+                    pixel_format=PixelFormat.MJPEG,
+                    exposure_ns=None,
+                    payload=b"",
+                )
                 self._exposed[self._board.session, self._sequence] = self._board_shot_ns
                 self._sequence += 1
                 self._grabbed += 1
@@ -286,9 +313,19 @@ class SteppingWorld:
             if self.true_ns > self.host.asleep_until_ns and self._is_there(self.host):
                 true_ns = self._host_shot_ns + _HOST_PHASE_NS
                 exposed = Stamp(true_ns + self.host.shift_ns, HOST_CLOCK)
-                size = (640, 480, PixelFormat.MJPEG)
                 self._host_exposed[self._host_sequence] = true_ns
-                self.queue.add_host(Frame(self._host_sequence, exposed, exposed, *size, None, b""))
+                self.queue.add_host(
+                    Frame(
+                        sequence=self._host_sequence,
+                        exposed=exposed,
+                        grabbed=exposed,
+                        width_px=640,
+                        height_px=480,
+                        pixel_format=PixelFormat.MJPEG,
+                        exposure_ns=None,
+                        payload=b"",
+                    )
+                )
                 self._host_sequence += 1
 
     def _deliver(self, to: str) -> None:

@@ -40,6 +40,6 @@ class TwoClocks:
             there, back = (least_ns + round(chance.expovariate(1) * jitter_ns) for _ in range(2))
             t1, t2 = host_ns + there, host_ns + there + BOARD_WORKS_NS
             t3 = t2 + back
-            measured.append(Echo(number, host_ns, self.board(t1), self.board(t2), t3))
+            measured.append(Echo(wave=number, t0_ns=host_ns, t1_ns=self.board(t1), t2_ns=self.board(t2), t3_ns=t3))
             host_ns = t3 + BETWEEN_ECHOES_NS
         return measured, host_ns

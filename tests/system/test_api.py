@@ -139,7 +139,7 @@ def test_arguments_of_no_sense_are_told_at_once(wrong: dict[str, str], film: Pat
 def test_the_examples_do_what_they_say(example: str, live: tuple[str, str], tmp_path: Path) -> None:
     """Each example ends well and leaves what it announces."""
     matrix = np.array([[150.0, 0, WIDTH_PX / 2], [0, 150.0, HEIGHT_PX / 2], [0, 0, 1]])
-    model = CameraModel(WIDTH_PX, HEIGHT_PX, matrix, np.zeros(5))
+    model = CameraModel(width_px=WIDTH_PX, height_px=HEIGHT_PX, matrix=matrix, distortion=np.zeros(5))
     rig = Rig(model, model, np.eye(3), np.array([-0.1, 0, 0]))
     write_rig(tmp_path / "rig.yaml", rig, rectify_rig(rig))
     arguments = [*live, *([] if example == "plot_delays" else [str(tmp_path / "rig.yaml")]), "12"]

@@ -91,8 +91,8 @@ def target(tmp_path: Path) -> Iterator[Target]:
     write_film(tmp_path / "film", 30)
     port = ports()
     board_keys, host_keys = KeyFolder(tmp_path / "b"), KeyFolder(tmp_path / "h")
-    board_keys.add(Peer("victim", host_keys.own().public, ""))
-    host_keys.add(Peer("board", board_keys.own().public, "", f"tcp://127.0.0.1:{port}"))
+    board_keys.add(Peer(name="victim", key=host_keys.own().public, added=""))
+    host_keys.add(Peer(name="board", key=board_keys.own().public, added="", address=f"tcp://127.0.0.1:{port}"))
     camera = f"replay:{tmp_path / 'film'}?fps=30&loop=1"
     with board(
         ["run", "--camera", camera, "--link", f"tcp://*:{port}", "--keys", str(tmp_path / "b")], tmp_path
@@ -155,7 +155,7 @@ def test_thousands_of_connections(target: Target) -> None:
 
 def test_unknown_keys_get_nothing(target: Target) -> None:
     """A hundred machines with keys of their own, which know the board's: none is heard, all together cost a line or two in the log."""
-    peer = Peer("board", KeyFolder(target.folder / "b").own().public, "", target.link)
+    peer = Peer(name="board", key=KeyFolder(target.folder / "b").own().public, added="", address=target.link)
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     try:
         with target.streaming():
@@ -270,7 +270,7 @@ def test_a_forgotten_host_gets_no_more_frames(target: Target) -> None:
         until(lambda: lines(out / "delays.jsonl") > 10, "frames come")
         folder = KeyFolder(target.folder / "b")
         folder.forget("victim")
-        folder.add(Peer("victim", KeyFolder(target.folder / "other").own().public, ""))
+        folder.add(Peer(name="victim", key=KeyFolder(target.folder / "other").own().public, added=""))
         until(lambda: "host_gone" in target.agent.stderr, "the board hears it no longer")
         until(lambda: "board_gone" in running.stderr, "the host notices")
         assert running.stop() == 0, running.stderr

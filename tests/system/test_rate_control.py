@@ -104,7 +104,7 @@ class TwoSizes(ReplayCamera):
     """
 
     def __init__(self, folder: Path, small: Path, now_ns: int) -> None:
-        chosen = ReplaySettings(str(folder), Fraction(FPS), loop=True, clock="board")
+        chosen = ReplaySettings(path=str(folder), fps=Fraction(FPS), loop=True, clock="board")
         super().__init__(chosen, now_ns)
         self._small = ReplayCamera(replace(chosen, path=str(small)), now_ns)
         whole, half = ((c.description.width_px, c.description.height_px) for c in (self, self._small))

@@ -12,16 +12,16 @@ def account(rung: Rung) -> LinkAccount:
 def test_a_lowered_camera_is_told_of_in_one_line() -> None:
     """Rung, rate, quality and the number of changes are named; a camera that was never lowered is not spoken of."""
     assert rung_lines(LinkAccount()) == []
-    assert rung_lines(account(Rung(0, 3, 0, 50_000_000))) == []
-    [line] = rung_lines(account(Rung(2, 3, 4, 133_333_333, 45)))
+    assert rung_lines(account(Rung(index=0, last=3, changes=0, period_ns=50_000_000))) == []
+    [line] = rung_lines(account(Rung(index=2, last=3, changes=4, period_ns=133_333_333, quality=45)))
     assert line == ("board camera: on rung 2 of 3 (7.5 frames/s, quality 45), changed 4 times by what the link carries")
-    [line] = rung_lines(account(Rung(0, 3, 4, 50_000_000)))
+    [line] = rung_lines(account(Rung(index=0, last=3, changes=4, period_ns=50_000_000)))
     assert "as it was asked for (20 frames/s)" in line
 
 
 def test_what_cannot_be_set_is_null() -> None:
     """The JSON object has every value, and null for a quality or size that the camera does not let itself be told."""
-    assert rung_values(Rung(2, 3, 4, 125_000_000, 45, 320, 240)) == {
+    assert rung_values(Rung(index=2, last=3, changes=4, period_ns=125_000_000, quality=45, width_px=320, height_px=240)) == {
         "rung": 2, "lowest_rung": 3, "changes": 4, "fps": 8.0, "quality": 45, "size": "320x240",
     }  # fmt: skip
     assert rung_values(Rung()) == {

@@ -42,14 +42,21 @@ from phone_host.measure.delays import DELAYS, STAGES
 from phone_host.model import PairCounts
 from phone_host.sync.fifo import FifoSettings
 
-UNDER = Conditions("a machine", "a date", "sgbm", FifoSettings(), 4.0, ((Interface("rfcomm"), "no radio"),))
+UNDER = Conditions(
+    machine="a machine",
+    date="a date",
+    matcher="sgbm",
+    fifo=FifoSettings(),
+    seconds=4.0,
+    not_run=((Interface("rfcomm"), "no radio"),),
+)
 UNITS = ("_ms", "_us", "_ns", "_s", "_hz", "_px", "_bytes", "_frames", "_pairs", "_runs", "_percent", "stalls")
 
 
 def ledger(number: int, period_ns: int = 33_000_000) -> PairLedger:
     """A pair whose delays are 1, 2, 3, 4, 5 and 15 ms."""
     exposed_ns = number * period_ns
-    marks = BoardMarks(exposed_ns, exposed_ns + 1_000_000, exposed_ns + 3_000_000)
+    marks = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=exposed_ns + 1_000_000, sent_ns=exposed_ns + 3_000_000)
     return PairLedger(
         session="s",
         sequence=number,
@@ -67,7 +74,7 @@ def ledger(number: int, period_ns: int = 33_000_000) -> PairLedger:
         time_skew_ns=-5_000,
         offset_ns=0,
         uncertainty_ns=40_000,
-        host=HostMarks(exposed_ns + 5_000, exposed_ns + 1_000_000),
+        host=HostMarks(exposed_ns=exposed_ns + 5_000, grabbed_ns=exposed_ns + 1_000_000),
     )
 
 
@@ -79,7 +86,18 @@ def result(pairs: int = 100, link: str = "tcp") -> CaseResult:
     kept, measured_s = after_warm_up([ledger(number) for number in range(pairs)])
     board = BoardAccount(108, 105, (("no_host", 3),))
     case = Case(Interface(link), Size(640, 480), 80, 30)
-    return CaseResult(case, kept, measured_s, 45e3, 70e3, board, LinkAccount([account]), host, 100, 0)
+    return CaseResult(
+        case=case,
+        ledgers=kept,
+        measured_s=measured_s,
+        uncertainty_ns=45e3,
+        bound_ns=70e3,
+        board=board,
+        link=LinkAccount([account]),
+        counts=host,
+        processed=100,
+        undecodable=0,
+    )
 
 
 def analysed(*results: CaseResult) -> Analysis:

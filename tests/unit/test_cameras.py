@@ -20,8 +20,21 @@ _CAMERA = Listed(
         (FormatOffer("H264", "H.264", ((1920, 1080),)), (((1920, 1080), _RATES),)),
     ),
     (
-        (Control(1, "Gain", abi.CTRL_TYPE_INTEGER, 0, 100, 5, 20), 25),
-        (Control(2, "Auto Exposure", abi.CTRL_TYPE_MENU, 0, 3, 1, 3, 0, ((1, "Manual"), (3, "Aperture"))), None),
+        (Control(id=1, name="Gain", kind=abi.CTRL_TYPE_INTEGER, minimum=0, maximum=100, step=5, default=20), 25),
+        (
+            Control(
+                id=2,
+                name="Auto Exposure",
+                kind=abi.CTRL_TYPE_MENU,
+                minimum=0,
+                maximum=3,
+                step=1,
+                default=3,
+                flags=0,
+                menu=((1, "Manual"), (3, "Aperture")),
+            ),
+            None,
+        ),
     ),
 )
 

@@ -142,7 +142,9 @@ def test_a_wave_that_lies_is_never_believed(lie_ns: int, echoes: int) -> None:
     run(estimator, clocks, chance, seconds=15)
     told, behind_ns = clocks.wave(10**6, START_NS + 15 * SECOND_NS, chance, least_ns=50_000, jitter_ns=0, echoes=echoes)
     for echo in told:
-        lie = Echo(echo.wave, echo.t0_ns, echo.t1_ns + lie_ns, echo.t2_ns + lie_ns, echo.t3_ns)
+        lie = Echo(
+            wave=echo.wave, t0_ns=echo.t0_ns, t1_ns=echo.t1_ns + lie_ns, t2_ns=echo.t2_ns + lie_ns, t3_ns=echo.t3_ns
+        )
         assert estimator.add(lie) is Heard.DOUBTED
         assert estimator.estimate is None
         assert estimator.in_doubt
@@ -191,7 +193,9 @@ def test_a_link_that_fills_up_does_not_make_forget(queue_ns: int) -> None:
         t0 = START_NS + 15 * SECOND_NS + number * 250 * MS
         t1 = t0 + 50_000
         t3 = t1 + queue_ns + (number * 7919 % 100) * MS  # the way back is full, the queue's length changes
-        estimator.add(Echo(10**6 + number, t0, clocks.board(t1), clocks.board(t1) + 10, t3))
+        estimator.add(
+            Echo(wave=10**6 + number, t0_ns=t0, t1_ns=clocks.board(t1), t2_ns=clocks.board(t1) + 10, t3_ns=t3)
+        )
         estimate = estimator.estimate
         assert estimate is not None
         found = error_at(estimate, clocks, clocks.board(t3))
@@ -203,9 +207,9 @@ def test_nothing_heard_is_nothing_known() -> None:
     """Before the first echo there is no estimate, and echoes whose times run backwards are none."""
     estimator = ClockEstimator()
     assert estimator.estimate is None
-    estimator.add(Echo(1, 100, 5, 6, 99))
-    estimator.add(Echo(1, 100, 6, 5, 200))
-    estimator.add(Echo(1, 100, 5, 50, 120))
+    estimator.add(Echo(wave=1, t0_ns=100, t1_ns=5, t2_ns=6, t3_ns=99))
+    estimator.add(Echo(wave=1, t0_ns=100, t1_ns=6, t2_ns=5, t3_ns=200))
+    estimator.add(Echo(wave=1, t0_ns=100, t1_ns=5, t2_ns=50, t3_ns=120))
     assert estimator.estimate is None
 
 
@@ -216,7 +220,7 @@ def test_one_echo_bounds_the_offset(offset_ns: int, there_ns: int, work_ns: int,
     t0 = 10**12
     t1 = t0 + there_ns - offset_ns
     estimator = ClockEstimator()
-    estimator.add(Echo(1, t0, t1, t1 + work_ns, t0 + there_ns + work_ns + back_ns))
+    estimator.add(Echo(wave=1, t0_ns=t0, t1_ns=t1, t2_ns=t1 + work_ns, t3_ns=t0 + there_ns + work_ns + back_ns))
     estimate = estimator.estimate
     assert estimate is not None
     assert estimate.round_trip_ns == there_ns + back_ns

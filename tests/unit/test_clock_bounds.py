@@ -116,7 +116,7 @@ def test_no_delays_whatever_break_the_bound(
         t1 = t0 + there_ns
         t2 = t1 + 1000
         host_ns = t2 + back_ns + 1
-        estimator.add(Echo(number // 3, t0, clocks.board(t1), clocks.board(t2), host_ns))
+        estimator.add(Echo(wave=number // 3, t0_ns=t0, t1_ns=clocks.board(t1), t2_ns=clocks.board(t2), t3_ns=host_ns))
         lowest_rtt_ns = min(lowest_rtt_ns, there_ns + back_ns)
         estimate = estimator.estimate
         assert estimate is not None
@@ -138,7 +138,13 @@ def test_a_single_false_echo_is_an_excursion() -> None:
     before = estimator.estimate
     assert before is not None
     estimator.add(
-        Echo(1000, behind_ns, clocks.board(behind_ns) + SECOND_NS, clocks.board(behind_ns) + SECOND_NS, host_ns)
+        Echo(
+            wave=1000,
+            t0_ns=behind_ns,
+            t1_ns=clocks.board(behind_ns) + SECOND_NS,
+            t2_ns=clocks.board(behind_ns) + SECOND_NS,
+            t3_ns=host_ns,
+        )
     )
     echoes, behind_ns = clocks.wave(1001, host_ns, chance, least_ns=50_000, jitter_ns=50_000)
     for echo in echoes:

@@ -41,7 +41,15 @@ def test_a_board_that_booted_anew(uptime_ns: int) -> None:
 def test_a_host_that_slept_with_an_echo_under_way(asleep_s: float) -> None:
     """CLOCK_MONOTONIC stands still in sleep: the answer that waited looks swift and is right; all that follow show the board further on."""
     estimator, clocks, chance = learnt(2)
-    estimator.add(Echo(10**6, AT_NS, clocks.board(AT_NS + 50_000), clocks.board(AT_NS + 70_000), AT_NS + 300_000))
+    estimator.add(
+        Echo(
+            wave=10**6,
+            t0_ns=AT_NS,
+            t1_ns=clocks.board(AT_NS + 50_000),
+            t2_ns=clocks.board(AT_NS + 70_000),
+            t3_ns=AT_NS + 300_000,
+        )
+    )
     woken = moved(clocks, round(asleep_s * SECOND_NS))
     errors = run(estimator, woken, chance, from_ns=LEARN_S * SECOND_NS + MS, seconds=5, doubtful_waves=2)
     assert all(error.error_ns < MS for error in errors)
@@ -54,7 +62,9 @@ def test_a_board_that_slept_with_an_echo_under_way(asleep_s: float) -> None:
     asleep_ns = round(asleep_s * SECOND_NS)
     woken = moved(clocks, -asleep_ns)
     answered_ns = clocks.board(AT_NS + 50_000)
-    estimator.add(Echo(10**6, AT_NS, answered_ns, answered_ns + 20_000, AT_NS + asleep_ns + 200_000))
+    estimator.add(
+        Echo(wave=10**6, t0_ns=AT_NS, t1_ns=answered_ns, t2_ns=answered_ns + 20_000, t3_ns=AT_NS + asleep_ns + 200_000)
+    )
     errors = run(estimator, woken, chance, from_ns=LEARN_S * SECOND_NS + asleep_ns + MS, seconds=5, doubtful_waves=2)
     assert all(error.error_ns < MS for error in errors)
 
@@ -68,7 +78,9 @@ def test_echoes_that_took_long_spoil_nothing(share: float) -> None:
         echoes, behind_ns = clocks.wave(number, host_ns, chance, least_ns=50_000, jitter_ns=100_000)
         for echo in echoes:
             held_ns = chance.randrange(2 * SECOND_NS) if chance.random() < share else 0
-            estimator.add(Echo(echo.wave, echo.t0_ns, echo.t1_ns, echo.t2_ns, echo.t3_ns + held_ns))
+            estimator.add(
+                Echo(wave=echo.wave, t0_ns=echo.t0_ns, t1_ns=echo.t1_ns, t2_ns=echo.t2_ns, t3_ns=echo.t3_ns + held_ns)
+            )
         host_ns += 250 * MS
         estimate = estimator.estimate
         assert estimate is not None

@@ -109,7 +109,7 @@ def known_over_two_links(seed: int) -> tuple[LinkClocks, DriftingClocks, int]:
 def echo_at(clocks: DriftingClocks, host_ns: int, wave: int, link: int, jump_ns: int = 0) -> Echo:
     """An echo of 2 ms, after the board's clock has jumped."""
     board_ns = clocks.board(host_ns + MS) + jump_ns
-    return Echo(wave, host_ns, board_ns, board_ns, host_ns + 2 * MS, link)
+    return Echo(wave=wave, t0_ns=host_ns, t1_ns=board_ns, t2_ns=board_ns, t3_ns=host_ns + 2 * MS, link=link)
 
 
 def test_a_jump_that_one_link_confirms_is_one_for_all() -> None:

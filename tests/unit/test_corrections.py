@@ -134,7 +134,7 @@ def test_two_orders_in_a_row_are_one_of_their_sum(tmp_path: Path) -> None:
     """An order that comes before the one before it was carried out does not take its place: the own camera exposes later by both."""
     (tmp_path / "0.jpg").write_bytes(jpeg())
     start_ns, frames = now.monotonic_ns(), list[Frame]()
-    camera = ReplayCamera(ReplaySettings(str(tmp_path), Fraction(20), loop=True), start_ns)
+    camera = ReplayCamera(ReplaySettings(path=str(tmp_path), fps=Fraction(20), loop=True), start_ns)
     own = OwnCamera(camera, frames.append, DemandClock(Pacing.CLOCK))
     unmoved_ns = camera.due_ns(start_ns)
     own.steer(5 * MS)

@@ -75,9 +75,25 @@ def test_nothing_measured_is_nan() -> None:
 
 def test_each_delay_of_a_ledger_reaches_its_series() -> None:
     """Marks 1, 2, 4, ... ns apart give each delay and stage its own value, and time skews lose their sign."""
-    board = BoardMarks(0, 1, 3)
+    board = BoardMarks(exposed_ns=0, grabbed_ns=1, sent_ns=3)
     ledger = PairLedger(
-        "s", 0, 0, 9, "tcp", board, 7, 9, 15, 31, 63, 14, StageTimes(1, 2, 3, 4, 5, 6), -77, 0, 88, host=HostMarks(0, 0)
+        session="s",
+        sequence=0,
+        host_sequence=0,
+        bytes=9,
+        link="tcp",
+        board=board,
+        received_ns=7,
+        paired_ns=9,
+        queued_ns=15,
+        dequeued_ns=31,
+        done_ns=63,
+        previous_done_ns=14,
+        stages=StageTimes(decode=1, interpolate=2, rectify=3, match=4, reproject=5, write=6),
+        time_skew_ns=-77,
+        offset_ns=0,
+        uncertainty_ns=88,
+        host=HostMarks(exposed_ns=0, grabbed_ns=0),
     )
     statistic = DelayStatistics()
     statistic.add(ledger)

@@ -358,7 +358,7 @@ def test_keys_are_judged_without_making_any(tmp_path: Path) -> None:
     assert check_keys(folder, me).verdict is Verdict.WARN
     assert not list(folder.path.iterdir())
     own = folder.own()
-    folder.add(Peer("phone", own.public, ""))
+    folder.add(Peer(name="phone", key=own.public, added=""))
     known = check_keys(folder, me)
     assert known.verdict is Verdict.OK
     assert "phone" in known.text

@@ -37,11 +37,30 @@ def halved(image: Image) -> Image:
 def pair_of(left: Image, right: Image, board_side: Side, asked_px: tuple[int, int]) -> FramePair:
     """Two frames as they come to the worker."""
     board, host = (left, right) if board_side is Side.LEFT else (right, left)
-    marks, stamp = BoardMarks(1, 1, 1), Stamp(1, HOST_CLOCK)
-    size, own = (board.shape[1], board.shape[0]), (host.shape[1], host.shape[0])
-    message = FrameMessage("s", 0, 7, *size, PixelFormat.PNG, None, marks, encoded(".png", board))
+    marks, stamp = BoardMarks(exposed_ns=1, grabbed_ns=1, sent_ns=1), Stamp(1, HOST_CLOCK)
+    message = FrameMessage(
+        session="s",
+        sent_index=0,
+        sequence=7,
+        width_px=board.shape[1],
+        height_px=board.shape[0],
+        pixel_format=PixelFormat.PNG,
+        exposure_ns=None,
+        marks=marks,
+        payload=encoded(".png", board),
+    )
     frame = BoardFrame(message, "tcp", marks, 1, 0, 0, asked_px)
-    return FramePair(frame, Frame(0, stamp, stamp, *own, PixelFormat.PNG, None, encoded(".png", host)), 0, 1, 1)
+    own = Frame(
+        sequence=0,
+        exposed=stamp,
+        grabbed=stamp,
+        width_px=host.shape[1],
+        height_px=host.shape[0],
+        pixel_format=PixelFormat.PNG,
+        exposure_ns=None,
+        payload=encoded(".png", host),
+    )
+    return FramePair(frame, own, 0, 1, 1)
 
 
 def disparity_error_px(scene: Plane, left: Image, right: Image, side: Side) -> float:

@@ -78,7 +78,7 @@ def test_what_root_writes_is_the_services(folder: Path) -> None:
     """Key, peers and spent codes that root writes belong to the folder's owner, and root has its own rights again afterwards."""
     keys = KeyFolder(folder)
     keys.own()
-    keys.add(Peer("phone", zmq.curve_keypair()[0].decode(), WHEN))
+    keys.add(Peer(name="phone", key=zmq.curve_keypair()[0].decode(), added=WHEN))
     keys.spend("123456")
     assert {path.name: path.stat().st_uid for path in folder.iterdir()} == {
         "key": NOBODY,
@@ -100,7 +100,10 @@ def test_a_link_to_a_file_of_roots_is_neither_read_nor_written(place: Path, fold
         read()
     assert SECRET not in str(caught.value)
     assert "\n" not in str(caught.value)
-    for write in (lambda: keys.spend("1"), lambda: keys.add(Peer("x", zmq.curve_keypair()[0].decode(), WHEN))):
+    for write in (
+        lambda: keys.spend("1"),
+        lambda: keys.add(Peer(name="x", key=zmq.curve_keypair()[0].decode(), added=WHEN)),
+    ):
         with suppress(TandemError):
             write()
     with suppress(TandemError):

@@ -79,7 +79,7 @@ def test_a_file_that_others_may_read_is_refused(tmp_path: Path, name: str) -> No
     """The line names the file, its mode and chmod."""
     folder = KeyFolder(tmp_path)
     folder.own()
-    folder.add(Peer("phone", some_key(), WHEN))
+    folder.add(Peer(name="phone", key=some_key(), added=WHEN))
     (tmp_path / name).chmod(0o640)
     with pytest.raises(DataError, match=rf"{name}.*0640.*chmod 600"):
         folder.own() if name == "key" else folder.peers()
@@ -101,9 +101,9 @@ def test_a_spoiled_file_of_peers_is_one_line(tmp_path: Path, text: str) -> None:
 def test_peers_are_added_renewed_and_forgotten(tmp_path: Path) -> None:
     """Names stay unique, a key that comes again takes the place of its old entry, and who is forgotten is gone."""
     folder, first, second = KeyFolder(tmp_path), some_key(), some_key()
-    assert folder.add(Peer("phone", first, WHEN)).name == "phone"
-    assert folder.add(Peer("phone", second, WHEN)).name == "phone-2"
-    assert folder.add(Peer("phone", first, WHEN, "tcp://192.0.2.1:5555")).name == "phone"
+    assert folder.add(Peer(name="phone", key=first, added=WHEN)).name == "phone"
+    assert folder.add(Peer(name="phone", key=second, added=WHEN)).name == "phone-2"
+    assert folder.add(Peer(name="phone", key=first, added=WHEN, address="tcp://192.0.2.1:5555")).name == "phone"
     assert {(peer.name, peer.key) for peer in folder.peers()} == {("phone", first), ("phone-2", second)}
     assert mode(tmp_path / "peers.json") == 0o600
     assert folder.forget("phone").key == first
@@ -111,7 +111,7 @@ def test_peers_are_added_renewed_and_forgotten(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="phone-2"):
         folder.forget("phone")
     with pytest.raises(SettingsError, match="is no public key"):
-        folder.add(Peer("phone", "short", WHEN))
+        folder.add(Peer(name="phone", key="short", added=WHEN))
 
 
 def test_the_state_changes_with_the_file(tmp_path: Path) -> None:
@@ -119,7 +119,7 @@ def test_the_state_changes_with_the_file(tmp_path: Path) -> None:
     folder = KeyFolder(tmp_path)
     states = [folder.peers_state]
     for number in range(5):
-        folder.add(Peer(f"host{number}", some_key(), WHEN))
+        folder.add(Peer(name=f"host{number}", key=some_key(), added=WHEN))
         states.append(folder.peers_state)
     folder.forget("host3")
     states.append(folder.peers_state)
@@ -144,9 +144,9 @@ def test_where_keys_lie() -> None:
 
 def test_who_is_at_an_address() -> None:
     """The one paired there last, else the one of that name, else the only one; with several and none that fits, nobody."""
-    bone = Peer("bone", "", WHEN, "tcp://192.168.7.2:5555")
-    other = Peer("other", "", WHEN, "tcp://192.168.7.2:5555")
-    far = Peer("far", "", WHEN, "tcp://far:5555")
+    bone = Peer(name="bone", key="", added=WHEN, address="tcp://192.168.7.2:5555")
+    other = Peer(name="other", key="", added=WHEN, address="tcp://192.168.7.2:5555")
+    far = Peer(name="far", key="", added=WHEN, address="tcp://far:5555")
     assert peer_at((bone, other, far), "tcp://192.168.7.2:5555") == other
     assert peer_at((bone, other, far), "tcp://BONE.local:5555") == bone
     assert peer_at((bone,), "tcp://10.0.0.9:5555") == bone

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 
 TIMES_NS = st.integers(-(2**62), 2**62)
-MARKS = st.builds(BoardMarks, TIMES_NS, TIMES_NS, TIMES_NS)
+MARKS = st.builds(BoardMarks, exposed_ns=TIMES_NS, grabbed_ns=TIMES_NS, sent_ns=TIMES_NS)
 DURATIONS_NS = st.integers(0, 2**40)
 LEDGERS = st.builds(
     PairLedger,
@@ -25,7 +25,7 @@ LEDGERS = st.builds(
     dequeued_ns=TIMES_NS,
     done_ns=TIMES_NS,
     previous_done_ns=TIMES_NS,
-    stages=st.builds(StageTimes, DURATIONS_NS, DURATIONS_NS, DURATIONS_NS, DURATIONS_NS, DURATIONS_NS),
+    stages=st.builds(StageTimes, **dict.fromkeys(("decode", "rectify", "match", "reproject", "write"), DURATIONS_NS)),
     time_skew_ns=TIMES_NS,
     offset_ns=TIMES_NS,
     uncertainty_ns=DURATIONS_NS,

@@ -21,30 +21,32 @@ from common.link.zeromq_address import plain_endpoint
 def test_tcp_addresses(port: int, host: str, *, listens: bool) -> None:
     """Every port on every kind of host is taken as it stands, and without an option the role's default decides who listens."""
     address = f"tcp://{host}:{port}"
-    assert parse_link(address, listens_by_default=listens) == LinkUri(address, listens)
-    assert parse_link(f"{address}?bind=1", listens_by_default=listens) == LinkUri(address, listens=True)
-    assert parse_link(f"{address}?connect=1", listens_by_default=listens) == LinkUri(address, listens=False)
+    assert parse_link(address, listens_by_default=listens) == LinkUri(address=address, listens=listens)
+    assert parse_link(f"{address}?bind=1", listens_by_default=listens) == LinkUri(address=address, listens=True)
+    assert parse_link(f"{address}?connect=1", listens_by_default=listens) == LinkUri(address=address, listens=False)
 
 
 def test_ipc_addresses() -> None:
     """The path of an ipc link is everything up to the options."""
-    assert parse_link("ipc:///tmp/a b", listens_by_default=True) == LinkUri("ipc:///tmp/a b", listens=True)
-    assert parse_link("ipc://x?connect=1", listens_by_default=True) == LinkUri("ipc://x", listens=False)
+    assert parse_link("ipc:///tmp/a b", listens_by_default=True) == LinkUri(address="ipc:///tmp/a b", listens=True)
+    assert parse_link("ipc://x?connect=1", listens_by_default=True) == LinkUri(address="ipc://x", listens=False)
 
 
 def test_serial_ports() -> None:
     """A serial port is named by its path; its speed and who plays the listener are options."""
-    assert parse_link("serial:/dev/ttyGS0", listens_by_default=True) == LinkUri("serial:/dev/ttyGS0", listens=True)
+    assert parse_link("serial:/dev/ttyGS0", listens_by_default=True) == LinkUri(
+        address="serial:/dev/ttyGS0", listens=True
+    )
     fast = parse_link("serial:/dev/ttyUSB0?baud=3000000&bind=1", listens_by_default=False)
-    assert fast == LinkUri("serial:/dev/ttyUSB0", listens=True, baud=3_000_000)
+    assert fast == LinkUri(address="serial:/dev/ttyUSB0", listens=True, baud=3_000_000)
 
 
 def test_bluetooth_devices() -> None:
     """A Bluetooth device is named by address or name, with or without a channel; whether strangers will do is an option."""
     for address in ("rfcomm://*", "rfcomm://*/1", "rfcomm://AA:BB:CC:DD:EE:FF/30", "rfcomm://my%20board"):
-        assert parse_link(address, listens_by_default=True) == LinkUri(address, listens=True)
+        assert parse_link(address, listens_by_default=True) == LinkUri(address=address, listens=True)
         assert parse_link(f"{address}?connect=1&unpaired=1", listens_by_default=True) == LinkUri(
-            address, listens=False, unpaired=True
+            address=address, listens=False, unpaired=True
         )
 
 
@@ -110,7 +112,7 @@ def test_bad_uris_are_named(uri: str) -> None:
 def test_addresses_that_cannot_be_dialled_are_refused(address: str) -> None:
     """An address without a host, or one that the transport cannot take, is the user's mistake and told at once."""
     with pytest.raises(SettingsError):
-        open_link(LinkUri(address, listens=False))
+        open_link(LinkUri(address=address, listens=False))
 
 
 @pytest.mark.parametrize(
@@ -160,18 +162,18 @@ def test_a_link_on_anothers_door_is_refused(links: tuple[str, ...], tmp_path: Pa
 def test_without_keys_nothing_beyond_this_machine_is_opened(listens: bool) -> None:  # noqa: FBT001 - one of two values
     """No caller that forgets the keys can open a link to other machines: it is refused, and insecure=1 is named."""
     with pytest.raises(SettingsError, match="insecure=1"):
-        open_link(LinkUri("tcp://192.0.2.1:5555", listens=listens))
+        open_link(LinkUri(address="tcp://192.0.2.1:5555", listens=listens))
 
 
 def test_an_unknown_board_is_named_with_the_command_that_helps(tmp_path: Path) -> None:
     """Dialling a board that is no peer says how to pair; with several peers it lists them."""
     keys = KeyFolder(tmp_path)
     with pytest.raises(UnavailableError, match=r"phone-host pair --link tcp://192\.0\.2\.1:5555"):
-        open_link(LinkUri("tcp://192.0.2.1:5555", listens=False), keys)
-    keys.add(Peer("bone", "a" * 40, "", "tcp://192.0.2.2:5555"))
-    keys.add(Peer("pi", "b" * 40, "", "tcp://192.0.2.3:5555"))
+        open_link(LinkUri(address="tcp://192.0.2.1:5555", listens=False), keys)
+    keys.add(Peer(name="bone", key="a" * 40, added="", address="tcp://192.0.2.2:5555"))
+    keys.add(Peer(name="pi", key="b" * 40, added="", address="tcp://192.0.2.3:5555"))
     with pytest.raises(UnavailableError, match=r"bone at tcp://192\.0\.2\.2:5555, pi at"):
-        open_link(LinkUri("tcp://192.0.2.1:5555", listens=False), keys)
+        open_link(LinkUri(address="tcp://192.0.2.1:5555", listens=False), keys)
 
 
 @pytest.mark.parametrize("host", ["192.0.2.1", "no-such-host.invalid"])

@@ -31,9 +31,28 @@ def pair_of(
     own_px: tuple[int, int] = (64, 48),
 ) -> FramePair:
     """A board's frame as it came, beside a sound one of the own camera."""
-    marks, stamp = BoardMarks(1, 1, 1), Stamp(1, HOST_CLOCK)
-    message = FrameMessage("s", 0, 7, *size_px, pixel_format, None, marks, board)
-    own = Frame(0, stamp, stamp, *own_px, JPEG, None, jpeg(*own_px))
+    marks, stamp = BoardMarks(exposed_ns=1, grabbed_ns=1, sent_ns=1), Stamp(1, HOST_CLOCK)
+    message = FrameMessage(
+        session="s",
+        sent_index=0,
+        sequence=7,
+        width_px=size_px[0],
+        height_px=size_px[1],
+        pixel_format=pixel_format,
+        exposure_ns=None,
+        marks=marks,
+        payload=board,
+    )
+    own = Frame(
+        sequence=0,
+        exposed=stamp,
+        grabbed=stamp,
+        width_px=own_px[0],
+        height_px=own_px[1],
+        pixel_format=JPEG,
+        exposure_ns=None,
+        payload=jpeg(*own_px),
+    )
     return FramePair(BoardFrame(message, "tcp", marks, 1, 0, 0, asked_px), own, 0, 1, 1)
 
 
@@ -115,7 +134,7 @@ def test_the_frame_before_may_lie_too() -> None:
     """A lie in the frame before, which interpolation looks at, costs the interpolation only."""
     pair = pair_of(jpeg(*SIZE), SIZE, SIZE)
     before = pair_of(bombs.SMALL_BOMB, SIZE, SIZE).board
-    marks = BoardMarks(-33_000_000, -33_000_000, -33_000_000)
+    marks = BoardMarks(exposed_ns=-33_000_000, grabbed_ns=-33_000_000, sent_ns=-33_000_000)
     earlier = BoardFrame(before.message, "tcp", marks, 1, 0, 0, SIZE)
     doubled = FramePair(pair.board, pair.host, 5_000_000, 1, 1, earlier)
     done = Pipeline(None, Side.LEFT, now.monotonic_ns, Interpolator()).process(doubled)

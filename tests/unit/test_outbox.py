@@ -27,7 +27,16 @@ class Act(Enum):
 def frame(sequence: int) -> Frame:
     """A frame that is told apart by its number."""
     stamp = Stamp(sequence, "board")
-    return Frame(sequence, stamp, stamp, 1, 1, PixelFormat.MJPEG, None, b"")
+    return Frame(
+        sequence=sequence,
+        exposed=stamp,
+        grabbed=stamp,
+        width_px=1,
+        height_px=1,
+        pixel_format=PixelFormat.MJPEG,
+        exposure_ns=None,
+        payload=b"",
+    )
 
 
 @given(st.lists(st.sampled_from(Act), max_size=60))

@@ -24,20 +24,41 @@ PERIOD_NS = 33 * MS
 
 def board_frame(sequence: int, exposed_ns: int, received_ns: int | None = None) -> BoardFrame:
     """A frame that the board exposed at this time of the host's clock."""
-    marks = BoardMarks(exposed_ns, exposed_ns, exposed_ns)
-    message = FrameMessage("s", sequence, sequence, 1, 1, PixelFormat.MJPEG, None, marks, b"")
+    marks = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=exposed_ns, sent_ns=exposed_ns)
+    message = FrameMessage(
+        session="s",
+        sent_index=sequence,
+        sequence=sequence,
+        width_px=1,
+        height_px=1,
+        pixel_format=PixelFormat.MJPEG,
+        exposure_ns=None,
+        marks=marks,
+        payload=b"",
+    )
     return BoardFrame(message, "tcp", marks, exposed_ns if received_ns is None else received_ns, 0, 0)
 
 
 def host_frame(sequence: int, exposed_ns: int, payload: bytes = b"") -> Frame:
     """A frame of the own camera."""
     stamp = Stamp(exposed_ns, HOST_CLOCK)
-    return Frame(sequence, stamp, stamp, 1, 1, PixelFormat.MJPEG, None, payload)
+    return Frame(
+        sequence=sequence,
+        exposed=stamp,
+        grabbed=stamp,
+        width_px=1,
+        height_px=1,
+        pixel_format=PixelFormat.MJPEG,
+        exposure_ns=None,
+        payload=payload,
+    )
 
 
 def camera_of(period_ns: int, pacing: Pacing = Pacing.CLOCK) -> CameraDescription:
     """A board's camera of that period."""
-    return CameraDescription("board's", 640, 480, PixelFormat.MJPEG, period_ns, pacing)
+    return CameraDescription(
+        name="board's", width_px=640, height_px=480, pixel_format=PixelFormat.MJPEG, period_ns=period_ns, pacing=pacing
+    )
 
 
 def queue_of(depth: int = 1, overflow: Overflow = Overflow.DROP_OLDEST) -> PairQueue:

@@ -64,10 +64,25 @@ def test_frames_of_one_size_have_no_line() -> None:
 
 def test_a_pairs_bars_are_as_long_as_its_delays() -> None:
     """Delays of 10, 20, 40, 10, 20 and 100 ms are bars of these lengths on one scale, each beginning where the one before ends."""
-    board = BoardMarks(0, 10 * MS, 30 * MS)
-    marks = (70 * MS, 80 * MS, 80 * MS, 100 * MS, 200 * MS, 0)
+    board = BoardMarks(exposed_ns=0, grabbed_ns=10 * MS, sent_ns=30 * MS)
     ledger = PairLedger(
-        "s", 0, 0, 9, "tcp", board, *marks, StageTimes(match=90 * MS, write=10 * MS), 0, 0, 0, host=HostMarks(0, 0)
+        session="s",
+        sequence=0,
+        host_sequence=0,
+        bytes=9,
+        link="tcp",
+        board=board,
+        received_ns=70 * MS,
+        paired_ns=80 * MS,
+        queued_ns=80 * MS,
+        dequeued_ns=100 * MS,
+        done_ns=200 * MS,
+        previous_done_ns=0,
+        stages=StageTimes(match=90 * MS, write=10 * MS),
+        time_skew_ns=0,
+        offset_ns=0,
+        uncertainty_ns=0,
+        host=HostMarks(exposed_ns=0, grabbed_ns=0),
     )
     root = svg(lives([Life("tcp, typical", ledger)], 500))
     bars = {

@@ -36,12 +36,27 @@ def cell(interface: str = "tcp", size_bytes: int = 10_000, period_ms: int = 40, 
     for number in range(50):
         exposed_ns = number * period_ms * MS
         received_ns = exposed_ns + 1 * MS + LATENCY_NS + NS_PER_BYTE * size_bytes
-        board = BoardMarks(exposed_ns, exposed_ns + 1 * MS, exposed_ns + 1 * MS)
+        board = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=exposed_ns + 1 * MS, sent_ns=exposed_ns + 1 * MS)
         done_ns = received_ns + processing_ns
-        marks = (received_ns, received_ns, received_ns, received_ns, done_ns, done_ns - period_ms * MS)
         ledgers.append(
             PairLedger(
-                "s", number, number, size_bytes, "tcp", board, *marks, StageTimes(), 0, 0, 0, host=HostMarks(0, 0)
+                session="s",
+                sequence=number,
+                host_sequence=number,
+                bytes=size_bytes,
+                link="tcp",
+                board=board,
+                received_ns=received_ns,
+                paired_ns=received_ns,
+                queued_ns=received_ns,
+                dequeued_ns=received_ns,
+                done_ns=done_ns,
+                previous_done_ns=done_ns - period_ms * MS,
+                stages=StageTimes(),
+                time_skew_ns=0,
+                offset_ns=0,
+                uncertainty_ns=0,
+                host=HostMarks(exposed_ns=0, grabbed_ns=0),
             )
         )
     return Cell(

@@ -29,19 +29,24 @@ NOW_NS = 500 * SECOND_NS
 )
 def test_marks_that_cannot_be(exposed_ms: int, grabbed_ms: int, sent_ms: int, reason: Disbelief | None) -> None:
     """With the moment of arrival known to 2 ms: nothing is sent after that, exposed after it was grabbed, or older than a minute."""
-    marks = BoardMarks(*(NOW_NS + value * MS for value in (exposed_ms, grabbed_ms, sent_ms)))
+    marks = BoardMarks(
+        exposed_ns=NOW_NS + exposed_ms * MS, grabbed_ns=NOW_NS + grabbed_ms * MS, sent_ns=NOW_NS + sent_ms * MS
+    )
     assert disbelief(marks, NOW_NS, 2 * MS, labelled=False) is reason
 
 
 @given(st.integers(-(2**62), 2**62))
 def test_labels_may_lie_anywhere_but_at_the_ends(exposed_ns: int) -> None:
     """Stamps of images shown on demand are believed unless a difference of two would not fit into 64 bits; when they were sent is no label."""
-    marks = BoardMarks(exposed_ns, NOW_NS - 2, NOW_NS - 1)
+    marks = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=NOW_NS - 2, sent_ns=NOW_NS - 1)
     far = abs(NOW_NS - exposed_ns) >= LABELS_NS
     assert disbelief(marks, NOW_NS, 0, labelled=True) is (Disbelief.PAST if far else None)
     for sent_ns, reason in ((2**62, Disbelief.FUTURE), (-(2**62), Disbelief.MARKS)):
-        assert disbelief(BoardMarks(NOW_NS, NOW_NS - 2, sent_ns), NOW_NS, 0, labelled=True) is reason
-    ancient = BoardMarks(NOW_NS, NOW_NS - 61 * SECOND_NS, NOW_NS - 61 * SECOND_NS)
+        assert (
+            disbelief(BoardMarks(exposed_ns=NOW_NS, grabbed_ns=NOW_NS - 2, sent_ns=sent_ns), NOW_NS, 0, labelled=True)
+            is reason
+        )
+    ancient = BoardMarks(exposed_ns=NOW_NS, grabbed_ns=NOW_NS - 61 * SECOND_NS, sent_ns=NOW_NS - 61 * SECOND_NS)
     assert disbelief(ancient, NOW_NS, 0, labelled=True) is Disbelief.PAST
 
 

@@ -31,7 +31,7 @@ def test_waits_follow_lindleys_recursion(steps: list[tuple[int, int]]) -> None:
     """With a queue that never fills, W(k+1) = max(0, W(k) + S(k) - A(k+1)) (Lindley 1952), for any arrivals and services."""
     queued = np.cumsum([gap for gap, _ in steps]).astype(float)
     service = np.array([float(length) for _, length in steps])
-    served = serve(queued, service, ENDLESS, Overflow.DROP_NEWEST)
+    served = serve(queued_ns=queued, service_ns=service, depth=ENDLESS, overflow=Overflow.DROP_NEWEST)
     wait = [0.0]
     for index, (before, now) in enumerate(pairwise(queued)):
         wait.append(max(0.0, wait[-1] + service[index] - (now - before)))
@@ -47,8 +47,8 @@ def test_who_gives_way_does_not_change_how_many(steps: list[tuple[int, int]], de
     """How many wait at any moment does not depend on which one gives way; so both policies drop equally many and are busy at the same times."""
     queued = np.cumsum([gap for gap, _ in steps]).astype(float)
     service = np.array([float(length) for _, length in steps])
-    oldest = serve(queued, service, depth, Overflow.DROP_OLDEST)
-    newest = serve(queued, service, depth, Overflow.DROP_NEWEST)
+    oldest = serve(queued_ns=queued, service_ns=service, depth=depth, overflow=Overflow.DROP_OLDEST)
+    newest = serve(queued_ns=queued, service_ns=service, depth=depth, overflow=Overflow.DROP_NEWEST)
     assert oldest.dropped == newest.dropped
     kept = [one.done_ns[~np.isnan(one.done_ns)].tolist() for one in (oldest, newest)]
     assert kept[0] == kept[1]
@@ -60,7 +60,7 @@ def test_mean_wait_of_poisson_arrivals_and_constant_service(load: float) -> None
     random = np.random.default_rng(1)
     count = 400_000
     queued = np.cumsum(random.exponential(1.0 / load, count))
-    served = serve(queued, np.ones(count), ENDLESS, Overflow.DROP_NEWEST)
+    served = serve(queued_ns=queued, service_ns=np.ones(count), depth=ENDLESS, overflow=Overflow.DROP_NEWEST)
     assert float((served.start_ns - queued).mean()) == pytest.approx(load / (2.0 * (1.0 - load)), rel=0.03)
 
 
@@ -70,7 +70,7 @@ def test_mean_wait_of_poisson_arrivals_and_drawn_service() -> None:
     count, rate = 400_000, 0.6
     service = random.choice([0.2, 1.8], count)
     queued = np.cumsum(random.exponential(1.0 / rate, count))
-    served = serve(queued, service, ENDLESS, Overflow.DROP_NEWEST)
+    served = serve(queued_ns=queued, service_ns=service, depth=ENDLESS, overflow=Overflow.DROP_NEWEST)
     expected = rate * (0.5 * 0.2**2 + 0.5 * 1.8**2) / (2.0 * (1.0 - rate * 1.0))
     assert float((served.start_ns - queued).mean()) == pytest.approx(expected, rel=0.03)
 
@@ -81,7 +81,9 @@ def test_loss_of_a_full_queue_under_poisson_arrivals(load: float, depth: int) ->
     random = np.random.default_rng(3)
     count = 300_000
     queued = np.cumsum(random.exponential(1.0 / load, count))
-    served = serve(queued, random.exponential(1.0, count), depth, Overflow.DROP_OLDEST)
+    served = serve(
+        queued_ns=queued, service_ns=random.exponential(1.0, count), depth=depth, overflow=Overflow.DROP_OLDEST
+    )
     places = depth + 1
     expected = (1.0 - load) * load**places / (1.0 - load ** (places + 1))
     assert served.dropped / count == pytest.approx(expected, rel=0.03)

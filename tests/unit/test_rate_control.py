@@ -17,7 +17,16 @@ from common.stamp import Stamp
 
 MS = 1_000_000
 S = 1_000_000_000
-FRAME = Frame(0, Stamp(0, "board"), Stamp(0, "board"), 8, 8, PixelFormat.GREY, None, bytes(64))
+FRAME = Frame(
+    sequence=0,
+    exposed=Stamp(0, "board"),
+    grabbed=Stamp(0, "board"),
+    width_px=8,
+    height_px=8,
+    pixel_format=PixelFormat.GREY,
+    exposure_ns=None,
+    payload=bytes(64),
+)
 
 OFFERS = Offers((50 * MS, 100 * MS, 200 * MS, 400 * MS), (90, 68, 41))
 """20, 10, 5 and 2.5 frames a second; three qualities."""

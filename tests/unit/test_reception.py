@@ -81,9 +81,18 @@ class Talk:
 
     def frame(self, **changes: object) -> FrameMessage:
         """The board's next frame, exposed 5 ms ago."""
-        marks = BoardMarks(self.now_ns - 5 * MS, self.now_ns - 2 * MS, self.now_ns - MS)
-        size = (CAMERA.width_px, CAMERA.height_px, PixelFormat.MJPEG)
-        made = FrameMessage(self.board.session, self.sent, self.sent, *size, None, marks, b"image")
+        marks = BoardMarks(exposed_ns=self.now_ns - 5 * MS, grabbed_ns=self.now_ns - 2 * MS, sent_ns=self.now_ns - MS)
+        made = FrameMessage(
+            session=self.board.session,
+            sent_index=self.sent,
+            sequence=self.sent,
+            width_px=CAMERA.width_px,
+            height_px=CAMERA.height_px,
+            pixel_format=PixelFormat.MJPEG,
+            exposure_ns=None,
+            marks=marks,
+            payload=b"image",
+        )
         self.sent += 1
         return replace(made, **changes)  # type: ignore[arg-type]
 
@@ -136,10 +145,13 @@ def test_a_strangers_refusal_ends_no_waiting(*, dialled: bool) -> None:
         ({"sent_index": 2**53 - 1}, Disbelief.CREDIT),
         ({"width_px": CAMERA.width_px + 1}, Disbelief.SIZE),
         ({"height_px": 16384}, Disbelief.SIZE),
-        ({"marks": BoardMarks(2**62, 2**62, 2**62)}, Disbelief.FUTURE),
-        ({"marks": BoardMarks(-(2**62), -(2**62), -(2**62))}, Disbelief.PAST),
-        ({"marks": BoardMarks(2**62, 0, -(2**62))}, Disbelief.FUTURE),
-        ({"marks": BoardMarks(10**12 - MS, 10**12 - 2 * MS, 10**12 - 3 * MS)}, Disbelief.MARKS),
+        ({"marks": BoardMarks(exposed_ns=2**62, grabbed_ns=2**62, sent_ns=2**62)}, Disbelief.FUTURE),
+        ({"marks": BoardMarks(exposed_ns=-(2**62), grabbed_ns=-(2**62), sent_ns=-(2**62))}, Disbelief.PAST),
+        ({"marks": BoardMarks(exposed_ns=2**62, grabbed_ns=0, sent_ns=-(2**62))}, Disbelief.FUTURE),
+        (
+            {"marks": BoardMarks(exposed_ns=10**12 - MS, grabbed_ns=10**12 - 2 * MS, sent_ns=10**12 - 3 * MS)},
+            Disbelief.MARKS,
+        ),
     ],
 )
 def test_a_frame_that_cannot_be_is_dropped_by_name(changes: dict[str, object], reason: Disbelief) -> None:
@@ -171,7 +183,9 @@ def test_frames_wait_while_an_echo_lies_and_come_back_by_themselves() -> None:
     talk.run(10)
     wave = talk.reception._session._paths[0].waves._wave
     told_ns = talk.now_ns + 3_600_000_000_000
-    talk.reception.receive(NAMES[Lane.CONTROL], Pong(wave, talk.now_ns - MS, told_ns, told_ns), talk.now_ns)
+    talk.reception.receive(
+        NAMES[Lane.CONTROL], Pong(wave=wave, t0_ns=talk.now_ns - MS, t1_ns=told_ns, t2_ns=told_ns), talk.now_ns
+    )
     talk.show(talk.frame())
     assert dict(talk.reception.account.disbelieved) == {Disbelief.CLOCK: 1}
     talk.said.clear()
@@ -246,7 +260,13 @@ def test_a_frame_older_than_its_partners_is_dropped_and_the_next_one_awaited() -
     talk = Talk()
     talk.run(300)
     for _ in range(2):
-        talk.show(talk.frame(marks=BoardMarks(talk.now_ns - 2_500 * MS, talk.now_ns - 2 * MS, talk.now_ns - MS)))
+        talk.show(
+            talk.frame(
+                marks=BoardMarks(
+                    exposed_ns=talk.now_ns - 2_500 * MS, grabbed_ns=talk.now_ns - 2 * MS, sent_ns=talk.now_ns - MS
+                )
+            )
+        )
         talk.run()
     assert dict(talk.reception.account.disbelieved) == {Disbelief.PAST: 1}
     assert talk.queue.counts.received == 1

@@ -105,7 +105,7 @@ def test_the_image_of_a_moment(
     if not folder.exists():
         fill(folder, "0.jpg", "1.jpg", "2.jpg")
     images = [path.read_bytes() for path in find_images(str(folder))]
-    camera = ReplayCamera(ReplaySettings(str(folder), fps, loop=True), start_ns)
+    camera = ReplayCamera(ReplaySettings(path=str(folder), fps=fps, loop=True), start_ns)
     now_ns = start_ns
     for step_ns in steps_ns:
         now_ns += step_ns
@@ -166,7 +166,7 @@ def test_options_reach_the_camera(tmp_path: Path) -> None:
 
 def test_a_long_stall_costs_bounded_work(tmp_path: Path) -> None:
     """After an hour without a read the newest images come, few of them, and sequence numbers tell how many were passed over."""
-    camera = ReplayCamera(ReplaySettings(str(fill(tmp_path, "a.jpg")), Fraction(30), loop=True), 0)
+    camera = ReplayCamera(ReplaySettings(path=str(fill(tmp_path, "a.jpg")), fps=Fraction(30), loop=True), 0)
     grabs = camera.read(3600 * 10**9)
     assert len(grabs) <= 65
     assert grabs[0] == Skipped(0, 3600 * 30 - 64)

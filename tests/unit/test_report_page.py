@@ -87,26 +87,28 @@ def ledger(number: int, delays_ms: tuple[int, ...] = (1, 2, 3, 4, 5, 20), start_
     """A pair's ledger with the six delays given in ms."""
     marks = np.cumsum([start_ms, *delays_ms]) * 1_000_000
     exposed, grabbed, sent, received, queued, dequeued, done = (int(mark) for mark in marks)
-    stages = StageTimes(1_000_000, 0, 2_000_000, 10_000_000, 3_000_000, 4_000_000)
-    board = BoardMarks(exposed, grabbed, sent)
+    stages = StageTimes(
+        decode=1_000_000, interpolate=0, rectify=2_000_000, match=10_000_000, reproject=3_000_000, write=4_000_000
+    )
+    board = BoardMarks(exposed_ns=exposed, grabbed_ns=grabbed, sent_ns=sent)
     return PairLedger(
-        "s",
-        number,
-        number,
-        1,
-        "tcp",
-        board,
-        received,
-        received,
-        queued,
-        dequeued,
-        done,
-        queued,
-        stages,
-        -7000,
-        0,
-        9000,
-        host=HostMarks(exposed + 7000, grabbed),
+        session="s",
+        sequence=number,
+        host_sequence=number,
+        bytes=1,
+        link="tcp",
+        board=board,
+        received_ns=received,
+        paired_ns=received,
+        queued_ns=queued,
+        dequeued_ns=dequeued,
+        done_ns=done,
+        previous_done_ns=queued,
+        stages=stages,
+        time_skew_ns=-7000,
+        offset_ns=0,
+        uncertainty_ns=9000,
+        host=HostMarks(exposed_ns=exposed + 7000, grabbed_ns=grabbed),
     )
 
 

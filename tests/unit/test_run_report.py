@@ -29,11 +29,26 @@ def run(pairs: int) -> RunSnapshot:
     delays = DelayStatistics()
     for number in range(pairs):
         at = number * 50 * MS
-        marks = (at + 3 * MS, at + 4 * MS, at + 4 * MS, at + 5 * MS, at + 15 * MS, at)
-        board = BoardMarks(at, at + MS, at + 2 * MS)
+        board = BoardMarks(exposed_ns=at, grabbed_ns=at + MS, sent_ns=at + 2 * MS)
         delays.add(
             PairLedger(
-                "s", number, number, 9, "ipc", board, *marks, StageTimes(), 0, 0, 50, host=HostMarks(at, at + MS)
+                session="s",
+                sequence=number,
+                host_sequence=number,
+                bytes=9,
+                link="ipc",
+                board=board,
+                received_ns=at + 3 * MS,
+                paired_ns=at + 4 * MS,
+                queued_ns=at + 4 * MS,
+                dequeued_ns=at + 5 * MS,
+                done_ns=at + 15 * MS,
+                previous_done_ns=at,
+                stages=StageTimes(),
+                time_skew_ns=0,
+                offset_ns=0,
+                uncertainty_ns=50,
+                host=HostMarks(exposed_ns=at, grabbed_ns=at + MS),
             )
         )
     counts = PairCounts(received=pairs, paired=pairs, taken=pairs)

@@ -259,14 +259,24 @@ def test_another_board_on_the_second_link_is_told_and_left_alone() -> None:
     """A link that leads to another board while ours is alive is told within two seconds, is said goodbye to, and no frame of it is taken."""
     world = with_second_link_lost()
     host = world.hosts[0]
-    other = BoardHello("other", "another boot", CAMERA, BoardCounts(), Rung())
+    other = BoardHello(session="other", boot_id="another boot", camera=CAMERA, counts=BoardCounts(), rung=Rung())
     control = host.names[1, Lane.CONTROL]
     begin_ns = world.now_ns
     while OtherBoard(1, other) not in host.others:
         world._host_does(host, host.session.receive(control, other, world.now_ns))
         world.settle(200 * MS)
         assert world.now_ns - begin_ns < TAKEOVER_NS + 500 * MS
-    foreign = FrameMessage("other", 3, 3, 1, 1, PixelFormat.MJPEG, None, BoardMarks(0, 0, 0), b"")
+    foreign = FrameMessage(
+        session="other",
+        sent_index=3,
+        sequence=3,
+        width_px=1,
+        height_px=1,
+        pixel_format=PixelFormat.MJPEG,
+        exposure_ns=None,
+        marks=BoardMarks(exposed_ns=0, grabbed_ns=0, sent_ns=0),
+        payload=b"",
+    )
     world._host_does(host, host.session.receive(host.names[1, Lane.FRAMES], foreign, world.now_ns))
     assert host.stale[-1].reason is StaleReason.OLD_SESSION
     assert host.session.receive(control, Bye(BoardCounts(99, 99)), world.now_ns) == []

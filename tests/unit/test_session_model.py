@@ -107,7 +107,7 @@ class Happenings(RuleBasedStateMachine):
     def an_echo_lies(self, by_ns: int, wave: int) -> None:
         """An answer of a wave, perhaps of the present one, tells another time."""
         told_ns, asked_ns = self.world.board_clock() + by_ns, self.world.host_clock() - MS
-        self.world.lie(Pong(wave, asked_ns, told_ns, told_ns))
+        self.world.lie(Pong(wave=wave, t0_ns=asked_ns, t1_ns=told_ns, t2_ns=told_ns))
 
     @rule()
     def a_stray_knock(self) -> None:
@@ -215,7 +215,7 @@ def test_a_wave_that_lies_is_not_confirmed_by_slow_echoes(seed: int) -> None:
     world = SteppingWorld(60 * MS, 4.0, seed)
     world.run(4 * SECOND_NS)
     told_ns, asked_ns = world.board_clock() + 180 * MS, world.host_clock() - MS
-    world.lie(Pong(world.reception._session._paths[0].waves._wave, asked_ns, told_ns, told_ns))
+    world.lie(Pong(wave=world.reception._session._paths[0].waves._wave, t0_ns=asked_ns, t1_ns=told_ns, t2_ns=told_ns))
     world.run(4 * SECOND_NS)
     assert world.reception.account.clock_steps == 0
     assert world.wrong == []

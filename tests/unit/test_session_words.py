@@ -305,12 +305,14 @@ def test_echoes_of_another_life_are_ignored() -> None:
         for output in host.session.tick(host.session.due_ns)
         if isinstance(output, Outgoing) and isinstance(output.message, Ping)
     ]
-    sound = Pong(ping.wave, 1, 2, 3)
-    assert Echo(ping.wave, 1, 2, 3, world.now_ns) in host.session.receive(control, sound, world.now_ns)
-    assert host.session.receive(control, Pong(ping.wave - 1, 1, 2, 3), world.now_ns) == [
-        Echo(ping.wave - 1, 1, 2, 3, world.now_ns)
+    sound = Pong(wave=ping.wave, t0_ns=1, t1_ns=2, t2_ns=3)
+    assert Echo(wave=ping.wave, t0_ns=1, t1_ns=2, t2_ns=3, t3_ns=world.now_ns) in host.session.receive(
+        control, sound, world.now_ns
+    )
+    assert host.session.receive(control, Pong(wave=ping.wave - 1, t0_ns=1, t1_ns=2, t2_ns=3), world.now_ns) == [
+        Echo(wave=ping.wave - 1, t0_ns=1, t1_ns=2, t2_ns=3, t3_ns=world.now_ns)
     ]
-    assert host.session.receive(control, Pong(0, 1, 2, 3), world.now_ns) == []
+    assert host.session.receive(control, Pong(wave=0, t0_ns=1, t1_ns=2, t2_ns=3), world.now_ns) == []
     world.restart_board()
     world.settle(20 * MS)
     assert host.session.is_open
@@ -334,7 +336,7 @@ def test_strangers_are_asked_who_they_are() -> None:
     """Words of a host from before a restart are answered with a knock, except its goodbye; no word of it counts."""
     world = World()
     knock = [Outgoing(b"x", Knock(Lane.CONTROL, world.board.session))]
-    for message in (Ping(1, 2), Credit(10**6), Pong(1, 2, 3, 4)):
+    for message in (Ping(1, 2), Credit(10**6), Pong(wave=1, t0_ns=2, t1_ns=3, t2_ns=4)):
         assert world.board.receive(b"x", message, world.now_ns, BoardCounts()) == knock
     assert world.board.receive(b"x", Bye(), world.now_ns, BoardCounts()) == []
     assert not world.board.has_credit
@@ -349,10 +351,12 @@ def test_send_times_are_set_at_the_last_moment(then_ns: int, now_ns: int) -> Non
         return decode(*encode_stamped(message, lambda: now_ns))
 
     assert stamped(Ping(3, then_ns), now_ns) == Ping(3, now_ns)
-    assert stamped(Pong(3, 1, 2, then_ns), now_ns) == Pong(3, 1, 2, now_ns)
+    assert stamped(Pong(wave=3, t0_ns=1, t1_ns=2, t2_ns=then_ns), now_ns) == Pong(
+        wave=3, t0_ns=1, t1_ns=2, t2_ns=now_ns
+    )
     stamped_frame = stamped(frame("s", 5), now_ns)
     assert isinstance(stamped_frame, FrameMessage)
-    assert stamped_frame.marks == BoardMarks(0, 0, now_ns)
+    assert stamped_frame.marks == BoardMarks(exposed_ns=0, grabbed_ns=0, sent_ns=now_ns)
     assert stamped(Credit(9), now_ns) == Credit(9)
 
 
@@ -372,7 +376,7 @@ def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, e
             outputs = host.session.tick(now_ns)
         while pings := [o.message for o in outputs if isinstance(o, Outgoing) and isinstance(o.message, Ping)]:
             t0_ns, now_ns, heard = now_ns, now_ns + round_trip_ns, heard + 1
-            outputs = host.session.receive(control, Pong(pings[0].wave, t0_ns, 1, 2), now_ns)
+            outputs = host.session.receive(control, Pong(wave=pings[0].wave, t0_ns=t0_ns, t1_ns=1, t2_ns=2), now_ns)
         assert heard == expected
 
 
@@ -396,7 +400,9 @@ def test_swift_echoes_are_learnt_from_when_their_wave_has_ended() -> None:
                     return output.message.wave, heard(outputs)
 
     def answered(wave: int, took_ns: int) -> list[Output]:
-        return host.session.receive(control, Pong(wave, world.now_ns - took_ns, 1, 2), world.now_ns)
+        return host.session.receive(
+            control, Pong(wave=wave, t0_ns=world.now_ns - took_ns, t1_ns=1, t2_ns=2), world.now_ns
+        )
 
     swift_ns, slow_ns = SLOW_ECHO_NS - 1, SLOW_ECHO_NS
     whole, _ = begun()
@@ -464,7 +470,10 @@ def test_the_host_is_told_once_of_each_rung() -> None:
     world = World()
     world.settle(500 * MS)
     host = world.hosts[0]
-    first, second = Rung(1, 3, 1, 66 * MS), Rung(2, 3, 2, 132 * MS)
+    first, second = (
+        Rung(index=1, last=3, changes=1, period_ns=66 * MS),
+        Rung(index=2, last=3, changes=2, period_ns=132 * MS),
+    )
     for rung in (first, second):
         camera = replace(CAMERA, period_ns=rung.period_ns)
         world.board.describe(camera, rung)
@@ -480,7 +489,7 @@ def test_a_host_that_comes_later_finds_the_camera_as_it_is() -> None:
     """A hello describes the camera with the rung that it is on; the accounts that follow are no news."""
     world = World()
     world.settle(500 * MS)
-    rung = Rung(2, 3, 2, 132 * MS, 45)
+    rung = Rung(index=2, last=3, changes=2, period_ns=132 * MS, quality=45)
     world.board.describe(replace(CAMERA, period_ns=132 * MS), rung)
     host = world.restart_host(world.hosts[0])
     world.settle(3000 * MS)

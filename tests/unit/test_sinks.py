@@ -26,15 +26,48 @@ PATIENCE_S = 60.0
 
 def result(number: int) -> Result:
     """A result of two grey images."""
-    marks = BoardMarks(number, number + 1, number + 2)
-    message = FrameMessage("s", number, number, 4, 3, PixelFormat.GREY, None, marks, b"\0" * 12)
+    marks = BoardMarks(exposed_ns=number, grabbed_ns=number + 1, sent_ns=number + 2)
+    size = {"width_px": 4, "height_px": 3}
+    message = FrameMessage(
+        session="s",
+        sent_index=number,
+        sequence=number,
+        **size,
+        pixel_format=PixelFormat.GREY,
+        exposure_ns=None,
+        marks=marks,
+        payload=b"\0" * 12,
+    )
     board = BoardFrame(message, "ipc", marks, number + 3, 0, 0)
-    host = Frame(number, Stamp(number, HOST_CLOCK), Stamp(number + 1, HOST_CLOCK), 4, 3, PixelFormat.GREY, None, b"")
+    exposed, grabbed = Stamp(number, HOST_CLOCK), Stamp(number + 1, HOST_CLOCK)
+    host = Frame(
+        sequence=number,
+        exposed=exposed,
+        grabbed=grabbed,
+        **size,
+        pixel_format=PixelFormat.GREY,
+        exposure_ns=None,
+        payload=b"",
+    )
     image = np.full((3, 4), number % 256, np.uint8)
     ledger = PairLedger(
-        *("s", number, number, 12, "ipc", marks, number + 3, number + 4, number + 5, number + 6, number + 7, 0),
-        *(StageTimes(), 0, 0, 0),
-        host=HostMarks(number, number + 1),
+        session="s",
+        sequence=number,
+        host_sequence=number,
+        bytes=12,
+        link="ipc",
+        board=marks,
+        received_ns=number + 3,
+        paired_ns=number + 4,
+        queued_ns=number + 5,
+        dequeued_ns=number + 6,
+        done_ns=number + 7,
+        previous_done_ns=0,
+        stages=StageTimes(),
+        time_skew_ns=0,
+        offset_ns=0,
+        uncertainty_ns=0,
+        host=HostMarks(exposed_ns=number, grabbed_ns=number + 1),
     )
     pair = FramePair(board, host, 0, number + 4, number + 5)
     processed = Processed(RectifiedPair(image, image), np.full((3, 4), np.nan, np.float32), None, StageTimes())

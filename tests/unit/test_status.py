@@ -36,10 +36,10 @@ def test_the_link_in_use_is_named() -> None:
 
 def test_a_lowered_camera_is_told() -> None:
     """What the camera gives instead of what was asked for stands at the end; nothing does while it gives all."""
-    lowered = Rung(1, 2, 1, 200_000_000, 50, 320, 240)
+    lowered = Rung(index=1, last=2, changes=1, period_ns=200_000_000, quality=50, width_px=320, height_px=240)
     text = line().text(SECOND_NS, BoardCounts(5, 5), has_host=True, rung=lowered)
     assert text.endswith("0 dropped; lowered to 5 fps of 320x240 at quality 50 for the link (rung 1 of 2)")
-    asked = Rung(0, 2, 2, 100_000_000, 80, 640, 480)
+    asked = Rung(index=0, last=2, changes=2, period_ns=100_000_000, quality=80, width_px=640, height_px=480)
     assert line().text(SECOND_NS, BoardCounts(5, 5), has_host=True, rung=asked).endswith("0 dropped")
 
 

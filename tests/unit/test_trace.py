@@ -18,7 +18,7 @@ def runs(draw: st.DrawFn) -> tuple[PairLedger, ...]:
     done_ns = 10**15
     ledgers = []
     for number in range(draw(st.integers(0, 12))):
-        stages = StageTimes(*draw(st.lists(st.integers(0, 10**7), min_size=6, max_size=6)))
+        stages = StageTimes(**{name: draw(st.integers(0, 10**7)) for name in StageTimes.__slots__})
         rest_ns = draw(st.integers(0, 10**6))
         dequeued_ns = done_ns + draw(st.integers(0, 10**8))
         queued_ns = dequeued_ns - draw(st.integers(0, 10**9))
@@ -26,10 +26,27 @@ def runs(draw: st.DrawFn) -> tuple[PairLedger, ...]:
         sent_ns = received_ns - draw(st.integers(0, 10**9))
         grabbed_ns = sent_ns - draw(st.integers(0, 10**9))
         done_ns = dequeued_ns + rest_ns + sum(getattr(stages, name) for name in StageTimes.__slots__)
-        board = BoardMarks(grabbed_ns - draw(st.integers(0, 10**9)), grabbed_ns, sent_ns)
-        marks = (received_ns, queued_ns, queued_ns, dequeued_ns, done_ns, 0)
+        board = BoardMarks(exposed_ns=grabbed_ns - draw(st.integers(0, 10**9)), grabbed_ns=grabbed_ns, sent_ns=sent_ns)
         ledgers.append(
-            PairLedger("s", number, number, 1000, "tcp", board, *marks, stages, 5, 0, 9, host=HostMarks(0, 0))
+            PairLedger(
+                session="s",
+                sequence=number,
+                host_sequence=number,
+                bytes=1000,
+                link="tcp",
+                board=board,
+                received_ns=received_ns,
+                paired_ns=queued_ns,
+                queued_ns=queued_ns,
+                dequeued_ns=dequeued_ns,
+                done_ns=done_ns,
+                previous_done_ns=0,
+                stages=stages,
+                time_skew_ns=5,
+                offset_ns=0,
+                uncertainty_ns=9,
+                host=HostMarks(exposed_ns=0, grabbed_ns=0),
+            )
         )
     return tuple(ledgers)
 
@@ -66,9 +83,25 @@ def test_a_pairs_slices_are_its_delays_one_behind_the_other(ledgers: tuple[PairL
 
 def test_a_clock_that_errs_gives_no_negative_slice() -> None:
     """A frame that seems to come before it was sent, within the clock's uncertainty, is shown as a slice without length."""
-    board = BoardMarks(0, 1000, 2000)
+    board = BoardMarks(exposed_ns=0, grabbed_ns=1000, sent_ns=2000)
     ledger = PairLedger(
-        "s", 0, 0, 9, "ipc", board, 1990, 3000, 3000, 4000, 5000, 0, StageTimes(), 0, 0, 50, host=HostMarks(0, 0)
+        session="s",
+        sequence=0,
+        host_sequence=0,
+        bytes=9,
+        link="ipc",
+        board=board,
+        received_ns=1990,
+        paired_ns=3000,
+        queued_ns=3000,
+        dequeued_ns=4000,
+        done_ns=5000,
+        previous_done_ns=0,
+        stages=StageTimes(),
+        time_skew_ns=0,
+        offset_ns=0,
+        uncertainty_ns=50,
+        host=HostMarks(exposed_ns=0, grabbed_ns=0),
     )
     events = checked(trace_json([TracedRun("run", (ledger,))]))
     assert [event["dur"] for event in events if event["name"] == "propagation"] == [0.0]

@@ -27,7 +27,9 @@ def test_rows_lose_their_padding_and_nothing_else(
     rows = height * 3 // 2 if source is PixelFormat.NV12 else height
     image = bytes((31 * i + 7) % 251 for i in range(row * rows))
     buffer = b"".join(image[i : i + row] + b"\xee" * padding for i in range(0, len(image), row))
-    made = PixelFormatSet(_LETTERS[source], (width, height), row + padding, len(buffer))
+    made = PixelFormatSet(
+        letters=_LETTERS[source], size_px=(width, height), row_bytes=row + padding, image_bytes=len(buffer)
+    )
     packing = Packing.of(made, source, part)
     payload = packing.pack(memoryview(buffer))
     if part is SendPart.WHOLE:
@@ -41,7 +43,9 @@ def test_rows_lose_their_padding_and_nothing_else(
 @pytest.mark.parametrize("part", list(SendPart))
 def test_jpeg_passes_untouched(part: SendPart) -> None:
     """A JPEG leaves as it came, also when luma is asked for: taking it would need decoding."""
-    packing = Packing.of(PixelFormatSet("MJPG", (640, 480), 0, 614400), PixelFormat.MJPEG, part)
+    packing = Packing.of(
+        PixelFormatSet(letters="MJPG", size_px=(640, 480), row_bytes=0, image_bytes=614400), PixelFormat.MJPEG, part
+    )
     payload = b"\xff\xd8 some scan \xff\xd9"
     assert (packing.pack(memoryview(payload)), packing.sent_as, packing.least_bytes) == (
         payload,
@@ -52,7 +56,7 @@ def test_jpeg_passes_untouched(part: SendPart) -> None:
 
 def test_a_raw_buffer_that_is_too_short_is_spoiled() -> None:
     """A raw image is whole from its last used byte on; one byte less is a fault, none at all another."""
-    made = PixelFormatSet("YUYV", (8, 4), 20, 80)
+    made = PixelFormatSet(letters="YUYV", size_px=(8, 4), row_bytes=20, image_bytes=80)
     least = Packing.of(made, PixelFormat.YUYV, SendPart.WHOLE).least_bytes
     assert least == 3 * 20 + 16
     assert find_fault(PixelFormat.YUYV, bytes(76), least) is None

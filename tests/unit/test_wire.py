@@ -193,7 +193,19 @@ def test_number_of_fields_is_exact(fields: list[Any]) -> None:
 def test_payload_has_a_limit() -> None:
     """A frame of exactly the greatest size is read, one of a byte more is refused."""
     whole = memoryview(bytes(MAX_PAYLOAD_BYTES + 1))
-    header = encode(FrameMessage("s", 0, 0, 1, 1, PixelFormat.MJPEG, None, BoardMarks(0, 0, 0), b""))[0]
+    header = encode(
+        FrameMessage(
+            session="s",
+            sent_index=0,
+            sequence=0,
+            width_px=1,
+            height_px=1,
+            pixel_format=PixelFormat.MJPEG,
+            exposure_ns=None,
+            marks=BoardMarks(exposed_ns=0, grabbed_ns=0, sent_ns=0),
+            payload=b"",
+        )
+    )[0]
     message = decode(header, whole[:-1])
     assert isinstance(message, FrameMessage)
     assert len(message.payload) == MAX_PAYLOAD_BYTES
@@ -231,8 +243,12 @@ def test_kinds_keep_their_numbers() -> None:
 @pytest.mark.parametrize("name", ["caf\udce9", "x" * 300, "\U0001f4f7" * 300, "\udcff" * 97])
 def test_any_folder_name_makes_a_hello(name: str) -> None:
     """A camera's name that is too long or, being a path, no UTF-8 is shortened or mended, never refused."""
-    camera = CameraDescription(name, 640, 480, PixelFormat.MJPEG, 1, Pacing.CLOCK)
-    message = decode(encode(BoardHello("s", "b", camera, BoardCounts(), Rung(period_ns=1)))[0])
+    camera = CameraDescription(
+        name=name, width_px=640, height_px=480, pixel_format=PixelFormat.MJPEG, period_ns=1, pacing=Pacing.CLOCK
+    )
+    message = decode(
+        encode(BoardHello(session="s", boot_id="b", camera=camera, counts=BoardCounts(), rung=Rung(period_ns=1)))[0]
+    )
     assert isinstance(message, BoardHello)
     assert message.camera.name[:3] == name[:3].replace("\udcff", "?")
 
@@ -240,6 +256,6 @@ def test_any_folder_name_makes_a_hello(name: str) -> None:
 def test_an_echo_is_as_long_as_its_answer() -> None:
     """On a slow line unequal lengths would be taken for a difference of the clocks."""
     uptime_ns = 3600 * 10**9
-    ping, pong = encode(Ping(7, uptime_ns)), encode(Pong(7, uptime_ns, uptime_ns, uptime_ns))
+    ping, pong = encode(Ping(7, uptime_ns)), encode(Pong(wave=7, t0_ns=uptime_ns, t1_ns=uptime_ns, t2_ns=uptime_ns))
     assert len(ping[0]) == len(pong[0])
     assert decode(*ping) == Ping(7, uptime_ns)

@@ -33,7 +33,12 @@ def cabled(guest: Guest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[G
     guest.sh(f"systemctl start {GADGET}")
     assert guest.show("ConditionResult", GADGET) == "no", "without a controller there is nothing to do"
     rules = tmp_path_factory.mktemp("rules") / RULES.name
-    write_rule(UsbBoard("ttyACM0", "1d6b", "0104", _serial_number(guest), "tandemscan"), rules)
+    write_rule(
+        UsbBoard(
+            device="ttyACM0", vendor="1d6b", product="0104", serial=_serial_number(guest), manufacturer="tandemscan"
+        ),
+        rules,
+    )
     guest.put(rules, "/etc/udev/rules.d")
     guest.sh("udevadm control --reload; modprobe -a dummy_hcd cdc_acm cdc_ncm")
     guest.sh(f"systemctl start {GADGET}")

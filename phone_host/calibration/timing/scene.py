@@ -57,7 +57,7 @@ _HUBER_PX: Final = 0.5
 _REMEDY: Final = "move something with texture up and down, quickly, in view of both cameras"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Rows:
     """Features seen by both cameras.
 
@@ -97,10 +97,19 @@ def measure_scene(
     require_shots(len(board), len(host))
     board_is_left = rectifier.rig.board_side is Side.LEFT
     left, right = (board, host) if board_is_left else (host, board)
-    first = _rows(left, right, 0.0, rectifier, look, advance=lambda share: advance(share / 2))
+    first = _rows(
+        left=left, right=right, offset_s=0.0, rectifier=rectifier, look=look, advance=lambda share: advance(share / 2)
+    )
     coarse_s, _ = _slope(first)
     # With the first answer the right neighbours in time are compared.
-    rows = _rows(left, right, coarse_s, rectifier, look, advance=lambda share: advance((1 + share) / 2))
+    rows = _rows(
+        left=left,
+        right=right,
+        offset_s=coarse_s,
+        rectifier=rectifier,
+        look=look,
+        advance=lambda share: advance((1 + share) / 2),
+    )
     offset_s, uncertainty_s = _slope(rows)
     weights = rows.velocity_px_s**2
     period = (left[-1].exposed_ns - left[0].exposed_ns) / 1e9 / (len(left) - 1)
@@ -122,12 +131,12 @@ def measure_scene(
 
 
 def _rows(
+    *,
     left: Sequence[Shot],
     right: Sequence[Shot],
     offset_s: float,
     rectifier: Rectifier,
     look: Look,
-    *,
     advance: Callable[[float], None],
 ) -> Rows:
     """Follow features through three left images, and find them in the right image nearest in time to the middle one."""
@@ -156,7 +165,13 @@ def _rows(
     moving = np.abs(table[:, 0]) > _MOVES_PX_S
     if moving.sum() < _LEAST_MOVING or len(np.unique(table[moving, 4])) < _LEAST_INSTANTS:
         raise DataError("no motion up or down was seen by both cameras", _REMEDY)
-    return Rows(table[:, 0], table[:, 1], table[:, 3], table[:, 4].astype(np.int64), table[:, 2])
+    return Rows(
+        velocity_px_s=table[:, 0],
+        difference_px=table[:, 1],
+        stamps_s=table[:, 3],
+        instant=table[:, 4].astype(np.int64),
+        row=table[:, 2],
+    )
 
 
 def _grey(image: Image) -> Image:

@@ -64,7 +64,13 @@ class LyingBoard:
         self._waiter = Waiter(self._link.pollables)
         self._images = [(film() / f"{number}.jpg").read_bytes() for number in range(FRAMES)]
         self.camera = CameraDescription(
-            "liar", WIDTH_PX, HEIGHT_PX, PixelFormat.MJPEG, PERIOD_NS, Pacing.CLOCK, Steering.GRID
+            name="liar",
+            width_px=WIDTH_PX,
+            height_px=HEIGHT_PX,
+            pixel_format=PixelFormat.MJPEG,
+            period_ns=PERIOD_NS,
+            pacing=Pacing.CLOCK,
+            steering=Steering.GRID,
         )
         self._boot_id = now.random_id()
         self.lanes: dict[Lane, bytes] = {}
@@ -159,9 +165,16 @@ class LyingBoard:
         """A frame of now that nobody asked for."""
         ns = now.monotonic_ns()
         frame = self._frame(ns, ns, payload)
-        size = (frame.width_px, frame.height_px, frame.pixel_format)
         return FrameMessage(
-            self.session.session, index, frame.sequence, *size, None, BoardMarks(ns, ns, ns), frame.payload
+            session=self.session.session,
+            sent_index=index,
+            sequence=frame.sequence,
+            width_px=frame.width_px,
+            height_px=frame.height_px,
+            pixel_format=frame.pixel_format,
+            exposure_ns=None,
+            marks=BoardMarks(exposed_ns=ns, grabbed_ns=ns, sent_ns=ns),
+            payload=frame.payload,
         )
 
     def end(self) -> None:
@@ -228,9 +241,16 @@ class LyingBoard:
 
     def _frame(self, exposed_ns: int, now_ns: int, image: bytes) -> Frame:
         self._exposed[self._sequence] = exposed_ns
-        size = (self.camera.width_px, self.camera.height_px)
-        stamps = Stamp(exposed_ns, "liar"), Stamp(now_ns, "liar")
-        frame = Frame(self._sequence, *stamps, *size, PixelFormat.MJPEG, None, image)
+        frame = Frame(
+            sequence=self._sequence,
+            exposed=Stamp(exposed_ns, "liar"),
+            grabbed=Stamp(now_ns, "liar"),
+            width_px=self.camera.width_px,
+            height_px=self.camera.height_px,
+            pixel_format=PixelFormat.MJPEG,
+            exposure_ns=None,
+            payload=image,
+        )
         self._sequence += 1
         return frame
 
