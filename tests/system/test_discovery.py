@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from phone_host.boards.discovery import remember
+from phone_host.boards.discovery import _last, remember
 from phone_host.boards.found import SERVICE
 from tests.support.numbered import write_film
 from tests.support.programs import PATIENCE_S
@@ -131,8 +131,6 @@ def test_the_package_brings_the_announcement(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["", "tcp://", "tcp://x:y", "ipc:///x", "\ud800", "tcp://127.0.0.1:5555 rm"])
 def test_a_spoiled_memory_is_no_board(text: str, tmp_path: Path) -> None:
     """Whatever stands in the file of the last board is a tcp link or nothing."""
-    from phone_host.boards.discovery import _last  # noqa: PLC0415
-
     (tmp_path / "last-board").write_bytes(text.encode("utf-8", "surrogatepass"))
     assert _last(tmp_path) == []
     remember(tmp_path, "tcp://192.0.2.1:5555")
@@ -141,8 +139,6 @@ def test_a_spoiled_memory_is_no_board(text: str, tmp_path: Path) -> None:
 
 def test_the_memory_leads_nowhere(tmp_path: Path) -> None:
     """A link or a pipe in place of the file of the last board is neither followed nor waited for; the next board that is used replaces it."""
-    from phone_host.boards.discovery import _last  # noqa: PLC0415
-
     (tmp_path / "precious").write_text("tcp://192.0.2.7:5555")
     (tmp_path / "state").mkdir()
     for plant in (lambda path: path.symlink_to(tmp_path / "precious"), os.mkfifo):

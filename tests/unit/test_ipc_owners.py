@@ -14,6 +14,10 @@ from pathlib import Path
 import pytest
 import zmq
 
+from board_agent.doctor.link_probe import examine_link
+from common.doctor.access import Account
+from common.doctor.finding import Verdict
+from common.doctor.unit_check import Unit
 from common.errors import SettingsError, TakenError, UnavailableError
 from common.link.base import Incoming, Link
 from common.link.factory import open_link, parse_link
@@ -246,11 +250,6 @@ def test_a_folder_for_sockets_that_somebody_has_planted_is_refused(
 @needs_root
 def test_the_doctor_asks_as_the_user_who_serves(shared: Path) -> None:
     """Root's doctor finds nothing wrong with a path in the service's own folder."""
-    from board_agent.doctor.link_probe import examine_link  # noqa: PLC0415
-    from common.doctor.access import Account  # noqa: PLC0415
-    from common.doctor.finding import Verdict  # noqa: PLC0415
-    from common.doctor.unit_check import Unit  # noqa: PLC0415
-
     place = shared / "run"
     place.mkdir(mode=0o750)
     os.chown(place, NOBODY, NOBODY)

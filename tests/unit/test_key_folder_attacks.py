@@ -1,5 +1,6 @@
 """A folder of keys whose owner was taken over, and root acting in it. Real users, real links."""
 
+import fcntl
 import os
 import re
 import shutil
@@ -258,8 +259,6 @@ def test_a_race_for_the_folder_gives_the_service_nothing(place: Path, folder: Pa
 
 def test_a_lock_that_is_never_given_back_ends_in_one_line(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A service that holds its folder's lock keeps root waiting for a while, not for ever."""
-    import fcntl  # noqa: PLC0415
-
     monkeypatch.setattr("common.keys._LOCK_WAIT_NS", 10**8)
     descriptor = os.open(folder, os.O_RDONLY)
     fcntl.flock(descriptor, fcntl.LOCK_EX)

@@ -1,5 +1,6 @@
 """The chessboard: reading its size, finding it, and the order of its corners."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -52,8 +53,6 @@ def test_corners_of_a_rendered_board_are_where_geometry_puts_them() -> None:
 
 
 def _corners_m(pose: np.ndarray) -> np.ndarray:
-    import cv2  # noqa: PLC0415
-
     points: np.ndarray = BOARD.points_m() @ np.asarray(cv2.Rodrigues(pose[:3])[0]).T + pose[3:]
     return points
 

@@ -125,8 +125,9 @@ def _measure(by: str, footage: Footage, rig: Rig | None) -> Measured:
     with progress:
         if by == "scene":
             assert rig is not None
-            look = lambda shot: decode_frame(shot.image)  # noqa: E731 - shorter than a function of one line
-            return measure_scene(footage.board, footage.host, Rectifier(rig), look, advance)
+            return measure_scene(
+                footage.board, footage.host, Rectifier(rig), lambda shot: decode_frame(shot.image), advance
+            )
         board_s, host_s, _ = to_seconds(*([shot.exposed_ns for shot in side] for side in (footage.board, footage.host)))
         return (_by_lamp if by == "lamp" else _by_screen)(footage, board_s, host_s, advance)
 
