@@ -27,8 +27,8 @@ from common.link.callers import Call, Callers, Left, Nonsense, Said
 from common.link.curve import Guard, Seldom
 from common.link.waiter import is_readable
 from common.program.logs import event
-from common.protocol.enrolment_code import Desk, Failed, Output, Paired, Say, ShowCode, code_text
-from common.protocol.enrolment_words import Identity, Refuse, Refused
+from common.protocol.enrolment_code import Desk, Enrolled, Failed, Output, Say, ShowCode, code_text
+from common.protocol.enrolment_words import Denial, Identity, Refuse
 
 _LOG = logging.getLogger(__name__)
 
@@ -188,7 +188,7 @@ class Door:
             case Said(connection, address, word):
                 self._do(self._desk.receive(connection, word, now_ns), address, now_ns)
             case Left(connection):
-                self._do(self._desk.receive(connection, Refuse(Refused.CLOSED), now_ns), "", now_ns)
+                self._do(self._desk.receive(connection, Refuse(Denial.CLOSED), now_ns), "", now_ns)
             case Nonsense(_, address, problem):
                 if self._strangers.now(now_ns):
                     count = self._strangers.count
@@ -207,7 +207,7 @@ class Door:
                     self._state = replace(self._state, code="", asking="", failed=self._state.failed + 1)
                     pause_s = pause_ns // 1_000_000_000
                     _LOG.warning(event("pairing_failed", host=clean_name(name), pause_s=pause_s))
-                case Paired(host):
+                case Enrolled(host):
                     if not self._take_in(host, address):
                         return
                 case _:

@@ -26,7 +26,7 @@ from common.link.sdp import PSM, channel_in, query
 from common.link.stream import Opening, StreamLink
 from common.link.uri import LinkRequest
 from common.program.logs import event
-from common.protocol.framing import Side
+from common.protocol.framing import LinkEnd
 from common.protocol.message import Lane
 
 _LOG = logging.getLogger(__name__)
@@ -195,7 +195,7 @@ class RfcommDialler(StreamLink):
             _check_adapter(uri)
         address = device if is_address(device) else _address_of(device)
         self._dialling = _Dialling(uri, address, channel, unpaired=unpaired)
-        super().__init__("rfcomm", Side.DIALLER, self._dialling, FRAME_BYTES, waits=waits)
+        super().__init__("rfcomm", LinkEnd.DIALLER, self._dialling, FRAME_BYTES, waits=waits)
 
     def close(self) -> None:
         """Give what was handed over half a second to leave, say goodbye, hang up."""
@@ -304,7 +304,7 @@ class RfcommListener:
                 accepted.close()
                 continue
             accepted.settimeout(0)
-            stream = StreamLink(self.kind, Side.LISTENER, _once(_RfcommLine(accepted)), FRAME_BYTES)
+            stream = StreamLink(self.kind, LinkEnd.LISTENER, _once(_RfcommLine(accepted)), FRAME_BYTES)
             self._streams[b"%d/" % next(self._numbers)] = stream
             self._epoll.register(stream.pollables[0].fileno(), select.EPOLLIN)
 

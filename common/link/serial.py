@@ -16,7 +16,7 @@ import serial
 from common.errors import MissingDeviceError, TakenError, UnavailableError
 from common.link.stream import StreamLink
 from common.link.uri import LinkRequest
-from common.protocol.framing import Side
+from common.protocol.framing import LinkEnd
 
 DEFAULT_BAUD: Final = 115200
 """For real UARTs; USB and pseudo terminals have no speed to set."""
@@ -106,7 +106,7 @@ class SerialLink(StreamLink):
     """
 
     def __init__(self, path: str, baud: int, *, listens: bool, waits: bool = False) -> None:
-        side = Side.LISTENER if listens else Side.DIALLER
+        side = LinkEnd.LISTENER if listens else LinkEnd.DIALLER
         super().__init__("serial", side, lambda: SerialLine(path, baud), waits=waits)
 
 

@@ -20,7 +20,7 @@ from common.frame import Buffer
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.protocol.chunking import Whole
 from common.protocol.duplex import Change, Duplex, DuplexCounts
-from common.protocol.framing import Side
+from common.protocol.framing import LinkEnd
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
 
@@ -86,14 +86,14 @@ class StreamLink:
     def __init__(
         self,
         kind: str,
-        side: Side,
+        side: LinkEnd,
         open_line: Callable[[], Line | Opening],
         frame_bytes: int = 1,
         *,
         waits: bool = False,
     ) -> None:
         self.kind = kind
-        self._dials = side is Side.DIALLER
+        self._dials = side is LinkEnd.DIALLER
         self.dialled = {lane: lane.name.encode() for lane in Lane} if self._dials else {}
         self._open_line = open_line
         self._line: Line | None = None

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from common.frame import Buffer
-from common.protocol.framing import UNIT_OVERHEAD_BYTES, Side, Unit, UnitKind, unit_parts
+from common.protocol.framing import UNIT_OVERHEAD_BYTES, LinkEnd, Unit, UnitKind, unit_parts
 from common.protocol.message import Lane
 from common.protocol.pacing import MS, Window
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
@@ -76,7 +76,7 @@ class Cutter:
         frame_bytes: the line carries bytes in frames of so many; 1: it does not.
     """
 
-    def __init__(self, side: Side, frame_bytes: int = 1) -> None:
+    def __init__(self, side: LinkEnd, frame_bytes: int = 1) -> None:
         self._side = side
         self._queues: dict[Lane, deque[_Parcel]] = {lane: deque() for lane in Lane}
         self._numbers = dict.fromkeys(Lane, 0)

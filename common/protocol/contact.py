@@ -10,7 +10,7 @@ from collections import deque
 from enum import Enum
 from typing import Final
 
-from common.protocol.framing import Side, Unit, UnitKind
+from common.protocol.framing import LinkEnd, Unit, UnitKind
 
 _WORD: Final = struct.Struct("<BI")
 _NEVER: Final = 2**63 - 1
@@ -46,8 +46,8 @@ class Contact:
         number: random below 2^32, so that no earlier life of this side has used it.
     """
 
-    def __init__(self, side: Side, number: int) -> None:
-        self._dials = side is Side.DIALLER
+    def __init__(self, side: LinkEnd, number: int) -> None:
+        self._dials = side is LinkEnd.DIALLER
         self._number = number if self._dials else None
         self._up = False
         self._due_ns = 0

@@ -10,7 +10,7 @@ from typing import Final
 from common.frame import Buffer
 from common.protocol.chunking import Cutter, Joiner, Whole
 from common.protocol.contact import Contact, News
-from common.protocol.framing import Deframer, Side, Unit, UnitKind, unit_parts
+from common.protocol.framing import Deframer, LinkEnd, Unit, UnitKind, unit_parts
 from common.protocol.message import Lane
 
 _NEVER: Final = 2**63 - 1
@@ -52,7 +52,7 @@ class Duplex:
         frame_bytes: the line carries bytes in frames of so many; 1: it does not.
     """
 
-    def __init__(self, side: Side, number: int, frame_bytes: int = 1) -> None:
+    def __init__(self, side: LinkEnd, number: int, frame_bytes: int = 1) -> None:
         self._side = side
         self._frame_bytes = frame_bytes
         self._contact = Contact(side, number)

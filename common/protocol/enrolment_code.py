@@ -24,10 +24,10 @@ from common.protocol.enrolment_words import (
     Ask,
     Begin,
     Commit,
+    Denial,
     Identity,
     Open,
     Refuse,
-    Refused,
     Shown,
     Word,
 )
@@ -56,7 +56,7 @@ _BIT_BASE: Final = 0x80
 """A round's bit is committed as 0x80 or 0x81, as the specification has it."""
 
 
-class Side(Enum):
+class Speaker(Enum):
     """Who speaks."""
 
     HOST = b"host"
@@ -96,10 +96,10 @@ class _Proof:
     """One side's part in an attempt: its commitments, and the check of the other's."""
 
     def __init__(
-        self, *, side: Side, host: Identity, board: Identity, code: int, chance: Callable[[int], bytes]
+        self, *, side: Speaker, host: Identity, board: Identity, code: int, chance: Callable[[int], bytes]
     ) -> None:
         self._side = side
-        self._other = Side.BOARD if side is Side.HOST else Side.HOST
+        self._other = Speaker.BOARD if side is Speaker.HOST else Speaker.HOST
         self._context = _context(host, board)
         self._code = code
         self._chance = chance
@@ -126,7 +126,7 @@ class _Proof:
         self.round += 1
         return hmac.compare_digest(expected, self._theirs)
 
-    def _commitment(self, side: Side, nonce: bytes) -> bytes:
+    def _commitment(self, side: Speaker, nonce: bytes) -> bytes:
         bit = _BIT_BASE | (self._code >> self.round & 1)
         said = struct.pack("<BB", self.round, bit) + side.value + b"\0" + self._context
         return hmac.digest(nonce, said, "sha256")
@@ -162,7 +162,7 @@ class Asking:
     def begin(self, code: int) -> Begin:
         """Begin the proof, with what was typed; only after `Shown` has come, be it over another connection."""
         assert self.board is not None
-        self._proof = _Proof(side=Side.HOST, host=self._host, board=self.board, code=code, chance=self._chance)
+        self._proof = _Proof(side=Speaker.HOST, host=self._host, board=self.board, code=code, chance=self._chance)
         self._expects = Commit
         return Begin(self._host, self._proof.commit().commitment)
 
@@ -210,7 +210,7 @@ class ShowCode:
 
 
 @dataclass(frozen=True, slots=True)
-class Paired:
+class Enrolled:
     """Desk: this host has proved the code; from now on it is trusted."""
 
     host: Identity
@@ -224,7 +224,7 @@ class Failed:
     pause_ns: int
 
 
-Output = Say | ShowCode | Paired | Failed
+Output = Say | ShowCode | Enrolled | Failed
 
 
 @dataclass(slots=True)
@@ -288,7 +288,7 @@ class Desk:
             case Commit() | Open() if attempt is not None and is_theirs:
                 return outputs + self._prove(attempt, word, now_ns)
             case Commit() | Open():
-                return [*outputs, Say(connection, Refuse(Refused.WRONG))]
+                return [*outputs, Say(connection, Refuse(Denial.WRONG))]
             case Ask() | Begin() | Shown() | Refuse():
                 return outputs + (self._fail(now_ns) if is_theirs else [])
             case _:
@@ -302,9 +302,9 @@ class Desk:
 
     def _refusal(self, connection: bytes, now_ns: int) -> list[Output]:
         """Send a host away while a proof or a pause lasts; else nothing."""
-        reason, until_ns = Refused.PAUSE, self._closed_until_ns
+        reason, until_ns = Denial.PAUSE, self._closed_until_ns
         if self._attempt is not None:
-            reason, until_ns = Refused.BUSY, self._attempt.until_ns
+            reason, until_ns = Denial.BUSY, self._attempt.until_ns
         return [Say(connection, Refuse(reason, -((now_ns - until_ns) // _S)))] if now_ns < until_ns else []
 
     def _take(self, connection: bytes, word: Ask | Begin, now_ns: int) -> list[Output]:
@@ -312,7 +312,7 @@ class Desk:
         if isinstance(word, Ask):
             self._code_until_ns = now_ns + CODE_LIFE_NS
             return [ShowCode(code, word.host.name), Say(connection, Shown(self._board))]
-        proof = _Proof(side=Side.BOARD, host=word.host, board=self._board, code=code, chance=self._chance)
+        proof = _Proof(side=Speaker.BOARD, host=word.host, board=self._board, code=code, chance=self._chance)
         proof.keep(Commit(0, word.commitment))
         self._attempt = _Attempt(connection, word.host, proof, now_ns + PROOF_NS)
         return [Say(connection, proof.commit())]
@@ -333,7 +333,7 @@ class Desk:
             return [Say(connection, answer)]
         self._attempt = None
         self.pardon()
-        return [Paired(attempt.host), Say(connection, answer)]
+        return [Enrolled(attempt.host), Say(connection, answer)]
 
     def _fail(self, now_ns: int) -> list[Output]:
         assert self._attempt is not None
@@ -343,7 +343,7 @@ class Desk:
         if self._failures % TRIES == 0:
             pause_ns = min(FIRST_PAUSE_NS << min(self._failures // TRIES - 1, 20), LONGEST_PAUSE_NS)
             self._closed_until_ns = now_ns + pause_ns
-        return [Failed(attempt.host.name, pause_ns), Say(attempt.connection, Refuse(Refused.WRONG, pause_ns // _S))]
+        return [Failed(attempt.host.name, pause_ns), Say(attempt.connection, Refuse(Denial.WRONG, pause_ns // _S))]
 
 
 def _out_of_turn() -> ProtocolError:

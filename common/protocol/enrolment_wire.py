@@ -15,10 +15,10 @@ from common.protocol.enrolment_words import (
     Ask,
     Begin,
     Commit,
+    Denial,
     Identity,
     Open,
     Refuse,
-    Refused,
     Shown,
     Word,
 )
@@ -132,9 +132,9 @@ def _read(kind: type, fields: list[Any]) -> Word:
     if type(first) is not int:
         raise _bad("no number")
     if kind is Refuse:
-        if not 0 <= first < len(Refused) or type(second) is not int or not 0 <= second <= _LONGEST_S:
+        if not 0 <= first < len(Denial) or type(second) is not int or not 0 <= second <= _LONGEST_S:
             raise _bad("no refusal")
-        return Refuse(Refused(first), second)
+        return Refuse(Denial(first), second)
     size = COMMITMENT_BYTES if kind is Commit else NONCE_BYTES
     if not 0 <= first < ROUNDS or type(second) is not bytes or len(second) != size:
         raise _bad("no round")

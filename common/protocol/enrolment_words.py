@@ -59,7 +59,7 @@ class Open:
     nonce: bytes
 
 
-class Refused(Enum):
+class Denial(Enum):
     """Why an attempt has no future."""
 
     CLOSED = 0
@@ -72,7 +72,7 @@ class Refused(Enum):
 class Refuse:
     """Either side: no. `seconds` until it may be tried again, where that is known; else 0."""
 
-    reason: Refused
+    reason: Denial
     seconds: int = 0
 
 

@@ -31,16 +31,16 @@ _KIND_SHIFT: Final = 14
 _LENGTH_MASK: Final = 0xFFF
 
 
-class Side(Enum):
+class LinkEnd(Enum):
     """Who wrote a unit; the value is the marker that it begins with."""
 
     DIALLER = 0xA5
     LISTENER = 0xC6
 
     @property
-    def peer(self) -> "Side":
+    def peer(self) -> "LinkEnd":
         """The other one."""
-        return Side.LISTENER if self is Side.DIALLER else Side.DIALLER
+        return LinkEnd.LISTENER if self is LinkEnd.DIALLER else LinkEnd.DIALLER
 
 
 class UnitKind(Enum):
@@ -74,7 +74,7 @@ class Unit:
 _KINDS: Final = tuple(UnitKind)
 
 
-def unit_parts(side: Side, unit: Unit) -> tuple[bytes, Buffer, bytes]:
+def unit_parts(side: LinkEnd, unit: Unit) -> tuple[bytes, Buffer, bytes]:
     """Give a unit's bytes on the wire in three parts, so that a large body need not be copied here.
 
     Args:
@@ -99,7 +99,7 @@ class Deframer:
         peer: who writes them.
     """
 
-    def __init__(self, peer: Side) -> None:
+    def __init__(self, peer: LinkEnd) -> None:
         self._marker = bytes((peer.value,))
         self._rest = b""
         self._garbage_bytes = 0

@@ -17,7 +17,7 @@ from phone_host.bench.analysis import Analysis, analyse
 from phone_host.bench.cases import Interface, cases, interfaces, parse_links, parse_qualities, parse_rates, parse_sizes
 from phone_host.bench.changes import parse_changes
 from phone_host.bench.emulate import parse_profiles
-from phone_host.bench.links import obstacle
+from phone_host.bench.links import why_not_measurable
 from phone_host.bench.matrix import measure, remote_cases
 from phone_host.bench.page import figure, page
 from phone_host.bench.report import PERCENTILES, Conditions, as_json, conditions, grouped
@@ -72,7 +72,7 @@ def _available(asked: Sequence[Interface]) -> tuple[list[Interface], list[tuple[
     """Those that can be had here, and the others with the reason, which is said at once."""
     here, not_run = [], []
     for interface in asked:
-        reason = obstacle(interface)
+        reason = why_not_measurable(interface)
         if reason:
             print(f"delay-bench: {interface} is not run: {reason}", file=sys.stderr)
             not_run.append((interface, reason))

@@ -67,7 +67,7 @@ class Ends:
 
 
 @contextmanager
-def ends_of(interface: Interface, camera: str, folder: Path) -> Iterator[Ends]:
+def open_ends(interface: Interface, camera: str, folder: Path) -> Iterator[Ends]:
     """Both ends of an interface for the length of a block.
 
     Args:
@@ -99,7 +99,7 @@ def ends_of(interface: Interface, camera: str, folder: Path) -> Iterator[Ends]:
                 yield Ends(relay.host, board, relay)
 
 
-def obstacle(interface: Interface) -> str:
+def why_not_measurable(interface: Interface) -> str:
     """Why an interface cannot be measured here; empty if it can, as far as is known without trying."""
     if interface.link != "rfcomm":
         return ""

@@ -20,7 +20,7 @@ from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.bench.cases import Case, Size
-from phone_host.bench.links import Ends, ends_of
+from phone_host.bench.links import Ends, open_ends
 from phone_host.bench.relay import RelayAccount
 from phone_host.children.board_process import BoardAccount
 from phone_host.demo.demonstration import NEAR_M
@@ -159,7 +159,7 @@ def run_case(
     def keep(result: Result) -> None:
         ledgers.append(result.ledger)
 
-    with ends_of(case.interface, shown.replay_uri(shown.left), folder) as ends:
+    with open_ends(case.interface, shown.replay_uri(shown.left), folder) as ends:
         host = Host(
             HostSettings(wait_ns=PATIENCE_NS, save_every=0, fifo=settings.fifo),
             open_camera(shown.replay_uri(shown.right), HOST_CLOCK, now.monotonic_ns()),

@@ -63,7 +63,7 @@ def find_board(state: Path, now_s: Callable[[], float], wait_s: float | None) ->
             raise UnavailableError(f"no board answers at {tried}, nor by mDNS{_why_not()}", "start it, or give --link")
 
 
-def find_aloud(state: Path, wait_s: float | None) -> str:
+def find_board_and_say(state: Path, wait_s: float | None) -> str:
     """As `find_board`, telling on stderr that it looks and what it has found."""
     sys.stderr.write("phone-host: looking for a board (--link names one)\n")
     link = find_board(state, lambda: now.monotonic_ns() / 1e9, wait_s)

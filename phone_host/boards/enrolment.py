@@ -17,7 +17,7 @@ from common.errors import DataError, ProtocolError, SettingsError, TandemError, 
 from common.keys import KeyFolder, Peer, clean_name
 from common.protocol.enrolment_code import Asking, code_text
 from common.protocol.enrolment_wire import MAX_WORD_BYTES, WordReader, frame_word
-from common.protocol.enrolment_words import Identity, Open, Refuse, Refused, Word
+from common.protocol.enrolment_words import Denial, Identity, Open, Refuse, Word
 
 _ANSWER_S: Final = 10.0
 """A word takes a round trip and one round of the board's loop; a board that is busy elsewhere, or opens its door only now, gets this long."""
@@ -154,15 +154,15 @@ class _Line:
 def _refusal(word: Refuse) -> TandemError:
     wait = f"wait {word.seconds} s" if word.seconds else "try again"
     match word.reason:
-        case Refused.CLOSED:
+        case Denial.CLOSED:
             return UnavailableError("the board takes in no new host", "run `sudo board-agent pair` there")
-        case Refused.PAUSE:
+        case Denial.PAUSE:
             return UnavailableError(
                 "the board takes a pause after wrong codes", f"{wait}, or run `sudo board-agent pair` there"
             )
-        case Refused.BUSY:
+        case Denial.BUSY:
             return UnavailableError("another host is being paired", wait)
-        case Refused.WRONG:
+        case Denial.WRONG:
             return DataError("the code was wrong", f"{wait} with the new code that the board then shows")
         case _:
             assert_never(word.reason)

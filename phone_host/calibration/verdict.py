@@ -37,7 +37,7 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class Assessment:
     """The verdict and what to do next.
 
     Attributes:
@@ -54,7 +54,7 @@ def vertical_p95_px(calibration: Calibration) -> float:
     return float(np.percentile(calibration.vertical_px, 95))
 
 
-def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Judgement:
+def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Assessment:
     """Judge a calibration.
 
     Args:
@@ -72,7 +72,7 @@ def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Judgement
         )
     if calibration.obstacle is not None:
         obstacle = f"{calibration.obstacle.problem}: {calibration.obstacle.remedy}"
-        return Judgement(Verdict.REJECT, (*contradictions, obstacle))
+        return Assessment(Verdict.REJECT, (*contradictions, obstacle))
     p95_px = vertical_p95_px(calibration)
     baseline_m = float(np.linalg.norm(calibration.rig.t_right_left_m))
     open_share = calibration.baseline_sigma_m / baseline_m
@@ -98,7 +98,7 @@ def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Judgement
         hints.append(f"{pairs} pairs are few: take 15")
     hints += _hints(calibration, rejected)
     verdict = Verdict.REJECT if rejects else Verdict.USABLE if limits else Verdict.GOOD
-    return Judgement(verdict, (*rejects, *limits, *hints))
+    return Assessment(verdict, (*rejects, *limits, *hints))
 
 
 def _open_baseline(calibration: Calibration, baseline_m: float) -> str:

@@ -6,8 +6,8 @@ from common import now
 from common.ledger import PairLedger
 from phone_host.demo.demonstration import CheckedPair, DepthErrors
 from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.report.report_page import Figure, PageData, Verdict, delay_series, page
-from phone_host.report.run_page import camera_table, losses_table, notes, pictures
+from phone_host.report.report_page import Figure, Headline, PageData, delay_series, page
+from phone_host.report.run_page import camera_table, notes, pictures, unused_table
 
 _GOOD_PERCENT = 0.6
 """Depth error that the figures of the stereo core allow at 2 m; the demo's scene lies between 0.7 and 2.5 m."""
@@ -35,7 +35,7 @@ def demo_page(run: RunSnapshot, errors: DepthErrors, last: CheckedPair | None, l
             figures=_figures(run, errors),
             pictures=pictures(last.processed if last else None),
             delays=delay_series(ledgers),
-            tables=(losses_table(run), camera_table(run.camera)),
+            tables=(unused_table(run), camera_table(run.camera)),
             notes=(
                 "The truth is the rendered scene itself: exact depth at every pixel that both cameras see.",
                 "Board and host share one clock here, so the clock's true offset is 0; what is plotted is what the echoes could prove.",
@@ -45,13 +45,13 @@ def demo_page(run: RunSnapshot, errors: DepthErrors, last: CheckedPair | None, l
     )
 
 
-def _verdict(errors: DepthErrors) -> tuple[Verdict, str]:
+def _verdict(errors: DepthErrors) -> tuple[Headline, str]:
     if not errors.pairs:
-        return Verdict.BAD, "No pair was compared with the truth: the run was too short or the programs did not meet."
+        return Headline.BAD, "No pair was compared with the truth: the run was too short or the programs did not meet."
     if errors.wrong_pairs:
-        return Verdict.BAD, f"{errors.wrong_pairs} of {errors.pairs} pairs show two different moments."
+        return Headline.BAD, f"{errors.wrong_pairs} of {errors.pairs} pairs show two different moments."
     text = f"Every checked pair shows one moment, and its depth is right within {errors.depth_mm:.1f} mm ({errors.depth_percent:.2f} %) at the median."
-    return (Verdict.GOOD if errors.depth_percent <= _GOOD_PERCENT else Verdict.WARNING), text
+    return (Headline.GOOD if errors.depth_percent <= _GOOD_PERCENT else Headline.WARNING), text
 
 
 def _figures(run: RunSnapshot, errors: DepthErrors) -> tuple[Figure, ...]:

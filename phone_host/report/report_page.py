@@ -43,7 +43,7 @@ _END_TO_END: Final = "from the middle of the exposure until the results are writ
 _STARVATION: Final = "how long the processor had nothing to do before this pair; no part of end-to-end"
 
 
-class Verdict(Enum):
+class Headline(Enum):
     """How a run went; the page shows it as a colour and a sign."""
 
     GOOD = "good"
@@ -142,7 +142,7 @@ class PageData:
 
     title: str
     subtitle: str
-    verdict: Verdict
+    verdict: Headline
     sentence: str
     figures: tuple[Figure, ...]
     pictures: tuple[Picture, ...]
@@ -198,7 +198,7 @@ def page(data: PageData) -> str:
     Raises:
         DataError: a picture is neither PNG nor JPEG.
     """
-    sign = {Verdict.GOOD: "✓", Verdict.WARNING: "!", Verdict.BAD: "✕"}[data.verdict]
+    sign = {Headline.GOOD: "✓", Headline.WARNING: "!", Headline.BAD: "✕"}[data.verdict]
     subtitle = f'<p class="sub">{escape(data.subtitle)}</p>' if data.subtitle else ""
     parts = [
         f"<header><h1>{escape(data.title)}</h1>{subtitle}</header>",

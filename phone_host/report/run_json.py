@@ -7,10 +7,10 @@ from typing import Final
 from common.camera.base import CameraHealth, health_values
 from phone_host.measure.accounts import LinkTally, rung_values
 from phone_host.measure.delays import DELAYS, STAGES, Spread
-from phone_host.measure.losses import losses
 from phone_host.measure.regime import Judgement, judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, disbelieved, figures
 from phone_host.measure.sink_account import SinkAccount
+from phone_host.measure.unused import unused
 from phone_host.model import TimeOffset
 from phone_host.sync.fifo import Overflow
 
@@ -75,7 +75,7 @@ def build(run: RunSnapshot) -> dict[str, object]:
             "dropped_fifo": run.counts.dropped,
             "stopped": run.stopped,
         },
-        "losses": [{"place": loss.place, "reason": loss.reason, "count": loss.count} for loss in losses(run)],
+        "unused": [{"place": item.place, "reason": item.reason, "count": item.count} for item in unused(run)],
         "sinks": {sink.name: _sink(sink) for sink in run.sinks},
         "unwritten": asdict(run.unwritten),
     }

@@ -9,13 +9,13 @@ from common import now
 from common.camera.base import CameraHealth
 from common.ledger import PairLedger
 from phone_host.measure.accounts import rung_lines
-from phone_host.measure.losses import losses
 from phone_host.measure.regime import Judgement, Regime, judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.trust import Concern
+from phone_host.measure.unused import unused
 from phone_host.model import Image, Processed, Side
 from phone_host.output.preview import colour_disparity, colour_range_px
-from phone_host.report.report_page import Figure, PageData, Picture, Table, Verdict, delay_series, page
+from phone_host.report.report_page import Figure, Headline, PageData, Picture, Table, delay_series, page
 from phone_host.report.summary import phase_lines
 
 
@@ -42,7 +42,7 @@ def run_page(run: RunSnapshot, last: Processed | None, board_side: Side, ledgers
             figures=_figures(run) if run.processed else (),
             pictures=pictures(last, board_side),
             delays=delay_series(ledgers),
-            tables=(*links_tables(run), losses_table(run), camera_table(run.camera)),
+            tables=(*links_tables(run), unused_table(run), camera_table(run.camera)),
             notes=notes(run),
         )
     )
@@ -91,15 +91,15 @@ def camera_table(health: CameraHealth) -> Table:
     return Table("The own camera", ("what", "value"), tuple(rows))
 
 
-def _verdict(run: RunSnapshot, judgement: Judgement, found: Sequence[Concern]) -> tuple[Verdict, str]:
+def _verdict(run: RunSnapshot, judgement: Judgement, found: Sequence[Concern]) -> tuple[Headline, str]:
     if not run.processed and run.spoiled_images:
-        return Verdict.BAD, "Not one pair had two sound images: look at the cameras."
+        return Headline.BAD, "Not one pair had two sound images: look at the cameras."
     if not run.processed:
-        return Verdict.BAD, "Not one pair was processed: the two cameras or the programs did not meet."
+        return Headline.BAD, "Not one pair was processed: the two cameras or the programs did not meet."
     if found:
-        return Verdict.WARNING, f"{found[0].sentence}: {found[0].remedy}."
+        return Headline.WARNING, f"{found[0].sentence}: {found[0].remedy}."
     fine = judgement.regime in {Regime.STARVED_BY_CAMERAS, Regime.UNKNOWN}
-    return (Verdict.GOOD if fine else Verdict.WARNING), f"{judgement.sentence}."
+    return (Headline.GOOD if fine else Headline.WARNING), f"{judgement.sentence}."
 
 
 def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
@@ -147,9 +147,9 @@ def pictures(last: Processed | None, board_side: Side = Side.LEFT) -> tuple[Pict
     return (*views, Picture("disparity: bright is near, black is none", _png(coloured)))
 
 
-def losses_table(run: RunSnapshot) -> Table:
+def unused_table(run: RunSnapshot) -> Table:
     """What was not used, by place and reason."""
-    rows = tuple((loss.words, str(loss.count)) for loss in losses(run))
+    rows = tuple((item.words, str(item.count)) for item in unused(run))
     return Table("Frames and pairs that were not used", ("what", "count"), rows)
 
 

@@ -6,9 +6,9 @@ from typing import Final
 from common.camera.base import CameraHealth
 from phone_host.measure.accounts import LinkAccount, rung_lines
 from phone_host.measure.delays import DELAYS
-from phone_host.measure.losses import losses
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
+from phone_host.measure.unused import unused
 from phone_host.model import TimeOffset
 from phone_host.sync.phase import Alignment, Phase
 
@@ -37,7 +37,7 @@ def summary(run: RunSnapshot) -> str:
     lines += [f"  {remedy}" for remedy in judge(figures(run)).remedies]
     lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(run)]
     lines += camera_troubles(run.camera)
-    lines += [*rung_lines(run.link), *_links(run.link), *_losses(run)]
+    lines += [*rung_lines(run.link), *_links(run.link), *_unused_lines(run)]
     return "\n".join(lines)
 
 
@@ -113,9 +113,9 @@ def _links(link: LinkAccount) -> list[str]:
     return lines
 
 
-def _losses(run: RunSnapshot) -> list[str]:
+def _unused_lines(run: RunSnapshot) -> list[str]:
     """What was not used, and what was not written."""
-    parts = [f"{loss.count} {loss.words}" for loss in losses(run)]
+    parts = [f"{item.count} {item.words}" for item in unused(run)]
     lines = [f"not used: {', '.join(parts) or 'nothing'}"]
     if run.unwritten.lines or run.unwritten.pairs:
         lines.append(f"not written: {run.unwritten.lines} lines, {run.unwritten.pairs} pairs ({run.unwritten.cause})")

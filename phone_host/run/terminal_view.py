@@ -13,9 +13,9 @@ from rich.text import Text
 from common import now
 from phone_host.measure.accounts import rung_lines
 from phone_host.measure.delays import DELAYS, STAGES, Spread
-from phone_host.measure.losses import losses
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
+from phone_host.measure.unused import unused
 from phone_host.report.summary import camera_troubles, phase_lines
 
 _REFRESH_S: Final = 0.25
@@ -115,7 +115,7 @@ def _state(run: RunSnapshot) -> Text:
         else "clock unknown"
     )
     board = f"board connected over {run.carrier}" if run.carrier else "waiting for the board"
-    lost = ", ".join(f"{loss.count} {loss.words}" for loss in losses(run)) or "nothing"
+    lost = ", ".join(f"{item.count} {item.words}" for item in unused(run)) or "nothing"
     phase = "\n".join(phase_lines(run.phase, run.alignment))
     return Text(f"{board} · {clock} · not used: {lost}" + (f"\n{phase}" if phase else ""))
 

@@ -14,7 +14,7 @@ from common.keys import KeyFolder
 from common.link.base import Link
 from common.link.factory import open_link, parse_link
 from common.link.stream import StreamLink
-from common.protocol.framing import Side
+from common.protocol.framing import LinkEnd
 from common.protocol.message import FrameMessage, Pacing
 from phone_host.stream.receiver import Receiver
 from tests.bench.link_job import Job, Tally
@@ -104,7 +104,7 @@ def _open(address: str) -> Link:
     """The host's end: an address, or `fd:N` for the end of a pseudo terminal."""
     if address.startswith("fd:"):
         descriptor = int(address.removeprefix("fd:"))
-        return StreamLink("serial", Side.DIALLER, lambda: OpenLine(descriptor))
+        return StreamLink("serial", LinkEnd.DIALLER, lambda: OpenLine(descriptor))
     return _open_tcp(address, listens=False)
 
 

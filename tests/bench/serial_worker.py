@@ -24,7 +24,7 @@ from common.ledger import BoardMarks
 from common.link.base import Packet, SendResult
 from common.link.factory import open_link, parse_link
 from common.link.stream import StreamLink
-from common.protocol.framing import Side
+from common.protocol.framing import LinkEnd
 from common.protocol.host_session import HostSession
 from common.protocol.message import FrameMessage, Lane
 from common.protocol.session import Arrived, Echo, Outgoing, Output, connection_name
@@ -154,7 +154,7 @@ def send_ours(device: str, frames: int, payload: bytes) -> dict[str, float]:
 
 def receive_ours(descriptor: int, frames: int) -> dict[str, float]:
     """The other end of it."""
-    link = StreamLink("serial", Side.DIALLER, lambda: OpenLine(descriptor))
+    link = StreamLink("serial", LinkEnd.DIALLER, lambda: OpenLine(descriptor))
     poller = zmq.Poller()
     poller.register(link.pollables[0], zmq.POLLIN)
     greeted, count, begun, size, before = False, 0, 0, 0, 0.0

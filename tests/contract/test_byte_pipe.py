@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from common.link.rfcomm import FRAME_BYTES
 from common.protocol.chunking import Whole
-from common.protocol.framing import Side
+from common.protocol.framing import LinkEnd
 from common.protocol.message import Lane
 from tests.support.virtual_line import VirtualLine
 
@@ -64,7 +64,7 @@ class Pipe:
                 return b""
 
 
-def _exchange(line: VirtualLine, packets: dict[Side, list[Sent]], until_ns: int) -> None:
+def _exchange(line: VirtualLine, packets: dict[LinkEnd, list[Sent]], until_ns: int) -> None:
     """Send what each end has, as the link takes it; what it does not take until then stays unsent."""
     waiting = {side: deque(own) for side, own in packets.items()}
 
@@ -76,16 +76,16 @@ def _exchange(line: VirtualLine, packets: dict[Side, list[Sent]], until_ns: int)
     line.run(until_ns, act)
 
 
-def _packets(kinds: list[tuple[Lane, int]], seed: int, word: str) -> dict[Side, list[Sent]]:
+def _packets(kinds: list[tuple[Lane, int]], seed: int, word: str) -> dict[LinkEnd, list[Sent]]:
     """Packets of these sizes for both ends, no two of them alike."""
     chance = random.Random(seed)
     return {
         side: [(lane, f"{word} {number}".encode(), chance.randbytes(size)) for number, (lane, size) in enumerate(kinds)]
-        for side in Side
+        for side in LinkEnd
     }
 
 
-def _came(line: VirtualLine, side: Side, lane: Lane) -> list[Sent]:
+def _came(line: VirtualLine, side: LinkEnd, lane: Lane) -> list[Sent]:
     """What came to an end on a lane."""
     came = [event for _, event in line.came[side] if isinstance(event, Whole) and event.lane is lane]
     return [(lane, bytes(whole.header), bytes(whole.payload)) for whole in came]
@@ -105,7 +105,7 @@ def test_whole_unaltered_and_in_order_or_not_at_all(
     """Whatever the pipe does, what comes was sent, once, in order and unaltered, all of it if the pipe only chops; once it is sound all comes again."""
     line = VirtualLine.of(BYTES_PER_S, delay_ms * MS, frame_bytes=FRAMES_OF[transport])
     line.meet()
-    pipes = {side: Pipe(seed + side.value, badness) for side in Side}
+    pipes = {side: Pipe(seed + side.value, badness) for side in LinkEnd}
     for side, way in line.ways.items():
         way.spoil = pipes[side]
         way.chop = pipes[side].chop
@@ -116,7 +116,7 @@ def test_whole_unaltered_and_in_order_or_not_at_all(
     line.run(line.now_ns + 3 * S)  # so long what was under way when bytes were lost may count as such
     late = _packets([(Lane.FRAMES, 3000), (Lane.CONTROL, 30), (Lane.FRAMES, 0)], seed + 1, "late")
     _exchange(line, late, line.now_ns + 3 * S)
-    for side in Side:
+    for side in LinkEnd:
         for lane in Lane:
             came = _came(line, side.peer, lane)
             sent_early, sent_late = ([one for one in own[side] if one[0] is lane] for own in (early, late))

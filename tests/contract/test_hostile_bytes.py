@@ -11,7 +11,7 @@ from common.frame import PixelFormat
 from common.ledger import BoardMarks
 from common.protocol.chunking import Whole
 from common.protocol.duplex import GAP_NS, Change, Duplex
-from common.protocol.framing import Side
+from common.protocol.framing import LinkEnd
 from common.protocol.message import FrameMessage, Lane
 from common.protocol.wire import decode, encode
 from tests.fuzz.protocols import SOUND_MESSAGES
@@ -28,7 +28,7 @@ class Pair:
     """Two ends that have met, and the time; what the board writes may be spoiled before the host reads it."""
 
     def __init__(self) -> None:
-        self.board, self.host = Duplex(Side.LISTENER, 17), Duplex(Side.DIALLER, 17)
+        self.board, self.host = Duplex(LinkEnd.LISTENER, 17), Duplex(LinkEnd.DIALLER, 17)
         self.now_ns = S
         while not (self.board.is_up and self.host.is_up):
             self.now_ns += S

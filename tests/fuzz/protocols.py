@@ -13,7 +13,7 @@ from common.link.sdp import channel_in
 from common.protocol.board_session import BoardSession
 from common.protocol.chunking import Whole
 from common.protocol.duplex import GAP_NS, Duplex
-from common.protocol.enrolment_code import Asking, Desk, Paired, Say
+from common.protocol.enrolment_code import Asking, Desk, Enrolled, Say
 from common.protocol.enrolment_wire import MAX_WORD_BYTES, WordReader, decode_word, encode_word
 from common.protocol.enrolment_words import (
     COMMITMENT_BYTES,
@@ -21,14 +21,14 @@ from common.protocol.enrolment_words import (
     Ask,
     Begin,
     Commit,
+    Denial,
     Identity,
     Open,
     Refuse,
-    Refused,
     Shown,
     Word,
 )
-from common.protocol.framing import MAX_BODY_BYTES, Deframer, Side, Unit, UnitKind, unit_parts
+from common.protocol.framing import MAX_BODY_BYTES, Deframer, LinkEnd, Unit, UnitKind, unit_parts
 from common.protocol.host_session import HostSession
 from common.protocol.message import (
     BoardCounts,
@@ -87,7 +87,7 @@ SOUND_MESSAGES: tuple[Message, ...] = (
 )
 
 
-def _wire(side: Side, unit: Unit) -> bytes:
+def _wire(side: LinkEnd, unit: Unit) -> bytes:
     return b"".join(unit_parts(side, unit))
 
 
@@ -96,20 +96,20 @@ _GOOD = Unit(UnitKind.CONTROL, first=True, last=True, number=77, body=b"the next
 
 def deframer(data: bytes) -> None:
     """Bytes of a line in two ways of chopping: the same units, each of which stands in the bytes; the good one behind them is found."""
-    stream = data + _wire(Side.LISTENER, _GOOD)
-    whole, chopped = Deframer(Side.LISTENER), Deframer(Side.LISTENER)
-    units = [_wire(Side.LISTENER, unit) for unit in whole.feed(stream)]
+    stream = data + _wire(LinkEnd.LISTENER, _GOOD)
+    whole, chopped = Deframer(LinkEnd.LISTENER), Deframer(LinkEnd.LISTENER)
+    units = [_wire(LinkEnd.LISTENER, unit) for unit in whole.feed(stream)]
     pieces: list[bytes] = []
     at = 0
     while at < len(stream):
         step = 1 + 37 * stream[at]
-        pieces += [_wire(Side.LISTENER, unit) for unit in chopped.feed(stream[at : at + step])]
+        pieces += [_wire(LinkEnd.LISTENER, unit) for unit in chopped.feed(stream[at : at + step])]
         assert len(chopped._rest) <= 4096, "more than one unit's bytes are kept"
         at += step
     assert units == pieces, "chopping changes the units"
-    units += [_wire(Side.LISTENER, unit) for unit in whole.give_up()]
+    units += [_wire(LinkEnd.LISTENER, unit) for unit in whole.give_up()]
     assert units, "the good unit is passed over"
-    assert units[-1] == _wire(Side.LISTENER, _GOOD), "the good unit is not the last one"
+    assert units[-1] == _wire(LinkEnd.LISTENER, _GOOD), "the good unit is not the last one"
     at = 0
     for unit in units:
         at = stream.find(unit, at)
@@ -121,7 +121,7 @@ def deframer(data: bytes) -> None:
 def deframer_seeds() -> list[bytes]:
     chance = random.Random(1)
     sizes = (0, 1, 20, 300, MAX_BODY_BYTES)
-    sound = [_wire(Side.LISTENER, Unit(UnitKind.FRAMES, True, False, n, chance.randbytes(n))) for n in sizes]  # noqa: FBT003 - first, not last
+    sound = [_wire(LinkEnd.LISTENER, Unit(UnitKind.FRAMES, True, False, n, chance.randbytes(n))) for n in sizes]  # noqa: FBT003 - first, not last
     return [*sound, b"".join(sound), sound[2][:-3] + sound[3], chance.randbytes(60_000), b"\xc6" * 3000, b"login: "]
 
 
@@ -160,7 +160,7 @@ def wire_seeds() -> list[bytes]:
 
 def line(data: bytes) -> None:
     """Units with sound checks and hostile contents: no error, no packet beyond the limits, no more bytes held than came."""
-    for side in Side:
+    for side in LinkEnd:
         end = Duplex(side, 17)
         now_ns, at, numbers = 1, 0, [0, 0, 0, 0]
         while at + 4 <= len(data):
@@ -259,7 +259,7 @@ def pairing(data: bytes) -> None:
         assert decode_word(encode_word(word)) == word, "what was read is not what is written"
         now_ns += 10**9
         for output in door.receive(part[:1], word, now_ns):
-            assert not isinstance(output, Paired), "let in without the code"
+            assert not isinstance(output, Enrolled), "let in without the code"
             if isinstance(output, Say):
                 encode_word(output.word)
         with suppress(ProtocolError):
@@ -274,7 +274,7 @@ def pairing_seeds() -> list[bytes]:
         Shown(Identity(b"k" * KEY_BYTES, "board")),
         Commit(1, b"c" * COMMITMENT_BYTES),
         Open(1, b"n" * NONCE_BYTES),
-        Refuse(Refused.PAUSE, 30),
+        Refuse(Denial.PAUSE, 30),
         Begin(Identity(b"k" * KEY_BYTES, "phone"), b"c" * COMMITMENT_BYTES),
     ]
     packed = [b"x" + encode_word(word) for word in words]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from common.protocol.chunking import Whole
 from common.protocol.duplex import Change, Duplex
-from common.protocol.framing import Side
+from common.protocol.framing import LinkEnd
 
 Spoil = Callable[[bytes], bytes]
 
@@ -46,18 +46,20 @@ class VirtualLine:
         now_ns: virtual time.
     """
 
-    ends: dict[Side, Duplex]
-    ways: dict[Side, Way]
-    came: dict[Side, list[tuple[int, Whole | Change]]] = field(default_factory=lambda: {side: [] for side in Side})
+    ends: dict[LinkEnd, Duplex]
+    ways: dict[LinkEnd, Way]
+    came: dict[LinkEnd, list[tuple[int, Whole | Change]]] = field(
+        default_factory=lambda: {side: [] for side in LinkEnd}
+    )
     now_ns: int = 1
-    _arrivals: list[tuple[int, int, Side, bytes]] = field(default_factory=list)
+    _arrivals: list[tuple[int, int, LinkEnd, bytes]] = field(default_factory=list)
     _count: int = 0
 
     @classmethod
     def of(cls, bytes_per_s: float, delay_ns: int, spoil: Spoil = bytes, frame_bytes: int = 1) -> "VirtualLine":
         """A line with two like directions."""
-        ends = {side: Duplex(side, 17, frame_bytes) for side in Side}
-        return cls(ends, {side: Way(bytes_per_s, delay_ns, spoil) for side in Side})
+        ends = {side: Duplex(side, 17, frame_bytes) for side in LinkEnd}
+        return cls(ends, {side: Way(bytes_per_s, delay_ns, spoil) for side in LinkEnd})
 
     def write(self) -> None:
         """Let both ends write what they have."""
@@ -96,9 +98,9 @@ class VirtualLine:
         while not all(end.is_up for end in self.ends.values()):
             self.run(self.now_ns + 10_000_000)
 
-    def packets(self, side: Side) -> list[Whole]:
+    def packets(self, side: LinkEnd) -> list[Whole]:
         """The packets that came to an end."""
         return [event for _, event in self.came[side] if isinstance(event, Whole)]
 
-    def _note(self, side: Side, events: list[Whole | Change]) -> None:
+    def _note(self, side: LinkEnd, events: list[Whole | Change]) -> None:
         self.came[side] += [(self.now_ns, event) for event in events]

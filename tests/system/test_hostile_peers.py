@@ -17,8 +17,8 @@ from common.link.curve import secure_dialler
 from common.protocol.enrolment_wire import frame_word
 from common.protocol.enrolment_words import Ask, Identity
 from common.protocol.message import PROTOCOL_VERSION
+from tests.support.enrolment_rig import ports
 from tests.support.numbered import write_film
-from tests.support.pairing_rig import ports
 from tests.support.programs import Program, board, host, lines, until
 from tests.support.pulse import Pulse
 

@@ -13,8 +13,8 @@ import msgpack
 import pytest
 import zmq
 
+from tests.support.enrolment_rig import ports
 from tests.support.numbered import write_film
-from tests.support.pairing_rig import ports
 from tests.support.programs import host, program, until
 
 NOBODY = 65534

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from common.protocol.chunking import Whole
 from common.protocol.duplex import Change, Duplex
-from common.protocol.framing import MAX_BODY_BYTES, UNIT_OVERHEAD_BYTES, Deframer, Side, Unit, UnitKind, unit_parts
+from common.protocol.framing import MAX_BODY_BYTES, UNIT_OVERHEAD_BYTES, Deframer, LinkEnd, Unit, UnitKind, unit_parts
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
 from tests.support.virtual_line import VirtualLine
 
-BOARD, HOST = Side.LISTENER, Side.DIALLER
+BOARD, HOST = LinkEnd.LISTENER, LinkEnd.DIALLER
 S = 1_000_000_000
 MS = 1_000_000
 
@@ -84,7 +84,7 @@ def test_two_ends_meet_whoever_comes_first() -> None:
     assert not made.ends[HOST].put(Lane.CONTROL, b"too early", b"")
     made.meet()
     made.run(made.now_ns + S)
-    for side in Side:
+    for side in LinkEnd:
         assert [event for _, event in made.came[side]] == [Change.MET]
 
 
@@ -102,7 +102,7 @@ def test_packets_come_whole_and_in_order(packets: list[tuple[Lane, bytes, int]],
     """On a clean line of any rate and delay each lane's packets come whole and in order, in both directions at once."""
     made = line(rate, delay_ms * MS)
     waiting = {
-        side: [(lane, head, random.Random(size).randbytes(size)) for lane, head, size in packets] for side in Side
+        side: [(lane, head, random.Random(size).randbytes(size)) for lane, head, size in packets] for side in LinkEnd
     }
     sent = {side: list(queue) for side, queue in waiting.items()}
 
@@ -115,7 +115,7 @@ def test_packets_come_whole_and_in_order(packets: list[tuple[Lane, bytes, int]],
     while any(waiting.values()):
         made.run(made.now_ns + S, act)
     made.run(made.now_ns + 2 * S)
-    for side in Side:
+    for side in LinkEnd:
         came = [(whole.lane, bytes(whole.header), bytes(whole.payload)) for whole in made.packets(side.peer)]
         for lane in Lane:
             assert [one for one in came if one[0] is lane] == [one for one in sent[side] if one[0] is lane]
@@ -266,13 +266,13 @@ def test_only_a_silence_that_was_listened_to_gives_a_frame_up() -> None:
 
 
 @pytest.mark.parametrize("restarts", [BOARD, HOST])
-def test_a_restarted_end_is_met_anew(restarts: Side) -> None:
+def test_a_restarted_end_is_met_anew(restarts: LinkEnd) -> None:
     """When either end's program is replaced without a word, the other is told that the first has gone, and packets flow again."""
     made = line(200_000, MS)
     film = Film(8000)
     made.run(made.now_ns + S, film)
     made.ends[restarts] = Duplex(restarts, 99)
-    made.came = {side: [] for side in Side}
+    made.came = {side: [] for side in LinkEnd}
     made.run(made.now_ns + S, Film(8000))
     told = [event for _, event in made.came[restarts.peer] if isinstance(event, Change)]
     assert [event for event in told if event is not Change.GARBAGE] == [Change.PARTED, Change.MET]
@@ -295,7 +295,7 @@ def test_goodbye_is_heard() -> None:
 
 def test_an_echoing_line_does_no_harm() -> None:
     """When the other end only gives back what it gets (a getty before raw mode), nothing is met and nothing delivered."""
-    for side in Side:
+    for side in LinkEnd:
         end = Duplex(side, 5)
         events = []
         for step in range(100):

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.protocol.framing import MAX_BODY_BYTES, UNIT_OVERHEAD_BYTES, Deframer, Side, Unit, UnitKind, unit_parts
+from common.protocol.framing import MAX_BODY_BYTES, UNIT_OVERHEAD_BYTES, Deframer, LinkEnd, Unit, UnitKind, unit_parts
 
-SIDE = Side.LISTENER
+SIDE = LinkEnd.LISTENER
 MARKER = bytes((SIDE.value,))
 
 UNITS = st.builds(

@@ -18,10 +18,10 @@ from phone_host.report.page_frame import document
 from phone_host.report.report_page import (
     DelaySeries,
     Figure,
+    Headline,
     PageData,
     Picture,
     Table,
-    Verdict,
     delay_series,
     page,
 )
@@ -116,7 +116,7 @@ def data(delays: DelaySeries, **changes: object) -> PageData:
     fields: dict[str, object] = {
         "title": "A run",
         "subtitle": "",
-        "verdict": Verdict.GOOD,
+        "verdict": Headline.GOOD,
         "sentence": "All is well.",
         "figures": (Figure("Depth error", "3.1", "mm"),),
         "pictures": (Picture("Left", JPEG), Picture("Disparity", PNG)),

@@ -10,8 +10,8 @@ from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts
 from phone_host.measure.accounts import LinkAccount, SessionAccount
 from phone_host.measure.delays import DelayStatistics
-from phone_host.measure.losses import losses
 from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.unused import unused
 from phone_host.model import PairCounts, Side, TimeOffset, Unwritten
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
@@ -102,7 +102,7 @@ def test_a_late_frame_has_one_reason() -> None:
     told: Any = build(seen)["sessions"]
     assert told[0]["sent"] == told[0]["received"] + told[0]["lost"]
     assert (told[0]["lost_late"], told[0]["stale"]) == (2, {"duplicate": 1, "old_session": 0})
-    found = {loss.place: loss.count for loss in losses(seen)}
+    found = {item.place: item.count for item in unused(seen)}
     assert found == {
         "frames lost on the link": 1,
         "frames that came too late over another link": 2,

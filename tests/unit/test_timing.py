@@ -12,7 +12,6 @@ from common.errors import DataError
 from common.frame import PixelFormat
 from phone_host.calibration.misfit_plot import misfit_svg
 from phone_host.calibration.timing.lamp import Brightness, brightness, measure_lamp
-from phone_host.calibration.timing.scene import measure_scene
 from phone_host.calibration.timing.screen import (
     COUNT,
     HEIGHT,
@@ -23,6 +22,7 @@ from phone_host.calibration.timing.screen import (
     draw,
     measure_screen,
 )
+from phone_host.calibration.timing.shared_motion import measure_shared_motion
 from phone_host.calibration.timing.shots import Measured, Method, Shot, Times
 from phone_host.model import Image, Side
 from phone_host.scene.scene import (
@@ -237,7 +237,7 @@ def film_scene(film: dict[Side, list[tuple[float, Image]]], offset_s: float, boa
     progress: list[float] = []
     rectifier = Rectifier(replace(unlike_rig(), board_side=board_side))
     board, host = sides[board_side], sides[board_side.other]
-    found = measure_scene(board, host, rectifier, lambda shot: images[shot.image.name], progress.append)
+    found = measure_shared_motion(board, host, rectifier, lambda shot: images[shot.image.name], progress.append)
     assert progress == sorted(progress)
     return found
 

@@ -20,12 +20,12 @@ from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level
 from common.program.signals import StopSignals
 from common.stamp import HOST_CLOCK
-from phone_host.boards.discovery import find_aloud
+from phone_host.boards.discovery import find_board_and_say
 from phone_host.calibration.misfit_plot import misfit_svg
 from phone_host.calibration.timing.lamp import Brightness, brightness, measure_lamp
-from phone_host.calibration.timing.scene import measure_scene
 from phone_host.calibration.timing.screen import PatternReader, counted, measure_screen
 from phone_host.calibration.timing.screen_page import pattern_page
+from phone_host.calibration.timing.shared_motion import measure_shared_motion
 from phone_host.calibration.timing.shots import Measured, Times, require_shots, to_seconds
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
@@ -104,7 +104,7 @@ def _footage(options: argparse.Namespace, signals: StopSignals) -> Footage:
         return read(options.frames)
     camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns())
     keys = key_folder(options.keys)
-    uri = parse_link(options.link or find_aloud(keys.path, options.wait), listens_by_default=False)
+    uri = parse_link(options.link or find_board_and_say(keys.path, options.wait), listens_by_default=False)
     tell_insecure(uri)
     links = open_links([uri], keys)
     progress, advance = _progress("filming")
@@ -125,7 +125,7 @@ def _measure(by: str, footage: Footage, rig: Rig | None) -> Measured:
     with progress:
         if by == "scene":
             assert rig is not None
-            return measure_scene(
+            return measure_shared_motion(
                 footage.board, footage.host, Rectifier(rig), lambda shot: decode_frame(shot.image), advance
             )
         board_s, host_s, _ = to_seconds(*([shot.exposed_ns for shot in side] for side in (footage.board, footage.host)))

@@ -12,7 +12,7 @@ from common.keys import KeyFolder, Peer
 from common.link.enrolment_door import pairing_address
 from common.link.factory import needs_keys, parse_link
 from common.protocol.enrolment_code import CODE_DIGITS, read_code
-from phone_host.boards.discovery import find_aloud
+from phone_host.boards.discovery import find_board_and_say
 from phone_host.boards.enrolment import PairingCall
 from phone_host.boards.udev_rule import RULES, find_usb_board, write_rule
 from phone_host.settings import chosen_keys
@@ -27,7 +27,7 @@ def run(options: argparse.Namespace) -> int:
     if options.udev:
         return _name_device(options)
     keys = chosen_keys(options.config, options.keys)
-    link = parse_link(options.link or find_aloud(keys.path, _PATIENCE_S), listens_by_default=False)
+    link = parse_link(options.link or find_board_and_say(keys.path, _PATIENCE_S), listens_by_default=False)
     if not link.address.startswith("tcp://") or link.listens:
         raise SettingsError(f"link {options.link!r} needs no keys", "pair over tcp://HOST:PORT")
     door = _door(link.address, options.pairing_port)

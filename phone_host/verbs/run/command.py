@@ -15,7 +15,7 @@ from common.program.commandline import INTERRUPTED
 from common.program.settings import Resolved, log_level, with_origins
 from common.program.signals import StopSignals
 from common.stamp import HOST_CLOCK
-from phone_host.boards.discovery import find_aloud, remember
+from phone_host.boards.discovery import find_board_and_say, remember
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.declared_settings import PhoneHostSettings
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
     core, board_side = _core(options, settings, (camera.description.width_px, camera.description.height_px))
     keys = key_folder(settings.keys)
-    named = settings.link or (find_aloud(keys.path, options.wait),)
+    named = settings.link or (find_board_and_say(keys.path, options.wait),)
     uris = [parse_link(uri, listens_by_default=False) for uri in named]
     for uri in uris:
         tell_insecure(uri)

@@ -17,8 +17,8 @@ import zmq
 
 from common.keys import KeyFolder
 from common.protocol.enrolment_code import CODE_DIGITS
+from tests.support.enrolment_rig import Rig, on_every_network, ports, start_pairing
 from tests.support.numbered import write_film
-from tests.support.pairing_rig import Rig, on_every_network, ports, start_pairing
 from tests.support.programs import board, host, program, until
 
 

@@ -13,8 +13,8 @@ import pytest
 from common.keys import KeyFolder
 from common.protocol.enrolment_wire import frame_word
 from common.protocol.enrolment_words import Ask, Identity
+from tests.support.enrolment_rig import Owner, Rig, on_every_network, ports, start_pairing
 from tests.support.numbered import write_film
-from tests.support.pairing_rig import Owner, Rig, on_every_network, ports, start_pairing
 from tests.support.programs import board, program, until
 
 

@@ -79,7 +79,7 @@ class Rows:
 Look = Callable[[Shot], Image]
 
 
-def measure_scene(
+def measure_shared_motion(
     board: Sequence[Shot], host: Sequence[Shot], rectifier: Rectifier, look: Look, advance: Callable[[float], None]
 ) -> Measured:
     """Measure the time offset.

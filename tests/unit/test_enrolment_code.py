@@ -18,9 +18,9 @@ from common.protocol.enrolment_code import (
     TRIES,
     Asking,
     Desk,
+    Enrolled,
     Failed,
     Output,
-    Paired,
     Say,
     ShowCode,
     code_text,
@@ -28,7 +28,7 @@ from common.protocol.enrolment_code import (
     read_code,
 )
 from common.protocol.enrolment_wire import MAX_WORD_BYTES, WordReader, decode_word, encode_word, frame_word
-from common.protocol.enrolment_words import Ask, Begin, Commit, Identity, Open, Refuse, Refused, Shown, Word
+from common.protocol.enrolment_words import Ask, Begin, Commit, Denial, Identity, Open, Refuse, Shown, Word
 
 BOARD = Identity(bytes(range(32)), "bone")
 HOST = Identity(bytes(range(32, 64)), "phone")
@@ -80,10 +80,10 @@ def test_who_types_the_code_is_trusted_and_trusts(seed: int) -> None:
     desk, asking = Desk(BOARD, chance(seed)), Asking(HOST, chance(seed + 1))
     code = start(desk, asking)
     outputs = converse(desk, asking, code, b"a", 0)
-    assert [output for output in outputs if isinstance(output, Paired)] == [Paired(HOST)]
+    assert [output for output in outputs if isinstance(output, Enrolled)] == [Enrolled(HOST)]
     assert asking.proved
     assert asking.board == BOARD
-    assert desk.receive(b"a", Commit(0, bytes(32)), 0) == [Say(b"a", Refuse(Refused.WRONG))]
+    assert desk.receive(b"a", Commit(0, bytes(32)), 0) == [Say(b"a", Refuse(Denial.WRONG))]
 
 
 @given(st.integers(0, 2**32), st.integers(1, 999_999))
@@ -93,14 +93,14 @@ def test_any_other_code_proves_nothing(seed: int, off: int) -> None:
     code = start(desk, asking)
     typed = (code + off) % 10**6
     outputs = converse(desk, asking, typed, b"a", 0)
-    assert not any(isinstance(output, Paired) for output in outputs)
+    assert not any(isinstance(output, Enrolled) for output in outputs)
     assert not asking.proved
     same_bits = ((code ^ typed) & -(code ^ typed)).bit_length() - 1
     assert sum(isinstance(word, Commit) for word in said(outputs)) == same_bits + 1, "the board's, one a round"
     assert sum(isinstance(word, Open) for word in said(outputs)) == same_bits
     again = Asking(HOST, chance(seed + 2))
     assert start(desk, again, b"b") == desk.code(0)
-    assert said(outputs)[-1] == Refuse(Refused.WRONG, 0)
+    assert said(outputs)[-1] == Refuse(Denial.WRONG, 0)
 
 
 @given(codes, st.integers(0, 2**32))
@@ -114,12 +114,12 @@ def test_keys_changed_on_the_way_are_noticed_even_with_the_right_code(code: int,
         (commit,) = said(desk.receive(b"a", Begin(changed, begun.commitment), 0))
         opened = asking.receive(commit)
         assert isinstance(opened, Open)
-        assert said(desk.receive(b"a", opened, 0)) == [Refuse(Refused.WRONG)]
+        assert said(desk.receive(b"a", opened, 0)) == [Refuse(Denial.WRONG)]
     asking = Asking(HOST, chance(seed))
     desk = Desk(BOARD, chance(seed + 1))
     outputs = desk.receive(b"a", asking.ask(), 0)
     asking.receive(Shown(replace(BOARD, key=MALLORY.key)))  # the host believes in another board
-    assert not any(isinstance(o, Paired) for o in converse(desk, asking, shown_code(outputs), b"a", 0))
+    assert not any(isinstance(o, Enrolled) for o in converse(desk, asking, shown_code(outputs), b"a", 0))
     assert not asking.proved
     del code
 
@@ -165,7 +165,7 @@ def test_after_three_wrong_codes_there_is_a_pause_that_grows() -> None:
         assert [failed.pause_ns > 0 for failed in failures] == [False, False, True]
         pauses.append(failures[-1].pause_ns)
         (refusal,) = said(desk.receive(b"y", Ask(HOST), now_ns + 1))
-        assert refusal == Refuse(Refused.PAUSE, pauses[-1] // S)
+        assert refusal == Refuse(Denial.PAUSE, pauses[-1] // S)
         now_ns += pauses[-1]
     assert pauses == [min(FIRST_PAUSE_NS * 2**k, LONGEST_PAUSE_NS) for k in range(10)]
 
@@ -175,7 +175,7 @@ def test_the_owner_ends_a_pause_and_success_forgets_failures() -> None:
     desk = Desk(BOARD, chance(4))
     for _ in range(TRIES):
         fail_once(desk, 0)
-    assert said(desk.receive(b"y", Ask(HOST), 1)) == [Refuse(Refused.PAUSE, 60)]
+    assert said(desk.receive(b"y", Ask(HOST), 1)) == [Refuse(Denial.PAUSE, 60)]
     desk.pardon()
     fail_once(desk, 1)
     asking = Asking(HOST, chance(5))
@@ -195,7 +195,7 @@ def test_who_only_asks_keeps_nobody_waiting() -> None:
         outputs = desk.receive(b"m%d" % number, Ask(MALLORY), number)
         assert [type(output) for output in outputs] == [ShowCode, Say]
         assert shown_code(outputs) == code
-    assert any(isinstance(output, Paired) for output in converse(desk, first, code, b"later", 10 * S))
+    assert any(isinstance(output, Enrolled) for output in converse(desk, first, code, b"later", 10 * S))
     assert first.proved
 
 
@@ -205,9 +205,9 @@ def test_one_proof_at_a_time_and_for_seconds() -> None:
     code = start(desk, first)
     commit = said(desk.receive(b"a", first.begin(code), 0))[0]
     for word in (Ask(MALLORY), Begin(MALLORY, bytes(32))):
-        assert said(desk.receive(b"b", word, S)) == [Refuse(Refused.BUSY, PROOF_NS // S - 1)]
-    assert said(desk.receive(b"b", Commit(0, bytes(32)), S)) == [Refuse(Refused.WRONG)]
-    assert desk.receive(b"b", Refuse(Refused.CLOSED), S) == []
+        assert said(desk.receive(b"b", word, S)) == [Refuse(Denial.BUSY, PROOF_NS // S - 1)]
+    assert said(desk.receive(b"b", Commit(0, bytes(32)), S)) == [Refuse(Denial.WRONG)]
+    assert desk.receive(b"b", Refuse(Denial.CLOSED), S) == []
     assert desk.is_proving(b"a")
     answer = first.receive(commit)
     while answer is not None:
@@ -225,14 +225,14 @@ def test_one_proof_at_a_time_and_for_seconds() -> None:
         assert desk.code(TRIES * PROOF_NS) != code
     late = TRIES * PROOF_NS + 1
     for word in (Ask(HOST), Begin(HOST, bytes(32))):
-        assert said(desk.receive(b"d", word, late)) == [Refuse(Refused.PAUSE, FIRST_PAUSE_NS // S)]
+        assert said(desk.receive(b"d", word, late)) == [Refuse(Denial.PAUSE, FIRST_PAUSE_NS // S)]
 
 
 def test_tries_are_counted_whoever_makes_them_and_however_often_they_connect() -> None:
     """A guess from a new connection, under a new key and name, without asking first, or broken off half way, is one of the three all the same."""
     desk = Desk(BOARD, chance(20))
     desk.receive(b"a", Begin(MALLORY, bytes(32)), 0)
-    assert any(isinstance(output, Failed) for output in desk.receive(b"a", Refuse(Refused.CLOSED), 0))
+    assert any(isinstance(output, Failed) for output in desk.receive(b"a", Refuse(Denial.CLOSED), 0))
     fail_once(desk, 0, b"b")
     other = Identity(bytes(32), "another")
     desk.receive(b"c", Begin(other, bytes(32)), 0)
@@ -252,7 +252,7 @@ def test_a_code_that_nobody_types_runs_out() -> None:
     assert desk.code(again_ns + CODE_LIFE_NS) != code
     late = Asking(HOST, chance(12))
     late.receive(Shown(BOARD))
-    assert not any(isinstance(o, Paired) for o in converse(desk, late, code, b"c", again_ns + CODE_LIFE_NS))
+    assert not any(isinstance(o, Enrolled) for o in converse(desk, late, code, b"c", again_ns + CODE_LIFE_NS))
     owned = Desk(BOARD, chance(12))  # a code shown by the owner's command before anybody asked
     early = owned.code(0)
     assert owned.code(CODE_LIFE_NS - 1) == early
@@ -272,7 +272,7 @@ words = st.one_of(
     ),
     st.builds(Commit, st.integers(0, ROUNDS - 1), st.binary(min_size=32, max_size=32)),
     st.builds(Open, st.integers(0, ROUNDS - 1), st.binary(min_size=16, max_size=16)),
-    st.builds(Refuse, st.sampled_from(Refused), st.integers(0, 86_400)),
+    st.builds(Refuse, st.sampled_from(Denial), st.integers(0, 86_400)),
 )
 
 
@@ -320,7 +320,7 @@ def test_no_order_of_words_lets_a_stranger_in(events: list[tuple[bytes, Word, in
     for connection, word, wait_ns in events:
         now_ns += wait_ns
         outputs = desk.receive(connection, word, now_ns)
-        assert not any(isinstance(output, Paired) for output in outputs)
+        assert not any(isinstance(output, Enrolled) for output in outputs)
         assert len(outputs) <= 6
 
 

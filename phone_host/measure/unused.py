@@ -8,7 +8,7 @@ from phone_host.measure.run_snapshot import RunSnapshot, disbelieved
 
 
 @dataclass(frozen=True, slots=True)
-class Loss:
+class Unused:
     """One place and reason.
 
     Attributes:
@@ -27,43 +27,43 @@ class Loss:
         return f"{self.place}: {self.reason}".replace("_", " ") if self.reason else self.place
 
 
-def losses(run: RunSnapshot) -> tuple[Loss, ...]:
+def unused(run: RunSnapshot) -> tuple[Unused, ...]:
     """What was not used, as far as it is known; nothing is told twice."""
-    return tuple(loss for loss in (*_on_the_way(run), *_on_the_host(run)) if loss.count)
+    return tuple(item for item in (*_on_the_way(run), *_on_the_host(run)) if item.count)
 
 
-def _on_the_way(run: RunSnapshot) -> Iterator[Loss]:
+def _on_the_way(run: RunSnapshot) -> Iterator[Unused]:
     sessions = run.link.sessions
     for reason, count in board_drops(run.link).items():
-        yield Loss("frames dropped on the board", reason, count)
+        yield Unused("frames dropped on the board", reason, count)
     lost, late = sum(account.lost for account in sessions), sum(account.late for account in sessions)
-    yield Loss("frames lost on the link", "", lost - late)
-    yield Loss("frames that came too late over another link", "", late)
-    yield Loss("frames delivered again", "", sum(account.duplicate for account in sessions))
-    yield Loss("frames of an earlier session", "", sum(account.old_session for account in sessions))
-    yield Loss("packets that were none of ours", "", run.link.garbage)
-    yield Loss("frames that came before the clock was known", "", run.link.no_clock)
+    yield Unused("frames lost on the link", "", lost - late)
+    yield Unused("frames that came too late over another link", "", late)
+    yield Unused("frames delivered again", "", sum(account.duplicate for account in sessions))
+    yield Unused("frames of an earlier session", "", sum(account.old_session for account in sessions))
+    yield Unused("packets that were none of ours", "", run.link.garbage)
+    yield Unused("frames that came before the clock was known", "", run.link.no_clock)
     for reason, count in disbelieved(run).items():
-        yield Loss("frames not believed", reason, count)
+        yield Unused("frames not believed", reason, count)
 
 
-def _on_the_host(run: RunSnapshot) -> Iterator[Loss]:
+def _on_the_host(run: RunSnapshot) -> Iterator[Unused]:
     counts = run.counts
-    yield Loss("own frames that were no whole images", "", run.spoiled)
-    yield Loss("own frames replaced by newer ones", "", run.skipped)
+    yield Unused("own frames that were no whole images", "", run.spoiled)
+    yield Unused("own frames replaced by newer ones", "", run.skipped)
     for reason, count in counts.board_orphans:
-        yield Loss("board frames without partner", reason, count)
+        yield Unused("board frames without partner", reason, count)
     for reason, count in counts.host_orphans:
-        yield Loss("own frames without partner", reason, count)
-    yield Loss("pairs that gave way in a full FIFO", "", counts.dropped)
+        yield Unused("own frames without partner", reason, count)
+    yield Unused("pairs that gave way in a full FIFO", "", counts.dropped)
     spoiled = sum(count for _, count in run.spoiled_images)
     for reason, count in run.spoiled_images:
-        yield Loss("pairs with a spoiled image", reason, count)
-    yield Loss("pairs that could not be processed", "", run.undecodable - spoiled)
+        yield Unused("pairs with a spoiled image", reason, count)
+    yield Unused("pairs that could not be processed", "", run.undecodable - spoiled)
     if run.ended != "running":
-        yield Loss("pairs that still waited at the end", "", run.stopped)
+        yield Unused("pairs that still waited at the end", "", run.stopped)
     for sink in run.sinks:
-        yield Loss("results that came too fast for the sink", sink.name, sink.dropped)
+        yield Unused("results that came too fast for the sink", sink.name, sink.dropped)
 
 
 def board_drops(link: LinkAccount) -> dict[str, int]:
