@@ -11,7 +11,8 @@ from common.camera.factory import parse_camera
 from common.errors import SettingsError
 from common.keys import KeyFolder, default_folder
 from common.link.factory import parse_link
-from common.program.settings import Resolved, log_level, resolve, setting
+from common.program.declaration import setting
+from common.program.settings import Resolved, log_level, resolve
 
 ENVIRONMENT_PREFIX = "BOARD_AGENT"
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.imagesize import MEGAPIXEL, MOST_PIXELS
-from common.program.settings import setting
+from common.program.declaration import setting
 
 _USUAL_MEGAPIXELS: Final = MOST_PIXELS // MEGAPIXEL
 MAX_MEGAPIXELS_HELP: Final = (

@@ -88,7 +88,7 @@ def _only(group: str, name: str) -> "EntryPoint":
 
 
 def _entry_points(group: str) -> "tuple[EntryPoint, ...]":
-    from importlib.metadata import entry_points  # noqa: PLC0415 - 30 ms of a host's start, ten times that on a board; seldom needed
+    from importlib.metadata import entry_points  # noqa: PLC0415 - 30 ms of a host's start, more on a board; seldom needed
 
     return tuple(entry_points(group=group))
 

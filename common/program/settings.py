@@ -9,7 +9,7 @@ import logging
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Generic, TypeVar, get_args, get_origin, get_type_hints
 
@@ -17,16 +17,6 @@ from common.errors import DataError, SettingsError
 from common.files import read_whole
 
 T = TypeVar("T")
-
-
-def setting(default: Any, doc: str) -> Any:  # noqa: ANN401 - stands in a dataclass field of any type, as dataclasses.field does
-    """Declare one setting of a settings dataclass.
-
-    Args:
-        default: its value where nothing else is said.
-        doc: one sentence for people.
-    """
-    return field(default=default, metadata={"doc": doc})
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from common.errors import SettingsError
-from common.program.settings import listing, log_level, resolve, setting
+from common.program.declaration import setting
+from common.program.settings import listing, log_level, resolve
 
 
 @dataclass(frozen=True, slots=True)
