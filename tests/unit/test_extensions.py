@@ -48,7 +48,9 @@ class Still:
             raise UnavailableError("still:gone is not there", "plug it in")
         self.request = request
         width = int(dict(request.options).get("width", "8"))
-        self.description = CameraDescription("still", width, 6, PixelFormat.MJPEG, 1_000_000, Pacing.CLOCK)
+        self.description = CameraDescription(
+            name="still", width_px=width, height_px=6, pixel_format=PixelFormat.MJPEG, period_ns=1_000_000, pacing=Pacing.CLOCK
+        )
 
     def adapt(self, mode, now_ns): ...
     def due_ns(self, now_ns): return now_ns

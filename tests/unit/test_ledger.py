@@ -29,7 +29,7 @@ LEDGERS = st.builds(
     time_skew_ns=TIMES_NS,
     offset_ns=TIMES_NS,
     uncertainty_ns=DURATIONS_NS,
-    host=st.builds(HostMarks, TIMES_NS, TIMES_NS),
+    host=st.builds(HostMarks, exposed_ns=TIMES_NS, grabbed_ns=TIMES_NS),
 )
 
 KEYS = (
