@@ -201,10 +201,10 @@ class BoardSession:
                     self._later_ns, self._steered_ns = later_ns % self._camera.period_ns, now_ns
                 return []
             case Bye():
-                # The last account goes behind the last frame, so that what it tells of and has not come is lost.
-                farewell = Status(self.session, counts, self._rung)
+                # The last account goes behind the last frame, so that what it tells of and has not come is lost. It is no Status: one of those may
+                # be under way, from before the host's last credit came, with frames behind it.
                 self._host = None
-                return [] if host.frames is None else [Outgoing(host.frames, farewell)]
+                return [] if host.frames is None else [Outgoing(host.frames, Bye(counts))]
             case BoardHello() | Knock() | Refusal() | FrameMessage() | Pong() | Status() | End():
                 return []  # a board's words from a host: nothing a sound host sends
             case _:
@@ -321,6 +321,11 @@ class BoardSession:
         return outgoing
 
     def _greet(self, connection: bytes, hello: HostHello, now_ns: int, counts: BoardCounts) -> list[Outgoing]:
+        own = next((lane for lane, known in self._dialled if known == connection), hello.lane)
+        if own is not hello.lane:  # a knock for the frames' lane, over a control lane that had just been dialled anew, was taken for this lane's own
+            if self._host is not None:  # the host has forgotten the right one, which is to be knocked on again
+                self._host.frames = None
+            return [Outgoing(connection, Knock(own, self.session))]
         host = self._host
         if host is not None and host.host_id != hello.host_id and now_ns - host.heard_ns < TAKEOVER_NS:
             return [Outgoing(connection, Refusal(RefusalReason.BUSY))]

@@ -276,6 +276,10 @@ class HostSession:
                 return []  # a second board; the first is alive
             lane = knock.lane
             path.lanes[lane] = connection
+        elif lane is Lane.FRAMES and knock.lane is Lane.CONTROL and not path.dialled:  # it had been taken for the other one
+            del path.lanes[lane]
+            lane = Lane.CONTROL
+            path.lanes[lane] = connection
         if lane is Lane.FRAMES and path.is_open:
             return self._want(path, now_ns) if path is self._wanted else []
         if path.is_open and knock.session == path.session and knock.lane is Lane.FRAMES:
@@ -439,8 +443,7 @@ class HostSession:
                 lost = (
                     stream.pass_over(counts.sent) if behind else 0
                 )  # what it tells of and has not come before it is lost
-                counted = Counted(counts, isinstance(message, End), lost, last=behind and self._leaving)
-                return [*_note_rung(stream, message), counted]
+                return [*_note_rung(stream, message), Counted(counts, isinstance(message, End), lost)]
             case _:
                 assert_never(message)
 
@@ -451,17 +454,18 @@ class HostSession:
             return []
         if counts.sent < stream.next_index:
             return []
+        # Answered, so that the board keeps the connection until its last words were read.
+        answer, can_be = Outgoing(connection, Bye()), stream.can_be(counts)
+        lost = stream.pass_over(counts.sent) if can_be and connection == path.lanes.get(Lane.FRAMES) else 0
+        told = Counted(counts, ended=False, lost=lost, last=True) if can_be else _TOO_MANY
+        if self._leaving:  # it is the board's answer to our own goodbye
+            return [answer, told]
         for known in self._paths:
             if known.is_open:
                 known.shut(now_ns + HELLO_RETRY_NS)
         self._carrier = self._wanted = None
         self._pending = self._streams = False
-        # Answered, so that the board keeps the connection until its last words were read.
-        answer = Outgoing(connection, Bye())
-        if not stream.can_be(counts):
-            return [answer, _TOO_MANY, Vanished(orderly=False)]
-        lost = stream.pass_over(counts.sent) if connection == path.lanes.get(Lane.FRAMES) else 0
-        return [answer, Counted(counts, ended=False, lost=lost, last=True), Vanished(orderly=True)]
+        return [answer, told, Vanished(orderly=can_be)]
 
 
 def _note_rung(stream: _Stream, message: Status | End) -> list[Output]:

@@ -259,7 +259,7 @@ class Reception:
         self.tail_known |= counted.last  # an older account on the other lane may come behind it
         account = self._current
         account.lost += counted.lost
-        account.latest = max(counted.counts, account.latest, key=lambda counts: counts.grabbed)
+        account.latest = max(counted.counts, account.latest, key=lambda counts: (counts.grabbed, counts.sent))
         account.ended |= counted.ended
         self._choice.account(counted.counts.grabbed, now_ns, has_credit=self._session.outstanding > 0)
 

@@ -21,6 +21,8 @@ from common.protocol.message import (
     Pong,
     Refusal,
     RefusalReason,
+    Rung,
+    Status,
 )
 from common.protocol.session import MS, Outgoing, connection_name
 from phone_host.model import BoardFrame
@@ -99,6 +101,21 @@ class Talk:
     def show(self, frame: FrameMessage) -> None:
         """A frame comes."""
         self.reception.receive(NAMES[Lane.FRAMES], frame, self.now_ns)
+
+
+def test_an_account_from_before_the_goodbye_is_not_the_last_one() -> None:
+    """A leaving host waits for the board's answer: an account that was under way behind the last frame then, and frames after it, do not end the wait."""
+    talk = Talk()
+    talk.run(60)
+    assert talk.reception.leave(talk.now_ns)
+    under_way = Status("first", BoardCounts(talk.sent, talk.sent), Rung())
+    talk.reception.receive(NAMES[Lane.FRAMES], under_way, talk.now_ns)
+    assert not talk.reception.tail_known
+    talk.show(talk.frame())
+    talk.reception.receive(NAMES[Lane.FRAMES], Bye(BoardCounts(talk.sent, talk.sent)), talk.now_ns)
+    assert talk.reception.tail_known
+    (account,) = talk.reception.account.sessions
+    assert account.latest.sent == talk.sent == account.received + account.lost
 
 
 def test_a_goodbye_says_nothing_of_the_next_life() -> None:
