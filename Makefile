@@ -15,7 +15,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test soak attack $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
+.PHONY: help venv demo test test-slow coverage soak attack $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -33,6 +33,12 @@ test: $(READY) ## unit, contract, system and hostile tests, with the minutes of 
 
 $(PARTS:%=test-%): test-%: $(READY) # one part alone: make test-unit
 	@.ci/test $*
+
+test-slow: $(READY) ## the samples that are too large for every day, of which the unit tests draw small ones
+	@$(BIN)/python -m pytest -q -n 2 -m slow tests/unit
+
+coverage: $(READY) ## the unit tests, and which branches of the pure modules none of them takes (CI fails below 98 %)
+	@COVERAGE=1 .ci/test unit
 
 test-board: $(READY) ## tests on booted virtual boards (the first time builds their images: apt and root)
 	@.ci/board
