@@ -60,9 +60,11 @@ def test_every_pixel_of_the_window_comes_from_inside_both_images(
 
 
 def _source_margin_px(camera: Camera, rotation: np.ndarray, r: Rectification) -> float:
-    """How far inside the camera's image the window's outermost source pixel lies."""
+    """How far inside the camera's image the window's outermost source pixel lies: one on its border, as the map does not fold."""
     columns, rows = np.meshgrid(np.arange(r.width_px), np.arange(r.height_px))
-    pixels = np.column_stack([columns.ravel(), rows.ravel(), np.ones(columns.size)])
+    border = np.ones(columns.shape, dtype=bool)
+    border[1:-1, 1:-1] = False
+    pixels = np.column_stack([columns[border], rows[border], np.ones(border.sum())])
     rays = pixels @ np.linalg.inv(r.P_left[:, :3]).T @ rotation
     source = np.asarray(cv2.projectPoints(rays, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)[0])
     source = source.reshape(-1, 2)
