@@ -1,7 +1,5 @@
 """A V4L2 camera for months of use: opened once, kept through unplugging, driver failures and stalls, resting while nobody listens.
 
-When it is opened, given up and tried again, `life.py` says; here it is done.
-
 `pollable` is the device's own descriptor and so changes with it. An epoll set that stays the same was tried: v4l2loopback, and vb2 before Linux
 5.11, tell an epoll set nothing of a frame if one was waiting already when the device joined it.
 """
@@ -13,8 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from common.camera.base import CameraHealth, Grab, Mode, Offers
-from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Phase, Step, Unwanted
+from common.camera.base import CameraHealth, CameraState, Grab, Mode, Offers
 from common.camera.v4l2_device import capture_nodes, lasting_name
 from common.camera.v4l2_formats import Wanted
 from common.camera.v4l2_ring import RING_BUFFERS
@@ -27,24 +24,17 @@ from common.protocol.message import CameraDescription, Pacing, Steering
 
 _LOG = logging.getLogger(__name__)
 
-_FIRST_FRAME_NS: Final = 3_000_000_000
-"""Webcams take up to 2 s to begin: exposure search, power-up."""
+_FAR_FUTURE: Final = 2**63 - 1
+_RETRY_NS: Final = 200_000_000
+"""A camera that is gone is looked for five times a second: a stat() of its name, 10 us; a fifth of the second that recovery may take."""
 
-_LIFE: Final = LifeSettings(
-    start_ns=_FIRST_FRAME_NS,
-    first_frame_ns=_FIRST_FRAME_NS,
-    # After that a second without any frame, or ten periods, is a stall.
-    silence_ns=1_000_000_000,
-    silence_periods=10,
-    # A device that failed is often whole again at once.
-    lost_rest_ns=0,
-    # A camera that is gone is looked for five times a second: a stat() of its name, 10 us; a fifth of the second that recovery may take.
-    rest_ns=200_000_000,
-    longest_rest_ns=200_000_000,
-    # The device stays open, so that its controls are kept and the first frame is near; without a stream no driver tells of an unplugged one.
-    unwanted=Unwanted.STAYS_OPEN,
-    look_ns=1_000_000_000,
-)
+_LOOK_NS: Final = 1_000_000_000
+"""A resting camera is looked for once a second: without a stream no driver tells of an unplugged one."""
+
+_STALL_PERIODS: Final = 10
+_STALL_NS: Final = 1_000_000_000
+_FIRST_FRAME_NS: Final = 3_000_000_000
+"""Webcams take up to 2 s to begin (exposure search, power-up); then a second without any frame, or ten periods, is a stall."""
 
 _SETTLE_NS: Final = 2_000_000_000
 """Automatic exposure and white balance of webcams settle within one to two seconds from the first frame."""
@@ -73,17 +63,20 @@ class V4l2Camera:
         self._settings = settings
         self._wishes = settings.wishes
         self._tally = Tally()
-        self._life = Life(_LIFE, now_ns)
+        self._stalls = self._failures = self._unplugged = self._returned = 0
         self._stream: Stream | None = None
+        self._wanted = True
+        self._retry_ns = self._stall_ns = self._look_ns = _FAR_FUTURE
         self._settle_ns: int | None = None
         self._locked = not settings.wishes.lock
-        self._exposure_due_ns = NEVER_NS
+        self._exposure_due_ns = _FAR_FUTURE
         self._known_problem = ""
-        self._rate_is_off = self._is_told_lost = False
+        self._rate_is_off = False
+        self._is_coming_back = False
+        self._restart_ns: int | None = None
         self._latency_ns: int | None = None
         self._exposed_ns = 0
         try:
-            self._life.due(now_ns)
             stream = self._open()
             # From now on exactly this is asked for, whatever a camera that is plugged in later may prefer.
             width_px, height_px = stream.choice.size_px
@@ -95,9 +88,7 @@ class V4l2Camera:
             self._rates_hz = {stream.period_ns: settings.wanted.fps}
             self._rates_hz |= {int(1_000_000_000 / rate_hz): rate_hz for rate_hz in stream.slower_hz}
             self.offers = Offers(tuple(self._rates_hz), stream.qualities(), stream.sizes_px())
-            self._switch_on(stream, now_ns)
-            self._life.opened(now_ns, stream.period_ns)
-            self._life.accept()
+            self._begin(stream, now_ns)
         except OSError as error:
             self.close()
             raise UnavailableError(
@@ -124,20 +115,26 @@ class V4l2Camera:
     @property
     def pollable(self) -> int | None:
         """The device while it streams: readable with a frame, urgent with a changed control, in error when it is lost."""
-        return self._stream.fd if self._stream is not None and self._life.phase is Phase.STREAMING else None
+        if self._stream is None or not self._wanted or self._restart_ns is not None:
+            return None
+        return self._stream.fd
 
     @property
     def health(self) -> CameraHealth:
         """How the camera has fared since it was opened first."""
-        tally, counts = self._tally, self._life.counts
+        if self._stream is None:
+            state = CameraState.GONE
+        else:
+            state = CameraState.RUNNING if self._wanted else CameraState.PAUSED
+        tally = self._tally
         return CameraHealth(
-            state=self._life.state,
+            state=state,
             missed=tally.missed,
             faults=tuple(tally.faults.items()),
-            stalls=counts.lost[Loss.STALLED],
-            failures=counts.lost[Loss.FAILED],
-            unplugged=counts.lost[Loss.UNPLUGGED],
-            returned=counts.returned,
+            stalls=self._stalls,
+            failures=self._failures,
+            unplugged=self._unplugged,
+            returned=self._returned,
             distrusted_stamps=tally.distrusted,
             refused_controls=tally.refused,
             held=tuple((axis.value, value) for axis, value in self._wishes.held),
@@ -147,9 +144,13 @@ class V4l2Camera:
     def due_ns(self, now_ns: int) -> int:
         """When something is to be done that no descriptor tells of: a stall, a retry, controls to be held."""
         del now_ns
-        if self._life.phase is not Phase.STREAMING:
-            return self._life.due_ns
-        return min(self._life.due_ns, self._settle_ns or NEVER_NS, self._exposure_due_ns)
+        if self._stream is None:
+            return self._retry_ns
+        if not self._wanted:
+            return self._look_ns
+        if self._restart_ns is not None:
+            return self._restart_ns
+        return min(self._stall_ns, self._settle_ns or _FAR_FUTURE, self._exposure_due_ns)
 
     def anchor(self, exposed_ns: int, index: int) -> None:
         """A camera with a clock of its own takes no notice."""
@@ -160,18 +161,16 @@ class V4l2Camera:
         A camera whose sensor runs only while it streams exposes first a fixed time after the start; that time is taken from the stream that
         ends here. A sensor that runs on by itself takes no notice.
         """
-        if self._stream is None or self._latency_ns is None:
-            return
-        period_ns = self._tally.rate.period_ns or self._stream.period_ns
-        start_ns = self._exposed_ns + later_ns - self._latency_ns
-        start_ns = now_ns + _REST_NS + (start_ns - now_ns - _REST_NS) % period_ns
-        if self._life.steer(start_ns) is not Step.STOP:
+        if self._stream is None or not self._wanted or self._latency_ns is None:
             return
         try:
             self._stream.stop()
         except OSError as error:
             self._lose(error, now_ns)
             return
+        period_ns = self._tally.rate.period_ns or self._stream.period_ns
+        start_ns = self._exposed_ns + later_ns - self._latency_ns
+        self._restart_ns = now_ns + _REST_NS + (start_ns - now_ns - _REST_NS) % period_ns
         _LOG.info(event("camera_steered", camera=self._path, later_ms=round(later_ns / 1e6, 1)))
 
     def adapt(self, mode: Mode, now_ns: int) -> None:
@@ -192,76 +191,79 @@ class V4l2Camera:
         if wanted == self._settings.wanted:
             return
         self._settings = replace(self._settings, wanted=wanted)
-        if self._life.renew(now_ns) is Step.CLOSE:
-            self._let_go()
-            self._carry_out(self._life.due(now_ns), now_ns)
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
+            self._try_again(now_ns)
 
     def read(self, now_ns: int) -> list[Grab]:
         """Give what has come; a device that fails is closed here and opened anew, now or later."""
-        grabs: list[Grab] = []
-        if self._stream is not None and self._life.phase is Phase.STREAMING:
-            try:
-                grabs = self._take(self._stream, now_ns)
-            except OSError as error:
-                self._lose(error, now_ns)
-                return []
-        self._carry_out(self._life.due(now_ns), now_ns)
+        if self._stream is None:
+            if now_ns >= self._retry_ns:
+                self._try_again(now_ns)
+            return []
+        if not self._wanted:
+            self._look(now_ns)
+            return []
+        if self._restart_ns is not None and now_ns < self._restart_ns:
+            return []
+        try:
+            if self._restart_ns is not None:
+                self._begin(self._stream, now_ns)
+            grabs = self._take(self._stream, now_ns)
+        except OSError as error:
+            self._lose(error, now_ns)
+            return []
+        if not grabs and now_ns >= self._stall_ns:
+            self._stalls += 1
+            self._drop(now_ns, "stalled")
+            self._retry_ns = now_ns + _RETRY_NS
         return grabs
 
     def pause(self) -> None:
-        """Switch the stream off; the device stays open."""
-        if self._life.pause() is Step.STOP and self._stream is not None:
+        """Switch the stream off; the device stays open, so that its controls are kept and the first frame is near."""
+        if not self._wanted:
+            return
+        self._wanted = False
+        self._restart_ns = None
+        self._look_ns = 0
+        if self._stream is not None:
             with contextlib.suppress(OSError):  # a camera that has just vanished is noticed by the next look
                 self._stream.stop()
             _LOG.info(event("camera_paused", camera=self._path))
 
     def resume(self, now_ns: int) -> None:
         """Switch the stream on again."""
-        if self._life.resume(now_ns) is not Step.START:
+        if self._wanted:
             return
-        if self._start(now_ns):
-            _LOG.info(event("camera_resumed", camera=self._path))
+        self._wanted = True
+        if self._stream is None:
+            self._retry_ns = now_ns
+            return
+        try:
+            self._begin(self._stream, now_ns)
+        except OSError as error:
+            self._lose(error, now_ns)
+            self._try_again(now_ns)
         else:
-            self._carry_out(self._life.due(now_ns), now_ns)
+            _LOG.info(event("camera_resumed", camera=self._path))
 
     def close(self) -> None:
         """Let go of the device."""
-        self._life.end()
-        self._let_go()
-
-    def _carry_out(self, step: Step, now_ns: int) -> None:
-        """Do what time brings."""
-        match step:
-            case Step.OPEN:
-                self._try_again(now_ns)
-            case Step.START:
-                self._start(now_ns)
-            case Step.LOOK:
-                if not self._path.exists():
-                    self._lose(OSError(errno.ENODEV, "unplugged"), now_ns)
-            case Step.CLOSE:
-                self._drop("stalled")
-            case Step.NONE | Step.STOP:
-                pass
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
 
     def _open(self) -> Stream:
         return Stream(self._path, self._settings, self._wishes, self._tally)
 
-    def _start(self, now_ns: int) -> bool:
-        """Switch the open stream on; gives whether that went well."""
-        assert self._stream is not None
-        try:
-            self._switch_on(self._stream, now_ns)
-        except OSError as error:
-            self._lose(error, now_ns)
-            return False
-        return True
-
-    def _switch_on(self, stream: Stream, now_ns: int) -> None:
+    def _begin(self, stream: Stream, now_ns: int) -> None:
         """Start a stream and make it the current one."""
         self._stream = stream
-        self._latency_ns = self._settle_ns = None
+        self._restart_ns = self._latency_ns = None
         stream.start()
+        self._stall_ns = now_ns + max(_FIRST_FRAME_NS, _STALL_PERIODS * stream.period_ns)
+        self._settle_ns = None
         self._exposure_due_ns = now_ns + _AUTO_EXPOSURE_NS
 
     def _take(self, stream: Stream, now_ns: int) -> list[Grab]:
@@ -269,7 +271,7 @@ class V4l2Camera:
         if now_ns >= self._exposure_due_ns:
             stream.controls.read_exposure()
             still_changes = not stream.controls.tells_exposure or not self._wishes.lock
-            self._exposure_due_ns = now_ns + _AUTO_EXPOSURE_NS if still_changes else NEVER_NS
+            self._exposure_due_ns = now_ns + _AUTO_EXPOSURE_NS if still_changes else _FAR_FUTURE
         elif (
             not grabs and stream.controls.has_events()
         ):  # woken for something else: asking for events with each frame costs an ioctl
@@ -280,7 +282,7 @@ class V4l2Camera:
                 if self._latency_ns is None:
                     self._latency_ns = self._exposed_ns - stream.started_ns
         if grabs:
-            self._life.heard(now_ns, stream.period_ns)
+            self._stall_ns = now_ns + max(_STALL_NS, _STALL_PERIODS * stream.period_ns)
             self._note_back()
             self._settle(stream, now_ns)
             self._watch_rate()
@@ -288,8 +290,9 @@ class V4l2Camera:
 
     def _note_back(self) -> None:
         """Say once that a camera that was lost is back: with its first frame, or by being there when no frame is wanted."""
-        if self._is_told_lost and not self._life.is_lost:
-            self._is_told_lost = False
+        if self._is_coming_back:
+            self._is_coming_back = False
+            self._returned += 1
             _LOG.info(event("camera_back", camera=self._path))
 
     def _settle(self, stream: Stream, now_ns: int) -> None:
@@ -314,50 +317,56 @@ class V4l2Camera:
             event("rate_differs" if self._rate_is_off else "rate_nominal", period_ms=measured_ms, nominal_ms=nominal_ms)
         )
 
+    def _look(self, now_ns: int) -> None:
+        """See whether a resting camera is still there."""
+        if now_ns < self._look_ns:
+            return
+        self._look_ns = now_ns + _LOOK_NS
+        if not self._path.exists():
+            self._lose(OSError(errno.ENODEV, "unplugged"), now_ns)
+
     def _lose(self, error: OSError, now_ns: int) -> None:
         if error.errno in {errno.ENODEV, errno.ENXIO}:
-            loss, reason = Loss.UNPLUGGED, "unplugged"
+            self._unplugged += 1
+            self._drop(now_ns, "unplugged")
         else:
-            loss, reason = Loss.FAILED, errno.errorcode.get(error.errno or 0, str(error))
-        if self._life.lost(loss, now_ns) is Step.CLOSE:
-            self._drop(reason)
+            self._failures += 1
+            self._drop(now_ns, errno.errorcode.get(error.errno or 0, str(error)))
 
-    def _drop(self, reason: str) -> None:
-        """Close a device that is lost."""
+    def _drop(self, now_ns: int, reason: str) -> None:
+        """Close the device; the next read opens it anew."""
         # A camera that is opened again and again without a frame stays lost: that is no news.
-        level = logging.DEBUG if self._is_told_lost else logging.WARNING
+        level = logging.DEBUG if self._is_coming_back else logging.WARNING
         _LOG.log(level, event("camera_lost", camera=self._path, reason=reason))
-        self._let_go()
-        self._is_told_lost = True
-        self._locked = not self._wishes.lock
-
-    def _let_go(self) -> None:
-        """Close the device, if it is open, and say so."""
         if self._stream is not None:
             self._stream.close()
             self._stream = None
-        if self._life.phase is Phase.CLOSING:
-            self._life.closed()
+        self._restart_ns = None
+        self._is_coming_back = True
+        self._locked = not self._wishes.lock
+        self._retry_ns = now_ns
 
     def _try_again(self, now_ns: int) -> None:
         """Look whether the camera is back, and open it; as it was, or not at all."""
+        self._retry_ns = now_ns + _RETRY_NS
         if not self._path.exists():
-            self._life.refused(now_ns)
             return
         try:
-            stream = self._stream = self._open()
-            if self._life.is_wanted:
-                self._switch_on(stream, now_ns)
+            stream = self._open()
+            if not self._wanted:
+                self._stream, self._look_ns = stream, now_ns + _LOOK_NS
+                self._note_back()
+            else:
+                self._begin(stream, now_ns)
         except (TandemError, OSError) as error:
-            self._let_go()
-            self._life.refused(now_ns)
+            if self._stream is not None:
+                self._stream.close()
+                self._stream = None
             if str(error) != self._known_problem:
                 self._known_problem = str(error)
                 _LOG.warning(event("camera_refuses", camera=self._path, problem=self._known_problem))
         else:
             self._known_problem = ""
-            self._life.opened(now_ns, stream.period_ns)
-            self._note_back()
 
 
 def _find(path: str) -> Path:
