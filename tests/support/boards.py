@@ -62,7 +62,7 @@ def render_board(
     image: Image = np.full((camera.height_px, camera.width_px), 120, dtype=np.uint8)
     seen = image[tuple(slice(at.start * coarse, at.stop * coarse) for at in part)]
     fine_size = (seen.shape[1] * fine, seen.shape[0] * fine)
-    dense = cv2.resize(grid[part], fine_size, interpolation=cv2.INTER_LINEAR)
+    dense = np.asarray(cv2.resize(grid[part], fine_size, interpolation=cv2.INTER_LINEAR), dtype=np.float64)
     x, y = _squares(dense, rotation, translation_m, board)
     black = (np.floor(x) + np.floor(y)) % 2 == 0
     inside = (x >= 0) & (x < board.columns + 1) & (y >= 0) & (y < board.rows + 1)
