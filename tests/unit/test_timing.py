@@ -24,7 +24,7 @@ from phone_host.calibration.timing.screen import (
     measure_screen,
 )
 from phone_host.calibration.timing.shots import Measured, Method, Shot, Times
-from phone_host.model import Camera, Image, Rig, Side
+from phone_host.model import Image, Side
 from phone_host.scene.scene import (
     PHONE_LOOK,
     WEBCAM_LOOK,
@@ -33,10 +33,10 @@ from phone_host.scene.scene import (
     Scene,
     demo_scene,
     rig_poses,
-    unlike_rig,
 )
 from phone_host.stereo.raw_images import EncodedImage
 from phone_host.stereo.rectify import Rectifier
+from tests.support.rigs import small_rig
 
 REFRESH_S = 1 / 59.94
 START_S = 12.3
@@ -214,21 +214,6 @@ def test_a_lamp_that_says_too_little_is_named(switches: int, words: str) -> None
 # A scene.
 
 FRAMES = 33
-
-
-@cache
-def small_rig() -> Rig:
-    """The demo's rig with pixels twice as wide and high: a quarter of them."""
-
-    def small(camera: Camera) -> Camera:
-        # The middle of the first pixel is 0, so that the middle of the first two is 0.5.
-        half = np.array([[0.5, 0.0, -0.25], [0.0, 0.5, -0.25], [0.0, 0.0, 1.0]])
-        return replace(
-            camera, matrix=half @ camera.matrix, width_px=camera.width_px // 2, height_px=camera.height_px // 2
-        )
-
-    whole = unlike_rig()
-    return replace(whole, left=small(whole.left), right=small(whole.right))
 
 
 def moving(amplitude_m: tuple[float, float, float], spin_rad_s: float) -> Scene:
