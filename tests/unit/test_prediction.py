@@ -222,3 +222,17 @@ def test_a_full_line_tells_how_long_it_is_taken() -> None:
     assert not isinstance(told := learn_link("tcp", busy.images, [busy]), Unknown)
     # Where the processor is what is waited for, the line may be faster: all that is known is the propagation of 12 ms.
     assert told.ns_per_byte < 12 * MS / 10_000
+
+
+def test_other_cells_that_tell_too_little_give_a_reason() -> None:
+    """Without any cell nothing is foretold; with_own_delays of a cell over an interface that is not among the others says so, too."""
+    base = cell()
+    link = learn_link("tcp", base.images, [base])
+    assert not isinstance(link, Unknown)
+    assert isinstance(foretell(Target("tcp", link, base.images, FifoSettings()), []), Unknown)
+    assert isinstance(with_own_delays(cell("wifi"), [base]), Unknown)
+    # Two frames are too few to tell how long a self-paced line is taken: the line between them and larger ones does.
+    few = replace(base, self_paced=True, ledgers=base.ledgers[:2])
+    told = learn_link("tcp", base.images, [few, replace(cell(size_bytes=30_000), self_paced=True)])
+    assert not isinstance(told, Unknown)
+    assert 0 < told.ns_per_byte <= NS_PER_BYTE * 1.01

@@ -152,3 +152,17 @@ def test_an_image_of_another_size_is_told() -> None:
     rectifier = Rectifier(unlike_rig())
     with pytest.raises(DataError, match=r"right image is 640x480 px, .*1280x720"):
         rectifier.rectify(np.zeros((480, 640), np.uint8), np.zeros((480, 640), np.uint8))
+
+
+def test_cameras_in_one_place_are_told() -> None:
+    """Without a baseline there is no depth: the error says so."""
+    with pytest.raises(DataError, match="baseline"):
+        rectify_rig(unlike_rig((0.0, 0.0, 0.0)))
+
+
+def test_a_distortion_that_folds_inside_the_image_is_told() -> None:
+    """A lens model whose radius falls before the corner is no lens: the error names the camera."""
+    rig = unlike_rig()
+    rig.left.distortion[:] = (-3.0, 0.0, 0.0, 0.0, 0.0)
+    with pytest.raises(DataError, match="left"):
+        rectify_rig(rig)
