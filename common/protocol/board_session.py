@@ -322,7 +322,9 @@ class BoardSession:
 
     def _greet(self, connection: bytes, hello: HostHello, now_ns: int, counts: BoardCounts) -> list[Outgoing]:
         own = next((lane for lane, known in self._dialled if known == connection), hello.lane)
-        if own is not hello.lane:  # a knock for the frames' lane, over a control lane that had just been dialled anew, was taken for this lane's own
+        if (
+            own is not hello.lane
+        ):  # a knock for the frames' lane, over a control lane that had just been dialled anew, was taken for this lane's own
             if self._host is not None:  # the host has forgotten the right one, which is to be knocked on again
                 self._host.frames = None
             return [Outgoing(connection, Knock(own, self.session))]

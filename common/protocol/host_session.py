@@ -276,7 +276,9 @@ class HostSession:
                 return []  # a second board; the first is alive
             lane = knock.lane
             path.lanes[lane] = connection
-        elif lane is Lane.FRAMES and knock.lane is Lane.CONTROL and not path.dialled:  # it had been taken for the other one
+        elif (
+            lane is Lane.FRAMES and knock.lane is Lane.CONTROL and not path.dialled
+        ):  # it had been taken for the other one
             del path.lanes[lane]
             lane = Lane.CONTROL
             path.lanes[lane] = connection

@@ -1,4 +1,4 @@
-"""What the delay benchmark measured, as a JSON object. Pure. Every number's unit stands in its key."""
+"""What the delay benchmark measured, as a JSON object. Every number's unit stands in its key."""
 
 import os
 import platform

@@ -1,1 +1,1 @@
-"""The stereo core: calibration, rectification, matching, reprojection. Pure functions on arrays."""
+"""The stereo core: rectification, matching, reprojection: functions on arrays. Only `images` reads files, and `overheard` listens to image libraries."""

@@ -4,11 +4,13 @@ A board-agent process replays 50 KB JPEGs at 30 per second over loopback TCP; th
 depth 1: age at the link (received - exposed) p95 at most 35 ms, age at the pipeline (dequeued - exposed) p95 at most 1.5 periods plus
 the link's age, both the same at the end as in the first seconds; and the camera is never throttled. With `block` nothing is dropped
 on the host: a pair waits for the one before it, one processing time. A bare PUSH/PULL with high-water marks of 10 stands beside them.
+Exit 4 when a figure is missed.
 """
 
 import argparse
 import json
 import struct
+import sys
 import tempfile
 import threading
 import time
@@ -33,6 +35,7 @@ from phone_host.run.host import Host, HostSettings
 from phone_host.run.sinks import FunctionSink
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
+from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.bench.payloads import write_jpegs
 
@@ -192,8 +195,8 @@ def bare(folder: Path, seconds: float) -> Row:
     return Row("bare PUSH/PULL", both, both, grabbed[0] / elapsed_s, len(ages) / elapsed_s)
 
 
-def main() -> None:
-    """Run and print."""
+def main() -> int:
+    """Run and print; 4 when a figure is missed."""
     parser = argparse.ArgumentParser("python -m tests.bench.bench_age", description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0, help="length of each run (default 60)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -209,16 +212,19 @@ def main() -> None:
             bare(folder, options.seconds) if run == "bare" else ours(run, folder, options.seconds)
             for run in progress.track(("drop-oldest", "drop-newest", "block", "bare"))
         ]
+    verdicts = _judge(rows[0])
     if options.json:
         print(
             json.dumps({"machine": str(machine()), "seconds": options.seconds, "rows": [asdict(row) for row in rows]})
         )
-        return
+        return exit_code(verdicts)
     print(
         f"{machine()}\ncamera {_FPS}/s, {size / 1000:.0f} KB, host {_SLOWNESS} times slower, {options.seconds:g} s each"
     )
     _print(rows)
-    _judge(rows[0])
+    print(*verdicts, sep="\n")
+    print(f"camera: {rows[0].camera_hz:.2f} frames/s grabbed of {_FPS}")
+    return exit_code(verdicts)
 
 
 def _window(ages_ns: Sequence[int]) -> Window:
@@ -249,14 +255,14 @@ def _print(rows: Sequence[Row]) -> None:
     Console(width=160).print(table)
 
 
-def _judge(row: Row) -> None:
+def _judge(row: Row) -> list[Verdict]:
     link_ms = max(window.p95_ms for window in row.link)
     pipeline_ms, bound_ms = max(window.p95_ms for window in row.pipeline), _PERIODS * _PERIOD_MS + link_ms
-    for what, value, limit in (("link", link_ms, _LINK_MS), ("pipeline", pipeline_ms, bound_ms)):
-        reached = "reached" if value <= limit else "NOT reached"
-        print(f"age at the {what}, p95 of the worse window: {value:.1f} ms (to reach: {limit:.1f}) {reached}")
-    print(f"camera: {row.camera_hz:.2f} frames/s grabbed of {_FPS}")
+    return [
+        Verdict(f"age at the {what}, p95 of the worse window: {value:.1f} ms (to reach: {limit:.1f})", value <= limit)
+        for what, value, limit in (("link", link_ms, _LINK_MS), ("pipeline", pipeline_ms, bound_ms))
+    ]
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -4,13 +4,14 @@ First simulated clocks (offset to hours, skew to 97 ppm, changing by up to 1 ppm
 image load: error for frames sent 10 to 13 s after the first echo; at the end of 5 minutes; and 60 s after the last echo of these (`held`). Beside ours, on the same echoes,
 min-RTT as libsoftwaresync does it (the sample of the least round trip of the last 300, no skew) and the mean of all offsets. Then two real
 processes of this machine over loopback TCP, idle and with raw frames at 30 per second: both read one CLOCK_MONOTONIC, so the true offset is 0.
-Figures to reach: issue of clocks and pairs; printed beside what was measured.
+Figures to reach: printed beside what was measured; exit 4 when one is missed.
 """
 
 import argparse
 import json
 import math
 import random
+import sys
 import time
 from collections import deque
 from collections.abc import Sequence
@@ -24,6 +25,7 @@ from rich.table import Table
 from common.protocol.session import Echo
 from phone_host.sync.clock import ClockEstimator
 from tests.bench.clock_real import RealRow, measure
+from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.support.clock_sim import (
     MS,
@@ -211,8 +213,8 @@ def row_of(case: Case, errors: Errors) -> Row:
     )
 
 
-def main() -> None:
-    """Run and print."""
+def main() -> int:
+    """Run and print; 4 when a figure is missed."""
     parser = argparse.ArgumentParser("python -m tests.bench.bench_clock", description=__doc__)
     parser.add_argument("--runs", type=int, default=400, help="simulated runs of 13 s for each link (default 400)")
     parser.add_argument("--long-runs", type=int, default=100, help="simulated runs of 5 minutes (default 100)")
@@ -235,10 +237,12 @@ def main() -> None:
     if options.json:
         shown = [asdict(row) | {"missed": row.failures} for row in rows]
         print(json.dumps({"machine": str(machine()), "simulated": shown, "real": [asdict(row) for row in real]}))
-        return
-    print(f"{machine()}\n{options.runs} simulated runs, {options.long_runs} long ones for each link")
-    _print(rows)
-    _print_real(real)
+    else:
+        print(f"{machine()}\n{options.runs} simulated runs, {options.long_runs} long ones for each link")
+        _print(rows)
+        _print_real(real)
+    simulated = [Verdict(row.name, not row.failures) for row in rows]
+    return exit_code([*simulated, *(Verdict(row.load, not _real_failures(row)) for row in real)])
 
 
 def _print(rows: Sequence[Row]) -> None:
@@ -318,4 +322,4 @@ def _percentile(values: Sequence[float], percent: float) -> float:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

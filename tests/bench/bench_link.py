@@ -28,6 +28,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from phone_host.children.board_process import free_port
+from tests.bench.figures import Verdict, exit_code
 from tests.bench.link_worker import receives
 from tests.bench.machine import machine, may_use_fifo
 from tests.bench.payloads import write_jpegs, write_raw
@@ -107,8 +108,8 @@ class Rows:
         return {name: _median(row) for name, row in values.items()} | {"lost_frames": self.lost}
 
 
-def main() -> None:
-    """Run and print."""
+def main() -> int:
+    """Run and print; 4 when a figure is missed."""
     options = _options()
     runs = range(options.runs)
     missing = _missing(options.transports)
@@ -140,12 +141,15 @@ def main() -> None:
     method = (
         f"{options.runs} runs of {options.seconds:g} s each, in turns; medians over runs; {scheduling}, one core each"
     )
+    verdicts = _judge(results.get("jpeg", {}))
     if options.json:
         print(json.dumps(_as_json(results, sizes, missing, method), indent=1))
-        return
+        return exit_code(verdicts)
     print(f"{machine()}\n{method}")
     for payload, rows in results.items():
         _print(payload, sizes[payload], rows, missing)
+    print(*verdicts, sep="\n")
+    return exit_code(verdicts)
 
 
 def _options() -> argparse.Namespace:
@@ -255,22 +259,26 @@ def _print(payload: str, size: int, rows: dict[str, Rows], missing: dict[str, st
     Console(width=150).print(table)
     for why in missing.values():
         print(why)
-    if payload == "jpeg" and {"tandemscan", "pyzmq"} <= rows.keys():
+
+
+def _judge(rows: dict[str, Rows]) -> list[Verdict]:
+    """Of the JPEGs; of transports that were not run nothing is said."""
+    verdicts = []
+    if {"tandemscan", "pyzmq"} <= rows.keys():
         ours, bare = rows["tandemscan"], rows["pyzmq"]
         ratio = statistics.median(ours.p50_us) / statistics.median(bare.p50_us)
         more_us = statistics.median(ours.sender_us) - statistics.median(bare.sender_us)
-        print(f"one-way p50: {ratio:.2f} x bare pyzmq (to reach: {_LATENCY_RATIO}) {_verdict(ratio <= _LATENCY_RATIO)}")
-        print(f"sender: {more_us:+.0f} us/frame (to reach: {_SENDER_US:.0f}) {_verdict(more_us <= _SENDER_US)}")
-
-    if payload == "jpeg" and {"tandemscan", "tandemscan-curve"} <= rows.keys():
+        verdicts += [
+            Verdict(f"one-way p50: {ratio:.2f} x bare pyzmq (to reach: {_LATENCY_RATIO})", ratio <= _LATENCY_RATIO),
+            Verdict(f"sender: {more_us:+.0f} us/frame (to reach: {_SENDER_US:.0f})", more_us <= _SENDER_US),
+        ]
+    if {"tandemscan", "tandemscan-curve"} <= rows.keys():
         without_us, with_us = (statistics.median(rows[name].p50_us) for name in ("tandemscan", "tandemscan-curve"))
         ratio = with_us / without_us
-        print(f"one-way p50 with keys: {ratio:.2f} x open (to reach: {_CURVE_RATIO}) {_verdict(ratio <= _CURVE_RATIO)}")
-
-
-def _verdict(reached: bool) -> str:  # noqa: FBT001 - a yes or no to print
-    return "reached" if reached else "NOT reached"
+        said = f"one-way p50 with keys: {ratio:.2f} x open (to reach: {_CURVE_RATIO})"
+        verdicts.append(Verdict(said, ratio <= _CURVE_RATIO))
+    return verdicts
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

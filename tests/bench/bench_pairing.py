@@ -5,12 +5,14 @@ within their stream, and are lost with 0, 2 or 10 %. Judge: the optimum by dynam
 pairs and total skew as parts of the optimum's; streams equal to it; pairs beyond the tolerance, and pairs that no optimum contains; extra wait:
 from the arrival of a pair's later frame to its forming. Missed: what the figures ask of our own rows and they do not hold. Rivals: ROS ApproximateTime (default, and with a lower bound of 0.9 periods), naive nearest.
 Figures to reach: where frames are further apart than twice the tolerance all streams equal, no forbidden pair, extra wait p50 0 and p99 1 ms; elsewhere
-99 % of the optimum's pairs, none beyond the tolerance, and no wait beyond one period of the slower camera (and a tick, when it ends).
+99 % of the optimum's pairs, none beyond the tolerance, and no wait beyond one period of the slower camera (and a tick, when it ends). Exit 4 when
+a figure is missed.
 """
 
 import argparse
 import json
 import random
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 
@@ -20,6 +22,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from phone_host.sync.pairing import Paired, Pairing, PairingSettings
+from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.bench.pairing_rivals import ApproximateTime, Nearest
 from tests.support.pairing_judge import best_score, forbidden_pairs
@@ -219,7 +222,7 @@ def row_of(regime: Regime, loss: float, method: str, tally: Tally) -> Row:
     )
 
 
-def main() -> None:
+def main() -> int:
     """Run and print."""
     parser = argparse.ArgumentParser("python -m tests.bench.bench_pairing", description=__doc__)
     parser.add_argument(
@@ -244,9 +247,10 @@ def main() -> None:
         print(
             json.dumps({"machine": str(machine()), "streams": options.streams, "rows": [asdict(row) for row in rows]})
         )
-        return
-    print(f"{machine()}\n{options.streams} pairs of streams of 2 s for each regime and loss")
-    _print(rows)
+    else:
+        print(f"{machine()}\n{options.streams} pairs of streams of 2 s for each regime and loss")
+        _print(rows)
+    return exit_code([Verdict(row.method, not row.missed) for row in rows])
 
 
 def _print(rows: Sequence[Row]) -> None:
@@ -274,4 +278,4 @@ def _print(rows: Sequence[Row]) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -53,21 +53,35 @@ def render_board(
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-10)
     slopes = cv2.undistortPointsIter(pixels, model.matrix, model.distortion, np.eye(3), np.eye(3), criteria)
     grid = np.asarray(slopes, dtype=np.float64).reshape(*columns.shape, 2)
-    fine_size = (model.width_px * fine, model.height_px * fine)
-    dense = cv2.resize(grid, fine_size, interpolation=cv2.INTER_LINEAR)
-    # Rays into the board's axes, cut with its plane z = 0.
-    rays = np.dstack([dense, np.ones(dense.shape[:2])]) @ rotation
-    origin = -rotation.T @ translation_m
-    on_plane = origin[:2] - rays[..., :2] * (origin[2] / rays[..., 2:])
-    squares = on_plane / board.square_m + 1  # inner corners start one square inside
-    x, y = squares[..., 0], squares[..., 1]
+    x, y = _squares(grid, rotation, translation_m, board)
+    # Only around the paper is there anything to see: two squares or two solved rays beyond it all is grey.
+    near = (x >= -3) & (x < board.columns + 4) & (y >= -3) & (y < board.rows + 4)
+    part = tuple(
+        slice(max(0, int(at.min()) - 2), int(at.max()) + 3) for at in (np.flatnonzero(near.any(axis=i)) for i in (1, 0))
+    )
+    image: Image = np.full((model.height_px, model.width_px), 120, dtype=np.uint8)
+    seen = image[tuple(slice(at.start * coarse, at.stop * coarse) for at in part)]
+    fine_size = (seen.shape[1] * fine, seen.shape[0] * fine)
+    dense = np.asarray(cv2.resize(grid[part], fine_size, interpolation=cv2.INTER_LINEAR), dtype=np.float64)
+    x, y = _squares(dense, rotation, translation_m, board)
     black = (np.floor(x) + np.floor(y)) % 2 == 0
     inside = (x >= 0) & (x < board.columns + 1) & (y >= 0) & (y < board.rows + 1)
     paper = (x >= -1) & (x < board.columns + 2) & (y >= -1) & (y < board.rows + 2)
     value = np.where(inside & black, 20.0, np.where(paper, 230.0, 120.0)).astype(np.float32)
-    size = (model.width_px, model.height_px)
-    image: Image = np.rint(cv2.resize(value, size, interpolation=cv2.INTER_AREA)).astype(np.uint8)
+    seen[:] = np.rint(cv2.resize(value, (seen.shape[1], seen.shape[0]), interpolation=cv2.INTER_AREA))
     return image
+
+
+def _squares(
+    slopes: NDArray[np.float64], rotation: NDArray[np.float64], translation_m: NDArray[np.float64], board: Board
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where rays (x, y, 1) meet the board's plane, in squares from its outer corner."""
+    # Rays into the board's axes, cut with its plane z = 0.
+    rays = np.dstack([slopes, np.ones(slopes.shape[:2])]) @ rotation
+    origin = -rotation.T @ translation_m
+    on_plane = origin[:2] - rays[..., :2] * (origin[2] / rays[..., 2:])
+    squares = on_plane / board.square_m + 1  # inner corners start one square inside
+    return squares[..., 0], squares[..., 1]
 
 
 def render_pair(rig: Rig, pose: NDArray[np.float64], board: Board = BOARD) -> tuple[Image, Image]:

@@ -1,12 +1,13 @@
 """Two unlike cameras with known geometry, and points seen by both through their full models."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import CameraModel, Rig
+from phone_host.scene.scene import unlike_rig as scene_rig
 
 
 def unlike_rig(right_centre_m: tuple[float, float, float] = (0.1, 0.004, -0.006), turn: float = 1.0) -> Rig:
@@ -63,3 +64,15 @@ def points_seen_by_both(rig: Rig, count: int, seed: int) -> SeenPoints:
 def _inside(points_px: NDArray[np.float64], model: CameraModel) -> NDArray[np.bool_]:
     limit = np.array([model.width_px - 1, model.height_px - 1])
     return np.asarray(((points_px >= 0) & (points_px <= limit)).all(axis=1))
+
+
+def small_rig() -> Rig:
+    """The demo's rig with pixels twice as wide and high: a quarter of them."""
+
+    def small(model: CameraModel) -> CameraModel:
+        # The middle of the first pixel is 0, so that the middle of the first two is 0.5.
+        half = np.array([[0.5, 0.0, -0.25], [0.0, 0.5, -0.25], [0.0, 0.0, 1.0]])
+        return replace(model, matrix=half @ model.matrix, width_px=model.width_px // 2, height_px=model.height_px // 2)
+
+    whole = scene_rig()
+    return replace(whole, left=small(whole.left), right=small(whole.right))

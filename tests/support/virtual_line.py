@@ -11,7 +11,7 @@ from common.protocol.framing import LinkEnd
 Spoil = Callable[[bytes], bytes]
 
 _GRAIN_BYTES = 16
-_GRAIN_NS = 100_000
+_GRAIN_NS = 250_000
 """A line hands on what it has after this many bytes or this much time."""
 
 
@@ -23,7 +23,7 @@ class Way:
         bytes_per_s: how fast bytes leave; what has not left waits in a queue without end.
         delay_ns: from leaving to arriving.
         spoil: what becomes of the bytes on the way.
-        chop: gives how many bytes come at one go; by default what leaves in 100 us, 16 at least.
+        chop: gives how many bytes come at one go; by default what leaves in 250 us, 16 at least.
         nap_ns: whoever reads is awake only so often.
     """
 

@@ -15,10 +15,11 @@ from phone_host.calibration.timing.screen import COUNT, PatternReader
 from phone_host.model import UNMEASURED_NS, TimeOffset
 from phone_host.output.rig_yaml import read_rig, write_rig
 from phone_host.scene.film import Film, render_film
-from phone_host.scene.scene import PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
+from phone_host.scene.scene import PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene
 from phone_host.scene.scene import Path as Motion
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.programs import board, free_port, host
+from tests.support.rigs import small_rig
 
 OFFSET_MS = 13.0
 """The own camera's stamps are late by this: its replay shows image k so much after k / fps, and says so."""
@@ -29,22 +30,22 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 @pytest.fixture(scope="module")
 def film(tmp_path_factory: pytest.TempPathFactory) -> Film:
-    """A cube and a ball that swing up and down, seen by the demo's rig; it repeats."""
+    """A cube and a ball that swing up and down, seen by a small copy of the demo's rig; it repeats."""
     swing = Motion((0.04, 0.09, 0.0), (0.5, 0.0, 0.0), SECONDS)
     base = demo_scene()
     names = {"wall", "table", "poster", "cube", "ball"}
     bodies = [replace(body, path=swing) if body.path.moves else body for body in base.bodies if body.name in names]
     folder = tmp_path_factory.mktemp("film")
     scene = Scene(tuple(bodies), base.light)
-    rig, looks = unlike_rig(), (WEBCAM_LOOK, PHONE_LOOK)
+    rig, looks = small_rig(), (WEBCAM_LOOK, PHONE_LOOK)
     return render_film(scene, rig, looks, folder, fps=FPS, seconds=SECONDS, advance=lambda: None)
 
 
 @pytest.fixture
 def rig_file(tmp_path: Path) -> Path:
-    """The demo's rig, its time offset not measured."""
+    """That rig, its time offset not measured."""
     path = tmp_path / "rig.yaml"
-    rig = unlike_rig()
+    rig = small_rig()
     write_rig(path, rig, rectify_rig(rig))
     text = path.read_text().splitlines()
     path.write_text("\n".join(line for line in text if not line.startswith("time_offset")) + "\n")

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from common.errors import SettingsError
 from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts
-from phone_host.bench.analysis import Analysis, analyse
+from phone_host.bench.analysis import Analysis, WhatIf, analyse
 from phone_host.bench.cases import (
     LOCAL_LINKS,
     SHAPED_LINKS,
@@ -33,9 +33,20 @@ from phone_host.bench.cases import (
 from phone_host.bench.changes import parse_changes
 from phone_host.bench.emulate import PROFILES
 from phone_host.bench.page import figure, page
+from phone_host.bench.prediction import Figures, Unknown
 from phone_host.bench.report import Conditions, as_json, losses
 from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up, rig_of
-from phone_host.bench.tables import fit_lines, fit_rows, rate_text, regime_lines, rows, summary_line
+from phone_host.bench.tables import (
+    checked_rows,
+    fit_lines,
+    fit_rows,
+    prediction_lines,
+    rate_text,
+    regime_lines,
+    rows,
+    summary_line,
+    what_if_rows,
+)
 from phone_host.children.board_process import BoardAccount
 from phone_host.measure.accounts import LinkAccount, SessionAccount
 from phone_host.measure.delays import DELAYS, STAGES
@@ -400,3 +411,39 @@ def test_figure_is_an_svg_file_of_its_own() -> None:
     assert {"tcp", "ipc", "capture", "processing"} <= words
     assert "prefers-color-scheme:dark" in text
     assert "href" not in text
+
+
+def test_predictions_stand_in_terminal_and_tables_with_reasons_where_there_are_none() -> None:
+    """Each run beside its prediction, and what was asked for; a prediction that could not be made says why in its place."""
+    said = Figures(12.5, 0.25, 3e6, 4e6, 5e6, 21e6, 30e6)
+    why = Unknown("nothing else was measured")
+    checked = analysed(result()).checked[0]
+    assert checked.measured.end_to_end_p50_ns == 30e6
+    analysis = dataclasses.replace(
+        analysed(result()),
+        checked=(
+            dataclasses.replace(checked, predicted=said, queues=said),
+            dataclasses.replace(checked, predicted=why, queues=why),
+        ),
+        what_ifs=(
+            WhatIf("tcp", "fps=60", said, asked_for=True),
+            WhatIf("tcp", "fps=90", why, asked_for=True),
+            WhatIf("wifi (tcp)", "the same", said),
+        ),
+    )
+    lines = prediction_lines(analysis)
+    runs = [line for line in lines if line.startswith("tcp 640x480")]
+    assert [line.split("/s; ")[1] for line in runs] == ["21.0\u202fms, 12.5/s", f"no prediction: {why.reason}"]
+    asked = lines[lines.index("predicted, not run:") + 1 :]
+    assert [line.split(":")[0] for line in asked] == ["tcp fps=60", "tcp fps=90"]
+    assert "12.5" in asked[0]
+    assert "25 %" in asked[0]
+    assert why.reason in asked[1]
+    assert [row[2:3] for row in checked_rows(analysis)][1] == (f"no prediction: {why.reason}",)
+    assert checked_rows(analysis)[0][2].endswith("| 12.5")
+    assert [row[2] for row in what_if_rows(analysis)] == ["12.5", f"no prediction: {why.reason}", "12.5"]
+
+
+def test_one_run_alone_is_compared_with_nothing() -> None:
+    """A single run has no others that could foretell it, and nothing was asked for: no line at all."""
+    assert prediction_lines(analysed(result())) == []

@@ -1,12 +1,14 @@
 """Calibration against rigs whose every number is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
-from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
+from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.verdict import Verdict, judge, vertical_p95_px
 from phone_host.model import Rig
@@ -130,3 +132,18 @@ def test_fewer_than_three_pairs_are_refused(count: int) -> None:
     """Nothing is made up from two views."""
     with pytest.raises(DataError, match=f"only {count} pairs"):
         calibrate(exact_pairs(_rig(), poses(count, seed=1)), BOARD, _SIZES)
+
+
+def test_remedies_fit_what_is_wrong() -> None:
+    """Rows between good and usable, a baseline left open, and many rejected pairs each have their remedy; the gravest is first."""
+    pairs = exact_pairs(_rig(), poses(8, seed=2), noise_px=0.2, seed=2)
+    found = calibrate(pairs, BOARD, _SIZES)
+    judgement = judge(found, ())
+    assert judgement.verdict is Verdict.USABLE
+    assert "hold the board still" in judgement.remedies[0]
+    assert any("8 pairs are few" in remedy for remedy in judgement.remedies)
+    unpaired = tuple(Rejected(str(number), Reason.NO_PARTNER, "no partner") for number in range(6))
+    assert any("the same number" in remedy for remedy in judge(found, unpaired).remedies)
+    open_by_half = replace(found, baseline_sigma_m=0.05)
+    assert judge(open_by_half, ()).verdict is Verdict.REJECT
+    assert any("nearer and farther" in remedy for remedy in judge(open_by_half, ()).remedies)

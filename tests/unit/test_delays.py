@@ -2,6 +2,7 @@
 
 import math
 import statistics
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
-from phone_host.measure.delays import DELAYS, EXACT, STAGES, DelayStatistics, Series
+from phone_host.measure.delays import DELAYS, EXACT, SAMPLE, STAGES, DelayStatistics, Sample, Series
+
+LEDGER = PairLedger(
+    session="s",
+    sequence=0,
+    host_sequence=0,
+    bytes=9,
+    link="tcp",
+    board=BoardMarks(exposed_ns=0, grabbed_ns=1, sent_ns=3),
+    received_ns=7,
+    paired_ns=9,
+    queued_ns=15,
+    dequeued_ns=31,
+    done_ns=63,
+    previous_done_ns=14,
+    stages=StageTimes(decode=1, interpolate=2, rectify=3, match=4, reproject=5, write=6),
+    time_skew_ns=-77,
+    offset_ns=0,
+    uncertainty_ns=88,
+    host=HostMarks(exposed_ns=0, grabbed_ns=0),
+)
 
 
 def series(values: list[int]) -> Series:
@@ -20,37 +41,45 @@ def series(values: list[int]) -> Series:
     return filled
 
 
-@given(st.lists(st.integers(-(2**50), 2**50), min_size=1, max_size=300))
+@given(st.lists(st.integers(-(2**50), 2**50), min_size=2, max_size=300))
 @settings(deadline=None)
 def test_short_series_are_exact(values: list[int]) -> None:
-    """Count, greatest, mean and median are those of all values; the percentiles are numpy's."""
+    """Count, greatest, mean and median are those of all values, and so are the percentiles."""
     spread = series(values).spread()
     assert (spread.count, spread.max_ns) == (len(values), max(values))
     assert spread.mean_ns == pytest.approx(statistics.fmean(values), abs=1e-3)
     assert spread.p50_ns == pytest.approx(statistics.median(values))
-    assert spread.p95_ns == pytest.approx(float(np.percentile(values, 95)))
-    assert spread.p99_ns == pytest.approx(float(np.percentile(values, 99)))
+    # Python's own percentiles: the 19th of 19 points that cut the values in 20 parts of one size, and the 99th of 99.
+    assert spread.p95_ns == pytest.approx(statistics.quantiles(values, n=20, method="inclusive")[18])
+    assert spread.p99_ns == pytest.approx(statistics.quantiles(values, n=100, method="inclusive")[98])
+
+
+def test_the_percentiles_of_a_known_series() -> None:
+    """Of 1 to 101 the median is 51, 95 % lie up to 96, and 99 % up to 100, whatever their order."""
+    spread = series([(10 * i) % 101 + 1 for i in range(101)]).spread()  # 101 is prime: each number once
+    assert (spread.p50_ns, spread.p95_ns, spread.p99_ns, spread.max_ns, spread.mean_ns) == (51, 96, 100, 101, 51)
 
 
 def test_percentiles_are_exact_up_to_the_stated_length() -> None:
-    """With EXACT values that are a permutation of 0..EXACT-1 the percentiles are the linear ranks."""
-    values = [(7919 * i) % EXACT for i in range(EXACT)]  # 7919 is odd and EXACT a power of two: each number once
+    """Of 65536 values that are 0 to 65535 in some order the median lies between 32767 and 32768, and 99 % up to 64879.65."""
+    values = [(7919 * i) % 65536 for i in range(65536)]  # 7919 is odd: each number once
     spread = series(values).spread()
-    assert spread.p50_ns == (EXACT - 1) / 2
-    assert spread.p99_ns == pytest.approx(0.99 * (EXACT - 1))
+    assert spread.p50_ns == 32767.5
+    assert spread.p99_ns == pytest.approx(64879.65, abs=1e-6)
 
 
 def test_a_long_series_is_thinned_evenly() -> None:
     """Beyond EXACT, memory stays bounded, count, mean and greatest stay exact, and percentiles of a smooth series are within 1 %."""
-    count = 5 * EXACT
-    values = [1_000_000 + round(500_000 * math.sin(i / 5000) + i) for i in range(count)]
+    # 0 to 299 999 in an order that no stride of the thinning follows (a prime, and no divisor of the length), and one giant.
+    count = 300_000
+    values = [1_000_000 + (104_729 * i) % count for i in range(count)]
     values[12345] = 10**12
     filled = series(values)
     spread = filled.spread()
     assert (spread.count, spread.max_ns) == (count, 10**12)
-    assert spread.mean_ns == pytest.approx(sum(values) / count)
-    for percent, measured in ((50, spread.p50_ns), (95, spread.p95_ns), (99, spread.p99_ns)):
-        assert measured == pytest.approx(float(np.percentile(values, percent)), rel=0.01)
+    assert spread.mean_ns == pytest.approx(1_149_999.5 + 10**12 / count, rel=1e-5)
+    for expected, measured in ((1_150_000, spread.p50_ns), (1_285_000, spread.p95_ns), (1_297_000, spread.p99_ns)):
+        assert measured == pytest.approx(expected, rel=0.01)
     assert len(filled._values) <= EXACT
 
 
@@ -75,30 +104,32 @@ def test_nothing_measured_is_nan() -> None:
 
 def test_each_delay_of_a_ledger_reaches_its_series() -> None:
     """Marks 1, 2, 4, ... ns apart give each delay and stage its own value, and time skews lose their sign."""
-    board = BoardMarks(exposed_ns=0, grabbed_ns=1, sent_ns=3)
-    ledger = PairLedger(
-        session="s",
-        sequence=0,
-        host_sequence=0,
-        bytes=9,
-        link="tcp",
-        board=board,
-        received_ns=7,
-        paired_ns=9,
-        queued_ns=15,
-        dequeued_ns=31,
-        done_ns=63,
-        previous_done_ns=14,
-        stages=StageTimes(decode=1, interpolate=2, rectify=3, match=4, reproject=5, write=6),
-        time_skew_ns=-77,
-        offset_ns=0,
-        uncertainty_ns=88,
-        host=HostMarks(exposed_ns=0, grabbed_ns=0),
-    )
     statistic = DelayStatistics()
-    statistic.add(ledger)
+    statistic.add(LEDGER)
     expected = (1, 2, 4, 8, 16, 32, 63, 1)
     assert tuple(statistic.spread(name).max_ns for name in DELAYS) == expected
     assert tuple(statistic.spread(name).max_ns for name in STAGES) == (1, 2, 3, 4, 5, 6)
     assert statistic.spread("time_skew").p50_ns == 77
     assert statistic.spread("uncertainty").p50_ns == 88
+
+
+@pytest.mark.parametrize("count", [1, SAMPLE, SAMPLE + 1, 3 * SAMPLE])
+def test_a_sample_is_even_and_bounded(count: int) -> None:
+    """Of however many ledgers at most SAMPLE are kept, the first among them, at one distance from each other."""
+    sample = Sample()
+    for number in range(count):
+        sample.add(replace(LEDGER, sequence=number))
+    numbers = [ledger.sequence for ledger in sample.ledgers]
+    assert numbers[0] == 0
+    assert count / 4 < len(numbers) * (numbers[1] if len(numbers) > 1 else 1) <= count + 4
+    assert len(numbers) <= SAMPLE
+    assert len(set(np.diff(numbers))) <= 1
+
+
+def test_the_mean_length_of_the_frames_needs_a_frame() -> None:
+    """Frames of 100 and 300 bytes have 200 in the mean; without any the mean is not known."""
+    statistic = DelayStatistics()
+    assert math.isnan(statistic.frame_bytes)
+    for size in (100, 300):
+        statistic.add(replace(LEDGER, bytes=size))
+    assert statistic.frame_bytes == 200

@@ -169,7 +169,10 @@ def test_the_rate_is_learnt() -> None:
     assert made.ends[BOARD].bytes_per_s == pytest.approx(50_000, rel=0.1)
 
 
-@pytest.mark.parametrize(("rate", "frame_bytes"), [(187_500, 25_000), (1_000_000, 250_000)])
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("rate", "frame_bytes"), [(187_500, 25_000), pytest.param(1_000_000, 250_000, marks=pytest.mark.slow)]
+)
 def test_a_reader_that_is_seldom_awake_gets_what_the_line_carries(rate: float, frame_bytes: int) -> None:
     """When the host comes to read only every 100 ms, the line is still filled, and once it is awake again echoes wait no longer than ever."""
     made = line(rate)
@@ -188,7 +191,8 @@ def test_a_reader_that_is_seldom_awake_gets_what_the_line_carries(rate: float, f
     assert max(film.round_trips_ns(made, settled_ns)) < 14 * MS
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 30))])
 def test_a_bad_line_loses_frames_and_alters_none(seed: int) -> None:
     """On a line that flips, loses, inserts and swallows, frames come in order, unaltered, and the stream never stops."""
     chance = random.Random(seed)
@@ -339,3 +343,39 @@ def test_a_peer_that_talks_and_never_reads_is_not_answered_for_ever() -> None:
 def _word(value: int, number: int) -> Unit:
     """A unit of contact, by its number on the wire."""
     return Unit(UnitKind.CONTACT, first=True, last=True, number=0, body=struct.pack("<BI", value, number))
+
+
+@pytest.mark.parametrize("lost_by", [BOARD, HOST])
+def test_a_line_that_was_lost_is_met_anew(lost_by: LinkEnd) -> None:
+    """An end whose line was interrupted keeps its counts, has to be met again under another number, and then packets flow as before."""
+    made = line()
+    film = Film(2000)
+    made.run(made.now_ns + 100 * MS, film)
+    end = made.ends[lost_by]
+    number, before = end.number, len(made.packets(HOST))
+    assert end.interrupt()
+    assert not end.is_up
+    assert end.due_ns == 0 or lost_by is HOST
+    assert not end.interrupt()
+    made.meet()
+    made.run(made.now_ns + S, Film(2000))
+    assert made.ends[HOST].number == made.ends[BOARD].number != number
+    assert len(made.packets(HOST)) > before
+
+
+def test_a_goodbye_before_the_meeting_says_nothing() -> None:
+    """Who leaves before the two have met has nobody to tell."""
+    end = Duplex(BOARD, 5)
+    end.leave()
+    assert end.take(S) == Duplex(BOARD, 5).take(S)
+    assert (end.number, end.is_up) == (0, False)
+
+
+@pytest.mark.parametrize("body", [b"", b"\x00", bytes(6), struct.pack("<BI", 9, 1)])
+def test_a_word_that_is_none_changes_nothing(body: bytes) -> None:
+    """A unit of contact of another length, or with a word that nobody knows, neither meets nor parts."""
+    made = line()
+    unit = Unit(UnitKind.CONTACT, first=True, last=True, number=0, body=body)
+    for side in LinkEnd:
+        assert made.ends[side].feed(b"".join(unit_parts(side.peer, unit)), made.now_ns) == []
+        assert made.ends[side].is_up

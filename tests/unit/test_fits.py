@@ -34,19 +34,20 @@ def test_outliers_do_not_move_the_line() -> None:
     assert abs(np.polynomial.polynomial.polyfit(size, delay, 1)[0] - 2e6) > 1e7
 
 
-def test_the_interval_holds_the_truth_as_often_as_it_says() -> None:
-    """Of 50 measurements with noise that neighbours share, the 95 % intervals of latency and slope hold the truth in 41 at least.
+@pytest.mark.parametrize(("count", "least"), [(15, 11), pytest.param(200, 178, marks=pytest.mark.slow)])
+def test_the_interval_holds_the_truth_as_often_as_it_says(count: int, least: int) -> None:
+    """Of measurements with noise that neighbours share, the 95 % intervals of latency and slope hold the truth in all but a few.
 
-    Binomial: a true 95 % misses that once in 5000 times; the seeds are fixed.
+    Binomial: a true 95 % misses 11 of 15, and 178 of 200, less than once in 1500 times; the seeds are fixed.
     """
     held = np.zeros(2)
-    for seed in range(50):
+    for seed in range(count):
         random = np.random.default_rng(seed)
         size = random.uniform(5_000, 60_000, 400)
         shared = np.repeat(random.exponential(5e5, 80), 5)
         fit = fit_delay(size, 1e6 + 500.0 * size + shared - 5e5 * math.log(2), draws=60)
         held += (fit.latency_low_ns <= 1e6 <= fit.latency_high_ns, fit.slope_low <= 500.0 <= fit.slope_high)
-    assert held.min() >= 41
+    assert held.min() >= least
 
 
 def test_one_size_gives_no_line() -> None:

@@ -135,3 +135,46 @@ def test_an_image_without_size_is_broken() -> None:
     at = image.index(b"\xff\xc0")
     image[at + 5 : at + 7] = b"\0\0"
     assert JpegStream().feed(bytes(image), 1) == [Broken(FrameFault.WRONG_LENGTH)]
+
+
+SOI, EOI = b"\xff\xd8", b"\xff\xd9"
+FRAME = b"\xff\xc0\x00\x0b\x08\x00\x10\x00\x20\x01\x01\x11\x00"
+"""A frame header of 32 x 16 pixels, one component (T.81, B.2.2)."""
+SCAN = b"\xff\xda\x00\x08\x01\x01\x00\x00\x3f\x00entropy"
+
+
+@pytest.mark.parametrize(
+    "markers",
+    [FRAME, b"\xff\xff" + FRAME, b"\xff\xd0\xff\xd7" + FRAME, b"\xff\xfe\x00\x04no" + FRAME],
+    ids=["plain", "filled up", "restarts", "a comment"],
+)
+def test_legal_markers_are_walked_over_byte_by_byte(markers: bytes) -> None:
+    """Fill bytes, restart markers and comments belong to an image; it is whole with its last byte, and none of it has passed by."""
+    image = SOI + markers + SCAN + EOI
+    stream = JpegStream()
+    events = [event for at in range(len(image)) for event in stream.feed(image[at : at + 1], at)]
+    [whole] = events
+    assert isinstance(whole, Whole)
+    assert (whole.payload, whole.width_px, whole.height_px) == (image, 32, 16)
+    assert (stream.passed_bytes, stream.held_bytes) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    "spoiled",
+    [
+        SOI + b"\xff\xd0\x00",
+        SOI + b"\xff\xd0\x00\x00\x00\x00",
+        SOI + b"\xff\x01\x00\x04",
+        SOI + b"\xff\xfe\x00\x01",
+        SOI + FRAME,
+    ],
+    ids=["no marker, short", "no marker", "a code that is none", "a length of one", "another beginning"],
+)
+def test_illegal_markers_break_the_image_and_only_that(spoiled: bytes) -> None:
+    """Where no marker can be, the image that had begun is broken, and the next one is found."""
+    stream = JpegStream()
+    events = [*stream.feed(spoiled, 1), *stream.feed(IMAGES[0], 2)]
+    assert [type(event) for event in events] == [Broken, Whole]
+    last = events[-1]
+    assert isinstance(last, Whole)
+    assert last.payload == IMAGES[0]

@@ -14,12 +14,14 @@ def dimmed(image: Image, gain: float, offset: float) -> Image:
     return np.asarray(np.clip(np.rint(image * gain + offset), 0, 255), np.uint8)
 
 
+PLANE = plane().pair.left
+
+
 @settings(deadline=None, max_examples=20)
 @given(gain=st.floats(0.5, 1.2), offset=st.floats(0, 25))
 def test_a_change_of_exposure_is_taken_back(gain: float, offset: float) -> None:
     """A gain and an offset are undone up to the rounding of the dimmed levels, except where they clipped."""
-    image = plane().pair.left
-    image = np.clip(image, 20, 190)
+    image = np.clip(PLANE, 20, 190)
     back = with_levels_of(image, dimmed(image, gain, offset))
     # Rounding to whole levels before the gain is undone: half a level, divided by the gain; and half a level after.
     assert np.abs(back.astype(float) - image).max() <= 0.5 / gain + 0.5 + 0.5

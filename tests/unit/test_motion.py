@@ -66,3 +66,12 @@ def test_speed_is_shift_by_time_between_consecutive_frames() -> None:
     lone.add(view(image, 0, 0), 0, 0)
     lone.add(view(image, 9, 0), 10**9, 10**9)
     assert np.isnan(lone.px_s)
+
+
+def test_nothing_is_measured_on_a_blank_wall() -> None:
+    """Where there is no corner the speed stays unknown, also where the second image has nothing of the first."""
+    blank = np.full((120, 160), 128, np.uint8)
+    assert np.isnan(fast_shift_px(blank, blank))
+    chance = np.random.default_rng(1)
+    other, another = (chance.integers(0, 256, (120, 160), dtype=np.uint8) for _ in range(2))
+    assert np.isnan(fast_shift_px(other, another))

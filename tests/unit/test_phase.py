@@ -139,6 +139,7 @@ def test_a_small_phase_is_left_alone() -> None:
     assert math.isnan(pair.controller.alignment.before_ns)
 
 
+@pytest.mark.long
 def test_slow_drift_is_corrected_again_and_again() -> None:
     """Cameras 100 ppm apart are kept within 5 ms for ten minutes by a correction every 40 s or so, without giving up."""
     pair = Pair(

@@ -1,14 +1,17 @@
 """What the host knows of a board over its lives: nothing of one is believed of the next."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
+from common.errors import UnavailableError
 from common.frame import PixelFormat
 from common.ledger import BoardMarks
 from common.protocol.board_session import BoardSession
 from common.protocol.message import (
     BoardCounts,
+    BoardHello,
     Bye,
     CameraDescription,
     FrameMessage,
@@ -24,11 +27,20 @@ from common.protocol.message import (
     Rung,
     Status,
 )
-from common.protocol.session import MS, Outgoing, connection_name
+from common.protocol.session import (
+    MS,
+    ClockVoid,
+    OtherBoard,
+    Outgoing,
+    Refused,
+    Stepped,
+    Unbelievable,
+    connection_name,
+)
 from phone_host.model import BoardFrame
 from phone_host.stream.frame_sink import FrameSink, NoFrames
 from phone_host.stream.pair_queue import PairQueue
-from phone_host.stream.reception import LinkFacts, Reception
+from phone_host.stream.reception import LinkFacts, Reception, refusal_text
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.quarantine import Disbelief
 from tests.support.session_world import CAMERA
@@ -110,10 +122,10 @@ def test_an_account_from_before_the_goodbye_is_not_the_last_one() -> None:
     assert talk.reception.leave(talk.now_ns)
     under_way = Status("first", BoardCounts(talk.sent, talk.sent), Rung())
     talk.reception.receive(NAMES[Lane.FRAMES], under_way, talk.now_ns)
-    assert not talk.reception.tail_known
+    known = [talk.reception.tail_known]
     talk.show(talk.frame())
     talk.reception.receive(NAMES[Lane.FRAMES], Bye(BoardCounts(talk.sent, talk.sent)), talk.now_ns)
-    assert talk.reception.tail_known
+    assert [*known, talk.reception.tail_known] == [False, True]
     (account,) = talk.reception.account.sessions
     assert account.latest.sent == talk.sent == account.received + account.lost
 
@@ -287,3 +299,130 @@ def test_a_frame_older_than_its_partners_is_dropped_and_the_next_one_awaited() -
         talk.run()
     assert dict(talk.reception.account.disbelieved) == {Disbelief.PAST: 1}
     assert talk.queue.counts.received == 1
+
+
+class TwoLinks(Talk):
+    """The same over two links to one board."""
+
+    def __init__(self, *, sink: FrameSink | None = None, camera: CameraDescription = CAMERA) -> None:
+        super().__init__(sink=sink, camera=camera)
+        self.far = {lane: connection_name(1, lane.name.encode()) for lane in Lane}
+        facts = [LinkFacts("ipc", dict(NAMES), self_paced=False), LinkFacts("serial", dict(self.far), self_paced=True)]
+        self.reception = Reception(facts, "host", sink or self.queue, self.said.append)
+
+
+def test_a_broken_link_costs_a_change_and_no_session() -> None:
+    """When the carrier breaks the other link takes over: counted as lost and as a switch, in the same session."""
+    talk = TwoLinks()
+    talk.run(60)
+    assert [tally.is_up for tally in talk.reception.account.links] == [True, True]
+    before = talk.reception.carrier
+    broken = NAMES if before == talk.reception.account.links[0].name else talk.far
+    for name in broken.values():
+        talk.reception.interrupted(name, talk.now_ns)
+        talk.board.unreachable(name)
+    talk.said = [outgoing for outgoing in talk.said if outgoing.connection not in broken.values()]
+    talk.answer()
+    assert talk.reception.carrier not in {"", before}
+    assert sum(tally.lost for tally in talk.reception.account.links) == 1
+    assert talk.reception.account.switches == 1
+    assert len(talk.reception.account.sessions) == 1
+
+
+def test_links_to_two_boards_are_an_error_unless_one_was_moved() -> None:
+    """A second link that leads to another board from the beginning is refused with the remedy; one that was right before is only told."""
+    talk = TwoLinks()
+    other = BoardHello(
+        session="other",
+        boot_id="another boot",
+        camera=replace(CAMERA, name="theirs"),
+        counts=BoardCounts(),
+        rung=Rung(),
+    )
+    talk.run(60)
+    moved = OtherBoard(1, other)
+    talk.reception.account.links[1].lost = 1
+    talk.reception._handle([moved], talk.now_ns)
+    talk.reception.account.links[1].lost = 0
+    with pytest.raises(UnavailableError) as caught:
+        talk.reception._handle([moved], talk.now_ns)
+    assert "theirs" in caught.value.problem
+    assert "--link" in caught.value.remedy
+
+
+def test_a_link_that_is_turned_away_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
+    """While one link carries, a refusal on the other is one line of the log, however often it comes, and the run goes on."""
+    talk = TwoLinks()
+    talk.run(60)
+    for _ in range(5):
+        talk.reception._handle([Refused(RefusalReason.BUSY, 1)], talk.now_ns)
+    assert len([record for record in caplog.records if "link_refused" in record.getMessage()]) == 1
+    assert talk.reception.connected
+    assert talk.reception.refused(talk.now_ns) is RefusalReason.BUSY
+    assert talk.reception.refused(talk.now_ns + 2000 * MS) is None
+
+
+@pytest.mark.parametrize("reason", RefusalReason)
+def test_every_refusal_has_a_remedy(reason: RefusalReason) -> None:
+    """Whatever a board refuses for, the user is told what to do."""
+    problem, remedy = refusal_text(reason)
+    assert "board" in problem
+    assert remedy
+
+
+def test_nonsense_is_counted_and_told_ever_more_seldom(caplog: pytest.LogCaptureFixture) -> None:
+    """Of a hundred messages that are none all are counted, and seven fill the log: the 1st, 2nd, 4th ... 64th."""
+    talk = Talk()
+    talk.run()
+    for _ in range(99):
+        talk.reception.count_garbage("noise")
+    talk.reception._handle([Unbelievable("noise")], talk.now_ns)
+    assert talk.reception.account.garbage == 100
+    assert len([record for record in caplog.records if "garbage" in record.getMessage()]) == 7
+
+
+def test_a_board_that_steps_to_a_lower_rate_is_gone_by() -> None:
+    """After the board has told of another rung its period is the rung's, for pairing and for the reports."""
+    talk = Talk()
+    talk.run()
+    rung = Rung(index=2, last=3, period_ns=2 * CAMERA.period_ns)
+    talk.reception._handle([Stepped(rung)], talk.now_ns)
+    hello = talk.reception.hello
+    assert hello is not None
+    assert (hello.camera.period_ns, hello.rung) == (2 * CAMERA.period_ns, rung)
+    assert talk.reception.account.sessions[-1].rung == rung
+
+
+UPSETS: dict[str, Callable[[Talk], None]] = {
+    "slept": lambda talk: talk.reception.slept(3_600_000 * MS, talk.now_ns),
+    "may have slept": lambda talk: talk.reception.doubt_clock("stopped", talk.now_ns),
+    "was not heard": lambda talk: talk.reception._handle([ClockVoid()], talk.now_ns),
+}
+
+
+@pytest.mark.parametrize("upset", UPSETS)
+def test_a_host_that_slept_believes_no_clock_until_an_echo_has_come(upset: str) -> None:
+    """After a sleep, or where one cannot be excluded, there is no estimate; the next echoes bring it back."""
+    talk = Talk()
+    talk.run(60)
+    known = [talk.reception.estimate is not None]
+    UPSETS[upset](talk)
+    known.append(talk.reception.estimate is not None)
+    talk.run(60)
+    assert [*known, talk.reception.estimate is not None] == [True, False, True]
+
+
+def test_a_board_that_vanished_leaves_an_open_end() -> None:
+    """Silence ends the contact: no link is up, nobody is connected, and what the board sent last is not known."""
+    talk = Talk()
+    talk.run(60)
+    assert talk.reception.carrier == "tcp"
+    talk.reception.steer(5 * MS, talk.now_ns)
+    for _ in range(100):
+        talk.now_ns += 100 * MS
+        talk.reception.tick(talk.now_ns)
+    assert not talk.reception.connected
+    assert not any(tally.is_up for tally in talk.reception.account.links)
+    assert talk.reception.account.sessions[-1].vanished
+    assert not talk.reception.ended
+    talk.reception.close()

@@ -60,9 +60,11 @@ def test_every_pixel_of_the_window_comes_from_inside_both_images(
 
 
 def _source_margin_px(model: CameraModel, rotation: np.ndarray, r: Rectification) -> float:
-    """How far inside the camera's image the window's outermost source pixel lies."""
+    """How far inside the camera's image the window's outermost source pixel lies: one on its border, as the map does not fold."""
     columns, rows = np.meshgrid(np.arange(r.width_px), np.arange(r.height_px))
-    pixels = np.column_stack([columns.ravel(), rows.ravel(), np.ones(columns.size)])
+    border = np.ones(columns.shape, dtype=bool)
+    border[1:-1, 1:-1] = False
+    pixels = np.column_stack([columns[border], rows[border], np.ones(border.sum())])
     rays = pixels @ np.linalg.inv(r.P_left[:, :3]).T @ rotation
     source = np.asarray(cv2.projectPoints(rays, np.zeros(3), np.zeros(3), model.matrix, model.distortion)[0])
     source = source.reshape(-1, 2)
@@ -150,3 +152,17 @@ def test_an_image_of_another_size_is_told() -> None:
     rectifier = Rectifier(unlike_rig())
     with pytest.raises(DataError, match=r"right image is 640x480 px, .*1280x720"):
         rectifier.rectify(np.zeros((480, 640), np.uint8), np.zeros((480, 640), np.uint8))
+
+
+def test_cameras_in_one_place_are_told() -> None:
+    """Without a baseline there is no depth: the error says so."""
+    with pytest.raises(DataError, match="baseline"):
+        rectify_rig(unlike_rig((0.0, 0.0, 0.0)))
+
+
+def test_a_distortion_that_folds_inside_the_image_is_told() -> None:
+    """A lens model whose radius falls before the corner is no lens: the error names the camera."""
+    rig = unlike_rig()
+    rig.left.distortion[:] = (-3.0, 0.0, 0.0, 0.0, 0.0)
+    with pytest.raises(DataError, match="left"):
+        rectify_rig(rig)

@@ -6,18 +6,20 @@ from typing import Any
 import pytest
 
 from common.camera.base import CameraHealth, CameraState
+from common.frame import FrameFault
 from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
-from common.protocol.message import BoardCounts
-from phone_host.measure.accounts import LinkAccount, SessionAccount
+from common.protocol.message import BoardCounts, DropReason
+from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.measure.delays import DelayStatistics
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.unused import unused
 from phone_host.model import PairCounts, Side, TimeOffset, Unwritten
-from phone_host.report.run_json import build
+from phone_host.report.run_json import age_bound, build
 from phone_host.report.run_page import run_page
 from phone_host.report.summary import phase_lines, summary
+from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings
-from phone_host.sync.phase import Phase
+from phone_host.sync.phase import Aligning, Alignment, Phase
 from phone_host.sync.quarantine import Disbelief, Suspects
 
 NAN = float("nan")
@@ -137,3 +139,104 @@ def test_what_was_not_believed_is_told_everywhere() -> None:
     for text in (summary(seen), run_page(seen, None, Side.LEFT, ())):
         for words in ("stepped 1 times", "7 pairs", "from the future", "beyond credit", "too large"):
             assert words in text
+
+
+def test_everything_that_a_run_knows_is_told() -> None:
+    """Clock, phase, alignment, links, losses and what befell the camera stand in JSON and summary, with the numbers that were given."""
+    estimate = ClockEstimate(
+        reference_ns=0,
+        offset_ns=5_000,
+        skew=2e-6,
+        skew_uncertainty=1e-7,
+        uncertainty_ns=30_000,
+        round_trip_ns=400_000,
+        low_ns=-200_000,
+        high_ns=210_000,
+        skew_low=-1e-4,
+        skew_high=1e-4,
+    )
+    links = (LinkTally("ipc", frames=20, bytes=900, carried=1), LinkTally("tcp", frames=11, carried=2, lost=1))
+    links[0].age.add(7 * MS)
+    account = SessionAccount("s", BoardCounts(), BoardCounts(40, 35, ((DropReason.REPLACED, 5),)), received=31)
+    health = CameraHealth(
+        CameraState.RUNNING, missed=1, stalls=2, failures=3, unplugged=4, returned=5, distrusted_stamps=6,
+        refused_controls=7, faults=((FrameFault.NO_END, 8),),
+    )  # fmt: skip
+    seen = replace(
+        run(31),
+        estimate=estimate,
+        link=LinkAccount([account], links=links, switches=2),
+        phase=Phase(5.0 * MS, 50 * MS, 1e-4, 0),
+        alignment=Alignment(
+            state=Aligning.ALIGNED, words="within 1 ms", corrections=3, before_ns=9.0 * MS, after_ns=0.5 * MS
+        ),
+        camera=health,
+        unwritten=Unwritten(4, 6, "disk full"),
+        undecodable=2,
+        counts=PairCounts(received=31, paired=40, taken=33, dropped=3, board_orphans=(("no_partner", 9),)),
+    )
+    told: Any = build(seen)
+    assert told["clock"]["known"]
+    assert (told["clock"]["offset_ns"], told["clock"]["skew_ppm"], told["clock"]["uncertainty_us"]) == (
+        5_000,
+        2.0,
+        30.0,
+    )
+    assert told["clock"]["round_trip_us"] == 400.0
+    assert told["clock"]["uncertainty_at_pairs_us"]["p50"] == pytest.approx(0.05)
+    assert told["phase"]["beat_s"] == pytest.approx(500.0)  # 50 ms at 100 ppm
+    assert told["phase"]["alignment"] == {
+        "state": "aligned", "words": "within 1 ms", "corrections": 3, "before_ms": 9.0, "after_ms": 0.5,
+    }  # fmt: skip
+    assert [link["link"] for link in told["links"]] == ["ipc", "tcp"]
+    assert told["links"][0]["age_ms"]["p50"] == 7.0
+    text = summary(seen)
+    for words in (
+        "+-30 us", "skew +2.0 ppm", "alignment: aligned", "unplugged 4 times", "stalled 2 times", "failed 3 times",
+        "back 5 times", "1 frames missed", "6 stamps not believed", "7 controls refused", "8 frames no end",
+        "5 frames dropped on the board: replaced", "9 board frames without partner: no partner",
+        "3 pairs that gave way in a full FIFO", "2 pairs that could not be processed",
+        "4 pairs that still waited at the end", "4 lines, 6 pairs (disk full)",
+    ):  # fmt: skip
+        assert words in text
+    [head, ipc, tcp] = text[text.index("link  ") :].splitlines()[:3]
+    assert head.split()[:4] == ["link", "frames", "carried", "lost"]
+    assert ipc.split() == ["ipc", "20", "1", "0", "7.000", "7.000"]
+    assert tcp.split() == ["tcp", "11", "2", "1", "-", "-"]
+
+
+@pytest.mark.parametrize(
+    ("latency_ms", "stated_ms", "offset", "words"),
+    [
+        (None, None, TimeOffset(), "latency is not known"),
+        (None, None, TimeOffset(3 * MS, MS), "part of the measured difference"),
+        (90, None, TimeOffset(), "arrivals - 90 ms; they"),
+        (90, 20, TimeOffset(), "arrivals - 90 ms, known to +-24.0 ms; they"),
+    ],
+)
+def test_stamps_that_are_arrivals_say_so(
+    latency_ms: int | None, stated_ms: int | None, offset: TimeOffset, words: str
+) -> None:
+    """Where the own camera's stamps are arrivals the summary tells what is known of its latency; jitter and what is left stand in JSON."""
+    latency_ns, stated_ns = (None if value is None else value * MS for value in (latency_ms, stated_ms))
+    health = CameraHealth(jitter_ns=4 * MS, latency_ns=latency_ns, latency_uncertainty_ns=stated_ns)
+    seen = replace(run(31), camera=health, time_offset=offset)
+    assert words in summary(seen)
+    assert "up to 4.0 ms late" in summary(seen)
+    told: Any = build(seen)
+    camera = told["host_frames"]["camera"]
+    assert (camera["latency_ms"], camera["jitter_ms"]) == (latency_ms, 4.0)
+    assert camera["stamp_uncertainty_ms"] == (None if stated_ms is None else 24.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "bound"),
+    [
+        ("2:drop-oldest", "2 frame period(s)"),
+        ("3:drop-newest", "3 processing time(s): pairs that are in stay in, here 30.0 ms"),
+        ("4:block", "4 processing time(s): a pair is fetched when a place is free, here 40.0 ms"),
+    ],
+)
+def test_the_age_bound_follows_from_the_policy(text: str, bound: str) -> None:
+    """Processing takes 10 ms: a FIFO that keeps its pairs makes them wait that often; one that drops the oldest, for frames."""
+    assert age_bound(replace(run(31), fifo=FifoSettings.parse(text))).startswith(bound)

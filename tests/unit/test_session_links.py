@@ -107,12 +107,30 @@ def happen(world: World, event: Event) -> None:
             world.pass_time(event.amount * MS)
 
 
-@given(events=EVENTS, board_dials=st.booleans(), slots=st.integers(1, 4), alive=st.integers(0, LINKS))
-@settings(deadline=None, max_examples=200)
+any_course = given(events=EVENTS, board_dials=st.booleans(), slots=st.integers(1, 4), alive=st.integers(0, LINKS))
+
+
+@any_course
+@settings(deadline=None, max_examples=50)
 def test_frames_flow_over_any_link_that_is_up(
     *, events: list[Event], board_dials: bool, slots: int, alive: int
 ) -> None:
     """After any events, with one link dead without a sound or none, frames flow within silence and a second; each is received or lost."""
+    run_course(events, board_dials=board_dials, slots=slots, alive=alive)
+
+
+@pytest.mark.slow
+@any_course
+@settings(deadline=None, max_examples=1000)
+def test_frames_flow_over_any_link_that_is_up_in_many_courses(
+    *, events: list[Event], board_dials: bool, slots: int, alive: int
+) -> None:
+    """The same, for a large sample."""
+    run_course(events, board_dials=board_dials, slots=slots, alive=alive)
+
+
+def run_course(events: list[Event], *, board_dials: bool, slots: int, alive: int) -> None:
+    """Let events happen, then see frames flow and be accounted for."""
     world = World(board_dials=board_dials, links=LINKS)
     world.hosts[0].slots = slots
     for event in events:

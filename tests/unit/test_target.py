@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from common.errors import SettingsError
-from phone_host.calibration.target import Board, agree, find_corners, parse_board
+from phone_host.calibration.target import Board, agree, find_corners, order_by_colour, parse_board
 from tests.support.boards import BOARD, poses, render_pair
 from tests.support.rigs import project_points, unlike_rig
 
@@ -83,3 +83,12 @@ def test_an_image_without_a_board_gives_no_corners() -> None:
     noise = np.random.default_rng(1).integers(0, 255, (240, 320)).astype(np.uint8)
     assert find_corners(noise, BOARD).shape == (0, 2)
     assert find_corners(np.full((240, 320, 3), 200, np.uint8), BOARD).shape == (0, 2)
+
+
+def test_corners_from_a_detector_that_looks_from_behind_are_turned_over() -> None:
+    """Rows in mirrored order are put right, and corners that begin at the black end are turned by half."""
+    image = render_pair(unlike_rig(), poses(1, seed=4)[0])[0]
+    corners = find_corners(image, BOARD)
+    grid = corners.reshape(BOARD.rows, BOARD.columns, 2)
+    for changed in (grid[:, ::-1], grid[::-1], grid[::-1, ::-1]):
+        np.testing.assert_array_equal(order_by_colour(changed.reshape(-1, 2), image, BOARD), corners)

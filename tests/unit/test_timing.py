@@ -33,10 +33,10 @@ from phone_host.scene.scene import (
     Scene,
     demo_scene,
     rig_poses,
-    unlike_rig,
 )
 from phone_host.stereo.raw_images import EncodedImage
 from phone_host.stereo.rectify import Rectifier
+from tests.support.rigs import small_rig
 
 REFRESH_S = 1 / 59.94
 START_S = 12.3
@@ -74,18 +74,26 @@ def filmed(moment_s: float, exposure_s: float, *, host: bool) -> Image:
         picture = cv2.warpPerspective(shown(number), turn, (400, 300), flags=cv2.INTER_AREA, borderValue=(70,))
         light += np.asarray(picture, dtype=np.float64) * ((end_s - begin_s) / exposure_s)
     light = cv2.GaussianBlur(25 + 0.6 * light, (0, 0), 0.8)
-    noise = np.random.default_rng(round(moment_s * 1e6)).normal(0, 3, light.shape)
+    noise = NOISE[round(moment_s * 1e6) % len(NOISE)]
     return np.asarray(np.clip(light + noise, 0, 255), dtype=np.uint8)
+
+
+NOISE = np.random.default_rng(6).normal(0, 3, (13, 300, 400))
+
+
+@cache
+def side_of_film(fps: float, phase_s: float, *, host: bool) -> tuple[Times, list[Reading | None]]:
+    """Eight seconds of the counting screen as one camera sees it: moments from their beginning, and what was read; filmed once."""
+    reader = PatternReader()
+    moments = stamps(8.0, fps, phase_s) + START_S
+    return moments - START_S, [reader.read(filmed(float(t), 0.008, host=host)) for t in moments]
 
 
 def film_screen(offset_s: float, board_fps: float, host_fps: float) -> Measured:
     """Film the counting screen with both cameras; the host's stamps are late by `offset_s`."""
-    reader, sides = PatternReader(), []
-    for host, fps, phase_s, late_s in ((False, board_fps, 0.004, 0.0), (True, host_fps, 0.017, offset_s)):
-        moments = stamps(8.0, fps, phase_s) + START_S
-        readings = [reader.read(filmed(float(t), 0.008, host=host)) for t in moments]
-        sides.append(counted(moments + late_s - START_S, readings))
-    return measure_screen(*sides)
+    board_s, seen = side_of_film(board_fps, 0.004, host=False)
+    host_s, own = side_of_film(host_fps, 0.017, host=True)
+    return measure_screen(counted(board_s, seen), counted(host_s + offset_s, own))
 
 
 def test_every_number_is_read() -> None:
@@ -146,22 +154,29 @@ def test_a_screen_that_cannot_serve_is_named(count: int, moves: bool | None, wor
 
 def film_lamp(offset_s: float, switches: Times, host_fps: float, exposure_s: float) -> Measured:
     """Film a lamp that changes at these moments, in the corner of one image and the middle of the other."""
-    sides = []
-    for host, fps, phase_s, late_s in ((False, 30.0, 0.003, 0.0), (True, host_fps, 0.019, offset_s)):
-        moments = stamps(float(switches[-1]) + 0.5, fps, phase_s)
-        chance = np.random.default_rng(int(host))
-        cells = []
-        for moment in moments:
-            inside = np.linspace(moment - exposure_s / 2, moment + exposure_s / 2, 50)
-            light = float(np.mean(np.searchsorted(switches, inside) % 2))
-            image = np.full((96, 128), 60.0)
-            place = (slice(40, 56), slice(50, 70)) if host else (slice(0, 96), slice(0, 30))
-            image[place] += 90 * light
-            cells.append(
-                brightness(np.asarray(np.clip(image + chance.normal(0, 4, image.shape), 0, 255), dtype=np.uint8))
-            )
-        sides.append(Brightness(moments + late_s, np.array(cells)))
-    return measure_lamp(*sides)
+    shown = tuple(switches.tolist())
+    board = side_of_lamp(shown, 30.0, 0.003, exposure_s, host=False)
+    host = side_of_lamp(shown, host_fps, 0.019, exposure_s, host=True)
+    return measure_lamp(board, replace(host, times_s=host.times_s + offset_s))
+
+
+@cache
+def side_of_lamp(
+    switches: tuple[float, ...], fps: float, phase_s: float, exposure_s: float, *, host: bool
+) -> Brightness:
+    """What one camera sees of the lamp; filmed once."""
+    moments = stamps(switches[-1] + 0.5, fps, phase_s)
+    chance = np.random.default_rng(int(host))
+    cells = []
+    for moment in moments:
+        inside = np.linspace(moment - exposure_s / 2, moment + exposure_s / 2, 50)
+        light = float(np.mean(np.searchsorted(switches, inside) % 2))
+        image = np.full((96, 128), 60.0)
+        place = (slice(40, 56), slice(50, 70)) if host else (slice(0, 96), slice(0, 30))
+        image[place] += 90 * light
+        noisy = image + chance.normal(0, 4, image.shape)
+        cells.append(brightness(np.asarray(np.clip(noisy, 0, 255), dtype=np.uint8)))
+    return Brightness(moments, np.array(cells))
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.013, -0.070])
@@ -213,7 +228,7 @@ def moving(amplitude_m: tuple[float, float, float], spin_rad_s: float) -> Scene:
 @cache
 def rendered(amplitude_m: tuple[float, float, float], spin_rad_s: float) -> dict[Side, list[tuple[float, Image]]]:
     """The scene as both cameras of the demo's rig see it, with the moments; the right one exposes 9 ms after the left."""
-    rig, scene = unlike_rig(), moving(amplitude_m, spin_rad_s)
+    rig, scene = small_rig(), moving(amplitude_m, spin_rad_s)
     views = zip(Side, (rig.left, rig.right), rig_poses(rig), (WEBCAM_LOOK, PHONE_LOOK), strict=True)
     film = {}
     for side, camera, pose, look in views:
@@ -235,7 +250,7 @@ def film_scene(film: dict[Side, list[tuple[float, Image]]], offset_s: float, boa
             encoded = EncodedImage(b"", PixelFormat.MJPEG, image.shape[1], image.shape[0], name)
             sides[side].append(Shot(10**14 + round((moment_s + late_s) * 1e9), encoded))
     progress: list[float] = []
-    rectifier = Rectifier(replace(unlike_rig(), board_side=board_side))
+    rectifier = Rectifier(replace(small_rig(), board_side=board_side))
     board, host = sides[board_side], sides[board_side.other]
     found = measure_shared_motion(board, host, rectifier, lambda shot: images[shot.image.name], progress.append)
     assert progress == sorted(progress)

@@ -67,8 +67,9 @@ def test_an_absent_size_is_refused_with_the_list() -> None:
 
 def test_an_absent_format_is_refused_with_the_list() -> None:
     """A format that is not there is an error that lists the camera's formats."""
-    with pytest.raises(SettingsError, match="no format nv12: give one of its formats: MJPG, YUYV"):
+    with pytest.raises(SettingsError, match="nv12") as caught:
         choose((_MJPEG, _YUYV), Wanted(None, None, PixelFormat.NV12), "x")
+    assert caught.value.remedy.endswith("MJPG, YUYV")
 
 
 def test_a_camera_with_h264_alone_is_refused() -> None:
@@ -118,8 +119,9 @@ def test_the_rate(rates: Rates, wish: Fraction | None, expected: Fraction) -> No
 )
 def test_an_absent_rate_is_refused_with_the_list(rates: Rates, listed: str) -> None:
     """A rate that is not there is an error that lists those that are."""
-    with pytest.raises(SettingsError, match=f"no rate 25 at that size: give one of its rates: {listed}"):
+    with pytest.raises(SettingsError, match="25") as caught:
         choose_rate(rates, Wanted(None, Fraction(25)), "x")
+    assert caught.value.remedy.endswith(listed)
 
 
 def test_slower_rates_are_those_below() -> None:

@@ -1,0 +1,98 @@
+"""Whole sentences of advice, one example of each: here alone their wording is fixed. Other tests ask for kinds and figures.
+
+Where a wording was changed on purpose: `python -m tests.unit.test_sentences` writes sentences.txt anew; read its diff.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from common.camera.base import CameraHealth
+from common.protocol.message import RefusalReason
+from phone_host.measure.regime import RunFigures, judge
+from phone_host.measure.trust import (
+    Concern,
+    Timing,
+    Unbelieved,
+    stamp_doubt,
+    timing_concerns,
+    unbelieved_concerns,
+)
+from phone_host.model import TimeOffset
+from phone_host.stream.reception import refusal_text
+from phone_host.sync.fifo import Overflow
+
+MS: Final = 1_000_000
+FILE: Final = Path(__file__).with_name("sentences.txt")
+
+# 30 pairs whose cameras show one every 100 ms, whose link brings one every 100 ms, and whose processor takes 20 ms for each.
+CALM: Final = RunFigures(
+    pairs=30,
+    interval_ns=100 * MS,
+    processing_ns=20 * MS,
+    starvation_ns=80 * MS,
+    match_ns=15 * MS,
+    period_ns=100 * MS,
+    offered=1.0,
+    received=1.0,
+    frame_bytes=40_000,
+    propagation_ns=30 * MS,
+)
+REGIMES: Final = {
+    "too few": replace(CALM, pairs=3),
+    "cameras": CALM,
+    "pairing": replace(CALM, interval_ns=300 * MS, starvation_ns=280 * MS, received=3.0),
+    "link": replace(CALM, interval_ns=300 * MS, starvation_ns=280 * MS),
+    "backlog": replace(
+        CALM, interval_ns=200 * MS, processing_ns=200 * MS, starvation_ns=0, match_ns=150 * MS, offered=2
+    ),
+    "backlog behind a FIFO that blocks": replace(
+        CALM, interval_ns=200 * MS, processing_ns=200 * MS, starvation_ns=0, match_ns=0, overflow=Overflow.BLOCK
+    ),
+    "just keeps up": replace(CALM, processing_ns=95 * MS, starvation_ns=5 * MS),
+}
+FAST: Final = Timing(16 * MS, 5 * MS, 80 * MS, 1000.0, 640)
+ARRIVALS: Final = CameraHealth(jitter_ns=4 * MS)
+STAMPS: Final = {
+    "never measured": (TimeOffset(), CameraHealth()),
+    "measured": (TimeOffset(3 * MS, 2 * MS), CameraHealth()),
+    "measured, arrivals": (TimeOffset(3 * MS, 2 * MS), ARRIVALS),
+    "arrivals": (TimeOffset(), ARRIVALS),
+    "arrivals, latency": (TimeOffset(), replace(ARRIVALS, latency_ns=90 * MS)),
+    "arrivals, latency stated": (
+        TimeOffset(),
+        replace(ARRIVALS, latency_ns=90 * MS, latency_uncertainty_ns=20 * MS),
+    ),
+}
+
+
+def sentences() -> Iterator[str]:
+    """All of them, each behind its name."""
+    for name, figures in REGIMES.items():
+        judgement = judge(figures)
+        yield f"regime, {name}: {judgement.sentence}"
+        yield from (f"    {remedy}" for remedy in judgement.remedies)
+    yield from map(told, timing_concerns(FAST))
+    for name, (offset, own) in STAMPS.items():
+        doubt = stamp_doubt(offset, own)
+        yield f"stamps, {name}: {doubt.why}\n    {doubt.remedy}"
+    for reason in ("clock_in_doubt", "from_the_future"):
+        yield from map(told, unbelieved_concerns(Unbelieved(2, 7, {reason: 3}, 100, {"too_large": 5})))
+    for refusal in RefusalReason:
+        problem, remedy = refusal_text(refusal)
+        yield f"refused, {refusal.name.lower()}: {problem}\n    {remedy}"
+
+
+def told(concern: Concern) -> str:
+    """A concern with its remedy."""
+    return f"concern, {concern.doubt.value}: {concern.sentence}\n    {concern.remedy}"
+
+
+def test_the_sentences_are_those_that_were_read_and_agreed_to() -> None:
+    """Each kind of advice reads as it stands in sentences.txt."""
+    assert "\n".join(sentences()).splitlines() == FILE.read_text(encoding="utf-8").splitlines()
+
+
+if __name__ == "__main__":
+    FILE.write_text("\n".join(sentences()) + "\n", encoding="utf-8")

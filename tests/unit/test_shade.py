@@ -1,0 +1,38 @@
+"""What bodies take of each other's light: seen from far above, from below, and beside."""
+
+import numpy as np
+import pytest
+
+from phone_host.scene.scene import Body, Box, Plane, Sphere
+from phone_host.scene.scene_model import Light
+from phone_host.scene.shade import may_darken, sky_blocked
+
+UP = (0.0, 1.0, 0.0)
+LIGHT = Light(towards=UP)
+TABLE = Body("table", Plane(), (0.0, 0.0, 0.0))
+
+
+def points(*places: tuple[float, float, float]) -> np.ndarray:
+    """(3, N) float32."""
+    return np.array(places, dtype=np.float32).T
+
+
+@pytest.mark.parametrize(("shape", "radius_m"), [(Sphere(0.3), 0.3), (Box((0.6, 0.6, 0.6)), 0.3)])
+def test_a_solid_body_hides_its_share_of_the_sky(shape: Sphere | Box, radius_m: float) -> None:
+    """Half a metre straight above, a ball of radius r, or a cube of that size, hides (2 r)^2 of the sky but for what nobody sees; from behind a surface nothing."""
+    body = Body("it", shape, (0.0, 0.5, 0.0))
+    normals = points(UP, (0.0, -1.0, 0.0))
+    hidden = sky_blocked(body, points((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), normals)
+    assert (2 * radius_m) ** 2 - 0.05 <= hidden[0] <= (2 * radius_m) ** 2 + 1e-6
+    assert hidden[1] == 0.0
+
+
+def test_a_plane_hides_no_sky_and_bodies_far_beside_leave_each_other_alone() -> None:
+    """A plane is no body to stand behind; two balls ten metres apart, none in the other's light, do not darken each other."""
+    assert not sky_blocked(TABLE, points((0.0, 1.0, 0.0)), points(UP)).any()
+    ball, lower = Body("ball", Sphere(0.1), (0.0, 2.0, 0.0)), Body("lower", Sphere(0.1), (0.0, -8.0, 0.0))
+    aside = Body("aside", Sphere(0.1), (10.0, 2.0, 0.0))
+    assert not may_darken(LIGHT, ball, aside)
+    assert may_darken(LIGHT, ball, lower)
+    assert not may_darken(LIGHT, lower, ball)
+    assert may_darken(LIGHT, ball, Body("touching", Sphere(0.1), (0.2, 2.0, 0.0)))
