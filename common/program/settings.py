@@ -8,7 +8,7 @@ import json
 import logging
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Generic, TypeVar, get_args, get_origin, get_type_hints
@@ -65,19 +65,31 @@ def resolve(kind: type[T], prefix: str, file: Path | None, options: Mapping[str,
     return Resolved(kind(**values), tuple(origins))
 
 
-def with_origins(resolved: Resolved[Any], options: Mapping[str, object]) -> dict[str, dict[str, object]]:
+def with_origins(
+    resolved: Resolved[Any] | None, options: Mapping[str, object], words: Sequence[str]
+) -> dict[str, dict[str, object]]:
     """Settings and options of a run as one JSON object, by name, each with its value and its origin.
 
     Args:
-        resolved: the settings.
-        options: all that the command line gave, by name, with the defaults of those that it did not; those that are settings are left out.
+        resolved: the settings; None: the command has none.
+        options: all options by name, with the defaults of those that were not given; those that are settings too stand there as settings.
+        words: of the command line; they tell which options were given.
     """
-    names = {name for name, _ in resolved.origins}
-    given = {name: str(value) if isinstance(value, Path) else value for name, value in options.items()}
-    found = {name: {"value": getattr(resolved.values, name), "origin": origin} for name, origin in resolved.origins}
-    return found | {
-        name: {"value": value, "origin": "command line"} for name, value in given.items() if name not in names
-    }
+    known = {f"--{name.replace('_', '-')}": name for name in options}
+    given: set[str] = set()
+    for word in (word.partition("=")[0] for word in words if len(word) > 2 and word.startswith("--")):
+        given |= (
+            {word} if word in known else {option for option in known if option.startswith(word)}
+        )  # as argparse does
+    found: dict[str, dict[str, object]] = {}
+    for option, name in known.items():
+        value = options[name]
+        shown = str(value) if isinstance(value, Path) else value
+        found[name] = {"value": shown, "origin": option if option in given else "default"}
+    for name, origin in () if resolved is None else resolved.origins:
+        assert resolved is not None
+        found[name] = {"value": getattr(resolved.values, name), "origin": origin}
+    return found
 
 
 def listing(resolved: Resolved[Any], *, as_json: bool) -> str:

@@ -1,7 +1,7 @@
 """The demo: a rendered moving scene, a real board-agent process and the host on this machine, checked against the scene's truth."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -95,9 +95,10 @@ class DemoRun:
         rig: the cameras.
         out: folder for results.
         sockets: folder of this user's alone, in which the two programs meet.
+        resolved: the settings of the run with their origins.
     """
 
-    def __init__(self, film: Film, rig: Rig, out: Path, sockets: Path) -> None:
+    def __init__(self, film: Film, rig: Rig, out: Path, sockets: Path, resolved: Mapping[str, object]) -> None:
         self._film = film
         self._rectifier = Rectifier(rig)
         self._rig = rig
@@ -108,7 +109,7 @@ class DemoRun:
         core = StereoCore(create_matcher(MatchSettings(disparities=near)), self._rectifier)
         camera = open_camera(film.replay_uri(film.right), HOST_CLOCK, now.monotonic_ns())
         link = open_link(parse_link(self.address, listens_by_default=False))
-        settings = HostSettings(wait_ns=_BOARD_PATIENCE_NS, out=out, save_every=0)
+        settings = HostSettings(wait_ns=_BOARD_PATIENCE_NS, out=out, save_every=0, resolved=resolved)
         self.host = Host(settings, camera, [link], core, [FunctionSink("check", self._keep, waits=True)])
 
     @property

@@ -1,7 +1,9 @@
 """What reports say of what the board told."""
 
 from common.protocol.message import BoardCounts, Rung
-from phone_host.measure.accounts import LinkAccount, SessionAccount, rung_lines, rung_values
+from common.protocol.session import StaleReason
+from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount, rung_lines, rung_values
+from phone_host.sync.quarantine import Disbelief, Suspects
 
 
 def account(rung: Rung) -> LinkAccount:
@@ -27,3 +29,24 @@ def test_what_cannot_be_set_is_null() -> None:
     assert rung_values(Rung()) == {
         "rung": 0, "lowest_rung": 0, "changes": 0, "fps": None, "quality": None, "size": None,
     }  # fmt: skip
+
+
+def test_a_copy_of_an_account_stays_as_it_was() -> None:
+    """Nothing that the receiver counts afterwards reaches a copy: sessions, links, suspects, reasons."""
+    seen = LinkAccount([SessionAccount("s", BoardCounts(), BoardCounts())], links=(LinkTally("tcp"),))
+    seen.sessions[0].disbelieved[Disbelief.FUTURE] = 2
+    seen.suspects.append(Suspects("s", 1, 2, 2))
+    seen.links[0].age.add(7)
+    copied = seen.copy()
+    seen.sessions[0].disbelieved[Disbelief.FUTURE] += 1
+    for reason in StaleReason:
+        seen.sessions[0].count_stale(reason)
+    seen.sessions.append(SessionAccount("t", BoardCounts(), BoardCounts(), received=3))
+    seen.suspects.append(Suspects("t", 3, 4, 2))
+    seen.links[0].age.add(9)
+    seen.links[0].frames = 5
+    assert dict(copied.disbelieved) == {Disbelief.FUTURE: 2}
+    assert dict(seen.disbelieved) == {Disbelief.FUTURE: 3, Disbelief.CREDIT: 1}
+    assert [account.session for account in copied.sessions] == ["s"]
+    assert (copied.sessions[0].duplicate, copied.sessions[0].late, copied.sessions[0].old_session) == (0, 0, 0)
+    assert (len(copied.suspects), copied.links[0].frames, copied.links[0].age.spread().count) == (1, 0, 1)

@@ -133,3 +133,17 @@ def test_the_mean_length_of_the_frames_needs_a_frame() -> None:
     for size in (100, 300):
         statistic.add(replace(LEDGER, bytes=size))
     assert statistic.frame_bytes == 200
+
+
+def test_a_copy_stays_as_it_was() -> None:
+    """What is added afterwards does not reach a copy of the statistics, of however many values."""
+    statistic = DelayStatistics()
+    for number in range(1, 4):
+        statistic.add(replace(LEDGER, uncertainty_ns=number))
+    copied = statistic.copy()
+    for _ in range(EXACT + 1):
+        statistic.add(replace(LEDGER, uncertainty_ns=1000))
+    assert (copied.spread("uncertainty").p50_ns, copied.spread("uncertainty").max_ns) == (2, 3)
+    assert copied.spread("capture").count == 3
+    assert copied.frame_bytes == 9
+    assert statistic.spread("uncertainty").p50_ns == 1000

@@ -10,8 +10,9 @@ from common.frame import FrameFault
 from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts, DropReason
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
-from phone_host.measure.delays import DelayStatistics
+from phone_host.measure.delays import DelayStatistics, Series
 from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.unused import unused
 from phone_host.model import PairCounts, Side, TimeOffset, Unwritten
 from phone_host.report.run_json import age_bound, build
@@ -240,3 +241,33 @@ def test_stamps_that_are_arrivals_say_so(
 def test_the_age_bound_follows_from_the_policy(text: str, bound: str) -> None:
     """Processing takes 10 ms: a FIFO that keeps its pairs makes them wait that often; one that drops the oldest, for frames."""
     assert age_bound(replace(run(31), fifo=FifoSettings.parse(text))).startswith(bound)
+
+
+def test_what_was_not_used_is_told_once_each() -> None:
+    """Every place and reason of a run that lost something everywhere is there once, with its count, in JSON, summary and page alike."""
+    account = SessionAccount(
+        "s",
+        BoardCounts(),
+        BoardCounts(9, 7, ((DropReason.REPLACED, 2),)),
+        received=3,
+        lost=3,
+        late=1,
+        duplicate=4,
+        old_session=5,
+    )
+    seen = replace(
+        run(2),
+        link=LinkAccount([account], garbage=6, no_clock=7),
+        counts=PairCounts(paired=20, dropped=8, board_orphans=(("no_partner", 9),), host_orphans=(("too_late", 10),)),
+        undecodable=3, spoiled_images=(("corrupt", 1),), spoiled=12, skipped=13,
+        sinks=(SinkAccount("pairs", 1, 14, 0, Series().spread()),),
+    )  # fmt: skip
+    counts = {(item.place, item.reason): item.count for item in unused(seen)}
+    assert sorted(counts.values()) == [1, 1, 2, 2, 2, 4, 5, 6, 7, 7, 8, 9, 10, 12, 13, 14]
+    told: Any = build(seen)["unused"]
+    assert {(item["place"], item["reason"]): item["count"] for item in told} == counts
+    assert len(told) == len(counts)
+    for item in unused(seen):
+        assert f"{item.count} {item.words}" in summary(seen)
+        assert item.words in run_page(seen, None, Side.LEFT, ())
+    assert not unused(replace(run(2), ended="running"))

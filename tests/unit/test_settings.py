@@ -9,7 +9,7 @@ import pytest
 
 from common.errors import SettingsError
 from common.program.declaration import setting
-from common.program.settings import listing, log_level, resolve
+from common.program.settings import listing, log_level, resolve, with_origins
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,3 +149,16 @@ def test_log_levels_go_by_name() -> None:
     assert log_level("Warning") == logging.WARNING
     with pytest.raises(SettingsError, match="loud"):
         log_level("loud")
+
+
+def test_a_run_is_saved_with_the_origin_of_each_setting(tmp_path: Path) -> None:
+    """Settings keep their origin; options that are none say whether they were given, also cut short; paths are texts."""
+    resolved = resolve(Sample, "NOBODY_SETS_THIS", None, {"depth": 4})
+    options = {"name": None, "out": tmp_path, "save_every": 3, "pairs": 0, "wait": 2.5}
+    words = ["phone-host", "run", "--out", str(tmp_path), "--save=3", "--wait", "2.5", "--pairs-of-nothing"]
+    found = with_origins(resolved, options, words)
+    assert {name: item["origin"] for name, item in found.items()} == {
+        "name": "default", "depth": "--depth", "tolerance": "default", "loop_forever": "default", "links": "default",
+        "out": "--out", "save_every": "--save-every", "pairs": "default", "wait": "--wait",
+    }  # fmt: skip
+    assert json.loads(json.dumps(found))["out"]["value"] == str(tmp_path)

@@ -12,6 +12,7 @@ from rich.progress import Progress
 from common.errors import SettingsError, UnavailableError
 from common.program import logs
 from common.program.commandline import INTERRUPTED
+from common.program.settings import with_origins
 from common.program.signals import StopSignals
 from phone_host.children.board_process import socket_folder
 from phone_host.demo.demo_page import demo_page
@@ -46,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
         film = _render(scene, rig, out / "film", console, signals)
         write_rig(out / "rig.yaml", rig, rectify_rig(rig))
         with socket_folder() as sockets:
-            demo = DemoRun(film, rig, out, sockets)
+            demo = DemoRun(film, rig, out, sockets, with_origins(None, vars(options), sys.argv))
             live = LiveTable(demo.host.snapshot, console, seconds=options.seconds) if console.is_terminal else None
             try:
                 with live or nullcontext():

@@ -109,7 +109,7 @@ def _host_settings(
 ) -> HostSettings:
     settings = resolved.values
     return HostSettings(
-        resolved=with_origins(resolved, vars(options)),
+        resolved=with_origins(resolved, vars(options), sys.argv),
         board_side=board_side,
         tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
         fifo=fifo,
