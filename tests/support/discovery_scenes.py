@@ -44,7 +44,10 @@ def pair(stack: ExitStack, folder: Path) -> dict[str, Any]:
     command = ["pair", "--keys", str(folder / "board-keys")]
     owner = stack.enter_context(program("board_agent.cli", command, folder, "owner"))
     shown = "type this code"
-    until(lambda: owner.process.poll() is not None or shown in owner.out.read_text(), f"a code, or {owner.stderr!r}")
+    until(
+        lambda: owner.process.poll() is not None or shown in owner.out.read_text(),
+        "the owner is shown a code, or told why not",
+    )
     assert shown in owner.out.read_text(), owner.stderr
     command = [sys.executable, "-P", "-m", "phone_host.cli", "pair", "--keys", str(folder / "keys")]
     pairing = subprocess.Popen(
