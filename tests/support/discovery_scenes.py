@@ -43,7 +43,12 @@ def pair(stack: ExitStack, folder: Path) -> dict[str, Any]:
     """Pair with a board that nobody names, by the code that its owner is shown."""
     command = ["pair", "--keys", str(folder / "board-keys")]
     owner = stack.enter_context(program("board_agent.cli", command, folder, "owner"))
-    until(lambda: "type this code" in owner.out.read_text(), "the owner is shown a code")
+    shown = "type this code"
+    until(
+        lambda: owner.process.poll() is not None or shown in owner.out.read_text(),
+        "the owner is shown a code, or told why not",
+    )
+    assert shown in owner.out.read_text(), owner.stderr
     command = [sys.executable, "-P", "-m", "phone_host.cli", "pair", "--keys", str(folder / "keys")]
     pairing = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
