@@ -72,10 +72,10 @@ def with_origins(
 
     Args:
         resolved: the settings; None: the command has none.
-        options: all options by name, with the defaults of those that were not given; those that are settings too stand there as settings.
+        options: all options by name, with the defaults of those that were not given; those that are settings too stand there as settings; the verb is left out.
         words: of the command line; they tell which options were given.
     """
-    known = {f"--{name.replace('_', '-')}": name for name in options}
+    known = {f"--{name.replace('_', '-')}": name for name in options if name != "verb"}
     given: set[str] = set()
     for word in (word.partition("=")[0] for word in words if len(word) > 2 and word.startswith("--")):
         given |= (
