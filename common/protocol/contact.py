@@ -102,11 +102,11 @@ class Contact:
         """Say goodbye next; for the dialler what follows is a new contact."""
         if self._up:
             self._say.append((_Word.CLOSE, self.number))
-        self._part()
+        self._lose_peer()
 
     def interrupt(self) -> None:
         """Take note that the line was lost: the other end has to be met anew, and cannot be told."""
-        self._part()
+        self._lose_peer()
         self._say.clear()
         if not self._dials:
             self._say.append((_Word.WHO, 0))
@@ -118,7 +118,7 @@ class Contact:
         if word is _Word.WHO or (word is _Word.CLOSE and number == self._number):
             was_up = self._up
             if was_up:
-                self._part()
+                self._lose_peer()
             self._due_ns = 0
             return News.PARTED if was_up else News.NONE
         return News.NONE
@@ -131,11 +131,11 @@ class Contact:
             self._number, self._up = number, True
             return News.MET
         if word is _Word.CLOSE and self._up and number == self._number:
-            self._part()
+            self._lose_peer()
             return News.PARTED
         return News.NONE
 
-    def _part(self) -> None:
+    def _lose_peer(self) -> None:
         self._up = False
         self._due_ns = 0
         self._number = (self.number + 1) % _NUMBERS if self._dials else None

@@ -190,7 +190,7 @@ class HostSession:
             case Pong() | Status() | End():
                 return self._attend(path, connection, message, now_ns)
             case Bye(counts):
-                return self._part(path, connection, counts, now_ns)
+                return self._take_goodbye(path, connection, counts, now_ns)
             case _:
                 assert_never(message)
 
@@ -449,7 +449,7 @@ class HostSession:
             case _:
                 assert_never(message)
 
-    def _part(self, path: HostPath, connection: bytes, counts: BoardCounts, now_ns: int) -> list[Output]:
+    def _take_goodbye(self, path: HostPath, connection: bytes, counts: BoardCounts, now_ns: int) -> list[Output]:
         """Take a board's goodbye. It may come on one lane just after the other one broke: its account is the session's last all the same."""
         stream = self._stream
         if stream is None or path.session != stream.hello.session or connection not in path.lanes.values():

@@ -12,7 +12,7 @@ from common.protocol.message import FrameMessage
 from phone_host.model import BoardFrame, FramePair, Image, Processed, RectifiedPair, Side
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import enlarged
-from phone_host.stereo.interpolate import LARGEST_PART, Interpolator
+from phone_host.stereo.interpolate import LARGEST_FRACTION, Interpolator
 from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_frames
 
 T = TypeVar("T")
@@ -83,15 +83,15 @@ class Pipeline:
         """The board's image as it would have been at the host's exposure; as it is where the frame before is missing, far away or spoiled."""
         if self._interpolator is None or pair.before is None:
             return image
-        part = pair.time_skew_ns / (pair.board.marks.exposed_ns - pair.before.marks.exposed_ns)
-        if abs(part) > LARGEST_PART:
+        fraction = pair.time_skew_ns / (pair.board.marks.exposed_ns - pair.before.marks.exposed_ns)
+        if abs(fraction) > LARGEST_FRACTION:
             return image
         try:
             before = _encoded(pair.before.message, "board", pair.before.asked_px)
             earlier = _at_asked_size(decode_frame(before, self._most_pixels), pair.before)
         except DataError:
             return image
-        return self._interpolator.back(earlier, image, part) if earlier.shape == image.shape else image
+        return self._interpolator.back(earlier, image, fraction) if earlier.shape == image.shape else image
 
 
 def _at_asked_size(image: Image, frame: BoardFrame) -> Image:

@@ -6,7 +6,7 @@ No I/O, and no clock of its own: the caller brings the one by which the stages a
 from collections.abc import Callable
 
 from common.ledger import StageTimes
-from phone_host.model import CloudImage, Disparity, Image, Processed, RectifiedPair, StereoGeometry
+from phone_host.model import Image, Processed, RectifiedPair, StereoGeometry
 from phone_host.stereo.images import require_same_size, size_px
 from phone_host.stereo.match import Matcher
 from phone_host.stereo.rectify import Rectifier
@@ -14,7 +14,7 @@ from phone_host.stereo.reproject import reproject
 
 
 class StereoCore:
-    """From two images to a point cloud image, stage by stage.
+    """From two images to a point cloud image.
 
     Attributes:
         rig: the cameras; None when the images come rectified.
@@ -51,11 +51,11 @@ class StereoCore:
             DataError: a size that does not fit the rig, or two sizes without a rig.
         """
         start_ns = clock()
-        pair = self.rectify(left, right)
+        pair = self._rectify(left, right)
         rectified_ns = clock()
-        disparity = self.match(pair)
+        disparity = self._matcher.match(pair)
         matched_ns = clock()
-        cloud = None if self.geometry is None else self.reproject(disparity)
+        cloud = None if self.geometry is None else reproject(disparity, self.geometry)
         times = StageTimes(
             rectify=rectified_ns - start_ns, match=matched_ns - rectified_ns, reproject=clock() - matched_ns
         )
@@ -76,47 +76,8 @@ class StereoCore:
         else:
             require_same_size(left_px, right_px, "the left image", "the right image")
 
-    def rectify(self, left: Image, right: Image) -> RectifiedPair:
-        """Rectify, or pass images that come rectified.
-
-        Args:
-            left: (H, W) grey or (H, W, 3) BGR, uint8.
-            right: the same; another size is possible with a rectifier only.
-
-        Returns:
-            The rectified pair.
-
-        Raises:
-            DataError: a size that does not fit the rig, or two sizes without a rig.
-        """
+    def _rectify(self, left: Image, right: Image) -> RectifiedPair:
         if self._rectifier is not None:
             return self._rectifier.rectify(left, right)
         self.require_sizes(size_px(left), size_px(right))
         return RectifiedPair(left, right)
-
-    def match(self, pair: RectifiedPair) -> Disparity:
-        """Match a rectified pair.
-
-        Args:
-            pair: what `rectify` gave.
-
-        Returns:
-            (H, W) float32, px, NaN = none.
-        """
-        return self._matcher.match(pair)
-
-    def reproject(self, disparity: Disparity) -> CloudImage:
-        """Turn disparity into metres.
-
-        Args:
-            disparity: what `match` gave.
-
-        Returns:
-            (H, W, 3) float32, m, in the rectified left camera's axes; NaN = none.
-
-        Raises:
-            ValueError: there is no geometry; look at `geometry` before.
-        """
-        if self.geometry is None:
-            raise ValueError("no geometry: focal length and baseline are unknown")
-        return reproject(disparity, self.geometry)

@@ -14,7 +14,7 @@ from phone_host.model import Image
 _LEAST_PX: Final = 16
 """The flow refuses smaller images; they come back as they are."""
 
-LARGEST_PART: Final = 1.0
+LARGEST_FRACTION: Final = 1.0
 """Farther than the time between the two images nothing is guessed."""
 
 
@@ -27,18 +27,18 @@ class Interpolator:
         self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
         self._grid = np.empty((0, 0, 2), dtype=np.float32)
 
-    def back(self, earlier: Image, later: Image, part: float) -> Image:
+    def back(self, earlier: Image, later: Image, fraction: float) -> Image:
         """Make the image of a moment.
 
         Args:
             earlier: (H, W) or (H, W, 3), uint8.
             later: of the same shape, taken after it.
-            part: how far before `later` the moment lies, in times between the two images: 1 is at `earlier`, below 0 is after `later`.
+            fraction: how far before `later` the moment lies, in times between the two images: 1 is at `earlier`, below 0 is after `later`.
 
         Returns:
             The image, of the same shape.
         """
-        if part == 0.0 or min(later.shape[:2]) < _LEAST_PX:
+        if fraction == 0.0 or min(later.shape[:2]) < _LEAST_PX:
             return later
         greys = [image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in (later, earlier)]
         flow = np.asarray(self._flow.calc(greys[0], greys[1], np.empty(0, np.float32)), dtype=np.float32)
@@ -47,6 +47,6 @@ class Interpolator:
             self._grid = np.stack(np.meshgrid(*axes), axis=-1)
         # The motion is known where things are in the later image, and wanted where they are in the new one: the error is a motion's change over
         # its own length. Looking it up there (a fixed point) made no difference to depth, at four times the cost.
-        places = self._grid - np.float32(part) * flow
+        places = self._grid - np.float32(fraction) * flow
         bent = cv2.remap(later, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload] # stubs know no pair of columns
         return np.asarray(bent, dtype=np.uint8)

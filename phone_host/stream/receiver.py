@@ -120,7 +120,7 @@ class Receiver:
         try:
             while not self._stopping:
                 self._step()
-            self._part()
+            self._take_leave()
         except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
             self.failure = error
         finally:
@@ -128,7 +128,7 @@ class Receiver:
             for link in self._links:
                 link.close()
 
-    def _part(self) -> None:
+    def _take_leave(self) -> None:
         """Say goodbye and wait a moment for the board's last account: it comes behind the last frame."""
         reception = self._reception
         heard = reception.leave(now.monotonic_ns())

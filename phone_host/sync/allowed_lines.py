@@ -29,7 +29,7 @@ LIKELIHOOD_DROP: Final = 11.23
 the mean of n spacings the quantile is 3 F(6, 2 n); 11.23 (1 + 6 / n) is within 7 % of its values from n = 7 on (22.3, 17.3 at 11, 14.2 at 20)."""
 
 _NEGLIGIBLE: Final = 20.0
-"""A part of the posterior below exp(-20) of its maximum adds nothing."""
+"""A fraction of the posterior below exp(-20) of its maximum adds nothing."""
 
 Points = list[tuple[float, float]]
 
@@ -146,12 +146,12 @@ def believe(rows: list[Allowed], spacing: Spacing, middle_ns: float, prior_skew:
 def _crossing(a: Allowed, b: Allowed) -> Allowed:
     """Where low and high meet between two rows."""
     gap = a.high_ns - a.low_ns
-    part = gap / (gap - (b.high_ns - b.low_ns))
-    return _between(a, b, part)
+    fraction = gap / (gap - (b.high_ns - b.low_ns))
+    return _between(a, b, fraction)
 
 
-def _between(a: Allowed, b: Allowed, part: float) -> Allowed:
-    return Allowed(*(p + part * (q - p) for p, q in zip(a, b, strict=True)))
+def _between(a: Allowed, b: Allowed, fraction: float) -> Allowed:
+    return Allowed(*(p + fraction * (q - p) for p, q in zip(a, b, strict=True)))
 
 
 def _mean(rows: list[Allowed], drops: list[float]) -> tuple[float, float]:
@@ -185,8 +185,8 @@ def _region(rows: list[Allowed], drops: list[float], most_drop: float) -> list[t
     region: list[tuple[Allowed, float]] = []
     for index, (row, drop) in enumerate(zip(rows, drops, strict=True)):
         if index and (drop <= most_drop) != (drops[index - 1] <= most_drop):
-            part = (most_drop - drops[index - 1]) / (drop - drops[index - 1])
-            region.append((_between(rows[index - 1], row, part), most_drop))
+            fraction = (most_drop - drops[index - 1]) / (drop - drops[index - 1])
+            region.append((_between(rows[index - 1], row, fraction), most_drop))
         if drop <= most_drop:
             region.append((row, drop))
     return region

@@ -26,8 +26,11 @@ def shifted(px: int) -> tuple[Image, Image]:
 def test_a_shift_becomes_a_depth(name: MatcherName) -> None:
     """Random levels 10 px apart lie at f b / d = 500 x 0.1 / 10 = 5 m, with either matcher."""
     core = StereoCore(create_matcher(MatchSettings(name, 16)), geometry=GEOMETRY)
-    disparity = core.match(core.rectify(*shifted(10)))
-    depth_m = core.reproject(disparity)[..., 2]
+    ticks = iter(range(0, 10**6, 1000))
+    processed = core.compute(*shifted(10), lambda: next(ticks))
+    assert processed.cloud is not None
+    depth_m = processed.cloud[..., 2]
+    assert (processed.stages.rectify, processed.stages.match, processed.stages.reproject) == (1000, 1000, 1000)
     inner = depth_m[12:-12, 28:-12]
     assert np.nanmedian(inner) == pytest.approx(5.0, rel=0.01)
     assert np.isfinite(inner).mean() > 0.9
@@ -42,7 +45,7 @@ def test_a_core_that_rectifies_has_the_rigs_geometry() -> None:
     core.require_sizes((640, 480), (1280, 720))
     with pytest.raises(DataError):
         core.require_sizes((640, 480), (640, 480))
-    pair = core.rectify(np.zeros((480, 640), np.uint8), np.zeros((720, 1280), np.uint8))
+    pair = core.compute(np.zeros((480, 640), np.uint8), np.zeros((720, 1280), np.uint8), lambda: 0).pair
     assert pair.left.shape == pair.right.shape
     with pytest.raises(ValueError, match="geometry"):
         StereoCore(matcher, rectifier, GEOMETRY)
@@ -53,9 +56,10 @@ def test_without_a_rig_sizes_agree_and_there_are_no_metres() -> None:
     core = StereoCore(create_matcher(MatchSettings(MatcherName.BLOCK, 4)))
     assert core.rig is None
     with pytest.raises(DataError):
-        core.rectify(noise(64, 32), noise(64, 30))
-    with pytest.raises(ValueError, match="geometry"):
-        core.reproject(core.match(core.rectify(*shifted(2))))
+        core.compute(noise(64, 32), noise(64, 30), lambda: 0)
+    processed = core.compute(*shifted(2), lambda: 0)
+    assert processed.disparity is not None
+    assert processed.cloud is None
 
 
 @pytest.mark.parametrize(

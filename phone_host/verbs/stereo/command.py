@@ -9,6 +9,7 @@ import numpy as np
 
 from common import now
 from common.errors import SettingsError
+from common.ledger import StageTimes
 from phone_host.model import CloudImage, Disparity, RectifiedPair
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
@@ -53,12 +54,10 @@ def run(options: argparse.Namespace) -> int:
         options.out, has_cloud=core.geometry is not None
     )  # not before the images are known to be sound: else an earlier result is lost for nothing
     watch.lap("read")
-    pair = core.rectify(left, right)
-    watch.lap("rectify")
-    disparity = core.match(pair)
-    watch.lap("match")
-    cloud = core.reproject(disparity) if core.geometry is not None else None
-    watch.lap("reproject")
+    processed = core.compute(left, right, now.monotonic_ns)
+    pair, disparity, cloud = processed.pair, processed.disparity, processed.cloud
+    assert disparity is not None  # `compute` gives one
+    watch.take_over(processed.stages)
     points = _write(options.out, pair, disparity, cloud)
     watch.lap("write")
     report: dict[str, Any] = {
@@ -87,6 +86,11 @@ class _StopWatch:
         at_ns = now.monotonic_ns()
         self._laps_ns.append((stage, at_ns - self._last_ns))
         self._last_ns = at_ns
+
+    def take_over(self, stages: StageTimes) -> None:
+        """Take the stages that somebody else has timed meanwhile."""
+        self._laps_ns += [(stage, getattr(stages, stage)) for stage in ("rectify", "match", "reproject")]
+        self._last_ns = now.monotonic_ns()
 
     def times_ms(self) -> dict[str, float]:
         laps = [*self._laps_ns, ("total", self._last_ns - self._start_ns)]
