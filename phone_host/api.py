@@ -244,7 +244,8 @@ class _ResultQueue:
     def accounts(self) -> tuple[SinkAccount, ...]:
         """See Sink."""
         with self._changed:
-            return (SinkAccount("program", self._given, self._dropped, len(self._items), self._delay.spread()),)
+            counts, delay = (self._given, self._dropped, len(self._items)), self._delay.copy()
+        return (SinkAccount("program", *counts, delay.spread()),)
 
 
 def _open_links(addresses: Sequence[str], keys: KeyFolder) -> list[Link]:

@@ -109,7 +109,7 @@ class FileSink:
         if not self._lines.offer(result.ledger):
             with self._unwritten:
                 self._lost_lines += 1
-                self._cause = self._cause or "the disk hangs"
+                self._last_cause = "the disk hangs"
         if self._save_every and result.number % self._save_every == 0:
             self._pairs.offer(result)
 

@@ -118,7 +118,8 @@ class SinkQueue(Generic[T]):
     def account(self) -> SinkAccount:
         """How it has fared so far, a copy."""
         with self._changed:
-            return SinkAccount(self._name, self._written, self._dropped, len(self._items), self._delay.spread())
+            counts, delay = (self._written, self._dropped, len(self._items)), self._delay.copy()
+        return SinkAccount(self._name, *counts, delay.spread())  # percentiles take ms, in which nobody is to wait
 
     def _run(self) -> None:
         while True:
