@@ -85,6 +85,7 @@ def test_the_true_offset_lies_within_the_uncertainty(
     assert outside <= len(errors) * 0.15
 
 
+@pytest.mark.long
 def test_the_stated_uncertainty_is_rarely_wrong() -> None:
     """Over forty runs with jitter from none to fifty times the least delay, 99.5 % of all errors are within what was stated."""
     errors: list[Error] = []

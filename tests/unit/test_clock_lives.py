@@ -89,6 +89,7 @@ def test_echoes_that_took_long_spoil_nothing(share: float) -> None:
     assert max(errors[40:]) < 100_000
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("profile", [loopback, wifi, loaded_line(8e6, 0.3 * MS, 0.125 * MS)])
 def test_crystals_that_warm_up(profile: Profile) -> None:
     """Skews to 97 ppm that change by up to 1 ppm a minute: over ten links of a minute each the stated uncertainty holds in 99 %, the bound always."""

@@ -38,6 +38,7 @@ def mixed(
     yield from sorted(told, key=lambda wave: wave[0])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "profiles",
     [(loopback, SERIAL), (wifi, SERIAL), (one_sided, wifi), (standing_queue, one_sided), (heavy_tails, wifi, loopback)],

@@ -122,6 +122,7 @@ def test_packets_come_whole_and_in_order(packets: list[tuple[Lane, bytes, int]],
         assert made.ends[side].counts.garbage_bytes == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("rate", "delay_ms", "seconds"),
     [
@@ -158,6 +159,7 @@ def test_a_saturated_line_is_full_and_echoes_do_not_wait(rate: str, delay_ms: in
     assert goodput / bytes_per_s >= 256 / chunk_bytes - echo_share - 0.01
 
 
+@pytest.mark.long
 def test_the_rate_is_learnt() -> None:
     """The measured rate is within a tenth of the line's, at first as after the line has become slower."""
     made = line(200_000, MS)
@@ -228,6 +230,7 @@ def test_a_lost_chunk_costs_one_frame() -> None:
     assert made.ends[HOST].counts.broken == 1
 
 
+@pytest.mark.long
 def test_acknowledgements_that_all_get_lost_do_not_stop_the_stream() -> None:
     """While the way back is dead little is written; when it lives again the stream is back within a second, with fresh frames."""
     made = line(500_000, MS)

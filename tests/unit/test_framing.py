@@ -158,6 +158,7 @@ def test_hostile_headers_cost_no_memory() -> None:
     assert not deframer.partial
 
 
+@pytest.mark.long
 def test_of_many_units_with_flipped_bits_none_comes_altered() -> None:
     """10^5 units, half of them with one to eight bits flipped anywhere: every sound one comes, no altered one does."""
     chance = random.Random(2)

@@ -131,6 +131,7 @@ def test_what_gives_way_is_read_from_names() -> None:
         ways(["rate", "colour"])
 
 
+@pytest.mark.long
 @settings(max_examples=60, deadline=None)
 @given(st.floats(10_000, 1_200_000), st.floats(0, 0.3), st.integers(0, 99))
 def test_a_constant_link_is_found_out_and_left_in_peace(bytes_per_s: float, spread: float, seed: int) -> None:
@@ -150,6 +151,7 @@ def test_a_constant_link_is_found_out_and_left_in_peace(bytes_per_s: float, spre
     assert all(abs(b - a) == 1 for (_, a), (_, b) in pairwise(street.steps))
 
 
+@pytest.mark.long
 @settings(max_examples=30, deadline=None)
 @given(st.sampled_from([20_000.0, 60_000.0, 150_000.0]), st.floats(0, 0.2), st.integers(0, 99))
 def test_trials_become_rare(bytes_per_s: float, spread: float, seed: int) -> None:
