@@ -13,9 +13,11 @@ stills, it gets every one, and the scanner waits for it.
 What is here stays compatible; what lies below may move.
 """
 
+import math
 import threading
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -23,12 +25,12 @@ from typing import Self
 from common import now
 from common.camera.base import Camera
 from common.errors import SettingsError
-from common.keys import KeyFolder
 from common.link.base import Link
 from common.link.factory import open_links, parse_link, tell_insecure
 from common.protocol.message import Pacing
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import open_camera
+from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import NEAR_M
 from phone_host.measure.delays import Series
 from phone_host.measure.run_snapshot import RunSnapshot
@@ -97,6 +99,12 @@ def open_scanner(
         DataError: a bad rig.yaml.
         UnavailableError: a camera, link or folder that cannot be had.
     """
+    given = dict(locals())
+    _check_numbers(pairs=pairs, save_every=save_every, tolerance_ms=tolerance_ms, wait_s=wait_s, near_m=near_m)
+    named = [link] if isinstance(link, str) else list(link)
+    if not named:
+        raise SettingsError("no link is given", "give link='tcp://HOST:5555', or several")
+    uris = [parse_link(address, listens_by_default=False) for address in named]
     known = read_rig(Path(rig)) if isinstance(rig, str | Path) else rig
     if known is not None and geometry is not None:
         raise SettingsError("rig and geometry are both given", "leave geometry out: the rig has its own")
@@ -111,10 +119,18 @@ def open_scanner(
         out=None if out is None else Path(out),
         save_every=save_every,
         time_offset=TimeOffset() if known is None else known.time_offset,
+        resolved=_shown(given),
     )
-    opened = open_camera(camera, HOST_CLOCK, now.monotonic_ns())
-    links = _open_links([link] if isinstance(link, str) else link, key_folder("" if keys is None else str(keys)))
-    return Scanner(settings, opened, links, core, lossless=lossless)
+    for uri in uris:
+        tell_insecure(uri)
+    with ExitStack() as opened:  # what was opened is closed again where something else cannot be
+        own = opened.enter_context(closing(open_camera(camera, HOST_CLOCK, now.monotonic_ns())))
+        links = open_links(uris, key_folder("" if keys is None else str(keys)))
+        for item in links:
+            opened.enter_context(closing(item))
+        scanner = Scanner(settings, own, links, core, lossless=lossless)
+        opened.pop_all()
+    return scanner
 
 
 class Scanner:
@@ -139,12 +155,20 @@ class Scanner:
     ) -> None:
         self._results = _ResultQueue(waits=lossless or camera.description.pacing is Pacing.DEMAND)
         self._host = Host(settings, camera, links, core, [self._results])
+        self._opened: tuple[Camera | Link, ...] = (camera, *links)
+        self._was_entered = False
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="scanner", daemon=True)
         self._failure: BaseException | None = None
+        self._is_failure_told = False
         self.ended: EndReason | None = None
+        self.is_complete = True
+        """Whether everything that was asked for is in the folder of results, once the run has ended."""
 
     def __enter__(self) -> Self:
+        if self._was_entered:
+            raise RuntimeError("a scanner runs once: open another")
+        self._was_entered = True
         self._thread.start()
         return self
 
@@ -154,18 +178,36 @@ class Scanner:
         self._stopping.set()
         self._results.leave()
         self._thread.join()
+        if error is None:
+            self._tell_failure()
+
+    def _tell_failure(self) -> None:
+        """Raise what ended the run, once."""
+        if self._failure is not None and not self._is_failure_told:
+            self._is_failure_told = True
+            raise self._failure
+
+    def close(self) -> None:
+        """Let go of camera, links and folder of a scanner that was never entered; one that was does so by itself."""
+        if not self._was_entered:
+            self._was_entered = True
+            self._host.abandon()
+            for item in self._opened:
+                item.close()
 
     def __iter__(self) -> Iterator[Result]:
         """Give results until the run ends.
 
         Raises:
             TandemError: as `phone-host run` would end with: no board, images that do not fit the rig, a link that is gone.
+            RuntimeError: outside of `with`.
         """
+        if not self._was_entered:
+            raise RuntimeError("the scan has not begun: use `with open_scanner(…) as scanner`")
         while (result := self._results.take()) is not None:
             yield result
         self._thread.join()
-        if self._failure is not None:
-            raise self._failure
+        self._tell_failure()
 
     def snapshot(self) -> RunSnapshot:
         """Delays, accounts, clock, doubts and drops as they are now, or were at the end."""
@@ -178,8 +220,11 @@ class Scanner:
             self.ended = self._host.run(self._stopping.is_set)
         except BaseException as error:  # noqa: BLE001 - a thread's root: the iterator raises it
             self._failure = error
+        try:
+            self.is_complete = self._host.write_report(build(self.snapshot()))
+        except Exception as error:  # noqa: BLE001 - as above
+            self._failure = self._failure or error
         finally:
-            self._host.write_report(build(self.snapshot()))
             self._results.finish()
 
 
@@ -194,8 +239,9 @@ class _ResultQueue:
         self._given = self._dropped = 0
         self._delay = Series()
 
-    def await_place(self) -> None:
+    def await_place(self, number: int) -> None:
         """See Sink."""
+        del number  # all are alike
         if self._waits:
             with self._changed:
                 self._changed.wait_for(lambda: len(self._items) < _DEPTH or self._left)
@@ -244,15 +290,34 @@ class _ResultQueue:
     def accounts(self) -> tuple[SinkAccount, ...]:
         """See Sink."""
         with self._changed:
-            counts, delay = (self._given, self._dropped, len(self._items)), self._delay.copy()
-        return (SinkAccount("program", *counts, delay.spread()),)
+            given, dropped, waiting, delay = self._given, self._dropped, len(self._items), self._delay.copy()
+        spread = delay.spread()
+        return (SinkAccount(name="program", written=given, dropped=dropped, failed=0, waiting=waiting, delay=spread),)
 
 
-def _open_links(addresses: Sequence[str], keys: KeyFolder) -> list[Link]:
-    uris = [parse_link(address, listens_by_default=False) for address in addresses]
-    for uri in uris:
-        tell_insecure(uri)
-    return list(open_links(uris, keys))
+def _check_numbers(**numbers: float | None) -> None:
+    """Refuse numbers of no use.
+
+    Raises:
+        SettingsError: one is below 0, not finite, or 0 where it must be more.
+    """
+    for name, value in numbers.items():
+        if value is not None and not (math.isfinite(value) and value >= 0 and (value > 0 or name != "near_m")):
+            raise SettingsError(
+                f"{name} is {value:g}", "give a number above 0" if name == "near_m" else "give 0 or more"
+            )
+
+
+def _shown(arguments: Mapping[str, object]) -> dict[str, object]:
+    """Arguments as settings.json has them; objects by their kind."""
+    plain = (str, int, float, bool, type(None))
+    told = {name: str(value) if isinstance(value, Path) else value for name, value in arguments.items()}
+    told["camera"] = without_password(str(told["camera"]))
+    told["link"] = told["link"] if isinstance(told["link"], str) else " ".join(str(item) for item in arguments["link"])  # type: ignore[attr-defined]  # texts, as annotated
+    return {
+        name: {"value": value if isinstance(value, plain) else type(value).__name__, "origin": "open_scanner"}
+        for name, value in told.items()
+    }
 
 
 def _side(asked: str | None, rig: Rig | None) -> Side:

@@ -238,6 +238,15 @@ class Life:
         self._listen_until(now_ns, self._settings.silence_ns)
         self._come_back()
 
+    def stirred(self, now_ns: int) -> None:
+        """Something came that is no frame of use: it is not silent, and not back either.
+
+        Args:
+            now_ns: the time.
+        """
+        if self._phase is Phase.STREAMING:
+            self._listen_until(now_ns, self._settings.silence_ns)
+
     def lost(self, loss: Loss, now_ns: int) -> Step:
         """It failed or is gone; again, or while it is being closed, is no news.
 

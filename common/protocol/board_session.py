@@ -195,9 +195,8 @@ class BoardSession:
                 host.below_index = max(host.below_index, below_index)
                 return []
             case Steer(later_ns):
-                if (
-                    now_ns - self._steered_ns >= STEER_REST_NS
-                ):  # else a host that never stops steering would leave the camera no time to expose
+                # A host that never stops steering would leave the camera no time to expose.
+                if now_ns - self._steered_ns >= STEER_REST_NS:
                     self._later_ns, self._steered_ns = later_ns % self._camera.period_ns, now_ns
                 return []
             case Bye():
@@ -321,16 +320,16 @@ class BoardSession:
         return outgoing
 
     def _greet(self, connection: bytes, hello: HostHello, now_ns: int, counts: BoardCounts) -> list[Outgoing]:
-        own = next((lane for lane, known in self._dialled if known == connection), hello.lane)
-        if (
-            own is not hello.lane
-        ):  # a knock for the frames' lane, over a control lane that had just been dialled anew, was taken for this lane's own
-            if self._host is not None:  # the host has forgotten the right one, which is to be knocked on again
-                self._host.frames = None
-            return [Outgoing(connection, Knock(own, self.session))]
         host = self._host
         if host is not None and host.host_id != hello.host_id and now_ns - host.heard_ns < TAKEOVER_NS:
             return [Outgoing(connection, Refusal(RefusalReason.BUSY))]
+        own = next((lane for lane, known in self._dialled if known == connection), hello.lane)
+        if own is not hello.lane:
+            # A knock for the frames' lane, over a control lane that had just been dialled anew, was taken for this lane's own. The host has
+            # forgotten the right one, which is to be knocked on again.
+            if host is not None and host.frames is not None and host.frames[0] == connection[0]:
+                host.frames = None
+            return [Outgoing(connection, Knock(own, self.session))]
         if host is None or host.host_id != hello.host_id:
             self._host = host = _Host(hello.host_id, now_ns, now_ns + STATUS_NS, now_ns + SILENCE_NS)
         host.heard(connection, now_ns)

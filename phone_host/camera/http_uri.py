@@ -52,6 +52,15 @@ class HttpSettings:
         return f"{'https' if self.secure else 'http'}://{host}:{self.port}{self.target}"
 
 
+def without_password(uri: str) -> str:
+    """A camera URI for logs and files: without user and password, where it is a server's."""
+    if not is_http(uri):
+        return uri
+    scheme, _, rest = uri.partition("://")
+    authority, slash, target = rest.partition("/")
+    return f"{scheme}://{authority.rpartition('@')[2]}{slash}{target}"
+
+
 def is_http(uri: str) -> bool:
     """Whether a camera URI names a server."""
     return uri.lower().startswith(("http://", "https://"))

@@ -320,12 +320,13 @@ class HttpCamera:
         with self._lock:
             if self._life.phase is not Phase.STREAMING:
                 return
-            self._life.heard(now.monotonic_ns(), self._rate.period_ns or 0)
             size_px = image.width_px, image.height_px
             self._note_size(size_px)
             if self._asked_px not in {size_px, (0, 0)}:
+                self._life.stirred(now.monotonic_ns())
                 self._spoil(FrameFault.OTHER_SIZE)
                 return
+            self._life.heard(now.monotonic_ns(), self._rate.period_ns or 0)
             sequence, self._sequence = self._sequence, self._sequence + 1
             if self._is_told_lost and not self._life.is_lost:
                 self._is_told_lost = False

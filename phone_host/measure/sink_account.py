@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from phone_host.measure.delays import Spread
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SinkAccount:
     """What became of the results that were handed to one sink.
 
@@ -13,6 +13,7 @@ class SinkAccount:
         name: the sink's.
         written: results that it has done with.
         dropped: results that it had no place for.
+        failed: results that it had a place for and could not write.
         waiting: results in its queue now.
         delay: from a result's hand-over to when the sink had done with it, over all of them, ns.
     """
@@ -20,5 +21,6 @@ class SinkAccount:
     name: str
     written: int
     dropped: int
+    failed: int
     waiting: int
     delay: Spread

@@ -64,6 +64,7 @@ def _on_the_host(run: RunSnapshot) -> Iterator[Unused]:
         yield Unused("pairs that still waited at the end", "", run.stopped)
     for sink in run.sinks:
         yield Unused("results that came too fast for the sink", sink.name, sink.dropped)
+        yield Unused("results that the sink could not write", sink.name, sink.failed)
 
 
 def board_drops(link: LinkAccount) -> dict[str, int]:

@@ -109,6 +109,7 @@ class ListedFolder:
                 _sync_file(entry, folder)
             os.fsync(folder)
             os.rename(part, name, src_dir_fd=self.descriptor, dst_dir_fd=self.descriptor)
+            sync_folder(self.descriptor)
         except BaseException:
             self._remove(part)
             raise

@@ -82,7 +82,7 @@ def build(run: RunSnapshot) -> dict[str, object]:
 
 
 def _sink(sink: SinkAccount) -> dict[str, object]:
-    return {"written": sink.written, "dropped": sink.dropped, "delay_ms": spread_ms(sink.delay)}
+    return {"written": sink.written, "dropped": sink.dropped, "failed": sink.failed, "delay_ms": spread_ms(sink.delay)}
 
 
 def spread_ms(spread: Spread) -> dict[str, float | int | None]:

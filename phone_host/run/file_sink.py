@@ -5,14 +5,13 @@ follow in order. What is still missing at the end is said with the exit code. A 
 counted as a drop of the sink `pairs`, and never a line.
 
 Of an earlier run in the same folder what it listed there as its own is removed (`output/listed.py`); anything else in the way ends the run
-before it begins. All files survive a power cut; saved pairs are synced in the thread of their queue.
+before it begins. Each saved pair survives a power cut once it is there, lines and report do from the end on.
 """
 
 import errno
 import json
 import logging
 import os
-import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
@@ -27,7 +26,7 @@ from phone_host.output.listed import ListedFolder
 from phone_host.output.pfm import write_pfm
 from phone_host.output.ply import write_ply
 from phone_host.output.preview import write_png
-from phone_host.run.sinks import SinkQueue
+from phone_host.run.sinks import NotWrittenError, SinkQueue
 
 _LOG = logging.getLogger(__name__)
 
@@ -45,6 +44,85 @@ NAMES: Final = r"delays\.jsonl|report\.json|settings\.json|index\.html|pair-[0-9
 
 PAIR_FILES: Final = r"(left|right)\.png|disparity\.pfm|cloud\.ply"
 """What it writes into the folder of a saved pair."""
+
+
+class _Trouble:
+    """Whether writing fails now: said when it begins, and when it has ended. Used by one thread at a time.
+
+    Args:
+        folder: for the log.
+        what: is not written then.
+    """
+
+    def __init__(self, folder: Path, what: str) -> None:
+        self._folder, self._what = folder, what
+        self.now = self.last = ""
+
+    def begins(self, error: OSError) -> None:
+        """Something could not be written."""
+        cause = error.strerror or str(error)
+        if not self.now:
+            remedy = "make room; the run goes on"
+            _LOG.error(event("results_not_written", folder=self._folder, what=self._what, cause=cause, remedy=remedy))
+        self.now = self.last = cause
+
+    def ends(self) -> None:
+        """Something could be written."""
+        if self.now:
+            _LOG.info(event("results_written_again", folder=self._folder, what=self._what))
+            self.now = ""
+
+
+class _Lines:
+    """delays.jsonl: what the disk does not take waits in memory, and follows in order.
+
+    Args:
+        descriptor: of the file, empty; closed by its owner.
+        trouble: is told of.
+    """
+
+    def __init__(self, descriptor: int, trouble: _Trouble) -> None:
+        self._file = descriptor
+        self._trouble = trouble
+        self._pending: list[bytes] = []
+        self._pending_bytes = self._written_bytes = 0
+        self._tried_ns = 0
+        self.lost = 0
+
+    @property
+    def unwritten(self) -> int:
+        """Lines that are lost, or wait."""
+        return self.lost + len(self._pending)
+
+    def append(self, ledger: PairLedger) -> None:
+        """Add a line."""
+        line = ledger.to_json().encode() + b"\n"
+        self._pending.append(line)
+        self._pending_bytes += len(line)
+        if not self._trouble.now or now.monotonic_ns() - self._tried_ns > _RETRY_NS:
+            self.flush()
+        while self._pending_bytes > _PENDING_BYTES:
+            self._pending_bytes -= len(self._pending.pop(0))
+            self.lost += 1
+
+    def flush(self) -> None:
+        """Write the lines that wait; what cannot be written goes on waiting."""
+        if not self._pending:
+            return
+        self._tried_ns = now.monotonic_ns()
+        data = b"".join(self._pending)
+        try:
+            done = os.pwrite(self._file, data, self._written_bytes)
+            if done < len(data):  # the disk filled up in the middle of a line: the next try writes over the torn one
+                os.ftruncate(self._file, self._written_bytes)
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            self._trouble.begins(error)
+            return
+        self._written_bytes += done
+        self._pending.clear()
+        self._pending_bytes = 0
+        self._trouble.ends()
 
 
 class FileSink:
@@ -68,19 +146,10 @@ class FileSink:
         waits: bool = False,
         settings: Mapping[str, object] | None = None,
     ) -> None:
-        self._folder = folder
         self._save_every = save_every
-        self._pending: list[bytes] = []
-        self._pending_bytes = 0
-        self._unwritten = threading.Lock()
-        self._lost_lines = self._unsaved_pairs = 0
-        self._cause = self._last_cause = ""
-        self._tried_ns = 0
-        self._file = -1
-        self._written_bytes = 0
+        self._unsaved_pairs = self._lost_lines = 0
         self._own: ListedFolder | None = None
-        self._lines: SinkQueue[PairLedger] | None = None
-        self._pairs: SinkQueue[Result] | None = None
+        self._file = -1
         if folder is None:
             return
         try:
@@ -91,60 +160,67 @@ class FileSink:
                 self._own.add("settings.json")
                 self._own.write_text("settings.json", json.dumps(settings, indent=1) + "\n")
         except OSError as error:
+            self._let_go()
             raise UnavailableError(
                 f"results folder {folder} cannot be used ({error.strerror})", "give another with --out"
             ) from None
-        self._lines = SinkQueue("lines", self._append, depth=_LINES)
-        self._pairs = SinkQueue("pairs", self._save, waits=waits)
+        except BaseException:
+            self._let_go()
+            raise
+        self._of_lines, self._of_pairs = _Trouble(folder, "lines"), _Trouble(folder, "pairs")
+        self._of_report = _Trouble(folder, "report")
+        self._lines = _Lines(self._file, self._of_lines)
+        self._line_queue = SinkQueue("lines", self._lines.append, depth=_LINES)
+        self._pair_queue = SinkQueue("pairs", self._save, waits=waits)
 
-    def await_place(self) -> None:
+    def await_place(self, number: int) -> None:
         """See Sink."""
-        if self._pairs is not None:
-            self._pairs.await_place()
+        if self._own is not None and self._is_due(number):
+            self._pair_queue.await_place()
 
     def offer(self, result: Result) -> None:
         """See Sink."""
-        if self._lines is None or self._pairs is None:
+        if self._own is None:
             return
-        if not self._lines.offer(result.ledger):
-            with self._unwritten:
-                self._lost_lines += 1
-                self._last_cause = "the disk hangs"
-        if self._save_every and result.number % self._save_every == 0:
-            self._pairs.offer(result)
+        self._lost_lines += not self._line_queue.offer(result.ledger)
+        if self._is_due(result.number):
+            self._pair_queue.offer(result)
 
     def finish(self) -> None:
         """See Sink."""
-        if self._pairs is not None:
-            self._pairs.finish()
-        if self._lines is not None:
-            self._lines.finish()
-            self._flush()
+        if self._own is not None:
+            self._pair_queue.finish()
+            self._line_queue.finish()
+            self._lines.flush()
 
     @property
     def failure(self) -> Exception | None:
         """See Sink."""
-        return next(
-            (queue.failure for queue in (self._lines, self._pairs) if queue is not None and queue.failure), None
-        )
+        return None if self._own is None else self._line_queue.failure or self._pair_queue.failure
 
     @property
     def accounts(self) -> tuple[SinkAccount, ...]:
-        """See Sink."""
-        return tuple(queue.account for queue in (self._lines, self._pairs) if queue is not None)
+        """See Sink. Lines that wait in memory for the disk count as written here; `unwritten` has them."""
+        return () if self._file < 0 else (self._line_queue.account, self._pair_queue.account)
 
     @property
     def complete(self) -> bool:
         """Whether everything has been written so far."""
-        return not (self._lost_lines or self._pending or self._unsaved_pairs or self._cause)
+        return self._file < 0 or not (self.unwritten.lines or self.unwritten.pairs or self._of_report.now)
 
     @property
     def unwritten(self) -> Unwritten:
         """What has not been written so far."""
-        return Unwritten(self._lost_lines + len(self._pending), self._unsaved_pairs, self._last_cause)
+        if self._file < 0:
+            return Unwritten()
+        cause = self._of_lines.last or self._of_pairs.last or self._of_report.last
+        lost = self._lost_lines
+        return Unwritten(
+            lines=lost + self._lines.unwritten, pairs=self._unsaved_pairs, cause=cause or ("it hangs" if lost else "")
+        )
 
     def close(self, report: dict[str, object], page: str = "") -> None:
-        """Work off what was taken, write report.json and let go of the folder.
+        """Work off what was taken, write report.json and let go of the folder; may be called again.
 
         Args:
             report: the JSON object to write.
@@ -152,8 +228,8 @@ class FileSink:
         """
         if self._own is None:
             return
-        self.finish()
         try:
+            self.finish()
             os.fsync(self._file)
             self._own.write_text("report.json", json.dumps(report, indent=1) + "\n")
             if page:
@@ -161,68 +237,32 @@ class FileSink:
                 self._own.write_text("index.html", page)
             self._own.sync()
         except OSError as error:
-            self._failed(error)
-        os.close(self._file)
+            self._of_report.begins(error)
+        finally:
+            self._let_go()
+
+    def _let_go(self) -> None:
+        if self._own is None:
+            return
+        if self._file >= 0:
+            os.close(self._file)
         self._own.close()
         self._own = None
+
+    def _is_due(self, number: int) -> bool:
+        return self._save_every > 0 and number % self._save_every == 0
 
     def _save(self, result: Result) -> None:
         """Write a pair's folder; all of it or nothing."""
         assert self._own is not None
-        processed, name = result.processed, f"pair-{result.number:06d}"
         try:
-            with self._own.new_folder(name) as part:
-                _write_pair(part, processed)
+            with self._own.new_folder(f"pair-{result.number:06d}") as folder:
+                _write_pair(folder, result.processed)
         except OSError as error:
-            with self._unwritten:
-                self._unsaved_pairs += 1
-            self._failed(error)
-
-    def _append(self, ledger: PairLedger) -> None:
-        """Add a line to delays.jsonl."""
-        line = ledger.to_json().encode() + b"\n"
-        self._pending.append(line)
-        self._pending_bytes += len(line)
-        if not self._cause or now.monotonic_ns() - self._tried_ns > _RETRY_NS:
-            self._flush()
-        while self._pending_bytes > _PENDING_BYTES:
-            self._pending_bytes -= len(self._pending.pop(0))
-            with self._unwritten:
-                self._lost_lines += 1
-
-    def _flush(self) -> None:
-        """Write the lines that wait; what cannot be written goes on waiting."""
-        if self._folder is None or not self._pending:
-            return
-        self._tried_ns = now.monotonic_ns()
-        data = b"".join(self._pending)
-        try:
-            done = os.pwrite(self._file, data, self._written_bytes)
-        except OSError as error:
-            self._failed(error)
-            return
-        if done < len(data):  # the disk filled up in the middle of a line: the next try writes over the torn part
-            os.ftruncate(self._file, self._written_bytes)
-            self._failed(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
-            return
-        self._written_bytes += done
-        self._pending.clear()
-        self._pending_bytes = 0
-        if self._cause:
-            _LOG.info(event("results_written_again", folder=self._folder))
-            self._cause = ""
-
-    def _failed(self, error: OSError) -> None:
-        if not self._cause:
-            _LOG.error(
-                event(
-                    "results_not_written",
-                    folder=self._folder,
-                    cause=error.strerror,
-                    remedy="make room; the run goes on",
-                )
-            )
-        self._cause = self._last_cause = error.strerror or str(error)
+            self._unsaved_pairs += 1
+            self._of_pairs.begins(error)
+            raise NotWrittenError from None
+        self._of_pairs.ends()
 
 
 def _write_pair(folder: Path, processed: Processed) -> None:

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -156,10 +156,10 @@ class Host:
             UnavailableError: no board within the time, or it does not talk to this host.
             DataError: the streams' images do not fit the rig.
         """
-        self._worker.start()
-        self._receiver.start()
-        self._camera.start()
         try:
+            self._worker.start()
+            self._receiver.start()
+            self._camera.start()
             ended = self._watch(stop, watch)
         except BaseException:
             with suppress(Exception):  # what ended the run is told, not what followed from it
@@ -169,15 +169,24 @@ class Host:
         return ended
 
     def _end(self) -> None:
-        """Finish the pair in hand, not those that still wait, and let the sinks work off what they have."""
+        """Finish the pair in hand, not those that still wait, and let the sinks work off what they have; all of it, whatever part fails.
+
+        Raises:
+            Exception: what failed, the last of several.
+        """
         self._worker.finished.set()
-        self._camera.stop()
-        self._queue.finish()
-        self._worker.stop()
-        self._receiver.stop()  # last: the worker wakes it
-        for sink in self._sinks:
-            sink.finish()
-        self._raise_failures()
+        with ExitStack() as ending:  # the other way round
+            ending.callback(self._raise_failures)
+            for sink in reversed(self._sinks):
+                ending.callback(sink.finish)
+            ending.callback(self._receiver.stop)  # behind the worker, which wakes it
+            ending.callback(self._worker.stop)
+            ending.callback(self._queue.finish)
+            ending.callback(self._camera.stop)
+
+    def abandon(self) -> None:
+        """Let go of the folder of results, instead of `run`."""
+        self._files.close({})
 
     def write_report(self, report: dict[str, object], page: str = "") -> bool:
         """Write what is said of the whole run into the folder of its results, after `run`; nothing where there is none.

@@ -21,11 +21,15 @@ DEPTH: Final = 2
 """Results that wait for a sink: one to go on with, and one that comes meanwhile. Each holds its images and its cloud, 7 MB at 640x480."""
 
 
+class NotWrittenError(Exception):
+    """Raised by what works off a queue: this one item could not be written, which is counted; the next one is tried."""
+
+
 class Sink(Protocol):
     """Takes results. Used by the worker's thread, but for `finish`, which the run's root calls when the worker has ended."""
 
-    def await_place(self) -> None:
-        """Wait until there is a place for one result, if this sink is one that waits; else nothing."""
+    def await_place(self, number: int) -> None:
+        """Wait until there is a place for the result of this number, if this sink is one that waits; else nothing."""
 
     def offer(self, result: Result) -> None:
         """Take a result, or drop and count it; never waits."""
@@ -53,7 +57,7 @@ class SinkQueue(Generic[T]):
 
     Args:
         name: as it stands in report.json.
-        take: called with each item, in the queue's thread. Once it has failed nothing is taken any more.
+        take: called with each item, in the queue's thread. After any exception but NotWrittenError nothing is taken any more.
         depth: most items that wait.
         waits: whether `await_place` waits.
         clock: monotonic, ns.
@@ -72,7 +76,7 @@ class SinkQueue(Generic[T]):
         self._items: deque[_Waiting[T]] = deque()
         self._changed = threading.Condition()
         self._finishing = False
-        self._written = self._dropped = 0
+        self._written = self._dropped = self._failed = 0
         self._delay = Series()
         self._failure: Exception | None = None
         self._thread = threading.Thread(target=self._run, name=f"sink {name}", daemon=True)
@@ -118,8 +122,12 @@ class SinkQueue(Generic[T]):
     def account(self) -> SinkAccount:
         """How it has fared so far, a copy."""
         with self._changed:
-            counts, delay = (self._written, self._dropped, len(self._items)), self._delay.copy()
-        return SinkAccount(self._name, *counts, delay.spread())  # percentiles take ms, in which nobody is to wait
+            written, dropped, failed, waiting = self._written, self._dropped, self._failed, len(self._items)
+            delay = self._delay.copy()
+        spread = delay.spread()  # percentiles take ms, in which nobody is to wait
+        return SinkAccount(
+            name=self._name, written=written, dropped=dropped, failed=failed, waiting=waiting, delay=spread
+        )
 
     def _run(self) -> None:
         while True:
@@ -128,8 +136,11 @@ class SinkQueue(Generic[T]):
                 if not self._items:
                     return
                 waiting = self._items[0]  # it keeps its place until it is done: the bound is one of memory
+            has_failed = False
             try:
                 self._take(waiting.item)
+            except NotWrittenError:
+                has_failed = True
             except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
                 with self._changed:
                     self._failure = error
@@ -139,8 +150,10 @@ class SinkQueue(Generic[T]):
                 return
             with self._changed:
                 self._items.popleft()
-                self._written += 1
-                self._delay.add(self._clock() - waiting.since_ns)
+                self._failed += has_failed
+                if not has_failed:
+                    self._written += 1
+                    self._delay.add(self._clock() - waiting.since_ns)
                 self._changed.notify_all()
 
 
@@ -157,8 +170,9 @@ class FunctionSink:
     def __init__(self, name: str, take: Callable[[Result], None], *, depth: int = DEPTH, waits: bool = False) -> None:
         self._queue = SinkQueue(name, take, depth=depth, waits=waits)
 
-    def await_place(self) -> None:
+    def await_place(self, number: int) -> None:
         """See Sink."""
+        del number  # all are alike
         self._queue.await_place()
 
     def offer(self, result: Result) -> None:

@@ -81,10 +81,10 @@ class Worker:
             self._note_failed(error)
             return
         computed_ns = now.monotonic_ns()
-        for sink in self._sinks:
-            sink.await_place()
-        marks = WorkerMarks(dequeued_ns, computed_ns, done_ns=now.monotonic_ns())
         number = self._ledgerer.processed
+        for sink in self._sinks:
+            sink.await_place(number)
+        marks = WorkerMarks(dequeued_ns, computed_ns, done_ns=now.monotonic_ns())
         result = Result(number, pair, processed, self._ledgerer.enter(pair, processed, marks))
         for sink in self._sinks:
             sink.offer(result)

@@ -55,6 +55,7 @@ class Receiver:
         self._waiter = Waiter([*(item for link in links for item in link.pollables), self._wake_read])
         self._stopping = False
         self._corrections = Corrections()
+        self._steered_session = ""
         self._sleep, self._time_of_day = now.SleepWatch(), now.TimeOfDayWatch()
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
         self.failure: Exception | None = None
@@ -157,7 +158,15 @@ class Receiver:
                 os.read(self._wake_read, 4096)
         now_ns = now.monotonic_ns()
         self._reception.tick(now_ns)
-        if later_ns := self._corrections.take():
+        self._hand_on_corrections(now_ns)
+
+    def _hand_on_corrections(self, now_ns: int) -> None:
+        """Steer the board as was ordered, as soon as a link carries it; what was ordered for an earlier session is void."""
+        hello = self._reception.hello
+        if hello is None or not self._reception.carrier:
+            return
+        session, self._steered_session = self._steered_session, hello.session
+        if (later_ns := self._corrections.take()) and session in {"", hello.session}:
             self._reception.steer(later_ns, now_ns)
 
     def _watch_clock(self) -> None:

@@ -126,9 +126,21 @@ def test_what_ends_a_run_is_raised(live: tuple[str, str], film: Path, tmp_path: 
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"board_side": "up"}, {"matcher": "no-such"}, {"fifo": "0:block"}, {"link": "carrier-pigeon://x"}]
+    "wrong",
+    [
+        {"board_side": "up"},
+        {"matcher": "no-such"},
+        {"fifo": "0:block"},
+        {"link": "carrier-pigeon://x"},
+        {"link": []},
+        {"pairs": -1},
+        {"wait_s": float("nan")},
+        {"tolerance_ms": -5.0},
+        {"save_every": -1},
+        {"near_m": 0.0},
+    ],
 )
-def test_arguments_of_no_sense_are_told_at_once(wrong: dict[str, str], film: Path, tmp_path: Path) -> None:
+def test_arguments_of_no_sense_are_told_at_once(wrong: dict[str, object], film: Path, tmp_path: Path) -> None:
     """A wrong argument is a SettingsError before anything is opened for long."""
     usual = {"link": f"ipc://{tmp_path}/link", "camera": f"replay:{film}?loop=1"}
     with pytest.raises(SettingsError):
@@ -160,3 +172,23 @@ def test_the_examples_do_what_they_say(example: str, live: tuple[str, str], tmp_
             assert (tmp_path / "delays.svg").read_text().count("<rect") == 16
         case _:
             assert len(done.stdout.splitlines()) == 12
+
+
+def test_what_was_opened_is_let_go_where_the_rest_cannot_be(film: Path, tmp_path: Path) -> None:
+    """A folder in use ends `open_scanner` without a descriptor left open, a scanner that was never entered is closed, and one runs once."""
+    link, camera, out = f"ipc://{tmp_path}/link", f"replay:{film}?loop=1", tmp_path / "out"
+    scanner = open_scanner(link=link, camera=camera, out=out)
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    with pytest.raises(UnavailableError, match="another run"):
+        open_scanner(link=link, camera=camera, out=out)
+    until(lambda: len(list(Path("/proc/self/fd").iterdir())) <= before, "what was opened is closed")
+    with pytest.raises(RuntimeError):
+        next(iter(scanner))
+    scanner.close()
+    again = open_scanner(link=link, camera=camera, out=out, wait_s=0.1)
+    with pytest.raises(UnavailableError), again:
+        until(lambda: again.snapshot().ended == "failed", "there is no board")
+    with pytest.raises(RuntimeError):
+        again.__enter__()
+    settings = json.loads((out / "settings.json").read_text())
+    assert settings["wait_s"] == {"value": 0.1, "origin": "open_scanner"}

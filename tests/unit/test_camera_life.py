@@ -174,6 +174,24 @@ def test_a_camera_that_opens_and_fails_at_once_is_not_opened_without_a_rest() ->
 
 
 @BOTH
+def test_images_of_no_use_are_no_silence_and_no_return(settings: LifeSettings) -> None:
+    """A lost camera that comes back with other images is not closed for silence, and stays lost until a frame of use comes."""
+    life = opened(settings)
+    life.heard(1)
+    assert life.lost(Loss.FAILED, 2) is Step.CLOSE
+    life.closed()
+    at_ns = life.due_ns
+    assert life.due(at_ns) is Step.OPEN
+    life.opened(at_ns)
+    for number in range(1, 100):
+        life.stirred(at_ns + number * S // 10)
+        assert life.due(at_ns + number * S // 10 + 1) is not Step.CLOSE
+    assert life.is_lost
+    life.heard(at_ns + 11 * S)
+    assert not life.is_lost
+
+
+@BOTH
 def test_it_is_back_with_its_first_frame(settings: LifeSettings) -> None:
     """A lost camera stays lost through openings that give no frame, and is back, once, with the first frame."""
     life = opened(settings)

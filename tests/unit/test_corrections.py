@@ -130,6 +130,22 @@ def test_no_order_to_the_board_is_lost(tmp_path: Path) -> None:
     assert board.later_ns == 3 * ORDERS + LAST_NS
 
 
+def test_an_order_waits_for_a_link(tmp_path: Path) -> None:
+    """What is ordered before a link carries frames is carried out when one does."""
+    address = f"ipc://{tmp_path}/board"
+    receiver = Receiver([open_link(parse_link(address, listens_by_default=False))], "host", NoFrames())
+    receiver.steer(LAST_NS)
+    receiver.start()
+    board = Steered(address)
+    board.start()
+    try:
+        until(lambda: board.has_last, "the order has come")
+    finally:
+        receiver.stop()
+        board.close()
+    assert board.later_ns == LAST_NS
+
+
 def test_two_orders_in_a_row_are_one_of_their_sum(tmp_path: Path) -> None:
     """An order that comes before the one before it was carried out does not take its place: the own camera exposes later by both."""
     (tmp_path / "0.jpg").write_bytes(jpeg())

@@ -260,10 +260,10 @@ def test_what_was_not_used_is_told_once_each() -> None:
         link=LinkAccount([account], garbage=6, no_clock=7),
         counts=PairCounts(paired=20, dropped=8, board_orphans=(("no_partner", 9),), host_orphans=(("too_late", 10),)),
         undecodable=3, spoiled_images=(("corrupt", 1),), spoiled=12, skipped=13,
-        sinks=(SinkAccount("pairs", 1, 14, 0, Series().spread()),),
+        sinks=(SinkAccount(name="pairs", written=1, dropped=14, failed=15, waiting=0, delay=Series().spread()),),
     )  # fmt: skip
     counts = {(item.place, item.reason): item.count for item in unused(seen)}
-    assert sorted(counts.values()) == [1, 1, 2, 2, 2, 4, 5, 6, 7, 7, 8, 9, 10, 12, 13, 14]
+    assert sorted(counts.values()) == [1, 1, 2, 2, 2, 4, 5, 6, 7, 7, 8, 9, 10, 12, 13, 14, 15]
     told: Any = build(seen)["unused"]
     assert {(item["place"], item["reason"]): item["count"] for item in told} == counts
     assert len(told) == len(counts)

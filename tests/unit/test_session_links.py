@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from common.frame import PixelFormat
 from common.ledger import BoardMarks
+from common.protocol.board_session import BoardSession
 from common.protocol.host_session import STUCK_NS
 from common.protocol.message import (
     BoardCounts,
@@ -17,6 +18,7 @@ from common.protocol.message import (
     Credit,
     FrameMessage,
     HostHello,
+    Knock,
     Lane,
     Message,
     Ping,
@@ -35,6 +37,7 @@ from common.protocol.session import (
     Outgoing,
     Refused,
     StaleReason,
+    connection_name,
 )
 from tests.support.session_world import CAMERA, HostNode, World
 
@@ -322,6 +325,27 @@ def test_a_busy_board_on_the_second_link_is_asked_calmly() -> None:
                 told += [item for item in answer if isinstance(item, Refused)]
     assert set(told) == {Refused(RefusalReason.BUSY, 1)}
     assert 11 <= hellos <= 14
+
+
+@pytest.mark.parametrize("same_host", [False, True])
+def test_a_hello_on_the_wrong_lane_harms_no_other_host(*, same_host: bool) -> None:
+    """A board that dials tells of the right lane; the stream of a host goes on whatever a second one says, which is told that the board is busy."""
+    lanes = tuple((lane, connection_name(0, lane.name.encode())) for lane in Lane)
+    board = BoardSession("session", "boot", CAMERA, lanes)
+    names, now_ns, counts = dict(lanes), 10**9, BoardCounts()
+    for lane in Lane:
+        board.receive(names[lane], HostHello("first", lane), now_ns, counts)
+    board.receive(names[Lane.CONTROL], Credit(3), now_ns, counts)
+    assert board.has_credit
+    wrong = HostHello("first" if same_host else "second", Lane.FRAMES)
+    (answer,) = board.receive(names[Lane.CONTROL], wrong, now_ns, counts)
+    if same_host:
+        assert answer.message == Knock(Lane.CONTROL, "session")
+        knocks = board.tick(now_ns + 1000 * MS, counts)
+        assert Outgoing(names[Lane.FRAMES], Knock(Lane.FRAMES, "session")) in knocks
+    else:
+        assert answer.message == Refusal(RefusalReason.BUSY)
+        assert board.has_credit
 
 
 def test_a_goodbye_is_said_on_every_link() -> None:

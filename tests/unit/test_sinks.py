@@ -2,6 +2,8 @@
 
 import json
 import os
+import resource
+import signal
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
@@ -161,7 +163,7 @@ def test_a_sink_that_fails_is_told_and_takes_nothing_more() -> None:
 
     sink = FunctionSink("failing", fail, depth=1, waits=True)
     for number in range(5):
-        sink.await_place()
+        sink.await_place(number)
         sink.offer(result(number))
     sink.finish()
     assert isinstance(sink.failure, ZeroDivisionError)
@@ -172,7 +174,7 @@ def test_all_lines_and_every_third_pair_are_on_disk(tmp_path: Path) -> None:
     """Of ten results each has its line, every third its folder with whole files, and the settings stand beside them; all of it is listed as ours."""
     sink = FileSink(tmp_path, 3, waits=True, settings={"fifo": {"value": "1:block", "origin": "--fifo"}})
     for number in range(10):
-        sink.await_place()
+        sink.await_place(number)
         sink.offer(result(number))
     sink.close({"pairs": 10})
     lines = [json.loads(line) for line in (tmp_path / "delays.jsonl").read_text().splitlines()]
@@ -191,10 +193,12 @@ def test_a_pair_whose_name_somebody_has_taken_is_counted_and_the_run_goes_on(tmp
     (tmp_path / "pair-000001").mkdir()
     (tmp_path / "pair-000001" / "mine").write_text("mine")
     for number in range(3):
-        sink.await_place()
+        sink.await_place(number)
         sink.offer(result(number))
     sink.close({})
     assert (sink.unwritten.pairs, sink.complete) == (1, False)
+    by_name = {account.name: (account.written, account.failed) for account in sink.accounts}
+    assert by_name == {"lines": (3, 0), "pairs": (2, 1)}
     assert (tmp_path / "pair-000001" / "mine").read_text() == "mine"
     assert not list(tmp_path.glob("*.part"))
     assert (tmp_path / "pair-000002" / "left.png").exists()
@@ -213,3 +217,51 @@ def test_a_disk_slower_than_the_pairs_costs_pairs_and_no_line(tmp_path: Path) ->
     assert by_name["pairs"].dropped > 0
     assert by_name["pairs"].written == len(list(tmp_path.glob("pair-*"))) == 30 - by_name["pairs"].dropped
     assert (by_name["lines"].dropped, sink.complete) == (0, True)
+
+
+def test_a_full_disk_is_told_once_and_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Where no file may grow nothing is written; lines wait, pairs are counted as failed, each trouble is one line of the log, and the folder is let go."""
+    sink = FileSink(tmp_path, 1, waits=True)
+    noise = np.random.default_rng(1).integers(0, 256, (100, 100), np.uint8)
+    large = replace(result(0).processed, pair=RectifiedPair(noise, noise))
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200, hard))  # the list of names still has room
+    try:
+        for number in range(3):
+            sink.await_place(number)
+            sink.offer(replace(result(number), processed=large))
+        sink.finish()
+        assert sink.unwritten.lines == 3
+        assert sink.unwritten.pairs == 3
+        assert {account.name: account.failed for account in sink.accounts} == {"lines": 0, "pairs": 3}
+        sink.close({"pairs": "x" * 300})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before)
+    assert not sink.complete
+    told = [record.getMessage() for record in caplog.records if "results_not_written" in record.getMessage()]
+    assert sorted(text.partition("what=")[2].split()[0] for text in told) == ["lines", "pairs", "report"]
+    FileSink(tmp_path, 0).close({})  # nobody has it locked any more
+
+
+def test_a_folder_that_cannot_be_begun_is_let_go(tmp_path: Path) -> None:
+    """Settings that cannot be written, or are no JSON, leave no lock behind."""
+    with pytest.raises(TypeError):
+        FileSink(tmp_path, 1, settings={"camera": object()})
+    FileSink(tmp_path, 1).close({})
+
+
+def test_only_a_pair_that_is_due_waits_for_its_place(tmp_path: Path) -> None:
+    """While the queue of pairs is full, a result that is not to be saved is handed over at once."""
+    sink = FileSink(tmp_path, 10, waits=True)
+    noise = np.random.default_rng(1).integers(0, 256, (2400, 3200), np.uint8)
+    for number in (0, 10):
+        small = result(number)
+        sink.offer(replace(small, processed=replace(small.processed, pair=RectifiedPair(noise, noise))))
+    for number in range(11, 20):
+        sink.await_place(number)
+        sink.offer(result(number))
+    by_name = {account.name: account for account in sink.accounts}
+    assert by_name["pairs"].waiting > 0  # nine lines are faster than two large pairs
+    sink.close({})

@@ -5,6 +5,7 @@ import json
 import math
 import sys
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 from common import now
@@ -18,6 +19,7 @@ from common.stamp import HOST_CLOCK
 from phone_host.boards.discovery import find_board_and_say, remember
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
+from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.model import Side, TimeOffset
 from phone_host.report.run_json import build
@@ -109,7 +111,11 @@ def _host_settings(
 ) -> HostSettings:
     settings = resolved.values
     return HostSettings(
-        resolved=with_origins(resolved, vars(options), sys.argv),
+        resolved=with_origins(
+            replace(resolved, values=replace(settings, camera=without_password(settings.camera))),
+            vars(options),
+            sys.argv,
+        ),
         board_side=board_side,
         tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
         fifo=fifo,
