@@ -1,6 +1,6 @@
 """Save every tenth cloud as PLY: `python examples/save_every_tenth_cloud.py LINK CAMERA RIG [PAIRS]`.
 
-For example, with the two programs of the demo (`phone-host demo` prints their cameras):
+For example after `phone-host demo`, with the board's side in another terminal (the demo's last lines say how, add --link tcp://127.0.0.1:5555):
 
     python examples/save_every_tenth_cloud.py tcp://127.0.0.1:5555 'replay:tandemscan-demo/film/right?fps=15&loop=1' tandemscan-demo/rig.yaml
 """

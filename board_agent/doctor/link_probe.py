@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 from board_agent.doctor.link_checks import LinkReadings, check_link
 from common.doctor import machine
 from common.doctor.access import Account, Holder, check_access
-from common.doctor.finding import Finding, Outcome
+from common.doctor.finding import Finding, Grade
 from common.doctor.machine_checks import check_bluetooth
 from common.doctor.unit_check import Unit
 from common.errors import TakenError, TandemError
@@ -32,7 +32,7 @@ def examine_link(uri: str, account: Account, unit: Unit, *, listens_by_default: 
     if address.startswith("rfcomm:"):
         adapter = check_bluetooth(machine.read_bluetooth(), wanted=True)
         findings.append(adapter)
-        if adapter.verdict is Outcome.FAIL:
+        if adapter.verdict is Grade.FAIL:
             return findings
     if address.startswith("serial:") and (node := machine.read_node(Path(address.removeprefix("serial:")))) is not None:
         findings.append(check_access("permission", node, account))

@@ -28,7 +28,7 @@ class Unwanted(Enum):
     IS_CLOSED = "is closed"
 
 
-class Phase(Enum):
+class Standing(Enum):
     """Where the camera stands: closed, being opened, on, off for a moment to be steered, off because nobody listens, being closed."""
 
     CLOSED = "closed"
@@ -126,13 +126,13 @@ class Life:
         self._begun_ns = self._retry_ns = now_ns
         self._next_ns = NEVER_NS
         self._period_ns = 0
-        self._phase = Phase.CLOSED
+        self._phase = Standing.CLOSED
         self._is_wanted = self._is_gone = True
         self._is_accepted = self._is_ended = self._was_heard = False
         self._futile = 0
 
     @property
-    def phase(self) -> Phase:
+    def phase(self) -> Standing:
         """Where it stands."""
         return self._phase
 
@@ -157,12 +157,12 @@ class Life:
         if self._is_wanted:
             return CameraState.GONE if self._is_gone else CameraState.RUNNING
         stays_open = self._settings.unwanted is Unwanted.STAYS_OPEN
-        return CameraState.GONE if stays_open and self._phase is not Phase.RESTING else CameraState.PAUSED
+        return CameraState.GONE if stays_open and self._phase is not Standing.RESTING else CameraState.PAUSED
 
     @property
     def due_ns(self) -> int:
         """When `due` will have a step, ns; the far future if that is up to a report or an order."""
-        if self._phase is not Phase.CLOSED:
+        if self._phase is not Standing.CLOSED:
             return self._next_ns
         has_rest = not self._is_wanted and self._settings.unwanted is Unwanted.IS_CLOSED
         return NEVER_NS if self._is_ended or has_rest else self._retry_ns
@@ -172,18 +172,18 @@ class Life:
         if now_ns < self.due_ns:
             return Step.NONE
         match self._phase:
-            case Phase.CLOSED:
-                self._phase, self._next_ns = Phase.OPENING, NEVER_NS
+            case Standing.CLOSED:
+                self._phase, self._next_ns = Standing.OPENING, NEVER_NS
                 return Step.OPEN
-            case Phase.STREAMING:
+            case Standing.STREAMING:
                 return self.lost(Loss.STALLED, now_ns)
-            case Phase.STEERED:
+            case Standing.STEERED:
                 self._switch_on(now_ns)
                 return Step.START
-            case Phase.RESTING:
+            case Standing.RESTING:
                 self._next_ns = now_ns + self._settings.look_ns
                 return Step.LOOK
-            case Phase.OPENING | Phase.CLOSING:
+            case Standing.OPENING | Standing.CLOSING:
                 return Step.NONE
 
     def gives_up(self, now_ns: int) -> bool:
@@ -206,7 +206,7 @@ class Life:
         Returns:
             CLOSE if nobody wants it any more, else NONE.
         """
-        assert self._phase is Phase.OPENING, self._phase
+        assert self._phase is Standing.OPENING, self._phase
         self.counts.opened += 1
         self._was_heard, self._period_ns = False, period_ns
         if self._is_wanted and not self._is_ended:
@@ -214,15 +214,15 @@ class Life:
             return Step.NONE
         if self._is_ended or self._settings.unwanted is Unwanted.IS_CLOSED:
             return self._release()
-        self._phase, self._next_ns = Phase.RESTING, now_ns + self._settings.look_ns
+        self._phase, self._next_ns = Standing.RESTING, now_ns + self._settings.look_ns
         self._come_back()
         return Step.NONE
 
     def refused(self, now_ns: int) -> None:
         """It could not be opened."""
-        assert self._phase is Phase.OPENING, self._phase
+        assert self._phase is Standing.OPENING, self._phase
         self.counts.refused += 1
-        self._phase, self._is_gone = Phase.CLOSED, True
+        self._phase, self._is_gone = Standing.CLOSED, True
         self._rest(now_ns)
 
     def heard(self, now_ns: int, period_ns: int = 0) -> None:
@@ -232,7 +232,7 @@ class Life:
             now_ns: the time.
             period_ns: between its frames; 0: not known yet.
         """
-        if self._phase is not Phase.STREAMING:
+        if self._phase is not Standing.STREAMING:
             return
         self._was_heard, self._futile, self._period_ns = True, 0, period_ns
         self._listen_until(now_ns, self._settings.silence_ns)
@@ -244,7 +244,7 @@ class Life:
         Args:
             now_ns: the time.
         """
-        if self._phase is Phase.STREAMING:
+        if self._phase is Standing.STREAMING:
             self._listen_until(now_ns, self._settings.silence_ns)
 
     def lost(self, loss: Loss, now_ns: int) -> Step:
@@ -253,10 +253,10 @@ class Life:
         Returns:
             CLOSE, or NONE if it was no news.
         """
-        if self._phase not in {Phase.STREAMING, Phase.STEERED, Phase.RESTING}:
+        if self._phase not in {Standing.STREAMING, Standing.STEERED, Standing.RESTING}:
             return Step.NONE
         self.counts.lost[loss] += 1
-        self._phase, self._next_ns, self._is_gone = Phase.CLOSING, NEVER_NS, True
+        self._phase, self._next_ns, self._is_gone = Standing.CLOSING, NEVER_NS, True
         if not self._was_heard:
             self._rest(now_ns)
         elif loss is Loss.STALLED:
@@ -267,8 +267,8 @@ class Life:
 
     def closed(self) -> None:
         """It is closed, as was told."""
-        assert self._phase is Phase.CLOSING, self._phase
-        self._phase = Phase.CLOSED
+        assert self._phase is Standing.CLOSING, self._phase
+        self._phase = Standing.CLOSED
 
     # Orders.
 
@@ -281,11 +281,11 @@ class Life:
         if not self._is_wanted:
             return Step.NONE
         self._is_wanted = False
-        if self._phase not in {Phase.STREAMING, Phase.STEERED}:
+        if self._phase not in {Standing.STREAMING, Standing.STEERED}:
             return Step.NONE
         if self._settings.unwanted is Unwanted.IS_CLOSED:
             return self._release()
-        self._phase, self._next_ns = Phase.RESTING, 0
+        self._phase, self._next_ns = Standing.RESTING, 0
         return Step.STOP
 
     def resume(self, now_ns: int) -> Step:
@@ -297,7 +297,7 @@ class Life:
         if self._is_wanted:
             return Step.NONE
         self._is_wanted, self._retry_ns = True, now_ns
-        if self._phase is not Phase.RESTING:
+        if self._phase is not Standing.RESTING:
             return Step.NONE
         self._switch_on(now_ns)
         return Step.START
@@ -308,9 +308,9 @@ class Life:
         Returns:
             STOP if it is on.
         """
-        if self._phase not in {Phase.STREAMING, Phase.STEERED}:
+        if self._phase not in {Standing.STREAMING, Standing.STEERED}:
             return Step.NONE
-        self._phase, self._next_ns = Phase.STEERED, start_ns
+        self._phase, self._next_ns = Standing.STEERED, start_ns
         return Step.STOP
 
     def renew(self, now_ns: int) -> Step:
@@ -319,7 +319,7 @@ class Life:
         Returns:
             CLOSE if it is open; then an opening is due.
         """
-        if self._phase not in {Phase.STREAMING, Phase.STEERED, Phase.RESTING}:
+        if self._phase not in {Standing.STREAMING, Standing.STEERED, Standing.RESTING}:
             return Step.NONE
         self._retry_ns = now_ns
         return self._release()
@@ -331,10 +331,10 @@ class Life:
             CLOSE if it is open.
         """
         self._is_ended = True
-        return self._release() if self._phase in {Phase.STREAMING, Phase.STEERED, Phase.RESTING} else Step.NONE
+        return self._release() if self._phase in {Standing.STREAMING, Standing.STEERED, Standing.RESTING} else Step.NONE
 
     def _switch_on(self, now_ns: int) -> None:
-        self._phase = Phase.STREAMING
+        self._phase = Standing.STREAMING
         self._listen_until(now_ns, self._settings.first_frame_ns if self._is_accepted else self._settings.start_ns)
 
     def _listen_until(self, now_ns: int, patience_ns: int) -> None:
@@ -342,7 +342,7 @@ class Life:
 
     def _release(self) -> Step:
         self.counts.released += 1
-        self._phase, self._next_ns = Phase.CLOSING, NEVER_NS
+        self._phase, self._next_ns = Standing.CLOSING, NEVER_NS
         return Step.CLOSE
 
     def _rest(self, now_ns: int) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from common.camera.base import CameraHealth, Grab, Mode, Offers
-from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Phase, Step, Unwanted
+from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Step, Unwanted
 from common.camera.v4l2_device import capture_nodes, lasting_name
 from common.camera.v4l2_formats import Wanted
 from common.camera.v4l2_ring import RING_BUFFERS
@@ -130,7 +130,7 @@ class V4l2Camera:
     @property
     def pollable(self) -> int | None:
         """The device while it streams: readable with a frame, urgent with a changed control, in error when it is lost."""
-        return self._stream.fd if self._stream is not None and self._life.phase is Phase.STREAMING else None
+        return self._stream.fd if self._stream is not None and self._life.phase is Standing.STREAMING else None
 
     @property
     def health(self) -> CameraHealth:
@@ -153,7 +153,7 @@ class V4l2Camera:
     def due_ns(self, now_ns: int) -> int:
         """When something is to be done that no descriptor tells of: a stall, a retry, controls to be held."""
         del now_ns
-        if self._life.phase is not Phase.STREAMING:
+        if self._life.phase is not Standing.STREAMING:
             return self._life.due_ns
         return min(self._life.due_ns, self._settle_ns or NEVER_NS, self._exposure_due_ns)
 
@@ -205,7 +205,7 @@ class V4l2Camera:
     def read(self, now_ns: int) -> list[Grab]:
         """Give what has come; a device that fails is closed here and opened anew, now or later."""
         grabs: list[Grab] = []
-        if self._stream is not None and self._life.phase is Phase.STREAMING:
+        if self._stream is not None and self._life.phase is Standing.STREAMING:
             try:
                 grabs = self._take(self._stream, now_ns)
             except OSError as error:
@@ -342,7 +342,7 @@ class V4l2Camera:
         if self._stream is not None:
             self._stream.close()
             self._stream = None
-        if self._life.phase is Phase.CLOSING:
+        if self._life.phase is Standing.CLOSING:
             self._life.closed()
 
     def _try_again(self, now_ns: int) -> None:

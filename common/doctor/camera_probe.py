@@ -24,7 +24,7 @@ from common.doctor.camera_checks import (
     check_taken,
     raw_frame_bytes,
 )
-from common.doctor.finding import Finding, Outcome, fail, ok
+from common.doctor.finding import Finding, Grade, fail, ok
 from common.doctor.unit_check import Unit
 from common.errors import TakenError, TandemError
 from common.frame import Frame
@@ -80,7 +80,7 @@ def _denied(nodes: list[Path], account: Account) -> Iterator[Finding]:
     """What stands in the way of nodes that gave nothing."""
     for path in nodes:
         node = machine.read_node(path)
-        if node is not None and (finding := check_access("permission", node, account)).verdict is Outcome.FAIL:
+        if node is not None and (finding := check_access("permission", node, account)).verdict is Grade.FAIL:
             yield finding
 
 
@@ -108,7 +108,7 @@ def _examine(path: Path, settings: V4l2Settings, account: Account, unit: Unit) -
     yield access
     possible = check_format(str(path), offered, settings.wanted)
     yield possible
-    if possible.verdict is not Outcome.FAIL:
+    if possible.verdict is not Grade.FAIL:
         yield from _streamed(path, node, settings, offered, unit)
 
 

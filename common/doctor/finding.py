@@ -11,7 +11,7 @@ from typing import Any, Final
 CHECK_FAILED: Final = 4
 
 
-class Outcome(Enum):
+class Grade(Enum):
     """How a check came out."""
 
     OK = "ok"
@@ -31,24 +31,24 @@ class Finding:
     """
 
     what: str
-    verdict: Outcome
+    verdict: Grade
     text: str
     remedy: str = ""
 
 
 def ok(what: str, text: str) -> Finding:
     """A thing that is as it should be."""
-    return Finding(what, Outcome.OK, text)
+    return Finding(what, Grade.OK, text)
 
 
 def warn(what: str, text: str, remedy: str) -> Finding:
     """A thing that works badly, or could not be seen."""
-    return Finding(what, Outcome.WARN, text, remedy)
+    return Finding(what, Grade.WARN, text, remedy)
 
 
 def fail(what: str, text: str, remedy: str) -> Finding:
     """A thing without which nothing works."""
-    return Finding(what, Outcome.FAIL, text, remedy)
+    return Finding(what, Grade.FAIL, text, remedy)
 
 
 def table(findings: Sequence[Finding]) -> str:
@@ -63,8 +63,8 @@ def table(findings: Sequence[Finding]) -> str:
 def values(findings: Sequence[Finding]) -> dict[str, Any]:
     """The findings as one JSON object."""
     return {
-        "failed": sum(item.verdict is Outcome.FAIL for item in findings),
-        "warnings": sum(item.verdict is Outcome.WARN for item in findings),
+        "failed": sum(item.verdict is Grade.FAIL for item in findings),
+        "warnings": sum(item.verdict is Grade.WARN for item in findings),
         "checks": [
             {"what": item.what, "verdict": item.verdict.value, "finding": item.text, "remedy": item.remedy}
             for item in findings
@@ -74,4 +74,4 @@ def values(findings: Sequence[Finding]) -> dict[str, Any]:
 
 def exit_code(findings: Sequence[Finding]) -> int:
     """The command's exit code: 0 when nothing failed, warnings or not, else 4."""
-    return CHECK_FAILED if any(item.verdict is Outcome.FAIL for item in findings) else 0
+    return CHECK_FAILED if any(item.verdict is Grade.FAIL for item in findings) else 0

@@ -13,7 +13,7 @@ from typing import Final
 
 from common import now
 from common.camera.base import CameraHealth, Grab, Mode, Offers, Skipped, Spoiled
-from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Phase, Step, Unwanted
+from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Step, Unwanted
 from common.camera.v4l2_stamps import RateMeter
 from common.errors import TandemError, UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat
@@ -304,7 +304,7 @@ class HttpCamera:
             now_ns = now.monotonic_ns()
             if self._life.due(now_ns) is Step.CLOSE:
                 self._tell_lost("no image came any more")
-            return max(0, self._life.due_ns - now_ns) / _S if self._life.phase is Phase.STREAMING else 0.0
+            return max(0, self._life.due_ns - now_ns) / _S if self._life.phase is Standing.STREAMING else 0.0
 
     def _lose(self, loss: Loss, problem: str) -> None:
         with self._lock:
@@ -318,7 +318,7 @@ class HttpCamera:
 
     def _deliver(self, image: Whole) -> None:
         with self._lock:
-            if self._life.phase is not Phase.STREAMING:
+            if self._life.phase is not Standing.STREAMING:
                 return
             size_px = image.width_px, image.height_px
             self._note_size(size_px)
@@ -360,7 +360,7 @@ class HttpCamera:
 
     def _spoil(self, fault: FrameFault) -> None:
         with self._lock:
-            if self._life.phase is not Phase.STREAMING:
+            if self._life.phase is not Standing.STREAMING:
                 return
             self._faults[fault] = self._faults.get(fault, 0) + 1
             sequence, self._sequence = self._sequence, self._sequence + 1

@@ -18,7 +18,7 @@ from common.camera.v4l2_device import capture_nodes
 from common.doctor import machine
 from common.doctor.access import check_access
 from common.doctor.camera_probe import examine_camera
-from common.doctor.finding import Finding, Outcome, fail, ok
+from common.doctor.finding import Finding, Grade, fail, ok
 from common.doctor.machine_checks import check_bluetooth, check_clocks, check_disk, check_power, check_usb_log
 from common.doctor.unit_check import Unit
 from common.errors import TandemError, UnavailableError
@@ -80,7 +80,7 @@ def examine(question: Question) -> list[Finding]:
     findings = [check_python(sys.version_info[:3], sys.platform)]
     packages = [check_package(package) for package in _packages()]
     findings += packages
-    works = all(finding.verdict is not Outcome.FAIL for finding in packages)
+    works = all(finding.verdict is not Grade.FAIL for finding in packages)
     if is_http(question.camera):
         findings.append(_server(question.camera))
     elif question.camera:
@@ -174,7 +174,7 @@ def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> 
     try:
         board = ask_board(uri, wait_s, keys)
     except TandemError as error:
-        return [*findings, Finding("board", Outcome.FAIL, error.problem, error.remedy)]
+        return [*findings, Finding("board", Grade.FAIL, error.problem, error.remedy)]
     if board.answer is Answer.SILENT:
         board = BoardReadings(board.uri, _way(address), board.waited_s)
     return [*findings, check_board(board)]

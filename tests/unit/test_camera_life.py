@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.camera.base import CameraState
-from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Phase, Step, Unwanted
+from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Step, Unwanted
 
 S = 1_000_000_000
 DEVICE = LifeSettings(
@@ -255,7 +255,7 @@ def test_a_steered_camera_is_off_until_its_moment(settings: LifeSettings) -> Non
     assert life.steer(60 * S) is Step.STOP
     assert life.due(60 * S - 1) is Step.NONE
     assert life.due(60 * S) is Step.START
-    assert life.phase is Phase.STREAMING
+    assert life.phase is Standing.STREAMING
     life.lost(Loss.FAILED, 60 * S)
     assert life.steer(61 * S) is Step.NONE
 
@@ -371,7 +371,7 @@ class World:
             self.life.refused(self.now_ns)
             self.rest()
         elif chance is Chance.FRAME and self.is_open:
-            self.was_heard |= self.life.phase is Phase.STREAMING
+            self.was_heard |= self.life.phase is Standing.STREAMING
             self.life.heard(self.now_ns, S // 30)
 
     def order(self, chance: Chance) -> None:

@@ -25,7 +25,7 @@ from common.doctor.camera_checks import (
     check_stream,
     check_taken,
 )
-from common.doctor.finding import Finding, Outcome, exit_code, fail, ok, table, values, warn
+from common.doctor.finding import Finding, Grade, exit_code, fail, ok, table, values, warn
 from common.doctor.machine_checks import (
     Bluetooth,
     Clocks,
@@ -44,7 +44,7 @@ from common.doctor.unit_check import Unit, check_unit
 from common.frame import PixelFormat
 from common.keys import KeyFolder, Peer
 
-OK, WARN, FAIL = Outcome.OK, Outcome.WARN, Outcome.FAIL
+OK, WARN, FAIL = Grade.OK, Grade.WARN, Grade.FAIL
 SERVICE = Account("tandemscan", 995, frozenset({995, 44, 20}), is_me=False)
 ME = Account("me", 1000, frozenset({1000}), is_me=True)
 VIDEO = Node("/dev/video0", 0, 44, "video", 0o660, open_to_me=False)
@@ -127,7 +127,7 @@ def test_an_absent_camera_is_told_from_one_without_driver() -> None:
         (Wanted(pixel_format=PixelFormat.YUYV), FAIL, "MJPG"),
     ],
 )
-def test_what_is_asked_is_held_against_the_offer(wanted: Wanted, verdict: Outcome, word: str) -> None:
+def test_what_is_asked_is_held_against_the_offer(wanted: Wanted, verdict: Grade, word: str) -> None:
     """An offered format is named; of one that is not the finding lists what is."""
     finding = check_format("/dev/video0", OFFERED, wanted)
     assert finding.verdict is verdict
@@ -146,7 +146,7 @@ def test_what_is_asked_is_held_against_the_offer(wanted: Wanted, verdict: Outcom
         (5000, 2, 1920 * 1080 * 2, OK),
     ],
 )
-def test_the_bus_is_judged_by_bytes_a_second(megabits: float, cameras: int, frame_bytes: int, verdict: Outcome) -> None:
+def test_the_bus_is_judged_by_bytes_a_second(megabits: float, cameras: int, frame_bytes: int, verdict: Grade) -> None:
     """30 frames a second against what USB 2.0 (5.6.3) gives one endpoint: 24.576 MB/s at high, 1.023 MB/s at full speed."""
     assert check_bus(UsbBus("1-1", megabits, cameras), frame_bytes, 30.0).verdict is verdict
 
@@ -163,7 +163,7 @@ def test_the_bus_is_judged_by_bytes_a_second(megabits: float, cameras: int, fram
         (replace(SOUND, frames=3, period_ns=None, missed=1), OK, "too few to tell"),
     ],
 )
-def test_a_second_of_frames_is_judged(sample: Sample, verdict: Outcome, word: str) -> None:
+def test_a_second_of_frames_is_judged(sample: Sample, verdict: Grade, word: str) -> None:
     """No sound frame fails; spoiled, missed or slow ones warn; the rate is the measured one."""
     finding = check_stream(sample)[0]
     assert finding.verdict is verdict
@@ -194,7 +194,7 @@ AGENT, OTHER = Holder(412, "board-agent"), Holder(77, "motion")
     ],
 )
 def test_a_taken_camera_is_judged_by_who_has_it(
-    holders: tuple[Holder, ...], status: str, verdict: Outcome, word: str, *, all_seen: bool
+    holders: tuple[Holder, ...], status: str, verdict: Grade, word: str, *, all_seen: bool
 ) -> None:
     """Our own service may have it, if it streams; another program is named; what only root may see is said to be so."""
     finding = check_taken(holders, AGENT.pid, status, all_seen=all_seen)
@@ -216,7 +216,7 @@ def test_a_taken_camera_is_judged_by_who_has_it(
         (LinkReadings("serial:/dev/ttyS0", console=True), FAIL, "console=ttyS0"),
     ],
 )
-def test_a_link_is_judged_by_who_has_it(link: LinkReadings, verdict: Outcome, word: str) -> None:
+def test_a_link_is_judged_by_who_has_it(link: LinkReadings, verdict: Grade, word: str) -> None:
     """Free, ours, another's, a getty's, the console's, or not to be had: each is told, and each fault has its remedy."""
     finding = check_link(link, AGENT.pid)
     assert finding.verdict is verdict
@@ -233,7 +233,7 @@ def test_a_link_is_judged_by_who_has_it(link: LinkReadings, verdict: Outcome, wo
         (Disk("/", 10**9, 1000, counts_files=True, read_only=True), WARN),
     ],
 )
-def test_a_full_or_read_only_disk_warns(disk: Disk, verdict: Outcome) -> None:
+def test_a_full_or_read_only_disk_warns(disk: Disk, verdict: Grade) -> None:
     """Frames need no disk, so nothing here fails; what is short is named."""
     assert check_disk(disk).verdict is verdict
 
@@ -257,7 +257,7 @@ def test_a_full_or_read_only_disk_warns(disk: Disk, verdict: Outcome) -> None:
     ],
 )
 def test_power_is_judged_by_firmware_and_kernel_log(
-    kernel: KernelLog, supply: Supply, verdict: Outcome, word: str
+    kernel: KernelLog, supply: Supply, verdict: Grade, word: str
 ) -> None:
     """Too low now fails, too low before warns with how often and when; what may not be read is said to be so."""
     finding = check_power(kernel, supply)
@@ -276,7 +276,7 @@ def test_power_is_judged_by_firmware_and_kernel_log(
         ("eth0: link up", OK),
     ],
 )
-def test_usb_trouble_in_the_kernel_log_warns(text: str, verdict: Outcome) -> None:
+def test_usb_trouble_in_the_kernel_log_warns(text: str, verdict: Grade) -> None:
     """Resets and errors warn; pulling a device is nobody's fault."""
     assert check_usb_log(log(text)).verdict is verdict
 
@@ -303,7 +303,7 @@ def test_clocks() -> None:
         (Bluetooth(in_python=False, adapters=("hci0",)), False, OK),
     ],
 )
-def test_bluetooth_fails_only_where_a_link_asks_for_it(bluetooth: Bluetooth, verdict: Outcome, *, wanted: bool) -> None:
+def test_bluetooth_fails_only_where_a_link_asks_for_it(bluetooth: Bluetooth, verdict: Grade, *, wanted: bool) -> None:
     """Python's sockets, an adapter, and that it is switched on."""
     assert check_bluetooth(bluetooth, wanted=wanted).verdict is verdict
 
@@ -334,15 +334,15 @@ def unit(**fields: object) -> Unit:
         (Unit("board-agent"), OK, "no systemd"),
     ],
 )
-def test_the_service_is_judged_by_its_state(state: Unit, verdict: Outcome, word: str) -> None:
+def test_the_service_is_judged_by_its_state(state: Unit, verdict: Grade, word: str) -> None:
     """A failing service fails with the way to its reason, a stopped one warns, none at all is fine."""
     finding = check_unit(state)
     assert finding.verdict is verdict
     assert word in finding.text + finding.remedy
 
 
-@given(st.lists(st.tuples(st.sampled_from(Outcome), st.text(max_size=5))))
-def test_exit_code_and_counts_agree(drawn: list[tuple[Outcome, str]]) -> None:
+@given(st.lists(st.tuples(st.sampled_from(Grade), st.text(max_size=5))))
+def test_exit_code_and_counts_agree(drawn: list[tuple[Grade, str]]) -> None:
     """Exit 4 exactly when the object counts a failed check."""
     findings = [Finding("x", verdict, text) for verdict, text in drawn]
     assert (exit_code(findings) == 4) is (values(findings)["failed"] > 0)
@@ -352,20 +352,20 @@ def test_keys_are_judged_without_making_any(tmp_path: Path) -> None:
     """No folder and no host warn, a host is named, files of others and open ones fail; an absent key is not made by looking."""
     me = Account("me", os.geteuid(), frozenset(), is_me=True)
     folder = KeyFolder(tmp_path / "keys")
-    assert check_keys(folder, me).verdict is Outcome.WARN
+    assert check_keys(folder, me).verdict is Grade.WARN
     assert not folder.path.exists()
     folder.path.mkdir(mode=0o700)
-    assert check_keys(folder, me).verdict is Outcome.WARN
+    assert check_keys(folder, me).verdict is Grade.WARN
     assert not list(folder.path.iterdir())
     own = folder.own()
     folder.add(Peer(name="phone", key=own.public, added=""))
     known = check_keys(folder, me)
-    assert known.verdict is Outcome.OK
+    assert known.verdict is Grade.OK
     assert "phone" in known.text
     stranger = check_keys(folder, replace(me, name="tandemscan", uid=os.geteuid() + 1))
-    assert stranger.verdict is Outcome.FAIL
+    assert stranger.verdict is Grade.FAIL
     assert "chown -R tandemscan" in stranger.remedy
     (folder.path / "key").chmod(0o644)
     opened = check_keys(folder, me)
-    assert opened.verdict is Outcome.FAIL
+    assert opened.verdict is Grade.FAIL
     assert "chmod 600" in opened.remedy

@@ -2,7 +2,7 @@
 
 import pytest
 
-from common.doctor.finding import Outcome
+from common.doctor.finding import Grade
 from phone_host.doctor.host_checks import (
     Answer,
     BoardReadings,
@@ -16,11 +16,11 @@ from phone_host.doctor.host_checks import (
     check_rig,
 )
 
-OK, WARN, FAIL = Outcome.OK, Outcome.WARN, Outcome.FAIL
+OK, WARN, FAIL = Grade.OK, Grade.WARN, Grade.FAIL
 
 
 @pytest.mark.parametrize(("version", "verdict"), [((3, 11, 0), OK), ((3, 14, 1), OK), ((3, 10, 12), FAIL)])
-def test_python_must_be_3_11(version: tuple[int, int, int], verdict: Outcome) -> None:
+def test_python_must_be_3_11(version: tuple[int, int, int], verdict: Grade) -> None:
     """Older interpreters fail."""
     assert check_python(version, "linux").verdict is verdict
 
@@ -40,7 +40,7 @@ def test_python_must_be_3_11(version: tuple[int, int, int], verdict: Outcome) ->
         (Package("numpy", "1.26.4", "", "1.24"), OK, "1.26.4"),
     ],
 )
-def test_packages_are_judged_by_version_and_company(package: Package, verdict: Outcome, word: str) -> None:
+def test_packages_are_judged_by_version_and_company(package: Package, verdict: Grade, word: str) -> None:
     """In range is fine, out of range warns, broken or twice fails; the remedy keeps the headless wheel."""
     finding = check_package(package)
     assert finding.verdict is verdict
@@ -61,7 +61,7 @@ def test_packages_are_judged_by_version_and_company(package: Package, verdict: O
         (RigReadings("rig.yaml", "rig.yaml: T is 80 m long", "T is in metres"), FAIL, "metres"),
     ],
 )
-def test_a_rig_must_be_sound_and_fit_the_camera(rig: RigReadings, verdict: Outcome, word: str) -> None:
+def test_a_rig_must_be_sound_and_fit_the_camera(rig: RigReadings, verdict: Grade, word: str) -> None:
     """A good rig names its baseline; a bad file, another image size or a large error are told with the remedy."""
     finding = check_rig(rig)
     assert finding.verdict is verdict
