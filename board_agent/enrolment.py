@@ -4,6 +4,7 @@ Rule: root gives up its rights for those of the folder's owner before it touches
 own, whenever it likes. What answers is that owner's process, and no more is believed of it than what can be printed.
 """
 
+import os
 import stat
 from collections.abc import Iterator
 from contextlib import suppress
@@ -16,6 +17,9 @@ from common import now
 from common.errors import ProtocolError, UnavailableError
 from common.keys import KeyFolder
 from common.link.enrolment_door import CONTROL_PREFIX, DoorState
+
+_LONGEST_FOLDER_BYTES: Final = 107 - len("/pairing-12345678")
+"""What unix(7) leaves for the folder of a socket."""
 
 _ASK_NS: Final = 500_000_000
 _SILENCE_NS: Final = 5_000_000_000
@@ -61,6 +65,11 @@ def follow(keys: KeyFolder, seconds: float) -> Iterator[DoorState]:
 
 def absence(keys: KeyFolder) -> UnavailableError:
     """What is wrong while nobody answers."""
+    if len(os.fsencode(keys.path)) > _LONGEST_FOLDER_BYTES:
+        return UnavailableError(
+            f"the path {keys.path} is too long for a socket in it",
+            "choose a shorter one with --keys, for the service, too",
+        )
     return UnavailableError(
         f"no running board-agent with a secured link uses the keys in {keys.path}",
         "start it with a link such as tcp://*:5555 and a camera plugged in; for the service use sudo",

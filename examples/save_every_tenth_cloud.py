@@ -2,7 +2,7 @@
 
 For example after `phone-host demo`, with the board's side in another terminal (the demo's last lines say how, add --link tcp://127.0.0.1:5555):
 
-    python examples/save_every_tenth_cloud.py tcp://127.0.0.1:5555 'replay:tandemscan-demo/film/right?fps=15&loop=1' tandemscan-demo/rig.yaml
+    python examples/save_every_tenth_cloud.py tcp://127.0.0.1:5555 'replay:out/demo/film/right?fps=15&loop=1' out/demo/rig.yaml
 """
 
 import sys

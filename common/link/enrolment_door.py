@@ -13,6 +13,7 @@ import socket
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import astuple, dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Final, assert_never
 
@@ -42,6 +43,7 @@ _OWNER_NS: Final = 3_000_000_000
 _LAST_PORT: Final = 65535
 
 CONTROL_PREFIX: Final = "pairing-"
+_NAME_DIGITS: Final = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,7 +118,10 @@ class Door:
         self._callers = Callers(self._desk.is_proving)
         self._control = context.socket(zmq.ROUTER)
         self._control.setsockopt(zmq.LINGER, 0)
-        self._bind_control(keys.path / f"{CONTROL_PREFIX}{clean_name(_as_given(links[0]).removeprefix('tcp://'))}")
+        # Its name tells nobody anything and is short: a socket's path has 107 bytes (unix(7)), most of which the folder may take.
+        self._bind_control(
+            keys.path / f"{CONTROL_PREFIX}{sha256(_as_given(links[0]).encode()).hexdigest()[:_NAME_DIGITS]}"
+        )
         self._is_open = False
         self._owner_until_ns = 0
         self._state = self._before = DoorState(
@@ -237,7 +242,8 @@ class Door:
             with self._keys.with_owners_rights():
                 self._control.bind(f"ipc://{path}")
         except zmq.ZMQError as error:
-            _LOG.warning(event("pair_command_off", path=path, problem=error.strerror))
+            remedy = "choose another folder with --keys, of a shorter path if it is too long"
+            _LOG.warning(event("pair_command_off", path=path, problem=error.strerror, remedy=remedy))
         finally:
             os.umask(before)
 

@@ -44,11 +44,13 @@ def pair(stack: ExitStack, folder: Path) -> dict[str, Any]:
     command = ["pair", "--keys", str(folder / "board-keys")]
     owner = stack.enter_context(program("board_agent.cli", command, folder, "owner"))
     shown = "type this code"
-    until(
-        lambda: owner.process.poll() is not None or shown in owner.out.read_text(),
-        "the owner is shown a code, or told why not",
-    )
-    assert shown in owner.out.read_text(), owner.stderr
+    try:
+        until(
+            lambda: owner.process.poll() is not None or shown in owner.out.read_text(),
+            "the owner is shown a code, or told why not",
+        )
+    finally:
+        assert shown in owner.out.read_text(), f"the owner is told: {owner.stderr or 'nothing'}"
     command = [sys.executable, "-P", "-m", "phone_host.cli", "pair", "--keys", str(folder / "keys")]
     pairing = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True

@@ -171,6 +171,16 @@ def test_what_makes_no_sense_is_one_line(module: str, options: list[str], named:
     assert KeyFolder(tmp_path).peers() == ()
 
 
+def test_a_folder_too_deep_for_a_socket_is_named(tmp_path: Path) -> None:
+    """Where no socket's path fits the owner is told so at once, and the wait ends with exit 3."""
+    deep = tmp_path / ("x" * 60) / ("y" * 60)
+    deep.mkdir(parents=True)
+    with program("board_agent.cli", ["pair", "--seconds", "1", "--keys", str(deep)], tmp_path, "deep") as waiting:
+        assert waiting.wait() == 3
+    assert "too long" in waiting.stderr
+    assert "--keys" in waiting.stderr
+
+
 def test_keys_are_shown_and_never_the_secret_one(tmp_path: Path) -> None:
     """`keys` on both sides shows the public key, adds a peer by hand, and prints no secret."""
     folder = KeyFolder(tmp_path / "b")
