@@ -47,6 +47,7 @@ class DemandClock:
         self.labels_board = False
         """Whether the stamps of the board's present life are labels."""
         self._label_offset_ns: int | None = None
+        # Bounded by the credit: the board sends no frame for which the pair queue has no room.
         self._wants: queue.SimpleQueue[_Want | None] = queue.SimpleQueue()
         self._life = 0
         self._expected: int | None = None
