@@ -57,7 +57,9 @@ class Series:
             if self._kept == EXACT:
                 self._kept //= 2
                 self._stride *= 2
-                self._values[: self._kept] = self._values[::2].copy()
+                thinned = np.ones(EXACT, np.int64)  # anew: copies look at the old ones
+                thinned[: self._kept] = self._values[::2]
+                self._values = thinned
             self._values[self._kept] = value
             self._kept += 1
         self._count += 1
@@ -65,9 +67,9 @@ class Series:
         self._max = value if self._max is None else max(self._max, value)
 
     def copy(self) -> "Series":
-        """The same values, which stay as they are now; takes memory for those only, and nothing more can be added beyond EXACT."""
+        """The same values, which stay as they are now; nothing can be added to it. Costs nothing: a value is never changed where it stands."""
         copied = Series.__new__(Series)
-        copied.__dict__ |= self.__dict__ | {"_values": self._values[: self._kept].copy()}
+        copied.__dict__ |= self.__dict__ | {"_values": self._values[: self._kept]}
         return copied
 
     def spread(self, last: int | None = None) -> Spread:
