@@ -310,7 +310,9 @@ def test_a_full_disk_stops_neither_the_stream_nor_the_account(tmp_path: Path) ->
         run = subprocess.run(command, capture_output=True, check=False, timeout=110, text=True)
     assert run.returncode == 4, run.stderr
     assert "Traceback" not in run.stderr
-    assert run.stderr.count("results_not_written") == 1
+    told = [line.partition(" what=")[2].split()[0] for line in run.stderr.splitlines() if "results_not_written" in line]
+    assert sorted(told) == sorted(set(told)), "each trouble is told when it begins"
+    assert "lines" in told
     report = json.loads(run.stdout)
     assert report["pairs"] == 120
     assert report["unwritten"]["pairs"] > 0
