@@ -113,6 +113,7 @@ def depth_errors(skew_s: float) -> tuple[float, float, float]:
     return error_mm(later, MOMENT_S), error_mm(moved, host_s), error_mm(left.frame(host_s), host_s)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("part", [0.5, -0.45])
 def test_depth_of_what_moves_is_right_again(part: float) -> None:
     """At half a period of skew the depth of moving things is off by centimetres; interpolated, or continued, most of that is gone."""

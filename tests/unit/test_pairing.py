@@ -120,12 +120,28 @@ def test_every_frame_leaves_once_and_every_pair_is_sound(
         assert before.board[0] < after.board[0]
 
 
+@pytest.mark.long
 @given(sparse_streams())
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=120)
 def test_sparse_streams_are_paired_best_at_once_and_in_any_order_of_arrival(
     streams: tuple[int, list[int], list[int], list[tuple[bool, int]]],
 ) -> None:
     """Frames further apart than twice the tolerance: as many pairs as possible with the least skew, each at its second frame's arrival."""
+    pair_at_once(streams)
+
+
+@pytest.mark.slow
+@given(sparse_streams())
+@settings(deadline=None, max_examples=2000)
+def test_many_sparse_streams_are_paired_best_at_once(
+    streams: tuple[int, list[int], list[int], list[tuple[bool, int]]],
+) -> None:
+    """The same, for a large sample."""
+    pair_at_once(streams)
+
+
+def pair_at_once(streams: tuple[int, list[int], list[int], list[tuple[bool, int]]]) -> None:
+    """Pair, and compare each moment and the whole with the best there is."""
     tolerance_ns, board, host, arrivals = streams
     pairing: Pairing[int, int] = Pairing(PairingSettings(tolerance_ns, 2 * tolerance_ns + 1, 2 * tolerance_ns + 1))
     account = Account()
@@ -214,6 +230,7 @@ def paired(cameras: Cameras) -> tuple[list[tuple[int, int]], int]:
     return account.pairs, longest_ns
 
 
+@pytest.mark.long
 @given(st.floats(0.2, 1.0), st.floats(0, 1), st.sampled_from([0.0, 0.02, 0.1]), st.integers(0, 2**32))
 @settings(deadline=None, max_examples=100)
 def test_dense_streams_lose_hardly_a_pair_and_wait_a_period_at_most(

@@ -152,6 +152,7 @@ def test_slow_drift_is_corrected_again_and_again() -> None:
     assert 10 <= len(pair.corrections) <= 40
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("follows", "drift"), [(False, 0.0), (True, 3000e-6)])
 def test_a_camera_that_does_not_follow_is_given_up_in_words(follows: bool, drift: float) -> None:  # noqa: FBT001
     """A sensor that runs on through restarts, or drifts away faster than it can be steered, is left alone after six attempts, and the report says so."""
