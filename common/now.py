@@ -44,21 +44,15 @@ class TimeOfDayWatch:
     """
 
     def __init__(self) -> None:
-        self._apart_ns = self._read() or 0
+        self._apart_ns = time.time_ns() - time.monotonic_ns()
 
     def jumped(self) -> bool:
-        """Whether it has."""
-        apart_ns = self._read()
-        if apart_ns is None:
-            return False
-        before_ns, self._apart_ns = self._apart_ns, apart_ns
-        return abs(apart_ns - before_ns) >= _LEAST_SLEEP_NS
-
-    @staticmethod
-    def _read() -> int | None:
-        """Time of day minus CLOCK_MONOTONIC; None where the process was held up between the readings."""
+        """Whether it has; not where the process was held up between two readings of clocks, which would look alike. Asked before each message."""
         before_ns, wall_ns, after_ns = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
-        return wall_ns - before_ns if after_ns - before_ns < _LEAST_SLEEP_NS // 5 else None
+        if after_ns - before_ns >= _LEAST_SLEEP_NS // 5:
+            return False
+        moved_ns, self._apart_ns = wall_ns - before_ns - self._apart_ns, wall_ns - before_ns
+        return not -_LEAST_SLEEP_NS < moved_ns < _LEAST_SLEEP_NS
 
 
 def wall_time() -> str:

@@ -311,11 +311,12 @@ class ZeroMqDialer(_AlwaysReady):
             known.redial(now_ns)
         going_on = True
         while going_on:
-            going_on = False
-            for connection, known in self._connections.items():
-                if is_readable(known.socket):
-                    going_on = True
-                    yield self._received(known, connection, now_ns)
+            while going_on:  # both lanes by turns, then the monitors, each look at which costs some us
+                going_on = False
+                for connection, known in self._connections.items():
+                    if is_readable(known.socket):
+                        going_on = True
+                        yield self._received(known, connection, now_ns)
             for connection, known in self._connections.items():
                 if is_readable(known.monitor):
                     going_on = True

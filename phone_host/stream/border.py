@@ -68,7 +68,7 @@ class Border:
     @property
     def waits_for_echo(self) -> bool:
         """Whether the next echo is wanted as soon as possible."""
-        return self._clock.in_doubt or self._quarantine.held > 0
+        return self._quarantine.held > 0 or self._clock.in_doubt
 
     @property
     def takes_frames(self) -> bool:
@@ -180,16 +180,11 @@ class Border:
             return []
         # Only `sent` is mapped to the host's clock, once, when the frame is believed; the other marks keep their distance to it.
         sent_ns = frame.marks.sent_ns
-        told = estimate.to_host(sent_ns)
+        offset_ns, uncertainty_ns = estimate.offset_at(sent_ns), estimate.uncertainty_at(sent_ns)
         name, asked_px = self._account.links[arrival.link].name, (arrival.camera.width_px, arrival.camera.height_px)
-        marks = frame.marks.moved_to(told.ns)
-        offset_ns = told.ns - sent_ns
-        return [
-            (
-                arrival.link,
-                BoardFrame(frame, name, marks, arrival.received_ns, offset_ns, told.uncertainty_ns, asked_px),
-            )
-        ]
+        marks = frame.marks.moved_to(sent_ns + offset_ns)
+        known = BoardFrame(frame, name, marks, arrival.received_ns, offset_ns, uncertainty_ns, asked_px)
+        return [(arrival.link, known)]
 
     def _doubts(self, arrival: Arrival, estimate: ClockEstimate) -> Disbelief | None:
         frame, camera = arrival.frame, arrival.camera
@@ -199,7 +194,10 @@ class Border:
         if since_ns is not None and frame.marks.exposed_ns < since_ns and not labelled:
             return Disbelief.CLOCK
         arrived_ns = arrival.received_ns - estimate.offset_at(arrival.received_ns - estimate.offset_ns)
-        return disbelief(frame.marks, arrived_ns, estimate.bound_at(arrived_ns), labelled=labelled)
+        # The bound costs some us and is asked for only where it decides: a frame that came after it was sent is within any.
+        newest_ns = max(frame.marks.exposed_ns, frame.marks.grabbed_ns, frame.marks.sent_ns)
+        bound_ns = 0 if newest_ns <= arrived_ns else estimate.bound_at(arrived_ns)
+        return disbelief(frame.marks, arrived_ns, bound_ns, labelled=labelled)
 
     def passed(self, frame: FrameMessage) -> None:
         """Take note of a frame that was given on: until an echo proves it, it counts as suspect."""

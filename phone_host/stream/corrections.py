@@ -19,6 +19,11 @@ class Corrections:
         with self._lock:
             self._later_ns += later_ns
 
+    @property
+    def is_due(self) -> bool:
+        """Whether there is something to carry out; a look without the lock."""
+        return self._later_ns != 0
+
     def take(self) -> int:
         """Give what is due, ns, and forget it: the caller carries it out. 0: nothing is due."""
         with self._lock:

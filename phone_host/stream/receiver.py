@@ -106,6 +106,8 @@ class Receiver:
 
     def steer(self, later_ns: int) -> None:
         """Ask the board's camera to expose later, beside what it is asked already; safe from any thread."""
+        hello = self._reception.hello
+        self._steered_session = "" if hello is None else hello.session
         self._corrections.add(later_ns)
         self.wake()
 
@@ -158,15 +160,15 @@ class Receiver:
                 os.read(self._wake_read, 4096)
         now_ns = now.monotonic_ns()
         self._reception.tick(now_ns)
-        self._hand_on_corrections(now_ns)
+        if self._corrections.is_due:
+            self._hand_on_corrections(now_ns)
 
     def _hand_on_corrections(self, now_ns: int) -> None:
         """Steer the board as was ordered, as soon as a link carries it; what was ordered for an earlier session is void."""
         hello = self._reception.hello
         if hello is None or not self._reception.carrier:
             return
-        session, self._steered_session = self._steered_session, hello.session
-        if (later_ns := self._corrections.take()) and session in {"", hello.session}:
+        if (later_ns := self._corrections.take()) and self._steered_session in {"", hello.session}:
             self._reception.steer(later_ns, now_ns)
 
     def _watch_clock(self) -> None:

@@ -311,7 +311,9 @@ class ClockEstimator:
     @property
     def in_doubt(self) -> bool:
         """Whether echoes contradict each other by more than is harmless, and no later ones have decided yet."""
-        old, new = (None if side is None else side.estimate for side in (self._learned, self._rival))
+        if self._rival is None or self._learned is None:  # asked for each frame
+            return False
+        old, new = self._learned.estimate, self._rival.estimate
         return old is not None and new is not None and may_harm(old, new)
 
     def add(self, echo: Echo) -> Heard:
