@@ -9,13 +9,12 @@ Nothing that arrives is believed: a refusal counts on a lane that this side dial
 only up to that credit. Time in which this process did not run is nobody's silence.
 """
 
-from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Final, assert_never
 
 from common.protocol.absence import Presence
 from common.protocol.host_path import HostPath
+from common.protocol.host_stream import Stream
 from common.protocol.message import (
     BoardCounts,
     BoardHello,
@@ -67,49 +66,6 @@ _FOREIGN_RETRY_NS: Final = 5000 * MS
 
 _TOO_MANY: Final = Unbelievable("an account of more frames than were allowed")
 
-_MOST_MISSING: Final = 64
-"""Lost frames that are remembered, so that one which comes late is not taken for a repetition: more than any link holds."""
-
-
-@dataclass(slots=True)
-class _Stream:
-    """The frames of one life of the board; nothing of it outlives that.
-
-    Attributes:
-        hello: what the board said of itself when its frames were accepted last.
-        changes: how often its camera had been set anew, as far as was told.
-        next_index: of the frame that is expected next.
-        below_index: credit was granted up to here since frames were accepted last.
-        granted_index: the same over the whole life: no honest frame has this index or a higher one.
-        missing: frames that were given up of late.
-    """
-
-    hello: BoardHello
-    changes: int
-    next_index: int
-    below_index: int = 0
-    granted_index: int = 0
-    missing: deque[int] = field(default_factory=lambda: deque(maxlen=_MOST_MISSING))
-
-    def pass_over(self, index: int) -> int:
-        """Give up the frames below an index that have not come; gives how many."""
-        lost = max(0, index - self.next_index)
-        self.missing.extend(range(max(self.next_index, index - _MOST_MISSING), index))
-        self.next_index += lost
-        return lost
-
-    def resume(self, hello: BoardHello) -> int:
-        """Take a hello of the same life. Frames beyond the credit went to another host, which was there between; they are not lost."""
-        lost = self.pass_over(min(hello.counts.sent, self.granted_index))
-        self.next_index = max(self.next_index, hello.counts.sent)
-        self.granted_index = max(self.granted_index, hello.counts.sent)
-        self.below_index = 0
-        return lost
-
-    def can_be(self, counts: BoardCounts) -> bool:
-        """Whether an account can be true: a board sends no more than it is allowed to."""
-        return counts.sent <= self.granted_index
-
 
 class HostSession:
     """A host's view of its board.
@@ -129,7 +85,7 @@ class HostSession:
         self._frames_hello_due_ns = 0
         self._streams = False
         self._leaving = False
-        self._stream: _Stream | None = None
+        self._stream: Stream | None = None
         self._boot_id = ""
         self._presence = Presence()
 
@@ -384,7 +340,7 @@ class HostSession:
         stream = self._stream
         resumed = stream is not None and stream.hello.session == hello.session
         if stream is None or not resumed:
-            lost, stream = 0, _Stream(hello, hello.rung.changes, hello.counts.sent, granted_index=hello.counts.sent)
+            lost, stream = 0, Stream(hello, hello.rung.changes, hello.counts.sent, granted_index=hello.counts.sent)
             self._stream = stream
         else:
             lost = stream.resume(hello)
@@ -470,7 +426,7 @@ class HostSession:
         return [answer, told, Vanished(orderly=can_be)]
 
 
-def _note_rung(stream: _Stream, message: Status | End) -> list[Output]:
+def _note_rung(stream: Stream, message: Status | End) -> list[Output]:
     """Tell of a camera that was set anew, once; accounts on two lanes may overtake each other."""
     if isinstance(message, End) or message.rung.changes <= stream.changes:
         return []
