@@ -74,10 +74,12 @@ class KeyFolder:
 
     Args:
         path: the folder; made with the first file.
+        lock_wait_ns: how long another process that changes it is waited for.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, lock_wait_ns: int = _LOCK_WAIT_NS) -> None:
         self.path = path
+        self._lock_wait_ns = lock_wait_ns
 
     @property
     def has_key(self) -> bool:
@@ -277,7 +279,7 @@ class KeyFolder:
     def _locked(self) -> Iterator[int]:
         """Keep other processes from changing the folder meanwhile."""
         with self._opened(make=True) as folder:
-            until_ns = now.monotonic_ns() + _LOCK_WAIT_NS
+            until_ns = now.monotonic_ns() + self._lock_wait_ns
             while True:
                 try:
                     fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -24,7 +24,9 @@ def runtime_folder(environment: Mapping[str, str]) -> Path:
     with suppress(OSError):
         if given.is_absolute() and _is_own(given.stat()):
             return given
-    folder = Path(tempfile.gettempdir()) / f"tandemscan-{os.geteuid()}"
+    named = Path(environment.get("TMPDIR", ""))
+    temporary = named if named.is_absolute() and named.is_dir() else Path(tempfile.gettempdir())
+    folder = temporary / f"tandemscan-{os.geteuid()}"
     try:
         with suppress(FileExistsError):
             folder.mkdir(mode=0o700)

@@ -207,9 +207,8 @@ def test_an_owner_who_does_not_exist_is_wrong_usage(tmp_path: Path) -> None:
         dial(f"ipc://{tmp_path}/x?owner=no-such-user")
 
 
-def test_the_folder_for_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_folder_for_sockets(tmp_path: Path) -> None:
     """$XDG_RUNTIME_DIR where it is one's own alone; else a folder of mode 0700 among the temporary files, whatever the umask."""
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     own = tmp_path / "run"
     own.mkdir(mode=0o700)
     assert runtime_folder({"XDG_RUNTIME_DIR": str(own)}) == own
@@ -218,7 +217,7 @@ def test_the_folder_for_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     before = os.umask(0)
     try:
         for given in (str(own), "", "relative", str(tmp_path / "nowhere")):
-            assert runtime_folder({"XDG_RUNTIME_DIR": given}) == made
+            assert runtime_folder({"XDG_RUNTIME_DIR": given, "TMPDIR": str(tmp_path)}) == made
     finally:
         os.umask(before)
     assert stat.S_IMODE(made.stat().st_mode) == 0o700
@@ -226,11 +225,8 @@ def test_the_folder_for_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 @needs_root
 @pytest.mark.parametrize("plant", ["link", "file", "foreign", "open"])
-def test_a_folder_for_sockets_that_somebody_has_planted_is_refused(
-    plant: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_for_sockets_that_somebody_has_planted_is_refused(plant: str, tmp_path: Path) -> None:
     """A link, a file, another user's folder or one that others may enter is named with the remedy, and not used."""
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     folder = tmp_path / f"tandemscan-{os.geteuid()}"
     match plant:
         case "link":
@@ -244,7 +240,7 @@ def test_a_folder_for_sockets_that_somebody_has_planted_is_refused(
         case _:
             folder.mkdir(mode=0o755)
     with pytest.raises(UnavailableError, match=f"{folder} .*XDG_RUNTIME_DIR"):
-        runtime_folder({})
+        runtime_folder({"TMPDIR": str(tmp_path)})
 
 
 @needs_root

@@ -257,14 +257,13 @@ def test_a_race_for_the_folder_gives_the_service_nothing(place: Path, folder: Pa
     assert all(path.lstat().st_uid == NOBODY for path in real.iterdir())
 
 
-def test_a_lock_that_is_never_given_back_ends_in_one_line(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lock_that_is_never_given_back_ends_in_one_line(folder: Path) -> None:
     """A service that holds its folder's lock keeps root waiting for a while, not for ever."""
-    monkeypatch.setattr("common.keys._LOCK_WAIT_NS", 10**8)
     descriptor = os.open(folder, os.O_RDONLY)
     fcntl.flock(descriptor, fcntl.LOCK_EX)
     try:
         with pytest.raises(UnavailableError, match="held by another"):
-            KeyFolder(folder).renew()
+            KeyFolder(folder, lock_wait_ns=10**8).renew()
     finally:
         os.close(descriptor)
     KeyFolder(folder).renew()
