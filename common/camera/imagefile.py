@@ -11,7 +11,8 @@ from common.errors import DataError
 from common.files import read_whole
 from common.frame import PixelFormat, SpoiledImageError
 from common.imagesize import ImageHead, ImageKind, read_head
-from common.protocol.wire import MAX_PAYLOAD_BYTES, MAX_SIZE_PX
+from common.protocol.wire import MAX_PAYLOAD_BYTES
+from common.protocol.wire_fields import MAX_SIZE_PX
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,8 @@ from typing import Final
 
 from common.frame import FrameFault
 from common.imagesize import JPEG_FRAME_HEADERS
-from common.protocol.wire import MAX_PAYLOAD_BYTES, MAX_SIZE_PX
+from common.protocol.wire import MAX_PAYLOAD_BYTES
+from common.protocol.wire_fields import MAX_SIZE_PX
 
 MAX_IMAGE_BYTES: Final = MAX_PAYLOAD_BYTES
 

@@ -23,7 +23,7 @@ from common.protocol.message import (
     Rung,
     Status,
 )
-from common.protocol.wire import MAX_SIZE_PX
+from common.protocol.wire_fields import MAX_SIZE_PX
 from tests.support.bombs import LARGE_PX, jpeg_bomb, png_bomb, torn_jpeg
 from tests.support.programs import free_port
 from tests.system.hostile.attack import Attack, Outcome, Rounds

@@ -1,0 +1,129 @@
+"""Fields of a header that are believed: each is checked for type and range, and in its order. No I/O."""
+
+from enum import Enum
+from typing import Any, Final, TypeVar
+
+from common.errors import ProtocolError
+from common.frame import PixelFormat
+from common.protocol.message import BoardCounts, CameraDescription, DropReason, Pacing, Rung, Steering
+
+MAX_SIZE_PX: Final = 16384
+"""Largest width and height of a frame, px: well beyond any camera, and 28 bits for their product."""
+
+MAX_TEXT: Final = 96
+MAX_COUNT: Final = 2**53
+MOST_NS: Final = 2**62
+"""146 years in ns: no honest clock is further from its zero; keeps sums inside 64 bits."""
+
+MAX_PERIOD_NS: Final = 3_600_000_000_000
+"""A frame an hour: what counts as a pair follows from the period, so it is believed only as far as somebody would call it a stream."""
+
+PIXEL_FORMATS: Final = tuple(PixelFormat)
+DROP_REASONS: Final = tuple(DropReason)
+
+E = TypeVar("E", bound=Enum)
+
+
+def bad_field(problem: str) -> ProtocolError:
+    """The error of a field that is not believed."""
+    return ProtocolError(problem, "the packet is dropped; check what else talks to this address")
+
+
+class FieldReader:
+    """Takes checked fields off a header, front to back."""
+
+    def __init__(self, items: list[Any], at: int = 0) -> None:
+        self._items = items
+        self._at = at
+
+    def finish(self) -> None:
+        """Check that nothing is left over."""
+        if self._at != len(self._items):
+            raise bad_field(f"{len(self._items) - self._at} fields too many")
+
+    def count(self) -> int:
+        """A number of things."""
+        return self._integer(0, MAX_COUNT)
+
+    def time_ns(self) -> int:
+        """A moment on some clock, ns."""
+        return self._integer(-MOST_NS, MOST_NS)
+
+    def later_ns(self) -> int:
+        """A length of time, ns."""
+        return self._integer(0, MOST_NS)
+
+    def size_px(self) -> int:
+        """A width or a height, px."""
+        return self._integer(1, MAX_SIZE_PX)
+
+    def text(self) -> str:
+        """A short text."""
+        value = self._next()
+        if type(value) is not str or len(value) > MAX_TEXT:
+            raise bad_field(f"field {self._at} is not a short text")
+        return value
+
+    def enum(self, kind: type[E]) -> E:
+        """A member of an enumeration of numbers."""
+        try:
+            return kind(self._integer(0, MAX_COUNT))
+        except ValueError:
+            raise bad_field(f"field {self._at} is no {kind.__name__}") from None
+
+    def choice(self, options: tuple[E, ...]) -> E:
+        """One of these, by its place."""
+        return options[self._integer(0, len(options) - 1)]
+
+    def camera(self) -> CameraDescription:
+        """What a board says of its camera."""
+        name, width_px, height_px = self.text(), self.size_px(), self.size_px()
+        return CameraDescription(
+            name=name,
+            width_px=width_px,
+            height_px=height_px,
+            pixel_format=self.choice(PIXEL_FORMATS),
+            period_ns=self._integer(1, MAX_PERIOD_NS),
+            pacing=self.enum(Pacing),
+            steering=self.enum(Steering),
+        )
+
+    def counts(self) -> BoardCounts:
+        """A board's account."""
+        grabbed, sent, flat = self.count(), self.count(), self._next()
+        if not isinstance(flat, list) or len(flat) % 2:
+            raise bad_field(f"field {self._at} is no list of drops")
+        inner = FieldReader(flat)
+        return BoardCounts(
+            grabbed, sent, tuple((inner.choice(DROP_REASONS), inner.count()) for _ in range(len(flat) // 2))
+        )
+
+    def rung(self) -> Rung:
+        """How far a board has lowered what its camera gives."""
+        index, last, changes, period_ns = self.count(), self.count(), self.count(), self._integer(1, MAX_PERIOD_NS)
+        quality, width_px, height_px = self.count(), self._integer(0, MAX_SIZE_PX), self._integer(0, MAX_SIZE_PX)
+        return Rung(
+            index=index,
+            last=last,
+            changes=changes,
+            period_ns=period_ns,
+            quality=quality,
+            width_px=width_px,
+            height_px=height_px,
+        )
+
+    def _next(self) -> Any:  # noqa: ANN401 - whatever msgpack found; every caller checks it
+        if self._at >= len(self._items):
+            raise bad_field("fields are missing")
+        self._at += 1
+        return self._items[self._at - 1]
+
+    def _integer(self, low: int, high: int) -> int:
+        at = self._at
+        if at >= len(self._items):
+            raise bad_field("fields are missing")
+        self._at = at + 1
+        value = self._items[at]
+        if type(value) is not int or not low <= value <= high:  # bool is an int to isinstance
+            raise bad_field(f"field {self._at} is no integer in {low}..{high}")
+        return int(value)
