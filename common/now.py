@@ -14,12 +14,16 @@ def monotonic_ns() -> int:
     return time.monotonic_ns()
 
 
+_RUNS_ON: Final = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
+"""The clock that goes on in a suspend; where the kernel has none, no sleep is seen."""
+
+
 def asleep_ns() -> int:
     """How long this machine has slept since it booted, ns: CLOCK_MONOTONIC stands still in a suspend, CLOCK_BOOTTIME goes on.
 
     At most that: what passes between the two readings makes it less, never more. 0 where the kernel has no clock that runs on.
     """
-    return time.clock_gettime_ns(time.CLOCK_BOOTTIME) - time.monotonic_ns() if hasattr(time, "CLOCK_BOOTTIME") else 0
+    return time.clock_gettime_ns(_RUNS_ON) - time.monotonic_ns()
 
 
 class SleepWatch:
@@ -37,22 +41,26 @@ class SleepWatch:
         return slept_ns
 
 
-class TimeOfDayWatch:
-    """Tells when the time of day has jumped against CLOCK_MONOTONIC since it was last asked: it was set, or this machine stood still and was told the time.
+class StandstillWatch:
+    """Tells when this machine's CLOCK_MONOTONIC has, or may have, stood still since it was last asked.
 
-    Only that it jumped is used, never its value. A machine that an emulator stops shows no sleep; where it is given the time again afterwards it shows this.
+    A suspend shows on CLOCK_BOOTTIME. A machine that an emulator stops shows none; where it is given the time again afterwards, the time of day has jumped:
+    only that it did is used, never its value. Asked before each message, so it reads each clock once.
     """
 
     def __init__(self) -> None:
+        self._sleep = SleepWatch()
         self._apart_ns = time.time_ns() - time.monotonic_ns()
 
-    def jumped(self) -> bool:
-        """Whether it has; not where the process was held up between two readings of clocks, which would look alike. Asked before each message."""
-        before_ns, wall_ns, after_ns = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
-        if after_ns - before_ns >= _LEAST_SLEEP_NS // 5:
-            return False
-        moved_ns, self._apart_ns = wall_ns - before_ns - self._apart_ns, wall_ns - before_ns
-        return not -_LEAST_SLEEP_NS < moved_ns < _LEAST_SLEEP_NS
+    def look(self) -> tuple[int, bool]:
+        """Nanoseconds of sleep that were not told yet, and whether the time of day was set; not where the process was held up between two readings."""
+        slept_ns, now_ns, wall_ns = self._sleep.slept_ns(), time.monotonic_ns(), time.time_ns()
+        moved_ns = wall_ns - now_ns - self._apart_ns
+        jumped = not -_LEAST_SLEEP_NS < moved_ns < _LEAST_SLEEP_NS
+        if jumped and time.monotonic_ns() - now_ns >= _LEAST_SLEEP_NS // 5:
+            return slept_ns, False  # looked at again the next time
+        self._apart_ns += moved_ns
+        return slept_ns, jumped
 
 
 def wall_time() -> str:

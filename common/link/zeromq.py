@@ -290,9 +290,9 @@ class ZeroMqDialer(_AlwaysReady):
             self._connections[self.dialled[lane]] = connection
 
     @property
-    def pollables(self) -> Sequence[zmq.Socket[bytes]]:
-        """Both sockets and their monitors."""
-        return tuple(item for known in self._connections.values() for item in (known.socket, known.monitor))
+    def pollables(self) -> Sequence[Any]:
+        """Both sockets, and their monitors' descriptors: only `receive` calls a monitor, so none of its news is taken in by another call."""
+        return tuple(item for known in self._connections.values() for item in (known.socket, known.monitor.fileno()))
 
     @property
     def due_ns(self) -> int:
@@ -311,11 +311,13 @@ class ZeroMqDialer(_AlwaysReady):
             known.redial(now_ns)
         going_on = True
         while going_on:
-            while going_on:  # both lanes by turns, then the monitors, each look at which costs some us
-                going_on = False
-                for connection, known in self._connections.items():
+            going_on = False
+            talking = list(self._connections.items())
+            while talking:  # by turns, for as long as each has something to say: a look costs some us
+                lanes, talking = talking, []
+                for connection, known in lanes:
                     if is_readable(known.socket):
-                        going_on = True
+                        talking.append((connection, known))
                         yield self._received(known, connection, now_ns)
             for connection, known in self._connections.items():
                 if is_readable(known.monitor):

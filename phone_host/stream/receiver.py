@@ -56,7 +56,7 @@ class Receiver:
         self._stopping = False
         self._corrections = Corrections()
         self._steered_session = ""
-        self._sleep, self._time_of_day = now.SleepWatch(), now.TimeOfDayWatch()
+        self._standstill = now.StandstillWatch()
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
         self.failure: Exception | None = None
 
@@ -173,8 +173,8 @@ class Receiver:
 
     def _watch_clock(self) -> None:
         """Notice that this machine's clock has, or may have, stood still, before anything is taken that came meanwhile."""
-        jumped = self._time_of_day.jumped()
-        if slept_ns := self._sleep.slept_ns():
+        slept_ns, jumped = self._standstill.look()
+        if slept_ns:
             self._reception.slept(slept_ns, now.monotonic_ns())
         elif jumped:
             self._reception.doubt_clock(
