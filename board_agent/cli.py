@@ -33,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout not to be had, 4 bad data or a failed check, 130 interrupted.
     """
-    return run_command(_parser(), arguments, _run)
+    return run_command(parser(), arguments, _run)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -48,9 +48,10 @@ def _run(options: argparse.Namespace) -> int:
     return code
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = ExamplesFirstParser("board-agent", description=_EXAMPLES)
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
+def parser() -> argparse.ArgumentParser:
+    """All verbs with their options."""
+    made = ExamplesFirstParser("board-agent", description=_EXAMPLES)
+    verbs = made.add_subparsers(dest="verb", required=True, metavar="VERB")
     run = verbs.add_parser("run", help="serve frames until stopped", description=_EXAMPLES)
     show = verbs.add_parser("settings", help="print each setting with its origin", description=_EXAMPLES)
     cameras = verbs.add_parser("cameras", help="list formats, rates and controls", description=_EXAMPLES)
@@ -88,7 +89,7 @@ def _parser() -> argparse.ArgumentParser:
         verb.add_argument(
             "--log-level", choices=("debug", "info", "warning", "error"), help="how much to log to stderr"
         )
-    return parser
+    return made
 
 
 def _add_keys_options(keys: argparse.ArgumentParser, pair: argparse.ArgumentParser) -> None:
