@@ -341,12 +341,13 @@ def unresolved(code: Code) -> list[str]:
     """Places whose message nobody can tell from the code, as `path:line`."""
     return [
         f"{place.path.relative_to(_ROOT)}:{place.call.lineno}"
-        for place, problems, remedies in _messages(code)
+        for place, problems, remedies in messages(code)
         if not problems or not remedies
     ]
 
 
-def _messages(code: Code) -> Iterator[tuple[Place, list[str], list[str]]]:
+def messages(code: Code) -> Iterator[tuple[Place, list[str], list[str]]]:
+    """Every place that makes an error, with what its problem and its remedy may read."""
     for place in code.calls(list(code.errors)):
         match place.call.args:
             case [ast.Attribute(attr="problem"), _]:
@@ -363,7 +364,7 @@ def _messages(code: Code) -> Iterator[tuple[Place, list[str], list[str]]]:
 def page(code: Code) -> str:
     """The page's text."""
     rooms: dict[str, list[str]] = {room: [] for room, _ in _ROOMS}
-    for place, problems, remedies in _messages(code):
+    for place, problems, remedies in messages(code):
         where = str(place.path.relative_to(_ROOT))
         room = next(room for room, folders in _ROOMS if where.startswith(folders))
         for problem in problems:
