@@ -185,8 +185,10 @@ class Code:
                 return str(constant.value)
             if found := self.texts(place, constant, depth):
                 return found[0]
-        if isinstance(inner, ast.Name) and depth and (told := self._named(place, inner.id, depth - 1)):
-            return max(told, key=len)
+        if isinstance(inner, ast.Name) and depth and place.around is not None:
+            told = [text for value in _reaching(place, inner.id) for text in self.texts(place, value, depth - 1)]
+            if told:
+                return max(told, key=len)
         return word(inner)
 
     def _attributes(self, path: Path, name: str) -> Iterator[tuple[Place, ast.expr]]:
