@@ -186,8 +186,7 @@ class JpegStream:
 
     def _give_up(self, at: int, events: list[Whole | Broken], fault: FrameFault = FrameFault.NO_END) -> bool:
         """What has begun is no image: go on behind the place that was wrong."""
-        if self._phase is not _Phase.BETWEEN:
-            events.append(Broken(fault))
+        events.append(Broken(fault))
         self._drop(at)
         self._phase = _Phase.BETWEEN
         return True

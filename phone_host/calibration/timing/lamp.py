@@ -128,7 +128,7 @@ def _edges(signal: _Signal) -> list[tuple[float, bool]]:
     edges: list[tuple[float, bool]] = []
     times, values = signal.times_s, signal.values
     is_bright = bool(values[0] > 0.5)
-    crossing: float | None = None
+    crossing = math.nan
     for before, after in zip(range(len(times) - 1), range(1, len(times)), strict=True):
         low, high = values[before], values[after]
         if (low <= 0.5) != (high <= 0.5):
@@ -138,7 +138,7 @@ def _edges(signal: _Signal) -> list[tuple[float, bool]]:
         now_bright = bool(high > (_LOW if is_bright else _HIGH))
         if now_bright is not is_bright:
             is_bright = now_bright
-            if crossing is not None and not math.isnan(crossing):
+            if not math.isnan(crossing):
                 edges.append((crossing, is_bright))
     return edges
 
