@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
-from common.frame import PixelFormat
+from common.frame import PixelFormat, raw_bytes
 from phone_host.stereo.raw_images import EncodedImage, decode_frames, decode_raw
 
 _WIDTH, _HEIGHT = 8, 4
@@ -63,3 +63,13 @@ def test_a_raw_and_an_encoded_frame_make_a_pair() -> None:
     png = cv2.imencode(".png", shade)[1].tobytes()
     left, right = decode_frames(_image(shade.tobytes(), PixelFormat.GREY), _image(png, PixelFormat.PNG))
     np.testing.assert_array_equal(left, right)
+
+
+@pytest.mark.parametrize(
+    ("pixel_format", "size_px"), [(PixelFormat.YUYV, (7, 4)), (PixelFormat.NV12, (7, 4)), (PixelFormat.NV12, (8, 3))]
+)
+def test_a_size_that_a_format_cannot_have_is_refused(pixel_format: PixelFormat, size_px: tuple[int, int]) -> None:
+    """Two pixels share their colour in YUYV, two by two in NV12: an odd side cannot be, however many bytes came."""
+    payload = bytes(raw_bytes(pixel_format, *size_px))
+    with pytest.raises(DataError, match=rf"frame 9 is {size_px[0]}x{size_px[1]}, which {pixel_format.value} cannot be"):
+        decode_raw(EncodedImage(payload, pixel_format, *size_px, "frame 9"))
