@@ -14,7 +14,7 @@ FREE = np.array([True] * 8 + [False])
 
 
 def parameters(camera: CameraModel) -> np.ndarray:
-    """fx fy cx cy k1 k2 p1 p2 k3."""
+    """A camera as the adjustment has it: fx fy cx cy k1 k2 p1 p2 k3."""
     (fx, _, cx), (_, fy, cy), _ = camera.matrix
     return np.array([fx, fy, cx, cy, *camera.distortion])
 

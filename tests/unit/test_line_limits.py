@@ -41,7 +41,8 @@ def test_the_round_trip_is_measured_anew_with_the_line_let_run_empty() -> None:
     now_ns = 2 * MS
     window.sent(1, 300, now_ns)
     room = []
-    for number in range(2, 1001):  # a unit of 300 bytes each 11 ms, the next one always written before the last one's word comes
+    # A unit of 300 bytes each 11 ms, the next one always written before word of the last one comes.
+    for number in range(2, 1001):
         now_ns += 11 * MS
         window.tick(now_ns)
         room.append(window.has_room(200))
