@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
-from common.frame import PixelFormat, raw_bytes
+from common.frame import PixelFormat
 from phone_host.stereo.raw_images import EncodedImage, decode_frames, decode_raw
 
 _WIDTH, _HEIGHT = 8, 4
@@ -66,10 +66,12 @@ def test_a_raw_and_an_encoded_frame_make_a_pair() -> None:
 
 
 @pytest.mark.parametrize(
-    ("pixel_format", "size_px"), [(PixelFormat.YUYV, (7, 4)), (PixelFormat.NV12, (7, 4)), (PixelFormat.NV12, (8, 3))]
+    ("pixel_format", "size_px", "size_bytes"),
+    [(PixelFormat.YUYV, (7, 4), 56), (PixelFormat.NV12, (7, 4), 42), (PixelFormat.NV12, (8, 3), 36)],
 )
-def test_a_size_that_a_format_cannot_have_is_refused(pixel_format: PixelFormat, size_px: tuple[int, int]) -> None:
+def test_a_size_that_a_format_cannot_have_is_refused(
+    pixel_format: PixelFormat, size_px: tuple[int, int], size_bytes: int
+) -> None:
     """Two pixels share their colour in YUYV, two by two in NV12: an odd side cannot be, however many bytes came."""
-    payload = bytes(raw_bytes(pixel_format, *size_px))
     with pytest.raises(DataError, match=rf"frame 9 is {size_px[0]}x{size_px[1]}, which {pixel_format.value} cannot be"):
-        decode_raw(EncodedImage(payload, pixel_format, *size_px, "frame 9"))
+        decode_raw(EncodedImage(bytes(size_bytes), pixel_format, *size_px, "frame 9"))
