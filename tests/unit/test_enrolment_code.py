@@ -380,10 +380,14 @@ def test_a_pardon_does_not_spoil_a_proof_under_way() -> None:
     code = start(desk, asking)
     word: Word | None = asking.begin(code)
     outputs: list[Output] = []
+    shown = set()
     while word is not None:
         outputs = desk.receive(b"a", word, 0)
         desk.pardon()
+        if desk.is_proving(b"a"):
+            shown.add(desk.code(0))
         (answer,) = said(outputs)
         word = asking.receive(answer)
     assert Enrolled(HOST) in outputs
     assert asking.proved
+    assert shown == {code}

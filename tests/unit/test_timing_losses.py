@@ -72,16 +72,16 @@ def test_a_pattern_half_out_of_view_or_too_faint_is_not_read() -> None:
 
 # A lamp.
 
-
-def lamp_seen(times_s: Times, late_s: float = 0.0, lost: NDArray[np.bool_] | None = None) -> Brightness:
-    """What a camera with an exposure of no length sees of a lamp that fills the image; frames may be lost."""
-    kept = times_s if lost is None else times_s[~lost]
-    light = 60.0 + 90.0 * (np.searchsorted(SWITCHES_S, kept) % 2)
-    return Brightness(kept + late_s, np.repeat(light[:, np.newaxis], CELLS[0] * CELLS[1], axis=1))
-
-
+Lost = NDArray[np.bool_] | None
 SWITCHES_S = np.cumsum(np.random.default_rng(5).uniform(0.15, 0.6, 30))
 FILM_S = np.arange(0.0, 12.0, 1 / 30)
+
+
+def lamp_seen(times_s: Times, late_s: float = 0.0, *, switches_s: Times | None = None, lost: Lost = None) -> Brightness:
+    """What a camera with an exposure of no length sees of a lamp that fills the image; frames may be lost."""
+    kept = times_s if lost is None else times_s[~lost]
+    light = 60.0 + 90.0 * (np.searchsorted(SWITCHES_S if switches_s is None else switches_s, kept) % 2)
+    return Brightness(kept + late_s, np.repeat(light[:, np.newaxis], CELLS[0] * CELLS[1], axis=1))
 
 
 def test_a_change_that_falls_into_a_gap_counts_for_nothing() -> None:
@@ -93,6 +93,27 @@ def test_a_change_that_falls_into_a_gap_counts_for_nothing() -> None:
     for measured in (whole, holed):
         found, doubt = offset_ms(measured)
         assert abs(found - 25.0) <= doubt < 15.0
+
+
+def test_a_regular_lamp_is_refused_though_a_change_was_missed() -> None:
+    """Two changes that fall into gaps make two pauses of double length: the lamp blinks regularly all the same, and may keep step."""
+    regular_s = 0.021 + np.arange(1, 31) * 0.347
+    gaps = np.abs(FILM_S[:, np.newaxis] - regular_s[[8, 17]]).min(axis=1) < 0.05
+    seen_by_host = lamp_seen(FILM_S + 0.011, 0.025, switches_s=regular_s)
+    with pytest.raises(DataError, match="regularly"):
+        measure_lamp(lamp_seen(FILM_S, switches_s=regular_s, lost=gaps), seen_by_host)
+
+
+def test_a_switch_that_bounces_tells_nothing_where_it_does() -> None:
+    """A swift camera sees every third change three times within 40 ms, a slow one once: which of them it saw is left open, and the others give the offset."""
+    bounces_s = np.sort(np.concatenate([SWITCHES_S, SWITCHES_S[::3] + 0.02, SWITCHES_S[::3] + 0.04]))
+    swift_s = np.arange(0.0, 12.0, 1 / 100)
+    once = measure_lamp(lamp_seen(FILM_S), lamp_seen(swift_s, 0.025))
+    bounced = measure_lamp(lamp_seen(FILM_S), lamp_seen(swift_s, 0.025, switches_s=bounces_s))
+    assert (once.samples, bounced.samples) == (30, 20)
+    for measured in (once, bounced):
+        found, doubt = offset_ms(measured)
+        assert abs(found - 25.0) <= doubt < 30.0
 
 
 def test_films_that_overlap_little_are_compared_where_they_do() -> None:
