@@ -37,7 +37,7 @@ $(PARTS:%=test-%): test-%: $(READY) # one part alone: make test-unit
 test-slow: $(READY) ## the samples that are too large for every day, of which the unit tests draw small ones
 	@$(BIN)/python -m pytest -q -n 2 -m slow tests/unit
 
-coverage: $(READY) ## the unit tests, and which branches of the pure modules none of them takes (CI fails below 98 %)
+coverage: $(READY) ## the unit tests, and which branches of the pure modules none of them takes (CI fails below 98 % of them)
 	@COVERAGE=1 .ci/test unit
 
 test-board: $(READY) ## tests on booted virtual boards (the first time builds their images: apt and root)

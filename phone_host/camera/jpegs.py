@@ -12,7 +12,7 @@ looked at once; never more than MAX_IMAGE_BYTES are kept.
 import re
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Final, assert_never
 
 from common.frame import FrameFault
 from common.imagesize import JPEG_FRAME_HEADERS
@@ -116,6 +116,8 @@ class JpegStream:
                 return self._segment(now_ns, events)
             case _Phase.ENTROPY:
                 return self._entropy()
+            case _:
+                assert_never(self._phase)
 
     def _seek(self, now_ns: int) -> bool:
         found = self._data.find(_BEGIN)
@@ -184,8 +186,7 @@ class JpegStream:
 
     def _give_up(self, at: int, events: list[Whole | Broken], fault: FrameFault = FrameFault.NO_END) -> bool:
         """What has begun is no image: go on behind the place that was wrong."""
-        if self._phase is not _Phase.BETWEEN:
-            events.append(Broken(fault))
+        events.append(Broken(fault))
         self._drop(at)
         self._phase = _Phase.BETWEEN
         return True

@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Final, assert_never
 
 from common.doctor.finding import Finding, fail, ok, warn
 
@@ -161,6 +161,8 @@ def check_board(board: BoardReadings) -> Finding:  # noqa: PLR0911 - one for eac
         case Answer.SILENT:
             remedy = "run board-agent doctor there; is it the right port, and the right end of the cable?"
             return fail("board", f"{board.uri}: no answer within {board.waited_s:g} s", remedy)
+        case _:
+            assert_never(board.answer)
 
 
 def check_ports(ports: tuple[str, ...], problem: str) -> Finding:

@@ -184,6 +184,8 @@ def faces_and_normals(shape: Shape, points: Floats) -> tuple[NDArray[np.int16], 
             normals = np.zeros_like(points)
             normals[axis, each] = side
             return (2 * axis + (side > 0)).astype(np.int16), normals
+        case _:
+            assert_never(shape)
 
 
 def dot(a: Floats, b: Floats) -> Floats:

@@ -248,6 +248,11 @@ def _filled_window(model: CameraModel, rotation: Matrix, side: Side) -> tuple[fl
         return (
             float(left[:, 0].max()), float(top[:, 1].max()), float(right[:, 0].min()), float(bottom[:, 1].min())
         )  # fmt: skip
+    if rotation[2, 2] < math.hypot(rotation[0, 2], rotation[1, 2]):  # its axis leads more aside than forward
+        raise DataError(
+            f"the {side.value} camera looks too far aside of what both cameras could see",
+            f"turn the cameras towards the same scene and {_RECALIBRATE}",
+        )
     raise DataError(
         f"the {side.value} camera's distortion folds back inside its image",
         f"{_RECALIBRATE}, with views that also cover the corners",

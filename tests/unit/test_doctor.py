@@ -177,6 +177,7 @@ def test_stamps_and_refused_controls_have_lines_of_their_own() -> None:
     doubtful = check_stream(replace(SOUND, distrusted=30, stamps=StampClock.UNKNOWN, driver="vivid", refused=2))
     assert [(item.what, item.verdict) for item in doubtful] == [("stream", OK), ("stamps", WARN), ("controls", WARN)]
     assert "unnamed clock" in doubtful[1].text
+    assert "a copied clock" in check_stream(replace(SOUND, stamps=StampClock.COPY))[1].text
     assert len(check_stream(replace(SOUND, frames=0))) == 1
 
 
@@ -369,3 +370,18 @@ def test_keys_are_judged_without_making_any(tmp_path: Path) -> None:
     opened = check_keys(folder, me)
     assert opened.verdict is Grade.FAIL
     assert "chmod 600" in opened.remedy
+
+
+def test_a_log_that_may_not_be_read_is_no_all_clear() -> None:
+    """Where only root may read the kernel's log the check of USB warns, and says how to ask again."""
+    finding = check_usb_log(KernelLog(readable=False))
+    assert (finding.verdict, finding.remedy) == (WARN, "ask again as root: sudo")
+
+
+@pytest.mark.parametrize(
+    ("age_s", "told"), [(119, "119 s ago"), (120, "2 min ago"), (7140, "119 min ago"), (7200, "2 h ago")]
+)
+def test_the_age_of_trouble_is_told_in_a_unit_that_people_read(age_s: float, told: str) -> None:
+    """Seconds below two minutes, minutes below two hours, then hours."""
+    trouble = LogLine(age_s, "usb 1-1: device descriptor read/64, error -71")
+    assert f"once, {told}" in check_usb_log(KernelLog(readable=True, lines=(trouble,))).text

@@ -127,3 +127,13 @@ def test_profiles_are_sound() -> None:
         assert profile.bytes_per_s > 0
         assert profile.byte_loss == 0 or profile.carrier == "serial"
         assert profile.held_bytes >= 2 * SEGMENT_BYTES
+
+
+def test_a_line_without_a_rate_still_holds_no_more_than_a_pipe() -> None:
+    """What adds no time takes 64 KiB, as a pipe of Linux does (pipe(7)), and no more until they were taken."""
+    way: Way[str] = Way(NOTHING)
+    assert way.room_bytes == 65_536
+    way.put("a", bytes(65_000), 5)
+    assert way.room_bytes == 536
+    assert way.take(5) == [("a", bytes(65_000))]
+    assert way.room_bytes == 65_536

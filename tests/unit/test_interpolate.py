@@ -124,3 +124,12 @@ def test_depth_of_what_moves_is_right_again(part: float) -> None:
     assert skewed_mm > 30
     assert interpolated_mm < skewed_mm / 4
     assert best_mm < 5
+
+
+def test_the_second_image_of_a_size_is_moved_like_the_first() -> None:
+    """What is kept of a size between images changes nothing, also when another size came between."""
+    large, small = textured((240, 320)), textured((120, 160))
+    keeps = Interpolator()
+    for picture in (large, large, small, large):
+        later = np.roll(picture, 3, axis=1)
+        np.testing.assert_array_equal(keeps.back(picture, later, 0.4), Interpolator().back(picture, later, 0.4))

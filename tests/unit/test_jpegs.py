@@ -178,3 +178,11 @@ def test_illegal_markers_break_the_image_and_only_that(spoiled: bytes) -> None:
     last = events[-1]
     assert isinstance(last, Whole)
     assert last.payload == IMAGES[0]
+
+
+def test_what_is_no_marker_is_told_with_its_first_byte() -> None:
+    """Where a marker has to stand and another byte comes the image is broken at once, not when more has come; the next one is whole."""
+    stream = JpegStream()
+    assert stream.feed(b"\xff\xd8\xff\xe0\0\4JF", 1) == []
+    assert stream.feed(b"\x20", 2) == [Broken(FrameFault.NO_END)]
+    assert parts(stream, IMAGES[1]) == [IMAGES[1]]

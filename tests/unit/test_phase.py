@@ -199,3 +199,35 @@ def test_frames_from_before_a_correction_say_nothing() -> None:
     for step in range(100):
         old = Phase(12.0 * MS, PERIOD_NS, math.nan, start_ns - 10**8)
         assert controller.update(start_ns + step * 50 * MS, old) is None
+
+
+def corrected(controller: PhaseController, now_ns: int, times: int) -> int:
+    """Let corrections that change nothing follow each other, two seconds apart; gives when the last one was made."""
+    for _ in range(times):
+        now_ns += 2000 * MS
+        assert controller.update(now_ns, Phase(12.0 * MS, PERIOD_NS, math.nan, now_ns)) is not None
+    return now_ns
+
+
+def test_six_corrections_in_vain_are_enough() -> None:
+    """A camera whose phase six corrections have left at 12 ms is steered no more, and what to do instead is said; the phase before is the first one."""
+    controller = PhaseController(Steering.GRID, Steering.NONE, has_phase=True)
+    now_ns = corrected(controller, 10**12, 6) + 2000 * MS
+    assert controller.update(now_ns, Phase(13.0 * MS, PERIOD_NS, math.nan, now_ns)) is None
+    alignment = controller.alignment
+    assert (alignment.state, alignment.corrections) == (Aligning.GIVEN_UP, 6)
+    assert (alignment.before_ns, alignment.after_ns) == (12.0 * MS, 13.0 * MS)
+    assert "13.0 ms" in alignment.words
+    assert "--interpolate" in alignment.words
+
+
+def test_a_camera_that_stayed_in_step_has_all_its_tries_again() -> None:
+    """Five corrections, ten seconds in step, then five more: a camera that drifts slowly is not given up for corrections of long ago."""
+    controller = PhaseController(Steering.GRID, Steering.NONE, has_phase=True)
+    now_ns = corrected(controller, 10**12, 5)
+    for _ in range(12):
+        now_ns += 1000 * MS
+        assert controller.update(now_ns, Phase(0.1 * MS, PERIOD_NS, 0.0, now_ns)) is None
+        assert controller.alignment.state is Aligning.ALIGNED
+    corrected(controller, now_ns, 5)
+    assert controller.alignment.corrections == 10

@@ -367,3 +367,16 @@ def test_finite_plane_is_seen_only_where_it_is() -> None:
     """A plane of 0.4 x 0.2 m at 1 m covers 80 x 40 pixels at f = 200 px; the rest is background."""
     scene = Scene((Body("card", Plane(0.4, 0.2), (0.0, 0.0, 1.0)),))
     assert (~truth(scene, SMALL_VIEW).background).sum() == 80 * 40
+
+
+def test_a_poster_that_moves_close_by_is_drawn_as_if_it_stood_there() -> None:
+    """A wide plane that moves, so near that the ball around it holds the camera, gives the frame of a still one in its place; planes throw no shadows."""
+    base = Scene((Body("wall", Plane(), (0.0, 0.0, 2.5)), Body("ball", Sphere(0.2), (0.3, 0.2, 1.6))))
+    swing = Path((0.1, 0.05, 0.0), (0.0, 0.0, 0.0), 2.0, (0.0, 1.0, 0.0), 0.0)
+    scene = replace(base, bodies=(*base.bodies, Body("poster", Plane(2.4, 0.2), (-0.2, -0.1, 1.0), path=swing)))
+    camera, pose = rectified_cameras(SMALL_VIEW)[0]
+    film = Renderer(scene, camera, pose)
+    for t_s in (0.2, 0.5):
+        difference = np.abs(film.frame(t_s).astype(int) - render(scene.at(t_s), camera, pose).astype(int))
+        assert difference.max() <= 1
+    assert (film.frame(0.5) != film.frame(0.2)).any()

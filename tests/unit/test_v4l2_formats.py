@@ -152,3 +152,26 @@ def test_a_size_must_have_the_rates() -> None:
     assert not has_rates(rates, [Fraction(30), Fraction(10)])
     assert has_rates(Rates(between_hz=(Fraction(1), Fraction(30))), [Fraction(30), Fraction(5, 2)])
     assert not has_rates(Rates(between_hz=(Fraction(1), Fraction(30))), [Fraction(60)])
+
+
+@pytest.mark.parametrize(
+    ("width_px", "height_px", "expected"),
+    [
+        ((16, 320, 2), (16, 240, 2), (320, 240)),
+        ((800, 1920, 2), (600, 1080, 2), (800, 600)),
+        ((40, 1920, 32), (30, 1080, 20), (616, 470)),  # 640 is no 40 + 32 n, 480 no 30 + 20 n
+    ],
+)
+def test_a_scaling_camera_without_the_usual_size_gives_the_nearest(
+    width_px: tuple[int, int, int], height_px: tuple[int, int, int], expected: tuple[int, int]
+) -> None:
+    """Where 640x480 is beyond a scaling camera's sizes, or not on their grid, the largest of them below it is taken, or the smallest there is."""
+    scaling = FormatOffer("YUYV", "", (), SizeRange(width_px, height_px))
+    assert choose((scaling,), Wanted(), "x").size_px == expected
+
+
+def test_the_highest_rate_is_the_first_of_a_list_or_the_end_of_a_range() -> None:
+    """The shortest time that an exposure may take follows from it; a driver that names no rate leaves it open."""
+    assert Rates((Fraction(60), Fraction(30))).highest_hz == 60
+    assert Rates(between_hz=(Fraction(1), Fraction(90))).highest_hz == 90
+    assert Rates().highest_hz is None
