@@ -67,10 +67,11 @@ class Film:
             name = b"p%d" % len(self.pings)
             self.pings[name] = on.now_ns
             on.ends[HOST].put(Lane.CONTROL, name.ljust(30), b"")
-        for _, event in on.came[BOARD][self._seen :]:
+        came = on.came[BOARD]
+        for _, event in came[self._seen :]:
             if isinstance(event, Whole):
                 board.put(Lane.CONTROL, bytes(event.header), b"")
-        self._seen = len(on.came[BOARD])
+        self._seen = len(came)
 
     def round_trips_ns(self, on: VirtualLine, after_ns: int) -> list[int]:
         """How long each echo took."""
