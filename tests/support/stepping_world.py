@@ -89,7 +89,9 @@ class SteppingWorld:
         self.board = Machine(7 * 10**12)
         self.lives = 0
         self.boot_id = "boot"
-        self._wires: dict[tuple[Lane, str], deque[tuple[int, Message]]] = {}
+        self._wires: dict[str, dict[Lane, deque[tuple[int, Message]]]] = {
+            to: {lane: deque() for lane in Lane} for to in ("board", "host")
+        }
         self._outbox: Frame | None = None
         self._sent = self._grabbed = self._sequence = self._host_sequence = 0
         self._board_shot_ns = self._host_shot_ns = self.true_ns
@@ -281,7 +283,7 @@ class SteppingWorld:
         self._board = BoardSession(f"board-{self.lives}", self.boot_id, _CAMERA)
 
     def _wire(self, lane: Lane, to: str) -> deque[tuple[int, Message]]:
-        return self._wires.setdefault((lane, to), deque())
+        return self._wires[to][lane]
 
     def _put(self, lane: Lane, to: str, message: Message) -> None:
         part = self._jitter if isinstance(message, FrameMessage) else self._jitter / 4
@@ -331,8 +333,7 @@ class SteppingWorld:
     def _deliver(self, to: str) -> None:
         if not self._is_there(self.board if to == "board" else self.host):
             return
-        for lane in Lane:
-            wire = self._wire(lane, to)
+        for lane, wire in self._wires[to].items():
             while wire and wire[0][0] <= self.true_ns:
                 _, message = wire.popleft()
                 if to == "board":
@@ -392,7 +393,7 @@ class SteppingWorld:
             self._asked_ns, self._settled_ns = asked_ns, apart_ns
 
     def _judge(self) -> None:
-        while self.queue.counts.waiting:
+        while len(self.queue._fifo):  # its counts would be made anew at each step
             pair = self.queue.take()
             assert pair is not None
             self.pairs += 1

@@ -67,10 +67,11 @@ class Film:
             name = b"p%d" % len(self.pings)
             self.pings[name] = on.now_ns
             on.ends[HOST].put(Lane.CONTROL, name.ljust(30), b"")
-        for _, event in on.came[BOARD][self._seen :]:
+        came = on.came[BOARD]
+        for _, event in came[self._seen :]:
             if isinstance(event, Whole):
                 board.put(Lane.CONTROL, bytes(event.header), b"")
-        self._seen = len(on.came[BOARD])
+        self._seen = len(came)
 
     def round_trips_ns(self, on: VirtualLine, after_ns: int) -> list[int]:
         """How long each echo took."""
@@ -230,7 +231,6 @@ def test_a_lost_chunk_costs_one_frame() -> None:
     assert made.ends[HOST].counts.broken == 1
 
 
-@pytest.mark.long
 def test_acknowledgements_that_all_get_lost_do_not_stop_the_stream() -> None:
     """While the way back is dead little is written; when it lives again the stream is back within a second, with fresh frames."""
     made = line(500_000, MS)
@@ -272,6 +272,7 @@ def test_only_a_silence_that_was_listened_to_gives_a_frame_up() -> None:
         assert listened_ns == S
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("restarts", [BOARD, HOST])
 def test_a_restarted_end_is_met_anew(restarts: LinkEnd) -> None:
     """When either end's program is replaced without a word, the other is told that the first has gone, and packets flow again."""

@@ -256,6 +256,7 @@ def test_no_pair_is_one_that_the_optimum_forbids(tolerance: float, phase: float,
     assert longest_ns == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("tolerance", [0.55, 0.6, 0.75])
 def test_at_half_a_period_the_partner_does_not_flip(tolerance: float) -> None:
     """Cameras exactly half a period apart: jitter favours now the previous, now the next frame, but all pairs stay with one of the two."""

@@ -139,7 +139,6 @@ def test_a_small_phase_is_left_alone() -> None:
     assert math.isnan(pair.controller.alignment.before_ns)
 
 
-@pytest.mark.long
 def test_slow_drift_is_corrected_again_and_again() -> None:
     """Cameras 100 ppm apart are kept within 5 ms for ten minutes by a correction every 40 s or so, without giving up."""
     pair = Pair(
@@ -152,7 +151,6 @@ def test_slow_drift_is_corrected_again_and_again() -> None:
     assert 10 <= len(pair.corrections) <= 40
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("follows", "drift"), [(False, 0.0), (True, 3000e-6)])
 def test_a_camera_that_does_not_follow_is_given_up_in_words(follows: bool, drift: float) -> None:  # noqa: FBT001
     """A sensor that runs on through restarts, or drifts away faster than it can be steered, is left alone after six attempts, and the report says so."""

@@ -54,6 +54,7 @@ def test_who_gives_way_does_not_change_how_many(steps: list[tuple[int, int]], de
     assert kept[0] == kept[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("load", [0.3, 0.6, 0.8])
 def test_mean_wait_of_poisson_arrivals_and_constant_service(load: float) -> None:
     """M/D/1: mean wait = load / (2 (1 - load)) services (Pollaczek-Khinchine with a variance of zero; Kleinrock, Queueing Systems 1, chapter 5)."""
@@ -75,6 +76,7 @@ def test_mean_wait_of_poisson_arrivals_and_drawn_service() -> None:
     assert float((served.start_ns - queued).mean()) == pytest.approx(expected, rel=0.03)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("load", "depth"), [(0.5, 1), (0.9, 2), (1.5, 3)])
 def test_loss_of_a_full_queue_under_poisson_arrivals(load: float, depth: int) -> None:
     """M/M/1/K with K = depth + 1 loses (1 - load) load^K / (1 - load^(K + 1)) of all (Kleinrock, Queueing Systems 1, section 3.6)."""

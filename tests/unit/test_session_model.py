@@ -141,7 +141,7 @@ class Happenings(RuleBasedStateMachine):
         assert unnamed == []
 
 
-TestHappenings = Happenings.TestCase
+TestHappenings = pytest.mark.long(Happenings.TestCase)
 TestHappenings.settings = settings(deadline=None, max_examples=25, stateful_step_count=15)
 
 
@@ -192,6 +192,7 @@ def test_a_board_that_answers_no_echo_is_named() -> None:
     assert world.pairs - before >= 25
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lane", Lane)
 @pytest.mark.parametrize("after_ms", range(0, 150, 15))
 def test_a_connection_that_breaks_in_a_doubt_forgets_no_step(lane: Lane, after_ms: int) -> None:
