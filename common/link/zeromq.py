@@ -13,13 +13,14 @@ import zmq
 from common import now
 from common.errors import UnavailableError
 from common.frame import Buffer
-from common.keys import KeyFolder, OwnKey, Peer
+from common.keys import KeyFolder, OwnKey
 from common.link import gate
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.dialled import Dialled
 from common.link.ipc import check_folder, check_peer, check_socket, let_in, trusted_users
 from common.link.waiter import is_readable
 from common.link.zeromq_address import explained, free_path, plain_endpoint
+from common.peers import Peer
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
 

@@ -42,7 +42,8 @@ from common.doctor.machine_checks import (
 )
 from common.doctor.unit_check import Unit, check_unit
 from common.frame import PixelFormat
-from common.keys import KeyFolder, Peer
+from common.keys import KeyFolder
+from common.peers import Peer
 
 OK, WARN, FAIL = Grade.OK, Grade.WARN, Grade.FAIL
 SERVICE = Account("tandemscan", 995, frozenset({995, 44, 20}), is_me=False)
