@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import DataError
-from common.imagesize import MOST_PIXELS
+from common.imagesize.head import MOST_PIXELS
 from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.target import Board, Corners, agree, find_corners
 from phone_host.calibration.view_files import ViewFiles

@@ -15,7 +15,7 @@ from enum import Enum
 from typing import Final
 
 from common.frame import FrameFault
-from common.imagesize import JPEG_FRAME_HEADERS
+from common.imagesize.jpeg import FRAME_HEADERS
 from common.protocol.wire import MAX_PAYLOAD_BYTES
 from common.protocol.wire_fields import MAX_SIZE_PX
 
@@ -146,7 +146,7 @@ class JpegStream:
         length = int.from_bytes(data[at + 2 : at + 4], "big")
         if length < 2:
             return self._give_up(at, events)
-        if code in JPEG_FRAME_HEADERS:
+        if code in FRAME_HEADERS:
             if len(data) < at + 9:
                 return False
             self._size_px = (int.from_bytes(data[at + 7 : at + 9], "big"), int.from_bytes(data[at + 5 : at + 7], "big"))

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from common.errors import DataError
 from common.frame import Frame
-from common.imagesize import MOST_PIXELS
+from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
 from common.protocol.message import FrameMessage
 from phone_host.model import BoardFrame, FramePair, Image, Processed, RectifiedPair, Side

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from common.imagesize import size_text
+from common.imagesize.head import size_text
 from phone_host.model import CameraModel, Image, Rectification, RectifiedPair, Rig, Side, StereoGeometry
 from phone_host.stereo.images import size_px
 

@@ -7,7 +7,7 @@ import pytest
 from common import now
 from common.errors import DataError
 from common.frame import Frame, FrameFault, ImageSizeError, PixelFormat, SpoiledImageError
-from common.imagesize import MEGAPIXEL
+from common.imagesize.head import MEGAPIXEL
 from common.ledger import BoardMarks
 from common.protocol.message import FrameMessage
 from common.stamp import HOST_CLOCK, Stamp
