@@ -40,7 +40,8 @@ from common.protocol.session import (
 from phone_host.model import BoardFrame
 from phone_host.stream.frame_sink import FrameSink, NoFrames
 from phone_host.stream.pair_queue import PairQueue
-from phone_host.stream.reception import LinkFacts, Reception, refusal_text
+from phone_host.stream.reception import LinkFacts, Reception
+from phone_host.stream.refusals import refusal_text
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.quarantine import Disbelief
 from tests.support.session_world import CAMERA

@@ -20,7 +20,7 @@ from phone_host.measure.trust import (
     unbelieved_concerns,
 )
 from phone_host.model import TimeOffset
-from phone_host.stream.reception import refusal_text
+from phone_host.stream.refusals import refusal_text
 from phone_host.sync.fifo import Overflow
 
 MS: Final = 1_000_000
