@@ -32,7 +32,7 @@ _LEAST_CODE: Final = 0xC0
 """Codes below are reserved (Table B.1)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Whole:
     """An image that came in whole.
 
@@ -176,7 +176,15 @@ class JpegStream:
         width_px, height_px = self._size_px
         if not (1 <= width_px <= MAX_SIZE_PX and 1 <= height_px <= MAX_SIZE_PX):
             return self._give_up(end, events, FrameFault.WRONG_LENGTH)
-        events.append(Whole(bytes(self._data[:end]), width_px, height_px, self._began_ns, now_ns))
+        events.append(
+            Whole(
+                payload=bytes(self._data[:end]),
+                width_px=width_px,
+                height_px=height_px,
+                began_ns=self._began_ns,
+                ended_ns=now_ns,
+            )
+        )
         del self._data[:end]
         self._old_bytes = max(0, self._old_bytes - end)
         self._phase = _Phase.BETWEEN

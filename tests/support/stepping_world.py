@@ -56,7 +56,7 @@ class Machine:
     told: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class WrongPair:
     """A pair whose images were exposed too far apart, although what was known of the clocks said otherwise.
 
@@ -402,7 +402,15 @@ class SteppingWorld:
             if apart_ns > allowed_ns and pair.board.received_ns > self._untold_ns:
                 stepped_ns = self._apart_at_sending[message.session, message.sequence] - self._settled_ns
                 excusable = self.unsettled and abs(stepped_ns) < 2 * PERIOD_NS
-                self.wrong.append(WrongPair(message.session, message.sequence, apart_ns, allowed_ns, excusable))
+                self.wrong.append(
+                    WrongPair(
+                        session=message.session,
+                        sequence=message.sequence,
+                        apart_ns=apart_ns,
+                        allowed_ns=allowed_ns,
+                        excusable=excusable,
+                    )
+                )
 
 
 def _lane(connection: bytes) -> Lane:

@@ -96,7 +96,7 @@ def result(pairs: int = 100, link: str = "tcp") -> CaseResult:
     host = PairCounts(received=102, paired=101, dropped=1, taken=100, board_orphans=(("no_partner", 1),))
     kept, measured_s = after_warm_up([ledger(number) for number in range(pairs)])
     board = BoardAccount(108, 105, (("no_host", 3),))
-    case = Case(Interface(link), Size(640, 480), 80, 30)
+    case = Case(interface=Interface(link), size=Size(640, 480), quality_percent=80, rate_hz=30)
     return CaseResult(
         case=case,
         ledgers=kept,
@@ -380,7 +380,9 @@ def test_page_is_whole_html_and_refers_to_nothing_outside() -> None:
 
     checker = Checker()
     checker.open_tags = []
-    small = dataclasses.replace(result(), case=Case(Interface("tcp"), Size(320, 240), 80, 15))
+    small = dataclasses.replace(
+        result(), case=Case(interface=Interface("tcp"), size=Size(320, 240), quality_percent=80, rate_hz=15)
+    )
     results = [result(), result(link="ipc"), small]
     text = page(results, UNDER, analysed(*results))
     checker.feed(text)
@@ -415,7 +417,15 @@ def test_figure_is_an_svg_file_of_its_own() -> None:
 
 def test_predictions_stand_in_terminal_and_tables_with_reasons_where_there_are_none() -> None:
     """Each run beside its prediction, and what was asked for; a prediction that could not be made says why in its place."""
-    said = Figures(12.5, 0.25, 3e6, 4e6, 5e6, 21e6, 30e6)
+    said = Figures(
+        pairs_per_s=12.5,
+        lost_share=0.25,
+        propagation_p50_ns=3e6,
+        queuing_p95_ns=4e6,
+        starvation_p50_ns=5e6,
+        end_to_end_p50_ns=21e6,
+        end_to_end_p95_ns=30e6,
+    )
     why = Unknown("nothing else was measured")
     checked = analysed(result()).checked[0]
     assert checked.measured.end_to_end_p50_ns == 30e6

@@ -170,7 +170,7 @@ def test_a_camera_that_does_not_follow_is_given_up_in_words(follows: bool, drift
 def test_a_camera_that_falls_silent_is_given_up() -> None:
     """When no frame comes after a correction for ten seconds the controller says so, and steers no more."""
     controller = PhaseController(Steering.GRID, Steering.NONE, has_phase=True)
-    phase = Phase(12.0 * MS, PERIOD_NS, math.nan, 0)
+    phase = Phase(time_skew_ns=12.0 * MS, period_ns=PERIOD_NS, drift=math.nan, first_ns=0)
     assert controller.update(MS, phase) is not None
     assert controller.update(12_000 * MS, None) is None
     assert "no frames came" in controller.alignment.words
@@ -186,7 +186,9 @@ def test_a_camera_that_falls_silent_is_given_up() -> None:
 def test_what_cannot_be_steered_is_said_at_once(ways: tuple[Steering, Steering], has_phase: bool, words: str) -> None:  # noqa: FBT001
     """Without a camera that can be steered, or a phase at all, nothing is tried and the reason is given."""
     controller = PhaseController(*ways, has_phase=has_phase)
-    assert controller.update(10**9, Phase(12.0 * MS, PERIOD_NS, 0.0, 10**9)) is None
+    assert (
+        controller.update(10**9, Phase(time_skew_ns=12.0 * MS, period_ns=PERIOD_NS, drift=0.0, first_ns=10**9)) is None
+    )
     assert controller.alignment.state is Aligning.IMPOSSIBLE
     assert words in controller.alignment.words
 
@@ -195,7 +197,12 @@ def test_frames_from_before_a_correction_say_nothing() -> None:
     """A phase that rests on frames exposed before the last correction took hold leads to no other one."""
     controller = PhaseController(Steering.GRID, Steering.NONE, has_phase=True)
     start_ns = 10**12
-    assert controller.update(start_ns, Phase(12.0 * MS, PERIOD_NS, math.nan, start_ns - 10**9)) is not None
+    assert (
+        controller.update(
+            start_ns, Phase(time_skew_ns=12.0 * MS, period_ns=PERIOD_NS, drift=math.nan, first_ns=start_ns - 10**9)
+        )
+        is not None
+    )
     for step in range(100):
-        old = Phase(12.0 * MS, PERIOD_NS, math.nan, start_ns - 10**8)
+        old = Phase(time_skew_ns=12.0 * MS, period_ns=PERIOD_NS, drift=math.nan, first_ns=start_ns - 10**8)
         assert controller.update(start_ns + step * 50 * MS, old) is None

@@ -15,7 +15,7 @@ _RED = (81, 90, 240)
 
 
 def _image(payload: bytes, pixel_format: PixelFormat) -> EncodedImage:
-    return EncodedImage(payload, pixel_format, _WIDTH, _HEIGHT, "frame 3")
+    return EncodedImage(payload=payload, pixel_format=pixel_format, width_px=_WIDTH, height_px=_HEIGHT, name="frame 3")
 
 
 def _yuyv(y: int, u: int, v: int) -> bytes:

@@ -118,7 +118,7 @@ def data(delays: DelaySeries, **changes: object) -> PageData:
         "subtitle": "",
         "verdict": Headline.GOOD,
         "sentence": "All is well.",
-        "figures": (Figure("Depth error", "3.1", "mm"),),
+        "figures": (Figure(label="Depth error", value="3.1", unit="mm"),),
         "pictures": (Picture("Left", JPEG), Picture("Disparity", PNG)),
         "delays": delays,
     }
@@ -154,7 +154,7 @@ def test_all_text_is_escaped() -> None:
             title=evil,
             subtitle=evil,
             sentence=evil,
-            figures=(Figure(evil, evil, evil, evil),),
+            figures=(Figure(label=evil, value=evil, unit=evil, note=evil),),
             pictures=(Picture(evil, PNG),),
             tables=(Table(evil, (evil,), ((evil,),)),),
             notes=(evil,),
@@ -167,7 +167,7 @@ def test_all_text_is_escaped() -> None:
     # title twice, subtitle, sentence, four of the figure, the caption, three of the table, the note.
     assert parsed.words.count(evil) == 13
     assert evil in Page(legend([(evil, 0)])).words
-    quantity = Quantity(evil, np.ones(3), 0, evil)
+    quantity = Quantity(label=evil, values_ns=np.ones(3), colour=0, meaning=evil)
     for plot in (
         distributions([Strips(evil, (quantity,))], 400),
         stacked_over_time(np.arange(3.0), [quantity], 400),
@@ -252,7 +252,10 @@ def test_several_budgets_share_one_axis() -> None:
 
 def test_stacked_columns_reach_their_sums() -> None:
     """Each layer starts where the one below ends, and heights are proportional to values."""
-    layers = [Quantity("a", np.array([10e6, 20e6]), 0), Quantity("b", np.array([30e6, 20e6]), 1)]
+    layers = [
+        Quantity(label="a", values_ns=np.array([10e6, 20e6]), colour=0),
+        Quantity(label="b", values_ns=np.array([30e6, 20e6]), colour=1),
+    ]
     root = svg(stacked_over_time(np.array([0.0, 1.0]), layers, 500, 260))
     lower, upper = (
         [float(v) for v in re.findall(r"V([\d.]+)", path.get("d", ""))] for path in root.findall("path[@style]")
@@ -268,7 +271,7 @@ def test_many_pairs_become_means_that_still_add_up() -> None:
     """Beyond one pair for three pixels, columns are means over slices of time, weighted they give the mean of all."""
     count = 5000
     values = np.random.default_rng(1).uniform(1e6, 9e6, count)
-    root = svg(stacked_over_time(np.arange(count) / 30.0, [Quantity("a", values, 0)], 500))
+    root = svg(stacked_over_time(np.arange(count) / 30.0, [Quantity(label="a", values_ns=values, colour=0)], 500))
     names = titles(root)
     assert 100 <= len(names) <= 146
     total, pairs = 0.0, 0
@@ -284,7 +287,7 @@ def test_many_pairs_become_means_that_still_add_up() -> None:
 def test_a_gap_in_time_stays_a_gap() -> None:
     """A pause in the stream shows as empty room, not as a column stretched over it."""
     time_s = np.concatenate([np.arange(10.0), 100.0 + np.arange(10.0)])
-    root = svg(stacked_over_time(time_s, [Quantity("a", np.ones(20), 0)], 500))
+    root = svg(stacked_over_time(time_s, [Quantity(label="a", values_ns=np.ones(20), colour=0)], 500))
     widths = [float(hit.get("width", "nan")) for hit in root.findall("rect")]
     # 438 px for 110 s: every column is one second wide.
     assert max(widths) == pytest.approx(438.0 / 110.0, abs=0.1)
@@ -294,7 +297,7 @@ def test_an_outlier_is_cut_off_and_marked() -> None:
     """One pair a hundred times slower than the rest does not flatten them: it is marked with its own value."""
     values = np.full(100, 10e6)
     values[50] = 1000e6
-    root = svg(stacked_over_time(np.arange(100.0), [Quantity("a", values, 0)], 500))
+    root = svg(stacked_over_time(np.arange(100.0), [Quantity(label="a", values_ns=values, colour=0)], 500))
     late = root.findall("path[@class='late']")
     assert [title.text for mark in late for title in mark.iter("title")] == ["1.00\u202fs"]
     tops = [float(v) for v in re.findall(r"V([\d.]+)H", root.findall("path[@style]")[0].get("d", ""))]
@@ -305,7 +308,9 @@ def test_an_outlier_is_cut_off_and_marked() -> None:
 def test_strips_show_the_percentiles() -> None:
     """Bar, median line and numbers stand at the percentiles of the data on the logarithmic axis."""
     values = np.arange(0.0, 1001.0) * 1000.0  # 0 to 1 ms in steps of 1 µs: percentile p is p * 10 µs
-    root = svg(distributions([Strips("tcp", (Quantity("queuing", values, 4, "waiting"),))], 520))
+    root = svg(
+        distributions([Strips("tcp", (Quantity(label="queuing", values_ns=values, colour=4, meaning="waiting"),))], 520)
+    )
     words = " ".join(text.text or "" for text in root.iter("text"))
     assert "tcp" in words
     assert "p50 500 µs · p95 950 µs · p99 990 µs" in words.replace("\u202f", " ")
@@ -324,18 +329,18 @@ def test_strips_show_the_percentiles() -> None:
 
 def test_what_was_not_measured_is_not_drawn() -> None:
     """Only NaN gives `not measured` or an empty plot; NaN among numbers is left out."""
-    nothing = Quantity("offset", np.full(5, np.nan), 0)
+    nothing = Quantity(label="offset", values_ns=np.full(5, np.nan), colour=0)
     assert "not measured" in distributions([Strips("", (nothing,))], 400)
     assert "no pairs" in over_time(np.arange(5.0), nothing, 400)
-    assert "no pairs" in stacked_over_time(np.zeros(0), [Quantity("a", np.zeros(0), 0)], 400)
+    assert "no pairs" in stacked_over_time(np.zeros(0), [Quantity(label="a", values_ns=np.zeros(0), colour=0)], 400)
     assert "nothing measured" in budgets([], 400)
-    some = Quantity("offset", np.array([1.0, np.nan, 3.0]), 0)
+    some = Quantity(label="offset", values_ns=np.array([1.0, np.nan, 3.0]), colour=0)
     assert len(svg(over_time(np.arange(3.0), some, 400)).findall("circle")) == 2
 
 
 def test_signed_values_stand_on_both_sides_of_zero() -> None:
     """Equal skews of either sign stand equally far from the zero line, and later pairs further right."""
-    skew = Quantity("time skew", np.array([-2e5, 2e5, 0.0]), 5)
+    skew = Quantity(label="time skew", values_ns=np.array([-2e5, 2e5, 0.0]), colour=5)
     root = svg(over_time(np.array([0.0, 1.0, 2.0]), skew, 400, band_ns=np.full(3, 5e4)))
     x, y = zip(
         *((float(dot.get("cx", "nan")), float(dot.get("cy", "nan"))) for dot in root.findall("circle")), strict=True
@@ -349,7 +354,7 @@ def test_extremes_survive_thinning() -> None:
     """With more pairs than can be told apart, the least and the greatest value are still drawn."""
     values = np.zeros(10_000)
     values[1234], values[4321] = 5e6, -7e6
-    drawn = " ".join(titles(svg(over_time(np.arange(10_000.0), Quantity("a", values, 0), 340))))
+    drawn = " ".join(titles(svg(over_time(np.arange(10_000.0), Quantity(label="a", values_ns=values, colour=0), 340))))
     assert "5.00\u202fms" in drawn
     assert "-7.00\u202fms" in drawn
 
@@ -393,7 +398,10 @@ def test_ticks_are_round_and_inside(low: float, width: float, count: int) -> Non
 @given(value=st.floats(1e3, 1e9))
 def test_scales_keep_order_and_ends(value: float) -> None:
     """Scales map their ends to their ends, keep values in between, and clamp what lies outside."""
-    for scale in (Linear(1e3, 1e9, 10.0, 110.0), Log(1e3, 1e9, 10.0, 110.0)):
+    for scale in (
+        Linear(low=1e3, high=1e9, start_px=10.0, end_px=110.0),
+        Log(low=1e3, high=1e9, start_px=10.0, end_px=110.0),
+    ):
         assert scale.px(1e3) == pytest.approx(10.0)
         assert scale.px(1e9) == pytest.approx(110.0)
         assert 10.0 <= scale.px(value) <= 110.0
