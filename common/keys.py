@@ -2,8 +2,7 @@
 
 Rules: files are for their owner only (0600 in a folder of 0700) and appear whole or not at all. Root acts here for the service with the
 service's rights (`common.files`): what it writes is the folder's owner's, and what that one may have planted leads nowhere. A file that
-others may read, or that is no key file, is refused with one line: nothing is repaired in silence. Keys are Curve25519 in Z85, as CurveZMQ
-has them (RFC 26, RFC 32).
+others may read, or that is no key file, is refused with one line: nothing is repaired in silence.
 """
 
 import fcntl
@@ -11,54 +10,31 @@ import json
 import os
 import stat
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
-from functools import reduce
 from pathlib import Path
 from typing import Any, Final
 
 from common import now
 from common.errors import DataError, SettingsError, TakenError, UnavailableError
 from common.files import become_owner, opened_folder, read_file, replacing_in
+from common.peers import Peer, clean_name, is_key
 
 SERVICE_FOLDER: Final = Path("/var/lib/tandemscan")
 """Where the board's service keeps its state (StateDirectory= of its unit)."""
-
-MAX_NAME: Final = 64
-"""Longest host name on Linux (HOST_NAME_MAX)."""
 
 _KEY_FILE: Final = "key"
 _PEERS_FILE: Final = "peers.json"
 _CODES_FILE: Final = "spent-codes"
 _CODES_KEPT: Final = 64
 """Codes that were typed last; a board shows one for minutes."""
-_Z85_CHARACTERS: Final = 40
-_Z85_ALPHABET: Final = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.-:+=^!/*?&<>()[]{}@%$#"
-"""RFC 32. A text of 40 of them may still be no 256 bits (each five stand for less than 2^32): see is_key."""
 _MAX_FILE_BYTES: Final = 1 << 20
 """Thousands of peers; more is no file of ours."""
 
 _LOCK_WAIT_NS: Final = 10_000_000_000
 _LOCK_STEP_S: Final = 0.05
 """Who changes the folder holds it for some ms. A service that was taken over may hold it for ever."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Peer:
-    """A machine that this one trusts.
-
-    Attributes:
-        name: by which people know it; unique in a folder.
-        key: its public key, Z85.
-        added: local wall time, ISO 8601.
-        address: link on which a host reaches it; empty for a host.
-    """
-
-    name: str
-    key: str
-    added: str
-    address: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -319,36 +295,6 @@ def usual_keys() -> KeyFolder:
     return KeyFolder(default_folder(os.environ, service=False))
 
 
-def peer_at(peers: Sequence[Peer], address: str) -> Peer | None:
-    """Find who is at an address: whoever was paired there last, else who is named like it, else the only one that there is.
-
-    Args:
-        peers: all that are known.
-        address: `tcp://HOST:PORT`.
-
-    Returns:
-        The peer; its key decides whether it is the right one. None if there are several and none fits.
-    """
-    host = address.partition("://")[2].rpartition(":")[0].lower().removesuffix(".").removesuffix(".local")
-    there = [peer for peer in peers if peer.address == address] or [peer for peer in peers if peer.name.lower() == host]
-    return there[-1] if there else peers[0] if len(peers) == 1 else None
-
-
-def is_key(text: str) -> bool:
-    """Whether a text has the form of a key in Z85."""
-    digits = [_Z85_ALPHABET.find(c) for c in text.encode()]
-    if len(digits) != _Z85_CHARACTERS or -1 in digits:
-        return False
-    groups = (digits[at : at + 5] for at in range(0, len(digits), 5))
-    return all(reduce(lambda value, digit: 85 * value + digit, group, 0) < 2**32 for group in groups)
-
-
-def clean_name(name: str) -> str:
-    """Make a name of what a peer says of itself: letters, digits, dots, hyphens, at most 64; anything else becomes a hyphen."""
-    kept = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in name[:MAX_NAME])
-    return kept.strip(".-") or "unnamed"
-
-
 def _curve() -> Any:  # noqa: ANN401 - a module
     """ZeroMQ, loaded only when a key is made or read: --help and settings need none of it."""
     import zmq  # noqa: PLC0415
@@ -393,50 +339,3 @@ def _unavailable(path: Path, error: OSError) -> UnavailableError:
         if os.geteuid() == 0:  # which has acted for whoever owns the way to it
             remedy = f"give all of it to one user (ls -ld {path} and above), or name another folder with --keys"
     return UnavailableError(f"{path} cannot be used ({error.strerror})", remedy)
-
-
-def change(
-    folder: KeyFolder, *, forget: str | None, new: bool, add: Sequence[str] | None, address: str, when: str
-) -> None:
-    """Do what the options of a `keys` verb ask for.
-
-    Args:
-        folder: the folder.
-        forget: name of a peer to trust no longer; None: nobody.
-        new: whether to make a new key.
-        add: name and public key of a peer to trust; None: nobody.
-        address: link on which that peer listens; empty if it does not.
-        when: local wall time.
-
-    Raises:
-        SettingsError: a name or key makes no sense.
-        DataError: the files are bad.
-        UnavailableError: they cannot be written.
-    """
-    if new:
-        folder.renew()
-    if forget is not None:
-        folder.forget(forget)
-    if add is not None:
-        folder.add(Peer(name=add[0], key=add[1], added=when, address=address))
-
-
-def listing(folder: KeyFolder, *, as_json: bool) -> str:
-    """What a `keys` verb prints: the own public key and who is trusted, never the secret key.
-
-    Args:
-        folder: the folder; its key is made if there is none.
-        as_json: whether as one JSON object; else as lines for people.
-
-    Raises:
-        DataError: the files are bad.
-        UnavailableError: they cannot be read.
-    """
-    own, peers = folder.own(), folder.peers()
-    if as_json:
-        known = [asdict(peer) for peer in peers]
-        return json.dumps({"folder": str(folder.path), "public": own.public, "peers": known})
-    rows = [(peer.name, peer.key, peer.added, peer.address) for peer in peers]
-    widths = [max((len(row[column]) for row in rows), default=0) for column in range(4)]
-    lines = ["  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join((f"folder  {folder.path}", f"public  {own.public}", *(lines or ["nobody is known yet"])))

@@ -6,7 +6,7 @@ Light: help is made of it. What the values must be is checked in `settings`.
 from dataclasses import dataclass
 from typing import Final
 
-from common.imagesize import MEGAPIXEL, MOST_PIXELS
+from common.imagesize.head import MEGAPIXEL, MOST_PIXELS
 from common.program.declaration import setting
 
 _USUAL_MEGAPIXELS: Final = MOST_PIXELS // MEGAPIXEL

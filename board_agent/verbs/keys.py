@@ -5,7 +5,7 @@ import sys
 
 from board_agent.settings import chosen_keys
 from common import now
-from common.keys import change, listing
+from common.keys_verb import change, listing
 
 
 def run(options: argparse.Namespace) -> int:

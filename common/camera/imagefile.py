@@ -10,7 +10,8 @@ from typing import Final
 from common.errors import DataError
 from common.files import read_whole
 from common.frame import PixelFormat, SpoiledImageError
-from common.imagesize import ImageHead, ImageKind, read_head
+from common.imagesize.head import ImageHead, ImageKind
+from common.imagesize.read import read_head
 from common.protocol.wire import MAX_PAYLOAD_BYTES
 from common.protocol.wire_fields import MAX_SIZE_PX
 

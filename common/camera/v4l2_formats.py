@@ -75,7 +75,7 @@ class Rates:
         return " to ".join(rate_text(rate) for rate in self.between_hz) if self.between_hz else "unknown"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FormatOffer:
     """One encoding of a camera.
 

@@ -13,8 +13,9 @@ from zmq.utils import z85
 
 from common import now
 from common.errors import TandemError
-from common.keys import KeyFolder, OwnKey, Peer
+from common.keys import KeyFolder, OwnKey
 from common.link.waiter import is_readable
+from common.peers import Peer
 from common.program.logs import event
 from common.protocol import zap
 

@@ -23,10 +23,11 @@ from zmq.utils import z85
 
 from common import now
 from common.errors import ProtocolError, SettingsError, TandemError
-from common.keys import KeyFolder, Peer, clean_name
+from common.keys import KeyFolder
 from common.link.callers import Call, Callers, Left, Nonsense, Said
 from common.link.curve import Guard, Seldom
 from common.link.waiter import is_readable
+from common.peers import Peer, clean_name
 from common.program.logs import event
 from common.protocol.enrolment_code import Desk, Enrolled, Failed, Output, Say, ShowCode, code_text
 from common.protocol.enrolment_words import Denial, Identity, Refuse

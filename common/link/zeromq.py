@@ -13,13 +13,14 @@ import zmq
 from common import now
 from common.errors import UnavailableError
 from common.frame import Buffer
-from common.keys import KeyFolder, OwnKey, Peer
+from common.keys import KeyFolder, OwnKey
 from common.link import gate
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.dialled import Dialled
 from common.link.ipc import check_folder, check_peer, check_socket, let_in, trusted_users
 from common.link.waiter import is_readable
 from common.link.zeromq_address import explained, free_path, plain_endpoint
+from common.peers import Peer
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
 
@@ -306,7 +307,7 @@ class ZeroMqDialer(_AlwaysReady):
             UnavailableError: the peer does not talk to us, or only with keys, or is another user's; it is dialled again later.
         """
         now_ns = now.monotonic_ns()
-        broken = []
+        broken, refused = [], None
         for known in self._connections.values():
             known.redial(now_ns)
         going_on = True
@@ -322,8 +323,13 @@ class ZeroMqDialer(_AlwaysReady):
             for connection, known in self._connections.items():
                 if is_readable(known.monitor):
                     going_on = True
-                    if known.broke(now_ns):
-                        broken.append(Broken(connection))
+                    try:
+                        if known.broke(now_ns):
+                            broken.append(Broken(connection))
+                    except UnavailableError as error:
+                        refused = error  # for when no news is left: a monitor wakes nobody a second time
+        if refused is not None:
+            raise refused
         yield from broken
 
     def _received(self, known: Dialled, connection: bytes, now_ns: int) -> Incoming:

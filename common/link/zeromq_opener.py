@@ -1,9 +1,10 @@
 """Opens ZeroMQ links: with keys where tcp leaves this machine, or where the peer at an address is known."""
 
 from common.errors import SettingsError, UnavailableError
-from common.keys import KeyFolder, Peer, peer_at
+from common.keys import KeyFolder
 from common.link.uri import LinkRequest, LinkUri, needs_keys
 from common.link.zeromq import ZeroMqDialer, ZeroMqListener
+from common.peers import Peer, peer_at
 
 
 def open_zeromq(request: LinkRequest) -> ZeroMqListener | ZeroMqDialer:

@@ -161,7 +161,7 @@ class Cutter:
         size = 0
         if self._acknowledge is not None:
             parts += unit_parts(
-                self._side, Unit(UnitKind.ACK, first=True, last=True, number=self._acknowledge, body=b"")
+                self._side, Unit(kind=UnitKind.ACK, first=True, last=True, number=self._acknowledge, body=b"")
             )
             self._acknowledge = None
         while size < _BATCH_BYTES and control:
@@ -184,7 +184,9 @@ class Cutter:
         body, first, last = queue[0].take(count)
         if last:
             queue.popleft()
-        parts += unit_parts(self._side, Unit(_KIND_OF[lane], first, last, self._numbers[lane], body))
+        parts += unit_parts(
+            self._side, Unit(kind=_KIND_OF[lane], first=first, last=last, number=self._numbers[lane], body=body)
+        )
         self._numbers[lane] = (self._numbers[lane] + 1) % _NUMBERS
         return len(body) + UNIT_OVERHEAD_BYTES
 

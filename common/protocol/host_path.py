@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from common.protocol.message import BoardHello, HostHello, Lane
+from common.protocol.message import BoardHello, HostHello, Knock, Lane
 from common.protocol.session import HELLO_RETRY_NS, MS, SILENCE_NS, TAKEOVER_NS, Outgoing
 from common.protocol.waves import Waves
 
@@ -48,6 +48,30 @@ class HostPath:
         """
         same_boot = self.hello is not None and self.hello.boot_id == hello.boot_id
         return not same_boot or now_ns - self.heard_ns < TAKEOVER_NS
+
+    def lane_of(self, connection: bytes, knock: Knock, now_ns: int) -> Lane | None:
+        """The lane that a knock speaks for; a board that dials names it itself.
+
+        Args:
+            connection: where it came from.
+            knock: what came.
+            now_ns: host's clock, ns.
+
+        Returns:
+            The lane; None if a second board knocks while the first is alive.
+        """
+        lane = next((lane for lane, known in self.lanes.items() if known == connection), None)
+        if lane is None:  # a board that dials
+            if self.is_open and knock.session != self.session and now_ns - self.heard_ns < TAKEOVER_NS:
+                return None
+            lane = knock.lane
+            self.lanes[lane] = connection
+        elif lane is Lane.FRAMES and knock.lane is Lane.CONTROL and not self.dialled:
+            # It had been taken for the other one.
+            del self.lanes[lane]
+            lane = Lane.CONTROL
+            self.lanes[lane] = connection
+        return lane
 
     def open(self, hello: BoardHello, now_ns: int) -> None:
         """Take note that our board answers."""

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Final, assert_never
 
 from common.protocol.absence import Presence
+from common.protocol.host_carriage import Carriage
 from common.protocol.host_path import HostPath
 from common.protocol.host_stream import Stream
 from common.protocol.message import (
@@ -53,14 +54,6 @@ from common.protocol.session import (
     Vanished,
 )
 
-_NEVER: Final = 2**63 - 1
-
-STUCK_NS: Final = 1000 * MS
-"""A link whose frames' lane leaves a hello unanswered for this long gives way to another: five hellos."""
-
-SILENCE_BESIDE_NS: Final = 1500 * MS
-"""The carrier is lost when unheard for this long while another link was heard: three accounts of the board and three waves have not come."""
-
 _FOREIGN_RETRY_NS: Final = 5000 * MS
 """A link that leads to another board, or is refused beside one that is not, is asked again after this time: the cable may be moved."""
 
@@ -78,11 +71,7 @@ class HostSession:
     def __init__(self, host_id: str, links: Sequence[dict[Lane, bytes]]) -> None:
         self._host_id = host_id
         self._paths = tuple(HostPath(link, dialled) for link, dialled in enumerate(links))
-        self._carrier: HostPath | None = None
-        self._wanted: HostPath | None = None
-        self._pending = False
-        self._pending_since_ns = 0
-        self._frames_hello_due_ns = 0
+        self._carriage = Carriage(host_id, self._paths)
         self._streams = False
         self._leaving = False
         self._stream: Stream | None = None
@@ -92,12 +81,13 @@ class HostSession:
     @property
     def is_open(self) -> bool:
         """Whether a board sends its frames to us now."""
-        return self._carrier is not None
+        return self._carriage.carrier is not None
 
     @property
     def carrier(self) -> int | None:
         """The link that frames come over now."""
-        return None if self._carrier is None else self._carrier.link
+        carrier = self._carriage.carrier
+        return None if carrier is None else carrier.link
 
     @property
     def outstanding(self) -> int:
@@ -108,8 +98,7 @@ class HostSession:
     @property
     def due_ns(self) -> int:
         """When `tick` wants to be called next, host's clock, ns."""
-        due_ns = min(path.due_ns for path in self._paths)
-        return min(due_ns, self._frames_hello_due_ns) if self._pending else due_ns
+        return min((self._carriage.due_ns, *(path.due_ns for path in self._paths)))
 
     def receive(  # noqa: PLR0911 - one line for each kind of message
         self, connection: bytes, message: Message, now_ns: int
@@ -155,16 +144,14 @@ class HostSession:
         self._notice_absence(now_ns)
         outputs: list[Output] = []
         for path in self._paths:
-            if path.is_open and self._is_silent(path, now_ns):
+            if path.is_open and self._carriage.is_silent(path, now_ns):
                 outputs += self._lose(path, now_ns)
         for path in self._paths:
             if not path.is_open:
                 outputs += path.greet(self._host_id, now_ns)
             elif now_ns >= path.waves.due_ns:
                 outputs += self._begin_wave(path, now_ns)
-        if self._pending and now_ns >= self._frames_hello_due_ns:
-            outputs += self._insist(now_ns)
-        return outputs
+        return outputs + self._carriage.tick(now_ns)
 
     def carry(self, link: int, now_ns: int) -> list[Output]:
         """Let frames come over that link from now on; until the board has agreed they come as before.
@@ -174,7 +161,7 @@ class HostSession:
             now_ns: host's clock, ns.
         """
         path = self._paths[link]
-        return self._want(path, now_ns) if path.is_open and path is not self._wanted else []
+        return self._carriage.want(path, now_ns) if path.is_open and path is not self._carriage.wanted else []
 
     def grant(self, slots: int) -> list[Output]:
         """Let the board have credit for this many frames beyond the last one that came; credit is never taken back.
@@ -182,12 +169,12 @@ class HostSession:
         Args:
             slots: free places for frames now.
         """
-        stream = self._stream
-        if self._carrier is None or stream is None or stream.next_index + slots <= stream.below_index:
+        carrier, stream = self._carriage.carrier, self._stream
+        if carrier is None or stream is None or stream.next_index + slots <= stream.below_index:
             return []
         below_index = stream.below_index = stream.next_index + slots
         stream.granted_index = max(stream.granted_index, below_index)
-        return [Outgoing(self._carrier.lanes[Lane.CONTROL], Credit(below_index))]
+        return [Outgoing(carrier.lanes[Lane.CONTROL], Credit(below_index))]
 
     def steer(self, later_ns: int) -> list[Output]:
         """Ask the board's camera to expose later.
@@ -195,7 +182,8 @@ class HostSession:
         Args:
             later_ns: by how much, less than its period.
         """
-        return [] if self._carrier is None else [Outgoing(self._carrier.lanes[Lane.CONTROL], Steer(later_ns))]
+        carrier = self._carriage.carrier
+        return [] if carrier is None else [Outgoing(carrier.lanes[Lane.CONTROL], Steer(later_ns))]
 
     def probe(self, now_ns: int) -> None:
         """Let the next echoes be asked for as soon as the lines permit: something waits for an answer that is younger than itself."""
@@ -212,7 +200,7 @@ class HostSession:
         for path in self._paths:
             if path.is_open:
                 path.waves.open(now_ns)
-        return [] if self._wanted is None else self._want(self._wanted, now_ns)
+        return self._carriage.want_again(now_ns)
 
     def interrupted(self, connection: bytes, now_ns: int) -> list[Output]:
         """Take note that a connection broke: what was under way on it is gone, so its link's lanes are greeted anew."""
@@ -226,24 +214,15 @@ class HostSession:
     # Links that come and go.
 
     def _answer_knock(self, path: HostPath, connection: bytes, knock: Knock, now_ns: int) -> list[Output]:
-        lane = next((lane for lane, known in path.lanes.items() if known == connection), None)
-        if lane is None:  # a board that dials
-            if path.is_open and knock.session != path.session and now_ns - path.heard_ns < TAKEOVER_NS:
-                return []  # a second board; the first is alive
-            lane = knock.lane
-            path.lanes[lane] = connection
-        elif (
-            lane is Lane.FRAMES and knock.lane is Lane.CONTROL and not path.dialled
-        ):  # it had been taken for the other one
-            del path.lanes[lane]
-            lane = Lane.CONTROL
-            path.lanes[lane] = connection
+        lane = path.lane_of(connection, knock, now_ns)
+        if lane is None:
+            return []
         if lane is Lane.FRAMES and path.is_open:
-            return self._want(path, now_ns) if path is self._wanted else []
+            return self._carriage.want(path, now_ns) if path is self._carriage.wanted else []
         if path.is_open and knock.session == path.session and knock.lane is Lane.FRAMES:
             # The board knows us and has lost its frames' lane, which it says on all others; the carrier has to answer then, or gives way.
             path.heard_ns = now_ns
-            return [] if self._wanted is None or self._pending else self._want(self._wanted, now_ns)
+            return [] if self._carriage.pending else self._carriage.want_again(now_ns)
         # The board has forgotten us: for a while one of the two was not there, and its clock may have stood still meanwhile.
         void: list[Output] = [ClockVoid()] if path.is_open and knock.session == path.session else []
         return void + self._lose(path, now_ns)
@@ -255,7 +234,7 @@ class HostSession:
             return
         for path in self._paths:
             path.heard_ns = min(now_ns, path.heard_ns + absent_ns)
-        self._pending_since_ns = min(now_ns, self._pending_since_ns + absent_ns)
+        self._carriage.absent(absent_ns, now_ns)
 
     def _open(self, path: HostPath, hello: BoardHello, now_ns: int) -> list[Output]:
         """Take a board's hello on a control lane."""
@@ -272,7 +251,7 @@ class HostSession:
         path.open(hello, now_ns)
         self._boot_id = hello.boot_id
         outputs.append(LinkUp(path.link, hello))
-        return outputs if self._wanted is not None else outputs + self._want(path, now_ns)
+        return outputs if self._carriage.wanted is not None else outputs + self._carriage.want(path, now_ns)
 
     def _doubt(self, path: HostPath, hello: BoardHello, others_heard_ns: int, now_ns: int) -> list[Output]:
         """A link leads to another life of a board than the others do: it is new, and those will fall silent, or it is another board."""
@@ -284,49 +263,18 @@ class HostSession:
         path.shut(now_ns + _FOREIGN_RETRY_NS)
         return [Outgoing(path.lanes[Lane.CONTROL], Bye()), OtherBoard(path.link, hello)]
 
-    def _is_silent(self, path: HostPath, now_ns: int) -> bool:
-        """Whether a link has been silent for too long: the carrier sooner than others, because frames have to go on."""
-        if now_ns - path.heard_ns >= path.silence_ns:
-            return True
-        return path is self._carrier and any(
-            other.is_open and other.heard_ns - path.heard_ns >= SILENCE_BESIDE_NS for other in self._paths
-        )
-
     def _lose(self, path: HostPath, now_ns: int) -> list[Output]:
         """A link is lost: it is greeted anew, and frames come over another one if there is one."""
         outputs: list[Output] = [LinkDown(path.link)] if path.is_open else []
         path.shut(now_ns)
         outputs += path.greet(self._host_id, now_ns)
-        if self._carrier is path:
-            self._carrier = None
-        if self._wanted is path:
-            self._wanted, self._pending = None, False
-            following = self._carrier or next((other for other in self._paths if other.is_open), None)
-            if following is not None:
-                return outputs + self._want(following, now_ns)
-        if self._streams and self._wanted is None:
+        outputs += self._carriage.lose(path, now_ns)
+        if self._streams and self._carriage.wanted is None:
             self._streams = False
             outputs.append(Vanished(orderly=False))
         return outputs
 
     # Frames' lane.
-
-    def _want(self, path: HostPath, now_ns: int) -> list[Output]:
-        self._wanted, self._pending, self._pending_since_ns = path, True, now_ns
-        return self._insist(now_ns)
-
-    def _insist(self, now_ns: int) -> list[Output]:
-        """Say hello for frames where they are wanted, or give that link up for another."""
-        assert self._wanted is not None
-        wanted = self._wanted
-        others = [path for path in self._paths if path.is_open and path is not wanted]
-        if others and now_ns - self._pending_since_ns >= STUCK_NS:
-            if self._carrier is wanted:
-                self._carrier = None
-            after = [path for path in others if path.link > wanted.link]
-            return [LinkDown(wanted.link, stuck=True), *self._want(self._carrier or (after or others)[0], now_ns)]
-        self._frames_hello_due_ns = now_ns + HELLO_RETRY_NS
-        return [*wanted.say_hello(self._host_id, Lane.FRAMES)]
 
     def _accept(self, path: HostPath, hello: BoardHello, now_ns: int) -> list[Output]:
         """Take a board's hello on a frames' lane."""
@@ -334,9 +282,9 @@ class HostSession:
             return []
         if (path.hello.session, path.hello.boot_id) != (hello.session, hello.boot_id):
             return self._lose(path, now_ns)  # the board began a new life between the two lanes, or slept
-        if path is not self._wanted:
+        if path is not self._carriage.wanted:
             # The answer to a hello of a while ago: the board may send its frames there now.
-            return [] if self._wanted is None else self._want(self._wanted, now_ns)
+            return self._carriage.want_again(now_ns)
         stream = self._stream
         resumed = stream is not None and stream.hello.session == hello.session
         if stream is None or not resumed:
@@ -345,9 +293,10 @@ class HostSession:
         else:
             lost = stream.resume(hello)
         path.heard_ns = now_ns
-        if not self._pending and resumed:  # the answer to a hello that was said twice: credit is void once more
+        if resumed and not self._carriage.pending:  # the answer to a hello said twice: credit is void once more
             return [Counted(hello.counts, ended=False, lost=lost)]
-        self._carrier, self._pending, self._streams = path, False, True
+        self._carriage.agree(path)
+        self._streams = True
         stream.hello, stream.changes = hello, hello.rung.changes
         return [Accepted(hello=hello, resumed=resumed, lost=lost, link=path.link)]
 
@@ -357,30 +306,24 @@ class HostSession:
             return [Stale(frame, StaleReason.OLD_SESSION)]
         if stream.hello.boot_id != self._boot_id:
             return [Stale(frame, StaleReason.OLD_SESSION)]  # sent before a sleep; its marks are of the clock before
-        index = frame.sent_index
-        if index >= stream.granted_index:
-            return [Stale(frame, StaleReason.BEYOND_CREDIT)]
-        if index < stream.next_index:
-            if index not in stream.missing:
-                return [Stale(frame, StaleReason.DUPLICATE)]
-            stream.missing.remove(index)
-            return [Stale(frame, StaleReason.LATE)]
-        lost = stream.pass_over(index)
-        stream.next_index = index + 1
+        taken = stream.take(frame.sent_index)
+        if isinstance(taken, StaleReason):
+            return [Stale(frame, taken)]
         if not path.is_open:
             path.lived(now_ns)
         path.heard_ns = now_ns
-        return [Arrived(frame, lost, path.link)]
+        return [Arrived(frame, taken, path.link)]
 
     # Accounts and echoes.
 
     def _begin_wave(self, path: HostPath, now_ns: int) -> list[Output]:
         control = path.lanes[Lane.CONTROL]
-        echoes, ping = path.waves.begin_wave(now_ns, standby=path is not self._carrier)
+        carrier = self._carriage.carrier
+        echoes, ping = path.waves.begin_wave(now_ns, standby=path is not carrier)
         if ping is None:
             return []
         # Credit is granted up to an index, so repeating it is harmless and mends one that a broken connection swallowed.
-        below_index = 0 if path is not self._carrier or self._stream is None else self._stream.below_index
+        below_index = 0 if path is not carrier or self._stream is None else self._stream.below_index
         return [*echoes, Outgoing(control, ping), *([Outgoing(control, Credit(below_index))] if below_index else [])]
 
     def _attend(self, path: HostPath, connection: bytes, message: Pong | Status | End, now_ns: int) -> list[Output]:
@@ -397,11 +340,13 @@ class HostSession:
                     return []
                 if not stream.can_be(counts):
                     return [_TOO_MANY]
+                # What it tells of and has not come before it is lost.
                 behind = connection == path.lanes.get(Lane.FRAMES)
-                lost = (
-                    stream.pass_over(counts.sent) if behind else 0
-                )  # what it tells of and has not come before it is lost
-                return [*_note_rung(stream, message), Counted(counts, isinstance(message, End), lost)]
+                lost = stream.pass_over(counts.sent) if behind else 0
+                told = Counted(counts, ended=isinstance(message, End), lost=lost)
+                if isinstance(message, Status) and stream.is_news(message.rung):
+                    return [Stepped(message.rung), told]
+                return [told]
             case _:
                 assert_never(message)
 
@@ -421,14 +366,6 @@ class HostSession:
         for known in self._paths:
             if known.is_open:
                 known.shut(now_ns + HELLO_RETRY_NS)
-        self._carrier = self._wanted = None
-        self._pending = self._streams = False
+        self._carriage.end()
+        self._streams = False
         return [answer, told, Vanished(orderly=can_be)]
-
-
-def _note_rung(stream: Stream, message: Status | End) -> list[Output]:
-    """Tell of a camera that was set anew, once; accounts on two lanes may overtake each other."""
-    if isinstance(message, End) or message.rung.changes <= stream.changes:
-        return []
-    stream.changes = message.rung.changes
-    return [Stepped(message.rung)]

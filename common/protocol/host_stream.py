@@ -4,7 +4,8 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Final
 
-from common.protocol.message import BoardCounts, BoardHello
+from common.protocol.message import BoardCounts, BoardHello, Rung
+from common.protocol.session import StaleReason
 
 _MOST_MISSING: Final = 64
 """Lost frames that are remembered, so that one which comes late is not taken for a repetition: more than any link holds."""
@@ -36,6 +37,33 @@ class Stream:
         self.missing.extend(range(max(self.next_index, index - _MOST_MISSING), index))
         self.next_index += lost
         return lost
+
+    def take(self, index: int) -> int | StaleReason:
+        """Take a frame of this life.
+
+        Args:
+            index: its own, of the frames that were sent.
+
+        Returns:
+            How many before it are given up for lost; or why it is none that was waited for.
+        """
+        if index >= self.granted_index:
+            return StaleReason.BEYOND_CREDIT
+        if index < self.next_index:
+            if index not in self.missing:
+                return StaleReason.DUPLICATE
+            self.missing.remove(index)
+            return StaleReason.LATE
+        lost = self.pass_over(index)
+        self.next_index = index + 1
+        return lost
+
+    def is_news(self, rung: Rung) -> bool:
+        """Take note of what the camera is set to; gives whether it was set anew since the last account: two lanes may overtake each other."""
+        if rung.changes <= self.changes:
+            return False
+        self.changes = rung.changes
+        return True
 
     def resume(self, hello: BoardHello) -> int:
         """Take a hello of the same life. Frames beyond the credit went to another host, which was there between; they are not lost."""

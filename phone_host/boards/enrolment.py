@@ -14,7 +14,8 @@ from zmq.utils import z85
 
 from common import now
 from common.errors import DataError, ProtocolError, SettingsError, TandemError, UnavailableError
-from common.keys import KeyFolder, Peer, clean_name
+from common.keys import KeyFolder
+from common.peers import Peer, clean_name
 from common.protocol.enrolment_code import Asking, code_text
 from common.protocol.enrolment_wire import MAX_WORD_BYTES, WordReader, frame_word
 from common.protocol.enrolment_words import Denial, Identity, Open, Refuse, Word

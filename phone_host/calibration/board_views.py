@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import DataError
-from common.imagesize import MOST_PIXELS
+from common.imagesize.head import MOST_PIXELS
 from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.target import Board, Corners, agree, find_corners
 from phone_host.calibration.view_files import ViewFiles
@@ -31,7 +31,7 @@ class BoardViews:
     sizes_px: tuple[Size, Size]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Seen:
     name: str
     sizes: tuple[Size, Size]
@@ -69,7 +69,9 @@ def look_for_boards(
             rejected.append(Rejected(name, Reason.UNREADABLE, error.problem))
         else:
             sizes = _size(images[0]), _size(images[1])
-            seen.append(_Seen(name, sizes, find_corners(images[0], board), find_corners(images[1], board)))
+            seen.append(
+                _Seen(name=name, sizes=sizes, left=find_corners(images[0], board), right=find_corners(images[1], board))
+            )
         advance()
     if not seen:
         raise DataError(

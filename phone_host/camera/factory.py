@@ -5,7 +5,7 @@ from typing import Final
 from common.camera import factory as common_factory
 from common.camera.base import Camera
 from common.frame import ImageSizeError
-from common.imagesize import MOST_PIXELS, require_pixels
+from common.imagesize.head import MOST_PIXELS, require_pixels
 from common.program.extensions import named
 from phone_host.camera.http_uri import http_settings, is_http
 

@@ -15,7 +15,7 @@ from enum import Enum
 from typing import Final, assert_never
 
 from common.frame import FrameFault
-from common.imagesize import JPEG_FRAME_HEADERS
+from common.imagesize.jpeg import FRAME_HEADERS
 from common.protocol.wire import MAX_PAYLOAD_BYTES
 from common.protocol.wire_fields import MAX_SIZE_PX
 
@@ -32,7 +32,7 @@ _LEAST_CODE: Final = 0xC0
 """Codes below are reserved (Table B.1)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Whole:
     """An image that came in whole.
 
@@ -148,7 +148,7 @@ class JpegStream:
         length = int.from_bytes(data[at + 2 : at + 4], "big")
         if length < 2:
             return self._give_up(at, events)
-        if code in JPEG_FRAME_HEADERS:
+        if code in FRAME_HEADERS:
             if len(data) < at + 9:
                 return False
             self._size_px = (int.from_bytes(data[at + 7 : at + 9], "big"), int.from_bytes(data[at + 5 : at + 7], "big"))
@@ -178,7 +178,15 @@ class JpegStream:
         width_px, height_px = self._size_px
         if not (1 <= width_px <= MAX_SIZE_PX and 1 <= height_px <= MAX_SIZE_PX):
             return self._give_up(end, events, FrameFault.WRONG_LENGTH)
-        events.append(Whole(bytes(self._data[:end]), width_px, height_px, self._began_ns, now_ns))
+        events.append(
+            Whole(
+                payload=bytes(self._data[:end]),
+                width_px=width_px,
+                height_px=height_px,
+                began_ns=self._began_ns,
+                ended_ns=now_ns,
+            )
+        )
         del self._data[:end]
         self._old_bytes = max(0, self._old_bytes - end)
         self._phase = _Phase.BETWEEN

@@ -17,7 +17,7 @@ from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Ste
 from common.camera.v4l2_stamps import RateMeter
 from common.errors import TandemError, UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat
-from common.imagesize import size_text
+from common.imagesize.head import size_text
 from common.program.logs import event
 from common.protocol.message import CameraDescription, Pacing
 from common.stamp import Stamp

@@ -19,7 +19,7 @@ _USABLE_PX: Final = 1.0
 """A stereo RMS above a pixel leaves rows that do not meet: no matcher finds much then."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Package:
     """A Python package that the host imports.
 
@@ -75,7 +75,7 @@ class Answer(Enum):
     UNKNOWN_NAME = "unknown name"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BoardReadings:
     """What a board has answered.
 

@@ -53,9 +53,16 @@ def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
     if receiver.failure is not None:
         raise receiver.failure
     if hello is None or estimate is None:
-        return BoardReadings(uri, answer, wait_s)
+        return BoardReadings(uri=uri, answer=answer, waited_s=wait_s)
     camera = f"{hello.camera.name} {hello.camera.width_px}x{hello.camera.height_px}"
-    return BoardReadings(uri, answer, 0.0, camera, estimate.round_trip_ns, estimate.uncertainty_ns)
+    return BoardReadings(
+        uri=uri,
+        answer=answer,
+        waited_s=0.0,
+        camera=camera,
+        round_trip_ns=estimate.round_trip_ns,
+        uncertainty_ns=estimate.uncertainty_ns,
+    )
 
 
 def read_rig_readings(calibration: str, camera: str) -> RigReadings:

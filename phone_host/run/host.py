@@ -10,7 +10,7 @@ from typing import Final
 
 from common import now
 from common.camera.base import Camera
-from common.imagesize import MOST_PIXELS
+from common.imagesize.head import MOST_PIXELS
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.program.logs import event

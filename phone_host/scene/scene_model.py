@@ -61,7 +61,7 @@ class Sphere:
 Shape = Plane | Box | Sphere
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Texture:
     """A solid texture: band-limited noise of several octaves, a function of the point in the body's axes.
 
@@ -84,7 +84,7 @@ class Texture:
     stretch: Vector = (1.0, 1.0, 1.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Path:
     """A periodic motion about the body's rest pose: each coordinate swings as amplitude * sin(2 pi t / period + phase).
 

@@ -2,7 +2,7 @@
 
 Rules:
 - one path for files and for streamed frames, so that both give the same bits;
-- nothing is decoded before its header was read: what claims more pixels than the limit is refused (see `common/imagesize.py`);
+- nothing is decoded before its header was read: what claims more pixels than the limit is refused (see `common/imagesize`);
 - EXIF rotation is ignored: a calibration belongs to the sensor's own rows and columns;
 - deeper than 8 bit: both images of a pair get the same scale, or the matcher would see two brightnesses (see `to_8_bit`).
 """
@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from common.files import read_whole
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
-from common.imagesize import MOST_PIXELS, ImageHead, ImageKind, read_head, require_believable, whole_image
-from common.imagesize import size_text as px_text
+from common.imagesize.head import MOST_PIXELS, ImageHead, ImageKind, require_believable
+from common.imagesize.head import size_text as px_text
+from common.imagesize.read import read_head, whole_image
 from common.program.logs import event
 from phone_host.model import Image
 from phone_host.stereo.overheard import overhear

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from common.frame import FrameFault, ImageSizeError, PixelFormat, SpoiledImageError, raw_bytes
-from common.imagesize import MOST_PIXELS, ImageKind, require_pixels, size_text
+from common.imagesize.head import MOST_PIXELS, ImageKind, require_pixels, size_text
 from phone_host.model import Image
 from phone_host.stereo.images import EncodedFile, decode_file, decode_files, examine, require_same_shape
 
@@ -16,7 +16,7 @@ _KINDS: Final = {PixelFormat.MJPEG: ImageKind.JPEG, PixelFormat.PNG: ImageKind.P
 _LOOK: Final = "look at the camera that sends it"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class EncodedImage:
     """A frame's bytes and what its header says of them.
 

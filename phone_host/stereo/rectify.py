@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from common.imagesize import size_text
+from common.imagesize.head import size_text
 from phone_host.model import CameraModel, Image, Rectification, RectifiedPair, Rig, Side, StereoGeometry
 from phone_host.stereo.images import size_px
 
@@ -64,7 +64,9 @@ def rectify_rig(rig: Rig) -> Rectification:
             f"the two cameras' fields of view overlap by {max(width_px, 0)}x{max(height_px, 0)} px only",
             f"turn the cameras towards the same scene and {_RECALIBRATE}",
         )
-    geometry = StereoGeometry(focal_px, baseline_m, cx_px=float(-focal_px * x0), cy_px=float(-focal_px * y0))
+    geometry = StereoGeometry(
+        focal_px=focal_px, baseline_m=baseline_m, cx_px=float(-focal_px * x0), cy_px=float(-focal_px * y0)
+    )
     projection = np.array([[focal_px, 0, geometry.cx_px, 0], [0, focal_px, geometry.cy_px, 0], [0, 0, 1, 0]])
     shift = np.zeros((3, 4))
     shift[0, 3] = -focal_px * baseline_m

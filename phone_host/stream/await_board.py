@@ -12,7 +12,7 @@ from common import now
 from common.errors import AbsentBoardError, BusyBoardError, OtherVersionError, UnavailableError
 from common.protocol.message import RefusalReason
 from phone_host.stream.receiver import Receiver
-from phone_host.stream.reception import refusal_text
+from phone_host.stream.refusals import refusal_text
 
 _STEP_S: Final = 0.05
 

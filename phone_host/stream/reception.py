@@ -6,7 +6,7 @@ No thread, no link and no clock of its own: messages and `now_ns` come in, what 
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from typing import Protocol
 
 from common.errors import UnavailableError
 from common.program.logs import event
@@ -33,14 +33,12 @@ from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount, 
 from phone_host.model import BoardFrame
 from phone_host.stream.border import Arrival, Border
 from phone_host.stream.frame_sink import FrameSink
+from phone_host.stream.refusals import Refusals, refusal_text
 from phone_host.sync.choice import LinkChoice
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.flow import Flow
 
 _LOG = logging.getLogger(__name__)
-
-_REFUSAL_NS: Final = 1_000_000_000
-"""A board that refuses does so at every hello, five times a second; one that has not done so for this long is gone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,16 +95,14 @@ class Reception:
         self._hello: BoardHello | None = None
         self._flow = Flow()
         self._streamed_over: int | None = None
-        self._refused: tuple[RefusalReason, int] | None = None
-        self._turned_away: set[int] = set()
+        self._refusals = Refusals()
         self.tail_known = False
         self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
         self._border = Border(self.account, sink.void)
 
     def refused(self, now_ns: int) -> RefusalReason | None:
         """Why the board that was last heard does not talk to us; None when it does, or is silent now."""
-        refused = self._refused  # read once: another thread may be writing
-        return None if refused is None or now_ns - refused[1] > _REFUSAL_NS else refused[0]
+        return self._refusals.last(now_ns)
 
     @property
     def connected(self) -> bool:
@@ -155,7 +151,7 @@ class Reception:
         In a running session it is somebody else's noise; whoever called here, not being called, may be anybody.
         """
         if not self._session.is_open and connection in self._links[connection[0]].dialled.values():
-            self._refused = (RefusalReason.VERSION, now_ns)
+            self._refusals.note(RefusalReason.VERSION, now_ns)
         self.count_garbage(problem)
 
     def interrupted(self, connection: bytes, now_ns: int) -> None:
@@ -268,9 +264,8 @@ class Reception:
         if isinstance(refused, Unbelievable):
             self.count_garbage(refused.problem)
             return
-        self._refused = (refused.reason, now_ns)
-        if self._session.is_open and refused.link not in self._turned_away:
-            self._turned_away.add(refused.link)
+        self._refusals.note(refused.reason, now_ns)
+        if self._session.is_open and self._refusals.is_news(refused.link):
             problem, remedy = refusal_text(refused.reason)
             _LOG.warning(
                 event("link_refused", link=self.account.links[refused.link].name, problem=problem, remedy=remedy)
@@ -291,7 +286,7 @@ class Reception:
         match news:
             case LinkUp(link, hello):
                 tally.is_up = True
-                self._turned_away.discard(link)
+                self._refusals.link_up(link)
                 if hello.boot_id != self._boot_id:
                     self._boot_id = hello.boot_id
                     self._border.other_clock()
@@ -324,7 +319,7 @@ class Reception:
 
     def _begin(self, accepted: Accepted, now_ns: int) -> None:
         hello, link = accepted.hello, accepted.link
-        self._refused = None
+        self._refusals.accepted()
         self._hello = hello
         self._flow = Flow()
         self.tail_known = False
@@ -371,7 +366,9 @@ class Reception:
         tally.frames += 1
         tally.bytes += len(frame.payload)
         assert self._hello is not None
-        for passed in self._border.admit(Arrival(frame, link, account, self._hello.camera, now_ns)):
+        for passed in self._border.admit(
+            Arrival(frame=frame, link=link, account=account, camera=self._hello.camera, received_ns=now_ns)
+        ):
             self._pass(*passed)
 
     def _pass(self, link: int, frame: BoardFrame) -> None:
@@ -391,12 +388,3 @@ class Reception:
         self._sink.add_board(frame)
         if self._listener is not None:
             self._listener.frame_arrived(marks.exposed_ns, message.sequence)
-
-
-def refusal_text(reason: RefusalReason) -> tuple[str, str]:
-    """What a refusal means, and its remedy."""
-    match reason:
-        case RefusalReason.BUSY:
-            return "the board is busy with another host", "stop the other one first"
-        case RefusalReason.VERSION:
-            return "the board speaks another protocol version", "update the older of the two"

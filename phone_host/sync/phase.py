@@ -48,7 +48,7 @@ _TRIES: Final = 6
 """A restart of a board under full load may miss by more than the goal several times in a row (an emulated one did three times)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Phase:
     """Where the two cameras stand to each other now.
 
@@ -99,7 +99,13 @@ class PhaseMeter:
         recent = [self._samples[index] for index in range(len(self._samples) - _RECENT, len(self._samples))]
         middle = median(value for _, value in recent)
         scatter_ns = median(abs(value - middle) for _, value in recent)
-        return Phase(self._wrapped(middle), self._period_ns, self._drift(), recent[0][0], scatter_ns)
+        return Phase(
+            time_skew_ns=self._wrapped(middle),
+            period_ns=self._period_ns,
+            drift=self._drift(),
+            first_ns=recent[0][0],
+            scatter_ns=scatter_ns,
+        )
 
     def add_host(self, stamp_ns: int) -> None:
         """Take note of a frame of the host's camera; stamps that go back are left out."""

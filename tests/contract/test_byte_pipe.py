@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.link.rfcomm import FRAME_BYTES
+from common.link.rfcomm_socket import FRAME_BYTES
 from common.protocol.chunking import Whole
 from common.protocol.framing import LinkEnd
 from common.protocol.message import Lane

@@ -9,7 +9,7 @@ from common.camera.v4l2_controls import Axis, Control, ControlPlan, ControlWishe
 from common.camera.v4l2_stamps import RateMeter, Timing, exposure_midpoint_ns, is_trusted, stamp_clock, stamp_source
 from common.errors import DataError, SettingsError
 from common.frame import ImageSizeError, SpoiledImageError, find_fault
-from common.imagesize import MEGAPIXEL
+from common.imagesize.head import MEGAPIXEL
 from common.keys import KeyFolder
 from common.link.factory import parse_link
 from common.program.settings import resolve

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from common.keys import KeyFolder, Peer
+from common.keys import KeyFolder
+from common.peers import Peer
 
 
 def acquainted(folder: Path, address: str) -> tuple[KeyFolder, KeyFolder]:

@@ -12,8 +12,9 @@ import msgpack
 import pytest
 import zmq
 
-from common.keys import KeyFolder, Peer
+from common.keys import KeyFolder
 from common.link.curve import secure_dialler
+from common.peers import Peer
 from common.protocol.enrolment_wire import frame_word
 from common.protocol.enrolment_words import Ask, Identity
 from common.protocol.message import PROTOCOL_VERSION

@@ -116,7 +116,7 @@ def test_a_refusal_that_ends_while_it_is_told_is_a_refusal(tmp_path: Path) -> No
     def flicker() -> None:
         while not done.is_set():
             reception.refuse_version(dialled, "another version", now.monotonic_ns())
-            reception._refused = None  # as when a board accepts
+            reception._refusals.accepted()  # as when a board accepts
 
     usual_s = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)

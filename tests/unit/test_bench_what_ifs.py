@@ -6,7 +6,7 @@ from dataclasses import replace
 from phone_host.bench.cases import Case, Interface, Size
 from phone_host.bench.emulate import PROFILES
 from phone_host.bench.tables import fit_lines
-from tests.unit.test_bench import analysed, result
+from tests.unit.test_bench_report import analysed, result
 
 
 def test_frames_of_one_size_tell_no_rate() -> None:
@@ -19,7 +19,7 @@ def test_frames_of_one_size_tell_no_rate() -> None:
 def test_an_interface_that_was_run_is_not_guessed_from_its_figures() -> None:
     """Each profile that nobody ran is predicted from its figures alone, in the place of the link that was; the one that was run is not."""
     ran, *others = PROFILES
-    case = Case(Interface(ran.carrier, ran), Size(640, 480), 80, 30)
+    case = Case(interface=Interface(ran.carrier, ran), size=Size(640, 480), quality_percent=80, rate_hz=30)
     analysis = analysed(replace(result(), case=case))
     guessed = {one.interface for one in analysis.what_ifs if "from its figures alone" in one.setting}
     assert guessed == {str(Interface(profile.carrier, profile)) for profile in others}

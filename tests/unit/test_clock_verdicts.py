@@ -112,7 +112,13 @@ class Gate:
     def arrival(self) -> Arrival:
         """A frame that comes over the first link."""
         marks = BoardMarks(exposed_ns=self.now_ns - 5 * MS, grabbed_ns=self.now_ns - 2 * MS, sent_ns=self.now_ns - MS)
-        return Arrival(replace(frame("life", 7), marks=marks), 0, self.session, CAMERA, self.now_ns)
+        return Arrival(
+            frame=replace(frame("life", 7), marks=marks),
+            link=0,
+            account=self.session,
+            camera=CAMERA,
+            received_ns=self.now_ns,
+        )
 
     def show(self) -> int:
         """A frame comes; gives how many pass, now or with the echo behind it."""

@@ -42,14 +42,15 @@ from common.doctor.machine_checks import (
 )
 from common.doctor.unit_check import Unit, check_unit
 from common.frame import PixelFormat
-from common.keys import KeyFolder, Peer
+from common.keys import KeyFolder
+from common.peers import Peer
 
 OK, WARN, FAIL = Grade.OK, Grade.WARN, Grade.FAIL
 SERVICE = Account("tandemscan", 995, frozenset({995, 44, 20}), is_me=False)
 ME = Account("me", 1000, frozenset({1000}), is_me=True)
-VIDEO = Node("/dev/video0", 0, 44, "video", 0o660, open_to_me=False)
+VIDEO = Node(path="/dev/video0", uid=0, gid=44, group="video", mode=0o660, open_to_me=False)
 
-MJPG = FormatOffer("MJPG", "Motion-JPEG", ((640, 480), (320, 240)))
+MJPG = FormatOffer(letters="MJPG", text="Motion-JPEG", sizes_px=((640, 480), (320, 240)))
 OFFERED = Offered((MJPG,), {("MJPG", (640, 480)): Rates((Fraction(30), Fraction(10)))})
 
 SOUND = Sample(
@@ -87,12 +88,16 @@ def test_every_finding_is_one_line_and_the_exit_code_follows_the_worst() -> None
         (VIDEO, SERVICE, True),
         (VIDEO, Account("nobody", 65534, frozenset({65534}), is_me=False), False),
         (VIDEO, Account("root", 0, frozenset({0}), is_me=False), True),
-        (Node("/dev/video0", 0, 44, "video", 0o600, open_to_me=False), SERVICE, False),
-        (Node("/dev/video0", 0, 44, "video", 0o640, open_to_me=False), SERVICE, False),
-        (Node("/dev/video0", 995, 0, "root", 0o600, open_to_me=False), SERVICE, True),
-        (Node("/dev/video0", 0, 0, "root", 0o666, open_to_me=False), SERVICE, True),
+        (Node(path="/dev/video0", uid=0, gid=44, group="video", mode=0o600, open_to_me=False), SERVICE, False),
+        (Node(path="/dev/video0", uid=0, gid=44, group="video", mode=0o640, open_to_me=False), SERVICE, False),
+        (Node(path="/dev/video0", uid=995, gid=0, group="root", mode=0o600, open_to_me=False), SERVICE, True),
+        (Node(path="/dev/video0", uid=0, gid=0, group="root", mode=0o666, open_to_me=False), SERVICE, True),
         (VIDEO, ME, False),
-        (Node("/dev/video0", 0, 44, "video", 0o660, open_to_me=True), ME, True),  # by an access list
+        (
+            Node(path="/dev/video0", uid=0, gid=44, group="video", mode=0o660, open_to_me=True),
+            ME,
+            True,
+        ),  # by an access list
     ],
 )
 def test_access_follows_owner_group_and_mode(node: Node, account: Account, *, may: bool) -> None:
@@ -105,7 +110,9 @@ def test_a_user_outside_the_group_is_told_to_join_and_a_changed_mode_is_named() 
     """Where the group would do, the remedy is usermod; where not even the group may, it is the node itself."""
     outside = check_access("permission", VIDEO, Account("pi", 1000, frozenset({1000}), is_me=False))
     assert "usermod -aG video pi" in outside.remedy
-    shut = check_access("permission", Node("/dev/video0", 0, 44, "video", 0o600, open_to_me=False), SERVICE)
+    shut = check_access(
+        "permission", Node(path="/dev/video0", uid=0, gid=44, group="video", mode=0o600, open_to_me=False), SERVICE
+    )
     assert "chmod 660 /dev/video0" in shut.remedy
 
 
@@ -206,15 +213,15 @@ def test_a_taken_camera_is_judged_by_who_has_it(
 @pytest.mark.parametrize(
     ("link", "verdict", "word"),
     [
-        (LinkReadings("tcp://*:5555"), OK, "free"),
-        (LinkReadings("tcp://127.0.0.1:5555"), OK, "this machine only"),
-        (LinkReadings("tcp://*:5555", (AGENT,)), OK, "our own service"),
-        (LinkReadings("tcp://*:5555", (OTHER,)), FAIL, "motion (pid 77)"),
-        (LinkReadings("tcp://*:5555", all_seen=False, problem="in use", taken=True), WARN, "only root"),
-        (LinkReadings("tcp://*:5555", problem="no such address", remedy="ip address"), FAIL, "no such address"),
-        (LinkReadings("serial:/dev/ttyGS0", terminals=(Holder(9, "agetty"),)), FAIL, "serial-getty@ttyGS0"),
-        (LinkReadings("serial:/dev/ttyS0", terminals=(Holder(9, "bash"),)), FAIL, "two readers"),
-        (LinkReadings("serial:/dev/ttyS0", console=True), FAIL, "console=ttyS0"),
+        (LinkReadings(uri="tcp://*:5555"), OK, "free"),
+        (LinkReadings(uri="tcp://127.0.0.1:5555"), OK, "this machine only"),
+        (LinkReadings(uri="tcp://*:5555", holders=(AGENT,)), OK, "our own service"),
+        (LinkReadings(uri="tcp://*:5555", holders=(OTHER,)), FAIL, "motion (pid 77)"),
+        (LinkReadings(uri="tcp://*:5555", all_seen=False, problem="in use", taken=True), WARN, "only root"),
+        (LinkReadings(uri="tcp://*:5555", problem="no such address", remedy="ip address"), FAIL, "no such address"),
+        (LinkReadings(uri="serial:/dev/ttyGS0", terminals=(Holder(9, "agetty"),)), FAIL, "serial-getty@ttyGS0"),
+        (LinkReadings(uri="serial:/dev/ttyS0", terminals=(Holder(9, "bash"),)), FAIL, "two readers"),
+        (LinkReadings(uri="serial:/dev/ttyS0", console=True), FAIL, "console=ttyS0"),
     ],
 )
 def test_a_link_is_judged_by_who_has_it(link: LinkReadings, verdict: Grade, word: str) -> None:
@@ -345,7 +352,7 @@ def test_the_service_is_judged_by_its_state(state: Unit, verdict: Grade, word: s
 @given(st.lists(st.tuples(st.sampled_from(Grade), st.text(max_size=5))))
 def test_exit_code_and_counts_agree(drawn: list[tuple[Grade, str]]) -> None:
     """Exit 4 exactly when the object counts a failed check."""
-    findings = [Finding("x", verdict, text) for verdict, text in drawn]
+    findings = [Finding(what="x", verdict=verdict, text=text) for verdict, text in drawn]
     assert (exit_code(findings) == 4) is (values(findings)["failed"] > 0)
 
 

@@ -321,7 +321,13 @@ def test_hostile_units_neither_fill_memory_nor_raise() -> None:
     for number in range(20_000):
         kind = chance.choice(list(UnitKind))
         body = chance.randbytes(chance.choice([0, 1, 5, 6, 30, 300]))
-        unit = Unit(kind, chance.random() < 0.5, chance.random() < 0.5, chance.choice([number % 65536, 3]), body)
+        unit = Unit(
+            kind=kind,
+            first=chance.random() < 0.5,
+            last=chance.random() < 0.5,
+            number=chance.choice([number % 65536, 3]),
+            body=body,
+        )
         for event in end.feed(b"".join(unit_parts(BOARD, unit)), made.now_ns):
             if isinstance(event, Whole):
                 assert len(event.header) <= MAX_HEADER_BYTES
@@ -336,7 +342,7 @@ def test_a_peer_that_talks_and_never_reads_is_not_answered_for_ever() -> None:
         for unit in (
             _word(0, number),
             _word(3, number),
-            Unit(UnitKind.CONTROL, first=True, last=True, number=0, body=b"?"),
+            Unit(kind=UnitKind.CONTROL, first=True, last=True, number=0, body=b"?"),
         ):  # OPEN, CLOSE
             end.feed(b"".join(unit_parts(HOST, unit)), number * S)
     said = [bytes(unit.body) for unit in Deframer(BOARD).feed(end.take(10_000 * S))]
@@ -346,7 +352,7 @@ def test_a_peer_that_talks_and_never_reads_is_not_answered_for_ever() -> None:
 
 def _word(value: int, number: int) -> Unit:
     """A unit of contact, by its number on the wire."""
-    return Unit(UnitKind.CONTACT, first=True, last=True, number=0, body=struct.pack("<BI", value, number))
+    return Unit(kind=UnitKind.CONTACT, first=True, last=True, number=0, body=struct.pack("<BI", value, number))
 
 
 @pytest.mark.parametrize("lost_by", [BOARD, HOST])
@@ -379,7 +385,7 @@ def test_a_goodbye_before_the_meeting_says_nothing() -> None:
 def test_a_word_that_is_none_changes_nothing(body: bytes) -> None:
     """A unit of contact of another length, or with a word that nobody knows, neither meets nor parts."""
     made = line()
-    unit = Unit(UnitKind.CONTACT, first=True, last=True, number=0, body=body)
+    unit = Unit(kind=UnitKind.CONTACT, first=True, last=True, number=0, body=body)
     for side in LinkEnd:
         assert made.ends[side].feed(b"".join(unit_parts(side.peer, unit)), made.now_ns) == []
         assert made.ends[side].is_up

@@ -11,7 +11,7 @@ from common.errors import SettingsError
 from phone_host.bench.emulate import NOTHING, PROFILES, SEGMENT_BYTES, Profile, Way, parse_profiles
 
 MS = 1_000_000
-PLAIN = Profile("plain", "tcp", 1_000_000, 3 * MS)
+PLAIN = Profile(name="plain", carrier="tcp", bytes_per_s=1_000_000, delay_ns=3 * MS)
 
 
 def drained(way: Way[str]) -> list[tuple[int, str, bytes]]:
@@ -26,7 +26,15 @@ def drained(way: Way[str]) -> list[tuple[int, str, bytes]]:
 @given(st.lists(st.tuples(st.sampled_from("ab"), st.binary(min_size=1, max_size=5000), st.integers(0, 10 * MS))))
 def test_every_byte_arrives_once_and_in_order(puts: list[tuple[str, bytes, int]]) -> None:
     """Without byte loss each connection gets exactly its bytes in their order, whatever jitter and stalls do."""
-    profile = Profile("p", "tcp", 500_000, 2 * MS, 5 * MS, stall_share=0.2, stall_ns=50 * MS)
+    profile = Profile(
+        name="p",
+        carrier="tcp",
+        bytes_per_s=500_000,
+        delay_ns=2 * MS,
+        jitter_ns=5 * MS,
+        stall_share=0.2,
+        stall_ns=50 * MS,
+    )
     way: Way[str] = Way(profile, 3)
     now_ns = 0
     for key, data, later_ns in puts:

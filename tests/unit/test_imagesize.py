@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from common.errors import DataError
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
-from common.imagesize import MEGAPIXEL, MOST_PIXELS, ImageKind, read_head, require_believable, whole_image
+from common.imagesize.head import MEGAPIXEL, MOST_PIXELS, ImageKind, require_believable
+from common.imagesize.read import read_head, whole_image
 from phone_host.stereo.images import decode
 from tests.support import bombs
 from tests.support.pictures import encoded, jpeg, picture

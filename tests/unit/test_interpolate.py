@@ -64,7 +64,7 @@ def test_nothing_is_done_for_no_time() -> None:
 @cache
 def scene() -> Scene:
     """The demo's still life with a ball and a cube that cross it quickly."""
-    sideways = Path((0.16, 0.05, 0.0), (2.2, 0.9, 0.0), 2.0)
+    sideways = Path(amplitude_m=(0.16, 0.05, 0.0), phase_rad=(2.2, 0.9, 0.0), period_s=2.0)
     bodies = [
         replace(body, path=sideways) if body.name in {"ball", "cube"} else resting(body) for body in demo_scene().bodies
     ]

@@ -77,7 +77,7 @@ def test_an_image_is_there_with_its_last_byte() -> None:
     assert stream.feed(image[:1], 10) == []
     assert stream.feed(image[1:100], 20) == []
     assert stream.feed(image[100:-1], 30) == []
-    assert stream.feed(image[-1:], 40) == [Whole(image, 32, 8, 10, 40)]
+    assert stream.feed(image[-1:], 40) == [Whole(payload=image, width_px=32, height_px=8, began_ns=10, ended_ns=40)]
 
 
 def test_a_thumbnail_ends_no_image() -> None:

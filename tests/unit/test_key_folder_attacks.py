@@ -18,7 +18,8 @@ import zmq
 
 from common.errors import DataError, TandemError, UnavailableError
 from common.files import opened_folder, replacing_in
-from common.keys import KeyFolder, Peer
+from common.keys import KeyFolder
+from common.peers import Peer
 
 ROOT = Path(__file__).resolve().parents[2]
 NOBODY = 65534

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from zmq.utils import z85
 
 from common.errors import DataError, SettingsError, UnavailableError
-from common.keys import KeyFolder, Peer, clean_name, default_folder, is_key, peer_at
+from common.keys import KeyFolder, default_folder
+from common.peers import Peer, clean_name, is_key, peer_at
 
 WHEN = "2026-01-01T00:00:00+0000"
 

@@ -76,7 +76,10 @@ def test_a_packet_of_another_length_than_it_announced_is_none(announced: int, bo
         lengths = struct.pack("<HI", 0, announced)
         whole = [lengths + bodies[0], *bodies[1:]]
         last = len(whole) - 1
-        return [Unit(UnitKind.FRAMES, at == 0, at == last, number + at, body) for at, body in enumerate(whole)]
+        return [
+            Unit(kind=UnitKind.FRAMES, first=at == 0, last=at == last, number=number + at, body=body)
+            for at, body in enumerate(whole)
+        ]
 
     assert [joiner.add(unit) for unit in units(announced, bodies, 7)] == [None] * len(bodies)
     assert joiner.broken == 1
@@ -94,7 +97,9 @@ def test_a_unit_whose_rest_was_lost_holds_nothing_up() -> None:
         board.feed(host.take(now_ns), now_ns)
         events += host.feed(board.take(now_ns), now_ns)
     assert events == [Change.MET]
-    cut = b"".join(unit_parts(BOARD, Unit(UnitKind.FRAMES, first=True, last=False, number=9, body=bytes(4000))))[:1000]
+    cut = b"".join(unit_parts(BOARD, Unit(kind=UnitKind.FRAMES, first=True, last=False, number=9, body=bytes(4000))))[
+        :1000
+    ]
     assert board.put(Lane.CONTROL, b"account", b"")
     assert host.feed(cut + board.take(20 * MS), 20 * MS) == []
     assert host.due_ns <= 20 * MS + GAP_NS

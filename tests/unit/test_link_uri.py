@@ -7,9 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import SettingsError, UnavailableError
-from common.keys import KeyFolder, Peer
+from common.keys import KeyFolder
 from common.link.factory import LinkUri, needs_keys, open_link, open_links, parse_link
 from common.link.zeromq_address import plain_endpoint
+from common.peers import Peer
 
 
 @given(

@@ -192,7 +192,7 @@ def test_of_two_rates_each_slow_frame_gets_the_nearest_fast_one(
             assert abs(chosen[stamp_ns] - stamp_ns) == min(abs(other - stamp_ns) for other in fast)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Cameras:
     """Two equally fast cameras: tolerance in periods, jitter and transport delays at random."""
 
@@ -242,7 +242,7 @@ def test_dense_streams_lose_hardly_a_pair_and_wait_a_period_at_most(
     Where phase and tolerance both are half a period to within the jitter, now this neighbour is near enough, now the other. Who knows the future changes
     sides each time; ours keeps one side, so that the partner does not flip, and finds at least 92 %.
     """
-    cameras = Cameras(tolerance, phase, loss, seed)
+    cameras = Cameras(tolerance=tolerance, phase=phase, loss=loss, seed=seed)
     board, host, _ = cameras.streams()
     pairs, longest_ns = paired(cameras)
     best = best_score(board, host, round(tolerance * PERIOD_NS))
@@ -256,7 +256,7 @@ def test_dense_streams_lose_hardly_a_pair_and_wait_a_period_at_most(
 @settings(deadline=None, max_examples=50)
 def test_no_pair_is_one_that_the_optimum_forbids(tolerance: float, phase: float, loss: float, seed: int) -> None:
     """With frames further apart than twice the tolerance every pair belongs to the best pairing, and none has waited."""
-    cameras = Cameras(tolerance, phase, loss, seed)
+    cameras = Cameras(tolerance=tolerance, phase=phase, loss=loss, seed=seed)
     board, host, _ = cameras.streams()
     pairs, longest_ns = paired(cameras)
     assert forbidden_pairs(pairs, board, host, round(tolerance * PERIOD_NS)) == []
@@ -268,7 +268,7 @@ def test_no_pair_is_one_that_the_optimum_forbids(tolerance: float, phase: float,
 def test_at_half_a_period_the_partner_does_not_flip(tolerance: float) -> None:
     """Cameras exactly half a period apart: jitter favours now the previous, now the next frame, but all pairs stay with one of the two."""
     for seed in range(20):
-        pairs, _ = paired(Cameras(tolerance, 0.5, 0.0, seed))
+        pairs, _ = paired(Cameras(tolerance=tolerance, phase=0.5, loss=0.0, seed=seed))
         assert len({board > host for board, host in pairs}) == 1
         assert len(pairs) >= 149
 

@@ -15,7 +15,7 @@ _RED = (81, 90, 240)
 
 
 def _image(payload: bytes, pixel_format: PixelFormat) -> EncodedImage:
-    return EncodedImage(payload, pixel_format, _WIDTH, _HEIGHT, "frame 3")
+    return EncodedImage(payload=payload, pixel_format=pixel_format, width_px=_WIDTH, height_px=_HEIGHT, name="frame 3")
 
 
 def _yuyv(y: int, u: int, v: int) -> bytes:
@@ -74,4 +74,12 @@ def test_a_size_that_a_format_cannot_have_is_refused(
 ) -> None:
     """Two pixels share their colour in YUYV, two by two in NV12: an odd side cannot be, however many bytes came."""
     with pytest.raises(DataError, match=rf"frame 9 is {size_px[0]}x{size_px[1]}, which {pixel_format.value} cannot be"):
-        decode_raw(EncodedImage(bytes(size_bytes), pixel_format, *size_px, "frame 9"))
+        decode_raw(
+            EncodedImage(
+                payload=bytes(size_bytes),
+                pixel_format=pixel_format,
+                width_px=size_px[0],
+                height_px=size_px[1],
+                name="frame 9",
+            )
+        )

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from common.errors import SettingsError, UnavailableError
 from common.link.factory import open_link, parse_link
-from common.link.rfcomm import FRAME_BYTES
+from common.link.rfcomm_socket import FRAME_BYTES
 from common.protocol.pacing import fill
 from tests.support.devices import MissingError, adapters
 

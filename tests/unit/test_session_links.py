@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from common.frame import PixelFormat
 from common.ledger import BoardMarks
 from common.protocol.board_session import BoardSession
-from common.protocol.host_session import STUCK_NS
+from common.protocol.host_carriage import STUCK_NS
 from common.protocol.message import (
     BoardCounts,
     BoardHello,

@@ -53,9 +53,13 @@ def test_help_and_settings_load_nothing_heavy(module: str, arguments: list[str])
         (
             "ipc://{folder}/link",
             "v4l2:{folder}/none",
-            {"common.camera.replay", "common.link.serial", "common.link.rfcomm"},
+            {"common.camera.replay", "common.link.serial", "common.link.rfcomm_opener"},
         ),
-        ("serial:{folder}/none", "replay:{folder}", {"common.camera.v4l2", "common.link.zeromq", "common.link.rfcomm"}),
+        (
+            "serial:{folder}/none",
+            "replay:{folder}",
+            {"common.camera.v4l2", "common.link.zeromq", "common.link.rfcomm_opener"},
+        ),
     ],
 )
 def test_the_board_loads_what_it_was_asked_for(link: str, camera: str, unwanted: set[str], tmp_path: Path) -> None:

@@ -220,7 +220,13 @@ FRAMES = 30
 
 def moving(amplitude_m: tuple[float, float, float], spin_rad_s: float) -> Scene:
     """The demo's scene with a cube and a ball that swing and turn."""
-    swing = Path(amplitude_m, (0.5, 0.0, 0.0), 1.6, (0.0, 1.0, 0.0), spin_rad_s)
+    swing = Path(
+        amplitude_m=amplitude_m,
+        phase_rad=(0.5, 0.0, 0.0),
+        period_s=1.6,
+        spin_axis=(0.0, 1.0, 0.0),
+        spin_rad_s=spin_rad_s,
+    )
     base = demo_scene()
     names = {"wall", "table", "poster", "cube", "ball"}
     bodies = [replace(body, path=swing) if body.path.moves else body for body in base.bodies if body.name in names]
@@ -249,7 +255,13 @@ def film_scene(film: dict[Side, list[tuple[float, Image]]], offset_s: float, boa
         for k, (moment_s, image) in enumerate(frames):
             name = f"{side.value} {k}"
             images[name] = image
-            encoded = EncodedImage(b"", PixelFormat.MJPEG, image.shape[1], image.shape[0], name)
+            encoded = EncodedImage(
+                payload=b"",
+                pixel_format=PixelFormat.MJPEG,
+                width_px=image.shape[1],
+                height_px=image.shape[0],
+                name=name,
+            )
             sides[side].append(Shot(10**14 + round((moment_s + late_s) * 1e9), encoded))
     progress: list[float] = []
     rectifier = Rectifier(replace(small_rig(), board_side=board_side))

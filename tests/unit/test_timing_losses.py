@@ -132,7 +132,7 @@ CAMERA = CameraModel(
     matrix=np.array([[160.0, 0, 79.5], [0, 160.0, 59.5], [0, 0, 1]]),
     distortion=np.zeros(5),
 )
-RECTIFIER = Rectifier(Rig(CAMERA, CAMERA, np.eye(3), np.array([-0.1, 0.0, 0.0])))
+RECTIFIER = Rectifier(Rig(left=CAMERA, right=CAMERA, R_right_left=np.eye(3), t_right_left_m=np.array([-0.1, 0.0, 0.0])))
 FRAMES, LATE_S = 34, 0.009
 
 
@@ -159,7 +159,10 @@ def film(board: list[Image], host: dict[int, Image], offset_s: float) -> Measure
 
     def shot(name: str, moment_s: float, image: Image) -> Shot:
         images[name] = image
-        return Shot(10**14 + round(moment_s * 1e9), EncodedImage(b"", PixelFormat.GREY, 160, 120, name))
+        return Shot(
+            10**14 + round(moment_s * 1e9),
+            EncodedImage(payload=b"", pixel_format=PixelFormat.GREY, width_px=160, height_px=120, name=name),
+        )
 
     ours = [shot(f"board {k}", k / 30, image) for k, image in enumerate(board)]
     theirs = [shot(f"host {k}", k / 30 + LATE_S + offset_s, image) for k, image in host.items()]

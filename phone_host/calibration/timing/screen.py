@@ -63,7 +63,7 @@ class Reading:
     row: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Counted:
     """What one camera read.
 
@@ -214,11 +214,11 @@ def counted(times_s: Times, readings: list[Reading | None]) -> Counted:
     """
     found = [(t, reading) for t, reading in zip(times_s, readings, strict=True) if reading is not None]
     return Counted(
-        len(times_s),
-        np.array([t for t, _ in found]),
-        np.array([reading.number for _, reading in found], dtype=np.int64),
-        float(np.mean([reading.row for _, reading in found])) if found else 0.5,
-        period_s(times_s) if len(times_s) > 1 else 0.0,
+        shots=len(times_s),
+        times_s=np.array([t for t, _ in found]),
+        numbers=np.array([reading.number for _, reading in found], dtype=np.int64),
+        row=float(np.mean([reading.row for _, reading in found])) if found else 0.5,
+        period=period_s(times_s) if len(times_s) > 1 else 0.0,
     )
 
 

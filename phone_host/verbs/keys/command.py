@@ -4,7 +4,7 @@ import argparse
 
 from common import now
 from common.errors import SettingsError
-from common.keys import change, listing
+from common.keys_verb import change, listing
 from phone_host.settings import chosen_keys
 
 

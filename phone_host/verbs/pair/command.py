@@ -8,9 +8,10 @@ import sys
 from pathlib import Path
 
 from common.errors import DataError, SettingsError, UnavailableError
-from common.keys import KeyFolder, Peer
+from common.keys import KeyFolder
 from common.link.enrolment_door import pairing_address
 from common.link.factory import needs_keys, parse_link
+from common.peers import Peer
 from common.protocol.enrolment_code import CODE_DIGITS, read_code
 from phone_host.boards.discovery import find_board_and_say
 from phone_host.boards.enrolment import PairingCall

@@ -1,0 +1,113 @@
+"""What is known of an image from its header, and the limits that its size must keep."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from common.frame import FrameFault, ImageSizeError, SpoiledImageError
+
+MEGAPIXEL: Final = 2**20
+"""As a megabyte here is 2^20 bytes; so the phones' "64 MP" (9248x6936) lie within 64 of them."""
+
+MOST_PIXELS: Final = 64 * MEGAPIXEL
+"""The limit where nobody set another: the largest usual sensor. Decoded in colour it takes 192 MB."""
+
+COPY_AGAIN: Final = "copy or record the image again"
+"""The remedy for an image that is not whole or not sound."""
+
+
+class ImageKind(Enum):
+    """Kinds of image files that are decoded."""
+
+    JPEG = "JPEG"
+    PNG = "PNG"
+    BMP = "BMP"
+    PNM = "PNM"
+    TIFF = "TIFF"
+    WEBP = "WebP"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageHead:
+    """What an image's header says.
+
+    Attributes:
+        kind: what it is.
+        width_px: width, px, at least 1.
+        height_px: height, px, at least 1.
+        body_at: where in the bytes the compressed image begins; 0 where that is not looked for.
+        least_bytes: with fewer bytes than these the compressed image cannot be whole; 0: not known.
+        block_pixels: pixels of the largest piece that is decoded at once; 0: no more than the image has.
+    """
+
+    kind: ImageKind
+    width_px: int
+    height_px: int
+    body_at: int = 0
+    least_bytes: int = 0
+    block_pixels: int = 0
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height, px."""
+        return self.width_px, self.height_px
+
+
+def require_pixels(size_px: tuple[int, int], most_pixels: int, name: str) -> None:
+    """Check a size against the limit.
+
+    Args:
+        size_px: width and height, px.
+        most_pixels: the limit.
+        name: how errors call what has this size.
+
+    Raises:
+        ImageSizeError: it has more pixels.
+    """
+    pixels = size_px[0] * size_px[1]
+    if pixels > most_pixels:
+        raise ImageSizeError(
+            FrameFault.TOO_LARGE,
+            f"{name} is {size_text(size_px)} px ({pixels / MEGAPIXEL:.3g} MPx), the limit is {most_pixels / MEGAPIXEL:.3g} MPx",
+            "scale it down, or raise --max-megapixels if its size is right",
+        )
+
+
+def require_believable(head: ImageHead, most_pixels: int, name: str) -> None:
+    """Check an image's size against the limit, and that of the pieces in which it is decoded.
+
+    Args:
+        head: what it says of itself.
+        most_pixels: the limit.
+        name: how errors call it.
+
+    Raises:
+        ImageSizeError: it has more pixels.
+    """
+    require_pixels(head.size_px, most_pixels, name)
+    if head.block_pixels:
+        require_pixels((head.block_pixels, 1), most_pixels, f"one piece of {name}")
+
+
+def check_length(count: int, head: ImageHead, name: str) -> None:
+    """Check that there is as much compressed data as the size in the header takes at least.
+
+    Args:
+        count: bytes of it.
+        head: what the image says of itself.
+        name: how errors call it.
+
+    Raises:
+        SpoiledImageError: there is less.
+    """
+    if count < head.least_bytes:
+        raise SpoiledImageError(
+            FrameFault.TOO_SHORT,
+            f"{name} has {count} bytes of image data, {size_text(head.size_px)} px take at least {head.least_bytes}",
+            COPY_AGAIN,
+        )
+
+
+def size_text(size_px: tuple[int, int]) -> str:
+    """Width and height as people write them, such as 640x480."""
+    return f"{size_px[0]}x{size_px[1]}"

@@ -1,0 +1,74 @@
+"""The head of an image of any kind that is known, by its first bytes, and what more can be checked of that kind."""
+
+import struct
+from typing import Final
+
+from common.frame import FrameFault, SpoiledImageError
+from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind, size_text
+from common.imagesize.jpeg import SOI, check_scans, jpeg_head
+from common.imagesize.png import PNG_START, pixel_chunks, png_head
+from common.imagesize.short_heads import PNM_HEADER, bmp_head, pnm_head, webp_head
+from common.imagesize.tiff import TIFF_KINDS, tiff_head
+
+_KNOWN: Final = "give a PNG, JPEG, TIFF, BMP, PGM, PPM or WebP image"
+
+
+def read_head(data: bytes, name: str) -> ImageHead:
+    """Read what an image says of itself.
+
+    Args:
+        data: the encoded image, from anybody.
+        name: how errors call it.
+
+    Raises:
+        SpoiledImageError: it is of no known kind, or its header cannot be believed.
+    """
+    if not data:
+        raise SpoiledImageError(FrameFault.EMPTY, f"{name} is empty", COPY_AGAIN)
+    try:
+        head = _head(data, name)
+    except struct.error:
+        raise SpoiledImageError(FrameFault.NO_END, f"{name} is cut short: its header ends early", COPY_AGAIN) from None
+    if not (head.width_px and head.height_px):
+        raise SpoiledImageError(FrameFault.NO_START, f"{name} is {size_text(head.size_px)} px", COPY_AGAIN)
+    return head
+
+
+def whole_image(data: bytes, head: ImageHead, name: str) -> bytes:
+    """Check that encoded bytes can be the whole image of their header, as far as that is seen without decoding.
+
+    Args:
+        data: the encoded image.
+        head: of `read_head`.
+        name: how errors call it.
+
+    Returns:
+        What a decoder should get: the same bytes; of a PNG only the chunks that carry pixels, since texts and colour profiles may be bombs.
+
+    Raises:
+        SpoiledImageError: they cannot be.
+    """
+    match head.kind:
+        case ImageKind.JPEG:
+            check_scans(data, head, name)
+            return data
+        case ImageKind.PNG:
+            return pixel_chunks(data, head, name)
+        case ImageKind.BMP | ImageKind.PNM | ImageKind.TIFF | ImageKind.WEBP:
+            return data
+
+
+def _head(data: bytes, name: str) -> ImageHead:
+    if data.startswith(SOI):
+        return jpeg_head(data, name)
+    if data.startswith(PNG_START):
+        return png_head(data, name)
+    if data.startswith(b"BM"):
+        return bmp_head(data)
+    if data[:4] in TIFF_KINDS:
+        return tiff_head(data, name)
+    if data.startswith(b"RIFF") and data[8:12] == b"WEBP":
+        return webp_head(data, name)
+    if found := PNM_HEADER.match(data):
+        return pnm_head(found)
+    raise SpoiledImageError(FrameFault.NO_START, f"{name} is no image of a known kind", _KNOWN)

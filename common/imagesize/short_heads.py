@@ -1,0 +1,63 @@
+"""BMP, PNM and WebP: kinds of files whose size stands in their first bytes."""
+
+import re
+import struct
+from typing import Final
+
+from common.frame import FrameFault, SpoiledImageError
+from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind
+
+PNM_HEADER: Final = re.compile(rb"P([1-6])(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})")
+"""Magic, width, height (netpbm's pbm(5), pgm(5), ppm(5)).
+
+Each blank can match in one way only: a nested quantifier took seconds for 30 blanks without a number behind them."""
+
+
+def bmp_head(data: bytes) -> ImageHead:
+    """BITMAPCOREHEADER or BITMAPINFOHEADER behind a BITMAPFILEHEADER (wingdi.h); a negative height means rows from the top down.
+
+    Args:
+        data: the encoded image; begins with BM.
+
+    Raises:
+        struct.error: it ends within the header.
+    """
+    (header_bytes,) = struct.unpack_from("<I", data, 14)
+    width_px, height_px = struct.unpack_from("<HH" if header_bytes == 12 else "<ii", data, 18)
+    return ImageHead(kind=ImageKind.BMP, width_px=abs(width_px), height_px=abs(height_px))
+
+
+def pnm_head(found: re.Match[bytes]) -> ImageHead:
+    """The head of a portable bitmap, graymap or pixmap.
+
+    Args:
+        found: of PNM_HEADER at the begin of the encoded image.
+    """
+    return ImageHead(kind=ImageKind.PNM, width_px=int(found[2]), height_px=int(found[3]), body_at=found.end())
+
+
+def webp_head(data: bytes, name: str) -> ImageHead:
+    """RFC 9649, 2.5 to 2.7 and 3.4; RFC 6386, 9.1.
+
+    Args:
+        data: the encoded image; begins with RIFF, a length and WEBP.
+        name: how errors call it.
+
+    Raises:
+        SpoiledImageError: its first chunk is no sound header.
+        struct.error: it ends within that.
+    """
+    kind = data[12:16]
+    if kind == b"VP8 ":
+        start, width, height = struct.unpack_from("<3sHH", data, 23)
+        if start == b"\x9d\x01\x2a":
+            return ImageHead(kind=ImageKind.WEBP, width_px=width & 0x3FFF, height_px=height & 0x3FFF)
+    elif kind == b"VP8L":
+        signature, bits = struct.unpack_from("<BI", data, 20)
+        if signature == 0x2F:
+            return ImageHead(kind=ImageKind.WEBP, width_px=(bits & 0x3FFF) + 1, height_px=(bits >> 14 & 0x3FFF) + 1)
+    elif kind == b"VP8X":
+        packed = struct.unpack_from("<6s", data, 24)[0]
+        width_px, height_px = (int.from_bytes(packed[at : at + 3], "little") + 1 for at in (0, 3))
+        return ImageHead(kind=ImageKind.WEBP, width_px=width_px, height_px=height_px)
+    raise SpoiledImageError(FrameFault.NO_START, f"{name} is a WebP without a sound header", COPY_AGAIN)
