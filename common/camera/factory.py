@@ -104,7 +104,7 @@ def _read(scheme: str, uri: str, path: str, options: dict[str, str], clock: str)
 
 
 def _parts(uri: str) -> tuple[str, str, dict[str, str]]:
-    """Part scheme, path and options; the scheme is one that is known."""
+    """Split scheme, path and options; the scheme is one that is known."""
     scheme, found, rest = uri.partition(":")
     known = found and (scheme in _KINDS or scheme in registered_names(_CAMERAS))
     if not known or (scheme == "replay" and not rest):
@@ -113,7 +113,7 @@ def _parts(uri: str) -> tuple[str, str, dict[str, str]]:
 
 
 def _split(uri: str, rest: str) -> tuple[str, dict[str, str]]:
-    """Part path and options; a `?` without `=` behind it belongs to a glob."""
+    """Split path and options; a `?` without `=` behind it belongs to a glob."""
     path, mark, query = rest.rpartition("?")
     if not mark or "=" not in query:
         return rest, {}

@@ -25,7 +25,7 @@ from phone_host.report.page_frame import HALF_PX, document, section, table, two_
 from phone_host.report.report_page import DelaySeries, delay_series
 from phone_host.svg.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
 from phone_host.svg.plot_parts import STYLE, legend, point_legend
-from phone_host.svg.plots import Budget, Part, Quantity, Strips, budgets, distributions
+from phone_host.svg.plots import Budget, Quantity, Strips, budgets, distributions, mean_share
 
 _FIGURE_PX: Final = 760
 _LETTER_PX: Final = 8
@@ -78,7 +78,7 @@ def figure(results: Sequence[CaseResult], under: Conditions) -> str:
     groups = grouped([result for result in results if result.ledgers])
     chosen = max(groups, key=len)
     measured = [(str(result.case.interface), delay_series(result.ledgers)) for result in chosen]
-    bars = [Budget(name, tuple(_mean(quantity) for quantity in series.delays)) for name, series in measured]
+    bars = [Budget(name, tuple(mean_share(quantity) for quantity in series.delays)) for name, series in measured]
     day = under.date.partition("T")[0]
     emulated = ", emulated interfaces" if all(result.case.interface.profile for result in chosen) else ""
     title = f"Mean delays of a pair, {chosen[0].case.images}{emulated}, {day}"
@@ -192,8 +192,8 @@ def _card(results: Sequence[CaseResult], under: Conditions) -> str:
         return section(title, "No pair was processed.", "")
     measured = [(str(result.case.interface), delay_series(result.ledgers)) for result in useful]
     delays, stages = measured[0][1].delays, measured[0][1].stages
-    bars = [Budget(name, tuple(_mean(quantity) for quantity in series.delays)) for name, series in measured]
-    work = [Budget(name, tuple(_mean(quantity) for quantity in series.stages)) for name, series in measured]
+    bars = [Budget(name, tuple(mean_share(quantity) for quantity in series.delays)) for name, series in measured]
+    work = [Budget(name, tuple(mean_share(quantity) for quantity in series.stages)) for name, series in measured]
     strips = [Strips(name, _quantities(series)) for name, series in measured]
     chosen = [life for result in useful for life in _lives(result)]
     summaries = "".join(_summary(result, under) for result in results)
@@ -231,7 +231,3 @@ def _lives(result: CaseResult) -> list[Life]:
 
 def _quantities(series: DelaySeries) -> tuple[Quantity, ...]:
     return (*series.delays, series.end_to_end, series.starvation, *series.stages)
-
-
-def _mean(quantity: Quantity) -> Part:
-    return Part(quantity.label, float(quantity.values_ns.mean()), quantity.colour)

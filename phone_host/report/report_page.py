@@ -20,11 +20,11 @@ from phone_host.report.page_frame import HALF_PX, document, section, table, two_
 from phone_host.svg.plot_parts import legend
 from phone_host.svg.plots import (
     Budget,
-    Part,
     Quantity,
     Strips,
     budgets,
     distributions,
+    mean_share,
     over_time,
     stacked_over_time,
 )
@@ -252,8 +252,10 @@ def _delays(series: DelaySeries) -> list[str]:
     if not series.pairs:
         return [section("Delays", "No pair was processed, so there are no delays to show.", "")]
     names = [(quantity.label, quantity.colour) for quantity in series.delays]
-    mean = Budget(f"mean of {series.pairs} pairs, end to end", tuple(_mean(quantity) for quantity in series.delays))
-    work = Budget("mean processing delay", tuple(_mean(quantity) for quantity in series.stages))
+    mean = Budget(
+        f"mean of {series.pairs} pairs, end to end", tuple(mean_share(quantity) for quantity in series.delays)
+    )
+    work = Budget("mean processing delay", tuple(mean_share(quantity) for quantity in series.stages))
     everything = Strips("", (*series.delays, series.end_to_end, series.starvation))
     return [
         section(
@@ -298,10 +300,6 @@ def _glossary(quantities: tuple[Quantity, ...]) -> str:
     """What each delay means, folded away: tooltips do not exist on a phone."""
     items = "".join(f"<dt>{escape(one.label)}</dt><dd>{escape(one.meaning)}</dd>" for one in quantities)
     return f'<details><summary>What each delay means</summary><dl class="words">{items}</dl></details>'
-
-
-def _mean(quantity: Quantity) -> Part:
-    return Part(quantity.label, float(np.mean(quantity.values_ns)), quantity.colour)
 
 
 def _table(one: Table) -> str:

@@ -22,7 +22,7 @@ FACES = 8
 NOTHING = -1
 """Surface number of a ray that meets nothing."""
 
-PART = 16384
+BATCH = 16384
 """Rays handled at a time: the arrays at work then stay in the caches, and products of this size are too small for the
 linear algebra library to wake its threads. Measured best among 8192 to all at once."""
 
@@ -238,8 +238,8 @@ def cast_one(index: int, body: Body, origin: Floats, rays: Floats, hits: Hits) -
     """
     local_origin = to_body(body, origin.astype(rays.dtype)[:, None])
     turn = body.R_scene_body.T.astype(rays.dtype)
-    for start in range(0, rays.shape[1], PART):
-        part = slice(start, start + PART)
+    for start in range(0, rays.shape[1], BATCH):
+        part = slice(start, start + BATCH)
         local_rays: Floats = turn @ rays[:, part]
         depth = intersect(body.shape, local_origin[:, 0], local_rays)
         first = np.flatnonzero(depth < hits.depth[part])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import CameraModel, Image
-from phone_host.scene.cast import FACES, NOTHING, PART, Hits, cast, cast_one, dot, pixel_rays, to_body
+from phone_host.scene.cast import BATCH, FACES, NOTHING, Hits, cast, cast_one, dot, pixel_rays, to_body
 from phone_host.scene.scene_model import Body, Floats, Look, Plane, Pose, Scene
 from phone_host.scene.shade import albedo, may_darken, shadow_balls, surface_light, surface_normals
 
@@ -292,8 +292,8 @@ def _by_body(surface: NDArray[np.int16], at: Flat) -> Iterator[tuple[int, Flat]]
     owner = surface[at] // FACES
     for index in range(int(owner.max(initial=NOTHING)) + 1):
         mine = at[owner == index]
-        for start in range(0, mine.size, PART):
-            yield index, mine[start : start + PART]
+        for start in range(0, mine.size, BATCH):
+            yield index, mine[start : start + BATCH]
 
 
 def _borders(surface: NDArray[np.int16]) -> NDArray[np.bool_]:

@@ -44,7 +44,7 @@ class Quantity:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class Share:
     """A piece of a budget.
 
     Attributes:
@@ -58,17 +58,22 @@ class Part:
     colour: int
 
 
+def mean_share(quantity: Quantity) -> Share:
+    """A quantity's mean as a piece of a budget."""
+    return Share(quantity.label, float(quantity.values_ns.mean()), quantity.colour)
+
+
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """One bar made of parts that add up.
+    """One bar made of shares that add up.
 
     Attributes:
         label: what it is the sum of, for example an interface.
-        parts: in order.
+        shares: in order.
     """
 
     label: str
-    parts: tuple[Part, ...]
+    shares: tuple[Share, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,7 +228,7 @@ def distributions(groups: Sequence[Strips], width_px: int) -> str:
 
 
 def budgets(rows: Sequence[Budget], width_px: int) -> str:
-    """Horizontal bars whose parts add up, all on one axis from zero.
+    """Horizontal bars whose shares add up, all on one axis from zero.
 
     Args:
         rows: one or several (interfaces side by side).
@@ -232,7 +237,7 @@ def budgets(rows: Sequence[Budget], width_px: int) -> str:
     Returns:
         An <svg> element.
     """
-    totals = [math.fsum(part.value_ns for part in row.parts) for row in rows]
+    totals = [math.fsum(share.value_ns for share in row.shares) for row in rows]
     if not totals or not max(totals) > 0.0:
         return empty(width_px, "nothing measured")
     x = Linear(low=0.0, high=max(totals), start_px=0.0, end_px=float(width_px))
@@ -244,17 +249,17 @@ def budgets(rows: Sequence[Budget], width_px: int) -> str:
             f'<text class="strong" x="{width_px}" y="{top + 13}" text-anchor="end">{duration_text(total)}</text>'
         )
         start = 0.0
-        for part in row.parts:
-            left, right = x.px(start), x.px(start + part.value_ns)
-            start += part.value_ns
-            label = f"{part.label}: {duration_text(part.value_ns)}, {100.0 * part.value_ns / total:.1f} %"
+        for share in row.shares:
+            left, right = x.px(start), x.px(start + share.value_ns)
+            start += share.value_ns
+            label = f"{share.label}: {duration_text(share.value_ns)}, {100.0 * share.value_ns / total:.1f} %"
             parts.append(
                 f'<rect x="{left:.1f}" y="{top + 20}" width="{max(0.0, right - left):.1f}" height="26" '
-                f'style="fill:var(--c{part.colour})"><title>{escape(label)}</title></rect>'
+                f'style="fill:var(--c{share.colour})"><title>{escape(label)}</title></rect>'
             )
-            words = f"{part.label} {duration_text(part.value_ns)}"
+            words = f"{share.label} {duration_text(share.value_ns)}"
             if right - left > _LETTER_PX * len(words):
-                pale = " pale" if part.colour in DARK_COLOURS else ""
+                pale = " pale" if share.colour in DARK_COLOURS else ""
                 parts.append(f'<text class="on{pale}" x="{left + 7:.1f}" y="{top + 37}">{escape(words)}</text>')
     return svg(width_px, 56.0 * len(rows) - 6.0, "shares of the delays", parts)
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from phone_host.svg.plot_scale import Linear, Log, duration_text, log_scale, span, ticks
 from phone_host.svg.plots import (
     Budget,
-    Part,
     Quantity,
+    Share,
     Strips,
     budgets,
     distributions,
@@ -34,7 +34,7 @@ def titles(root: ET.Element) -> list[str]:
 @given(parts=st.lists(st.floats(1.0, 1e9), min_size=1, max_size=6), width=st.integers(300, 1200))
 def test_budget_bars_have_the_lengths_of_their_parts(parts: list[float], width: int) -> None:
     """The parts of the longest bar fill the width, side by side, each as long as its share."""
-    row = Budget("all", tuple(Part(f"p{index}", value, index) for index, value in enumerate(parts)))
+    row = Budget("all", tuple(Share(f"p{index}", value, index) for index, value in enumerate(parts)))
     bars = svg(budgets([row], width)).findall("rect")
     edge = 0.0
     for bar, value in zip(bars, parts, strict=True):
@@ -45,7 +45,7 @@ def test_budget_bars_have_the_lengths_of_their_parts(parts: list[float], width: 
 
 def test_several_budgets_share_one_axis() -> None:
     """A bar of half the sum is half as long."""
-    bars = svg(budgets([Budget("a", (Part("x", 10.0, 0),)), Budget("b", (Part("x", 5.0, 0),))], 400)).findall("rect")
+    bars = svg(budgets([Budget("a", (Share("x", 10.0, 0),)), Budget("b", (Share("x", 5.0, 0),))], 400)).findall("rect")
     assert [float(bar.get("width", "nan")) for bar in bars] == [400.0, 200.0]
 
 

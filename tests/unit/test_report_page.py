@@ -25,8 +25,8 @@ from phone_host.report.report_page import (
 from phone_host.svg.plot_parts import legend
 from phone_host.svg.plots import (
     Budget,
-    Part,
     Quantity,
+    Share,
     Strips,
     budgets,
     distributions,
@@ -160,7 +160,7 @@ def test_all_text_is_escaped() -> None:
         distributions([Strips(evil, (quantity,))], 400),
         stacked_over_time(np.arange(3.0), [quantity], 400),
         over_time(np.arange(3.0), quantity, 400),
-        budgets([Budget(evil, (Part(evil, 1.0, 0),))], 400),
+        budgets([Budget(evil, (Share(evil, 1.0, 0),))], 400),
     ):
         assert ET.fromstring(plot).find(".//img") is None
 
