@@ -58,8 +58,8 @@ def follow(keys: KeyFolder, seconds: float) -> Iterator[DoorState]:
     if state == NOBODY:
         raise absence(keys)
     raise UnavailableError(
-        f"no host has paired within {seconds:g} s",
-        "run `phone-host pair --link tcp://BOARD:5555` on the host meanwhile",
+        f"no host paired within {seconds:g} s",
+        "run `phone-host pair --link tcp://BOARD:5555` on the host, then try again",
     )
 
 
@@ -68,7 +68,7 @@ def absence(keys: KeyFolder) -> UnavailableError:
     if len(os.fsencode(keys.path)) > _LONGEST_FOLDER_BYTES:
         return UnavailableError(
             f"the path {keys.path} is too long for a socket in it",
-            "choose a shorter one with --keys, for the service, too",
+            "choose a shorter one with --keys, and use it for the service, too",
         )
     return UnavailableError(
         f"no running board-agent with a secured link uses the keys in {keys.path}",

@@ -89,7 +89,8 @@ def check(settings: BoardSettings) -> None:
     ways(settings.adapt)
     if not 0 <= settings.least_fps <= _HIGHEST_FPS:
         raise SettingsError(
-            f"least_fps is {settings.least_fps:g}", f"give frames per second up to {_HIGHEST_FPS}, 0 to keep the rate"
+            f"least_fps is {settings.least_fps:g}",
+            f"give frames per second, at most {_HIGHEST_FPS}; 0 means never lower the rate",
         )
     if not 0 <= settings.idle_after < LONGEST_S:
-        raise SettingsError(f"idle_after is {settings.idle_after}", "give seconds, 0 for never")
+        raise SettingsError(f"idle_after is {settings.idle_after}", "give a number of seconds; 0 means never")

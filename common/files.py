@@ -108,7 +108,7 @@ def read_file(folder: int, path: Path, most_bytes: int) -> tuple[bytes, os.stat_
     with os.fdopen(descriptor, "rb") as file:
         content = file.read(most_bytes + 1)
     if len(content) > most_bytes:
-        raise DataError(f"{path} is longer than {most_bytes} bytes", "move it away: it is no file of ours")
+        raise DataError(f"{path} is longer than {most_bytes} bytes", "move it away: this program did not write it")
     return content, status
 
 
@@ -130,7 +130,7 @@ def read_whole(path: Path, most_bytes: int) -> bytes:
     with os.fdopen(descriptor, "rb") as file:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
-            raise DataError(f"{path} is no plain file", "give a file")
+            raise DataError(f"{path} is not a plain file", "give a file")
         content = file.read(most_bytes + 1) if status.st_size <= most_bytes else b""
     if status.st_size > most_bytes or len(content) > most_bytes:
         size = max(status.st_size, len(content))
@@ -187,7 +187,7 @@ def sync_folder(folder: int) -> None:
 
 def _no_file(path: Path) -> DataError:
     return DataError(
-        f"{path} is no plain file (a link, a pipe or a folder)", "find out who put it there, and remove it"
+        f"{path} is not a plain file but a link, a pipe or a folder", "find out who put it there, then remove it"
     )
 
 
@@ -233,7 +233,7 @@ def _go_on_as(status: os.stat_result, path: Path, stack: ExitStack) -> None:
         stack.enter_context(_rights_of(status))
     elif stat.S_ISDIR(status.st_mode) and is_open_to_others(status):
         raise UnavailableError(
-            f"{path} lies in a folder of root's that others may write to", "take that right away with chmod go-w"
+            f"{path} is in a folder of root that others may write to", "run chmod go-w on the folder"
         )
 
 

@@ -81,7 +81,9 @@ class KeyFolder:
             if is_key(secret):
                 return OwnKey(_curve().curve_public(secret.encode()).decode(), secret)
         path = self.path / _KEY_FILE
-        raise DataError(f"{path} is no key", "restore it, or make a new one with keys --new and pair again")
+        raise DataError(
+            f"{path} is not a key", "restore it from a backup, or make a new one with keys --new and pair again"
+        )
 
     def renew(self) -> OwnKey:
         """Make new keys in place of the old ones; whoever trusted those must be paired again.
@@ -120,7 +122,8 @@ class KeyFolder:
         except (ValueError, TypeError, RecursionError):
             path = self.path / _PEERS_FILE
             raise DataError(
-                f"{path} is no list of peers", "restore it, or delete it and pair every machine again"
+                f"{path} is not a list of known machines",
+                "restore it from a backup, or delete it and pair every machine again",
             ) from None
 
     @property
@@ -144,7 +147,9 @@ class KeyFolder:
             UnavailableError: it cannot be written.
         """
         if not is_key(peer.key):
-            raise SettingsError(f"{peer.key!r} is no public key", "give the 40 characters that `keys` shows there")
+            raise SettingsError(
+                f"{peer.key!r} is not a public key", "give the 40 characters that `keys` shows on the other machine"
+            )
         with self._locked() as folder:
             others = tuple(known for known in self._peers_in(folder) if known.key != peer.key)
             taken = {known.name for known in others}
@@ -237,7 +242,7 @@ class KeyFolder:
         content, status = read_file(folder, path, _MAX_FILE_BYTES)
         if status.st_mode & 0o077:
             mode = f"mode {stat.S_IMODE(status.st_mode):04o}"
-            raise DataError(f"{path} is open to others ({mode})", f"chmod 600 {path}")
+            raise DataError(f"{path} can be read by other users ({mode})", f"chmod 600 {path}")
         return content.decode("ascii", "replace")
 
     @contextmanager
@@ -300,7 +305,9 @@ def _curve() -> Any:  # noqa: ANN401 - a module
     import zmq  # noqa: PLC0415
 
     if not zmq.has("curve"):
-        raise UnavailableError("this ZeroMQ has no CURVE", "install one with libsodium (apt: python3-zmq)")
+        raise UnavailableError(
+            "this ZeroMQ was built without CURVE encryption", "install one with libsodium (apt: python3-zmq)"
+        )
     return zmq
 
 

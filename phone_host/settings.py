@@ -45,7 +45,7 @@ def check(settings: PhoneHostSettings) -> None:
     if settings.align_phase not in {"", "either", "board", "host"}:
         raise SettingsError(f"align_phase is {settings.align_phase!r}", "give either, board or host, or nothing")
     if not (math.isfinite(settings.tolerance) and settings.tolerance >= 0):
-        raise SettingsError(f"tolerance is {settings.tolerance:g}", "give ms, 0 or more")
+        raise SettingsError(f"tolerance is {settings.tolerance:g}", "give 0 or more milliseconds")
 
 
 def key_folder(keys: str) -> KeyFolder:

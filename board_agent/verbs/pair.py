@@ -12,7 +12,7 @@ from common.errors import SettingsError
 def run(options: argparse.Namespace) -> int:
     """Show the code until a host has proved it."""
     if not 0 < options.seconds < LONGEST_S:
-        raise SettingsError(f"--seconds {options.seconds:g}", "give seconds, more than 0")
+        raise SettingsError(f"--seconds is {options.seconds:g}", "give a number of seconds above 0")
     name, keys = "", chosen_keys(options)
     for state in follow(keys, options.seconds):
         if state == NOBODY:

@@ -108,7 +108,7 @@ def _parts(uri: str) -> tuple[str, str, dict[str, str]]:
     scheme, found, rest = uri.partition(":")
     known = found and (scheme in _KINDS or scheme in registered_names(_CAMERAS))
     if not known or (scheme == "replay" and not rest):
-        raise SettingsError(f"camera {uri!r} is of no known kind", f"give {EXAMPLE}")
+        raise SettingsError(f"camera {uri!r} is of an unknown kind", f"give {EXAMPLE}")
     return scheme, *_split(uri, rest)
 
 

@@ -85,7 +85,7 @@ def read_image(path: Path, data: bytes) -> ImageFile:
         )
     if len(image.payload) > MAX_PAYLOAD_BYTES:
         raise DataError(
-            f"{path} has {len(image.payload)} bytes as it is sent",
+            f"{path} has {len(image.payload)} bytes when it is sent",
             f"give images of at most {MAX_PAYLOAD_BYTES // 2**20} MB",
         )
     return image
@@ -108,7 +108,7 @@ def _parse(path: Path, data: bytes) -> ImageFile:
         case ImageKind.PNM if data[1:2] in b"56":
             return _from_pnm(path, head, data)
         case _:
-            raise DataError(f"{path} is no image that can be replayed", _REMEDY)
+            raise DataError(f"{path} is not an image that can be replayed", _REMEDY)
 
 
 def _from_pnm(path: Path, head: ImageHead, data: bytes) -> ImageFile:

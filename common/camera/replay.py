@@ -66,7 +66,7 @@ def find_images(pattern: str) -> list[Path]:
     folder = Path(pattern)
     try:
         if not pattern:
-            raise SettingsError("replay names no folder", "give a folder of images, an image or a quoted glob")
+            raise SettingsError("replay: names no folder", "give a folder of images, an image or a quoted glob")
         if folder.is_dir():
             found = [path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES]
         elif any(letter in pattern for letter in "*?["):
@@ -87,7 +87,9 @@ def find_images(pattern: str) -> list[Path]:
             f"replay {pattern!r} cannot be read ({error.strerror})", "check its permissions"
         ) from None
     except ValueError as error:  # pathlib's word on a pattern such as a**b
-        raise SettingsError(f"replay {pattern!r} is no glob ({error})", "give a folder or another glob") from None
+        raise SettingsError(
+            f"replay {pattern!r} is not a valid pattern ({error})", "give a folder or another pattern"
+        ) from None
     if not found:
         raise DataError(
             f"replay {pattern!r} holds no image",
@@ -255,12 +257,12 @@ class ReplayCamera:
                 theirs, ours = f"{other.width_px}x{other.height_px}", f"{first.width_px}x{first.height_px}"
                 raise DataError(
                     f"{path} is {theirs}, {self._paths[0].name} is {ours}",
-                    "one camera has one size: give images of one size",
+                    "give images of one size: a camera has only one",
                 )
             if other.pixel_format is not first.pixel_format:
                 raise DataError(
                     f"{path} is {other.pixel_format.value}, {self._paths[0].name} is {first.pixel_format.value}",
-                    "give images of one kind",
+                    "give images of one file format",
                 )
         return first
 

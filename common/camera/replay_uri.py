@@ -32,9 +32,11 @@ def replay_settings(uri: str, path: str, options: Mapping[str, str], clock: str)
         pacing = Pacing[options.get("pace", "clock").upper()]
         phase_ns = round(Fraction(options.get("phase_ms", "0")) * 1_000_000)
     except (ValueError, ZeroDivisionError, KeyError):
-        raise SettingsError(f"camera {uri!r} has an option of no use", f"give {EXAMPLE}") from None
+        raise SettingsError(f"camera {uri!r} has an option that cannot be used here", f"give {EXAMPLE}") from None
     if not Fraction(1, 100) <= fps <= 1000:
         raise SettingsError(f"camera {uri!r} has fps={options.get('fps')}", "give a rate between 0.01 and 1000")
     if phase_ns and pacing is Pacing.DEMAND:
-        raise SettingsError(f"camera {uri!r} has phase_ms and pace=demand", "leave one out: demand knows no clock")
+        raise SettingsError(
+            f"camera {uri!r} has phase_ms and pace=demand", "leave one out: with pace=demand there is no clock to shift"
+        )
     return ReplaySettings(path=path, fps=fps, loop=loop, pacing=pacing, clock=clock, phase_ns=phase_ns)

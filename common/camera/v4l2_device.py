@@ -139,7 +139,10 @@ class Device:
         try:
             self.fd = os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
         except PermissionError:
-            raise UnavailableError(f"camera {path} may not be opened", "add the user to the group video") from None
+            raise UnavailableError(
+                f"camera {path} may not be opened by this user",
+                "add the user to the group video: sudo usermod -aG video $USER, then log in again",
+            ) from None
         except OSError as error:
             raise UnavailableError(
                 f"camera {path} cannot be opened ({error.strerror})",
@@ -150,7 +153,7 @@ class Device:
         except OSError as error:
             self.close()
             raise UnavailableError(
-                f"{path} is no V4L2 node ({error.strerror})", "give a node such as /dev/video0"
+                f"{path} is not a V4L2 device ({error.strerror})", "give a node such as /dev/video0"
             ) from None
 
     def __enter__(self) -> Self:
@@ -176,11 +179,14 @@ class Device:
             return
         if capabilities & abi.CAP_META_CAPTURE:
             raise UnavailableError(
-                f"camera {self.path} gives metadata, not images", "use the camera's other node, the one with index0"
+                f"camera {self.path} gives metadata, not images",
+                "use the camera's other device, the one whose name ends in index0",
             )
         if capabilities & abi.CAP_VIDEO_CAPTURE_MPLANE:
-            raise UnavailableError(f"camera {self.path} has planes in several buffers", "use a USB camera")
-        raise UnavailableError(f"camera {self.path} gives no images", "give one that `board-agent cameras` lists")
+            raise UnavailableError(
+                f"camera {self.path} stores its images in several buffers, which is not supported", "use a USB camera"
+            )
+        raise UnavailableError(f"camera {self.path} gives no images", "use a camera that `board-agent cameras` lists")
 
     def formats(self) -> tuple[FormatOffer, ...]:
         """The encodings and sizes that are offered."""

@@ -160,10 +160,12 @@ def choose(offers: tuple[FormatOffer, ...], wanted: Wanted, camera: str) -> Choi
     known = [(by_letters[letters], kind) for letters, kind in PREFERENCE if letters in by_letters]
     listed = ", ".join(offer.letters for offer in offers)
     if not offers:
-        raise UnavailableError(f"camera {camera} offers no format now", "plug it in again, or start what feeds it")
+        raise UnavailableError(
+            f"camera {camera} offers no format at the moment", "plug it in again, or start what feeds it"
+        )
     if not known:
         raise UnavailableError(
-            f"camera {camera} has only {listed}, which is not passed on frame by frame",
+            f"camera {camera} has only {listed}, which cannot be sent frame by frame",
             "use a camera with MJPEG, YUYV, NV12 or GREY",
         )
     if wanted.pixel_format is not None:

@@ -231,7 +231,7 @@ class Stream:
             asked, got = f"{choice.letters} {_size(choice.size_px)}", f"{made.letters} {_size(made.size_px)}"
             raise UnavailableError(
                 f"camera {self._device.path} gives {got} when asked for {asked}",
-                f"ask for that: size={_size(made.size_px)}",
+                f"ask for that size: size={_size(made.size_px)}",
             )
         return made
 

@@ -49,7 +49,7 @@ def tiff_head(data: bytes, name: str) -> ImageHead:
         values[tag] = max(values[tag], value)
     if values[_ORIENTATION] not in {0, 1}:  # decoders turn a TIFF by it, and by no other format's
         raise DataError(
-            f"{name} is to be turned or mirrored (TIFF orientation {values[_ORIENTATION]})",
+            f"{name} must be turned or mirrored to stand upright (TIFF orientation {values[_ORIENTATION]})",
             "save it upright, without that tag",
         )
     block_pixels = values[_TILE_WIDTH] * values[_TILE_HEIGHT]

@@ -207,7 +207,7 @@ async def _ask(bus: "MessageBus", question: "Message") -> list[Any]:
     except (OSError, EOFError) as error:
         raise UnavailableError(f"D-Bus gave no answer to {question.member} ({error})", "systemctl start dbus") from None
     if answer is None:
-        raise UnavailableError("D-Bus has gone", "systemctl start dbus")
+        raise UnavailableError("D-Bus has stopped", "systemctl start dbus")
     if answer.message_type is MessageType.ERROR:
         told = answer.body[0] if answer.body else answer.error_name
         raise UnavailableError(f"bluetoothd refuses {question.member} ({told})", "systemctl restart bluetooth")

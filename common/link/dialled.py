@@ -119,8 +119,10 @@ class Dialled:
     def _mismatch(self) -> UnavailableError:
         if not self._peer:
             return UnavailableError(
-                f"{self._address} wants a key", f"pair with it: phone-host pair --link {self._address}"
+                f"{self._address} lets in only hosts with a key",
+                f"pair with it: phone-host pair --link {self._address}",
             )
         return UnavailableError(
-            f"{self._address} is open to everybody", "secure it there, or say so here too: add ?insecure=1 to --link"
+            f"{self._address} has no keys and is open to everybody",
+            "secure it on the board, or add ?insecure=1 to --link here, too",
         )

@@ -181,7 +181,7 @@ class Door:
             else:
                 self._callers.shut()
         except OSError as error:
-            self._state = replace(self._state, problem=f"{addresses} cannot be had ({os.strerror(error.errno or 0)})")
+            self._state = replace(self._state, problem=f"{addresses} cannot be used ({os.strerror(error.errno or 0)})")
             if self._troubles.now(now_ns):
                 _LOG.warning(event("pairing_impossible", address=addresses, problem=os.strerror(error.errno or 0)))
             return
@@ -263,7 +263,7 @@ def pairing_address(link: str) -> tuple[str, int]:
     """
     host, _, port = link.removeprefix("tcp://").rpartition(":")
     if int(port) >= _LAST_PORT:
-        raise SettingsError(f"{link} leaves no port for pairing", f"choose one below {_LAST_PORT}")
+        raise SettingsError(f"{link} leaves no free port for pairing", f"choose one below {_LAST_PORT}")
     return host.strip("[]"), int(port) + 1
 
 

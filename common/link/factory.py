@@ -81,7 +81,7 @@ def open_links(uris: Sequence[LinkUri], keys: KeyFolder | None = None, *, board:
         The open links, in that order.
 
     Raises:
-        SettingsError: an address makes no sense, or a link lies on the port on which another one's new hosts are taken in.
+        SettingsError: an address makes no sense, or a link uses the port on which another one's new hosts are taken in.
         UnavailableError: a port or path is taken, or every device is missing.
         DataError: the files of keys are bad.
     """
@@ -123,7 +123,7 @@ def _check_doors(uris: Sequence[LinkUri]) -> None:
             (host, _, port), (other_host, _, other_port) = places[secured], places[other]
             if int(other_port) == int(port) + 1 and (host == other_host or "*" in {host, other_host}):
                 raise SettingsError(
-                    f"{other} lies on the port on which {secured} takes in new hosts",
+                    f"{other} uses the port on which {secured} takes in new hosts",
                     f"choose another than the one behind it, for example {int(port) + 2}",
                 )
 

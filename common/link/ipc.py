@@ -56,7 +56,7 @@ def check_folder(path: str, trusted: frozenset[int]) -> None:
             raise _refused(path, f"{folder} belongs to {_name(status.st_uid)}", status.st_uid)
         if is_open_to_others(status):
             raise UnavailableError(
-                f"ipc://{path} is not safe: others may write to {folder}, which belongs to {_name(status.st_uid)}",
+                f"ipc://{path} is not safe: other users may write to {folder}, which belongs to {_name(status.st_uid)}",
                 f"chmod go-w {folder}, or choose a path in $XDG_RUNTIME_DIR",
             )
 
@@ -78,7 +78,7 @@ def check_socket(path: str, trusted: frozenset[int]) -> None:
             raise _refused(path, f"it belongs to {_name(status.st_uid)}", status.st_uid)
         if not os.access(path, os.R_OK | os.W_OK):
             raise UnavailableError(
-                f"ipc://{path} lets this user not in: it belongs to {_name(status.st_uid)}",
+                f"ipc://{path} does not let this user in: it belongs to {_name(status.st_uid)}",
                 f"add ?owner={os.geteuid()} to the link of the side that listens, as root",
             )
 

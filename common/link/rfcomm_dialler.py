@@ -173,4 +173,4 @@ def _undialled(uri: str, error: OSError, *, published: bool) -> UnavailableError
         return UnavailableError(problem, "pair the two devices with bluetoothctl")
     if error.errno == errno.ECONNREFUSED:
         return UnavailableError(problem, "start board-agent there with --link rfcomm://*, and pair the two devices")
-    return UnavailableError(problem, "is it switched on and in reach?")
+    return UnavailableError(problem, "switch it on and bring it into reach")

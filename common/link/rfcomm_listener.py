@@ -151,7 +151,7 @@ def _once(line: RfcommLine) -> Callable[[], RfcommLine]:
 
     def opened() -> RfcommLine:
         if not lines:
-            raise UnavailableError("the device has gone", "wait until it dials again")
+            raise UnavailableError("the device has gone", "wait until it connects again")
         return lines.pop()
 
     return opened

@@ -93,7 +93,7 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
     if scheme not in OWN_SCHEMES and (extension := _extension(uri, listens_by_default=listens_by_default)):
         return extension
     if not found or scheme not in OWN_SCHEMES or not rest:
-        raise SettingsError(f"link {uri!r} is of no known kind", _EXAMPLES)
+        raise SettingsError(f"link {uri!r} is of an unknown kind", _EXAMPLES)
     if scheme == "tcp":
         _check_port(uri, address)
     if scheme == "rfcomm":

@@ -25,12 +25,12 @@ def explained(address: str, error: zmq.ZMQError, remedy: str) -> SettingsError |
     """
     why = zmq.strerror(error.errno or 0)  # the exception's own text repeats the address
     if error.errno == zmq.EADDRINUSE:
-        return TakenError(f"{address} cannot be had ({why})", remedy)
+        return TakenError(f"{address} cannot be used ({why})", remedy)
     if error.errno in {zmq.EADDRNOTAVAIL, errno.ENODEV}:
-        return UnavailableError(f"{address} cannot be had ({why})", "give an address of this machine, or * for all")
+        return UnavailableError(f"{address} cannot be used ({why})", "give an address of this machine, or * for all")
     if error.errno in {errno.EPERM, errno.ENOENT, errno.EACCES}:  # the folder of an ipc path, or a port below 1024
         return UnavailableError(f"{address} cannot be opened ({why})", "check the folder and its permissions")
-    return SettingsError(f"link {address!r} makes no sense ({why})", remedy)
+    return SettingsError(f"link {address!r} is not valid ({why})", remedy)
 
 
 def _check_replaceable(path: str) -> None:
@@ -44,7 +44,7 @@ def _check_replaceable(path: str) -> None:
     except OSError:
         return
     if not stat.S_ISSOCK(status.st_mode):
-        raise UnavailableError(f"ipc://{path} is a file that is no socket", "choose another path with --link")
+        raise UnavailableError(f"ipc://{path} is a file, not a socket", "choose another path with --link")
     if os.geteuid() not in {0, status.st_uid}:
         raise TakenError(f"ipc://{path} belongs to {owner_of(path)}", "choose another path with --link")
 

@@ -31,7 +31,10 @@ def open_zeromq(request: LinkRequest) -> ZeroMqListener | ZeroMqDialer:
 
 def _keys(uri: LinkUri, keys: KeyFolder | None) -> KeyFolder:
     if keys is None:
-        raise SettingsError(f"{uri.address} leaves this machine", "name a folder of keys, or add ?insecure=1")
+        raise SettingsError(
+            f"{uri.address} leads to another machine and needs keys",
+            "name a folder of keys, or add ?insecure=1 to do without",
+        )
     return keys
 
 

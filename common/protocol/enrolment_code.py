@@ -77,7 +77,7 @@ def read_code(text: str) -> int:
     digits = text.replace(" ", "").replace("-", "").strip()
     if len(digits) == CODE_DIGITS and digits.isascii() and digits.isdigit():
         return int(digits)
-    raise SettingsError(f"{text.strip()!r:.40} is no code", f"type the {CODE_DIGITS} digits that the board shows")
+    raise SettingsError(f"{text.strip()!r:.40} is not a code", f"type the {CODE_DIGITS} digits that the board shows")
 
 
 def new_code(chance: Callable[[int], bytes]) -> int:

@@ -81,7 +81,7 @@ def _change(text: str) -> Change:
     for part in text.split(","):
         key, found, value = part.strip().partition("=")
         if not found:
-            raise SettingsError(f"--predict {part!r} is no change", _HELP)
+            raise SettingsError(f"--predict {part!r} is not a change", _HELP)
         match key:
             case "fps":
                 change = replace(change, rate_hz=parse_rates(value)[0])

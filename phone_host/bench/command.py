@@ -79,7 +79,7 @@ def _available(asked: Sequence[Interface]) -> tuple[list[Interface], list[tuple[
         else:
             here.append(interface)
     if not here:
-        raise UnavailableError("none of the links can be had here", "name others with --links")
+        raise UnavailableError("none of the links works on this machine", "give others with --links")
     return here, not_run
 
 
@@ -104,7 +104,7 @@ def _tell(options: argparse.Namespace, results: Sequence[CaseResult], under: Con
 
 def _settings(options: argparse.Namespace) -> RunSettings:
     if not 0.5 <= options.seconds <= 3600:
-        raise SettingsError(f"--seconds {options.seconds:g}", "give 0.5 to 3600")
+        raise SettingsError(f"--seconds is {options.seconds:g}", "give 0.5 to 3600 seconds")
     return RunSettings(matcher_named(options.matcher), FifoSettings.parse(options.fifo), options.seconds)
 
 
@@ -123,7 +123,8 @@ def _write(out: Path, files: dict[str, str]) -> None:
             write_text(out / name, text)
     except OSError as error:
         raise UnavailableError(
-            f"results in {out} cannot be written ({error.strerror})", "make room or give another folder with --out"
+            f"results in {out} cannot be written ({error.strerror})",
+            "make room on the disk, or give another folder with --out",
         ) from None
 
 

@@ -172,4 +172,7 @@ def _fresh(folder: Path) -> Path:
 
 
 def _no_room(folder: Path, error: OSError) -> UnavailableError:
-    return UnavailableError(f"temporary folder {folder} cannot be used ({error.strerror})", "make room, or set TMPDIR")
+    return UnavailableError(
+        f"temporary folder {folder} cannot be used ({error.strerror})",
+        "make room on the disk, or set TMPDIR to another folder",
+    )

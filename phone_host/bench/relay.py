@@ -311,7 +311,7 @@ class RelayProcess:
         try:
             said = json.loads(process.stdout.readline())
         except ValueError:
-            raise UnavailableError("the line between the two programs did not come up", "run it by hand") from None
+            raise UnavailableError("the two programs did not connect", "run it by hand to see why") from None
         self.board: str = said["board"]
         self.host: str = said["host"]
 
@@ -321,7 +321,7 @@ class RelayProcess:
         try:
             return RelayAccount(**json.loads(self._process.communicate(timeout=GOODBYE_S)[0]))
         except (subprocess.TimeoutExpired, ValueError):
-            raise UnavailableError("the line between the two programs broke", "run it again") from None
+            raise UnavailableError("the connection between the two programs broke", "run it again") from None
 
 
 @contextmanager

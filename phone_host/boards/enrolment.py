@@ -105,7 +105,7 @@ class PairingCall:
             connected = socket.create_connection(self._door, _ANSWER_S)
         except OSError as error:
             raise _HungUpError(
-                f"{where} takes in no new host ({error.strerror or error})",
+                f"{where} does not take in a new host ({error.strerror or error})",
                 "start board-agent there, and run sudo board-agent pair",
             ) from None
         with connected:
@@ -136,18 +136,21 @@ class _Line:
                 received = self._socket.recv(1 + MAX_WORD_BYTES)
                 words = self._reader.feed(received)
             except TimeoutError:
-                raise UnavailableError(f"{self._where} has fallen silent", "try again") from None
+                raise UnavailableError(f"{self._where} does not answer any more", "try again") from None
             except OSError:
                 received, words = b"", []
             except ProtocolError as error:
-                raise DataError(f"{self._where} is no board's door ({error.problem})", "check --link") from None
+                raise DataError(
+                    f"{self._where} does not answer like a board that takes in new hosts ({error.problem})",
+                    "check --link",
+                ) from None
             if words:
                 if isinstance(words[0], Refuse):
                     raise _refusal(words[0])
                 return words[0]
             if not received:
                 raise _HungUpError(
-                    f"{self._where} hangs up",
+                    f"{self._where} closes the connection",
                     "start board-agent there, and run sudo board-agent pair",
                 )
 
@@ -156,10 +159,10 @@ def _refusal(word: Refuse) -> TandemError:
     wait = f"wait {word.seconds} s" if word.seconds else "try again"
     match word.reason:
         case Denial.CLOSED:
-            return UnavailableError("the board takes in no new host", "run `sudo board-agent pair` there")
+            return UnavailableError("the board does not take in a new host", "run `sudo board-agent pair` there")
         case Denial.PAUSE:
             return UnavailableError(
-                "the board takes a pause after wrong codes", f"{wait}, or run `sudo board-agent pair` there"
+                "the board pauses after wrong codes", f"{wait}, or run `sudo board-agent pair` there"
             )
         case Denial.BUSY:
             return UnavailableError("another host is being paired", wait)

@@ -57,7 +57,7 @@ def find_usb_board(port: Path | None, sysfs: Path = Path("/sys")) -> UsbBoard:
         found = _usb_device(sysfs / "class" / "tty" / port.resolve().name)
         if found is None:
             raise MissingDeviceError(
-                f"{port} is no port of a USB device", "plug the board in; ls /dev/serial/by-id shows what is there"
+                f"{port} is not the port of a USB device", "plug the board in; ls /dev/serial/by-id shows what is there"
             )
         return _checked(found)
     ports = sorted((sysfs / "class" / "tty").glob("tty*"))
@@ -106,7 +106,7 @@ def write_rule(board: UsbBoard, rules: Path = RULES) -> None:
             file.write(rule_text(board).encode())
     except PermissionError:
         raise UnavailableError(
-            f"{rules} can be written by root alone", "run it with sudo: sudo phone-host pair --udev"
+            f"{rules} can only be written by root", "run it with sudo: sudo phone-host pair --udev"
         ) from None
     except OSError as error:
         raise UnavailableError(f"{rules} cannot be written ({error.strerror})", "install udev, and make room") from None
@@ -136,7 +136,7 @@ def _attribute(path: Path) -> str:
 def _checked(board: UsbBoard) -> UsbBoard:
     if not (_ID.fullmatch(board.vendor) and _ID.fullmatch(board.product) and _SERIAL.fullmatch(board.serial)):
         raise DataError(
-            f"/dev/{board.device} has the serial number {board.serial!r:.60}, which cannot stand in a rule",
+            f"/dev/{board.device} has the serial number {board.serial!r:.60}, which a udev rule cannot hold",
             "update the board's package, or name the device in a rule by hand",
         )
     return board

@@ -58,7 +58,7 @@ class Board:
     def __post_init__(self) -> None:
         if not all(_LEAST_CORNERS <= count <= _MOST_CORNERS for count in (self.columns, self.rows)):
             raise SettingsError(
-                f"--board {self.columns}x{self.rows} is no chessboard",
+                f"--board {self.columns}x{self.rows} is not a chessboard",
                 "give its inner corners, such as 9x6 (3 to 100 each)",
             )
         if not 0 < self.square_m <= _LARGEST_SQUARE_M:
@@ -85,10 +85,12 @@ def parse_board(corners: str, square: str) -> Board:
     """
     counts = re.fullmatch(r"\s*(\d{1,3})\s*[xX]\s*(\d{1,3})\s*", corners)
     if counts is None:
-        raise SettingsError(f"--board {corners!r} is no size", "give columns x rows of inner corners, such as 9x6")
+        raise SettingsError(f"--board {corners!r} is not a size", "give columns x rows of inner corners, such as 9x6")
     length = _LENGTH.match(square.lower())
     if length is None:
-        raise SettingsError(f"--square {square!r} is no length", "give it with its unit, such as 25mm, 2.5cm or 0.025m")
+        raise SettingsError(
+            f"--square {square!r} is not a length", "give it with its unit, such as 25mm, 2.5cm or 0.025m"
+        )
     return Board(int(counts[1]), int(counts[2]), float(length[1]) * _UNITS_M[length[2]])
 
 

@@ -29,9 +29,9 @@ _NO_STREAM: Final = (
 """What is told to be something else; any other type is looked into: servers call MJPEG many names, or none."""
 
 _FAILURES: Final[tuple[tuple[type[Exception], str, str], ...]] = (
-    (ssl.SSLCertVerificationError, "has a certificate that nobody vouches for", "give ?verify=0 to accept it"),
+    (ssl.SSLCertVerificationError, "has a certificate that this machine does not trust", "give ?verify=0 to accept it"),
     (ssl.SSLError, "does not speak https", "give http:// in place of https://"),
-    (TimeoutError, "does not answer", "check that both are in one network"),
+    (TimeoutError, "does not answer", "check that phone and host are in the same network"),
     (ConnectionRefusedError, "refuses the connection", "start the server in the phone's app"),
     (socket.gaierror, "has no address", "give the number that the phone's app shows"),
     (ConnectionResetError, "hangs up without an answer", "check the port, and whether it needs https://"),
@@ -146,15 +146,18 @@ class Connection:
                     "switch its password off, or to Basic",
                 )
             if self._settings.user:
-                raise UnavailableError(f"camera {shown} does not take this name and password", "correct them")
+                raise UnavailableError(
+                    f"camera {shown} does not take this name and password",
+                    "correct the name and password in the address",
+                )
             raise UnavailableError(f"camera {shown} asks for a password", "give http://USER:PASSWORD@HOST:PORT/…")
         if status in {301, 302, 303, 307, 308}:
             there = response.getheader("Location") or "elsewhere"
-            raise UnavailableError(f"camera {shown} has moved to {there[:200]}", "give that address")
+            raise UnavailableError(f"camera {shown} has moved to {there[:200]}", "give the new address")
         if status == http.client.NOT_FOUND:
             raise UnavailableError(f"camera {shown} is not there (404)", "check the path; IP Webcam has /video")
         if status != http.client.OK:
-            raise UnavailableError(f"camera {shown} answers {status}", "look at the phone's app; it may be busy")
+            raise UnavailableError(f"camera {shown} answers {status}", "look at the app on the phone; it may be busy")
         if kind.startswith(_NO_STREAM) and kind != "image/x-mjpeg":
             what = "a web page" if kind == "text/html" else "single images" if kind.startswith("image/") else kind
             raise UnavailableError(

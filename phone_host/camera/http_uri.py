@@ -84,17 +84,17 @@ def http_settings(uri: str, clock: str) -> HttpSettings:
         port, host = parts.port, parts.hostname
         user, password = unquote(parts.username or ""), unquote(parts.password or "")
     except ValueError:
-        raise SettingsError(f"camera {_hidden(uri)!r} is no address", f"give {EXAMPLE}") from None
+        raise SettingsError(f"camera {_hidden(uri)!r} is not a valid address", f"give {EXAMPLE}") from None
     secure = parts.scheme.lower() == "https"
     # Blanks and control characters would end the request's line early.
     target = parts.path or "/"
     if not host or port == 0 or re.search(r"[^\x21-\x7e]", host + target + parts.query):
-        raise SettingsError(f"camera {_hidden(uri)!r} is no address", f"give {EXAMPLE}")
+        raise SettingsError(f"camera {_hidden(uri)!r} is not a valid address", f"give {EXAMPLE}")
     ours, theirs = _split(parts.query)
     if "latency_uncertainty_ms" in ours and "latency_ms" not in ours:
         raise SettingsError(
-            f"camera {_hidden(uri)!r} has latency_uncertainty_ms without the latency_ms that it is of",
-            "give both, or neither and measure the time offset: phone-host calibrate-time",
+            f"camera {_hidden(uri)!r} has latency_uncertainty_ms but no latency_ms",
+            "give both, or neither and measure with phone-host calibrate-time",
         )
     return HttpSettings(
         secure=secure,

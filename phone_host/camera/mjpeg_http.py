@@ -221,7 +221,9 @@ class HttpCamera:
         if self._sequence:
             return UnavailableError(f"camera {shown} sent one image in {patience_s} s", "give the video's own address")
         if not self._life.counts.opened:
-            return UnavailableError(f"camera {shown} does not answer", "check that both are in one network")
+            return UnavailableError(
+                f"camera {shown} does not answer", "check that phone and host are in the same network"
+            )
         return UnavailableError(
             f"camera {shown} sent no JPEG image within {patience_s} s", "give the address of an MJPEG stream"
         )

@@ -42,7 +42,8 @@ class BoardProcess:
         if self._process.poll() is not None:
             words = self._process.communicate()[1].decode(errors="replace").strip().splitlines()
             raise UnavailableError(
-                f"board-agent ended with exit code {self._process.returncode}", words[-1] if words else "run it by hand"
+                f"board-agent ended with exit code {self._process.returncode}",
+                words[-1] if words else "run it by hand to see why",
             )
 
     def stop(self) -> BoardAccount:
@@ -54,7 +55,9 @@ class BoardProcess:
         try:
             said = json.loads(self._process.communicate(timeout=GOODBYE_S)[0])
         except (subprocess.TimeoutExpired, ValueError):
-            raise UnavailableError("board-agent did not end with its account", "run it by hand with --json") from None
+            raise UnavailableError(
+                "board-agent did not end with its account", "run it by hand with --json to see why"
+            ) from None
         return BoardAccount(said["grabbed"], said["sent"], tuple(sorted(said["dropped"].items())))
 
 
@@ -77,7 +80,9 @@ def socket_folder() -> Iterator[Path]:
     try:
         folder = tempfile.TemporaryDirectory(prefix="tandemscan-", dir=parent)
     except OSError as error:
-        raise UnavailableError(f"{parent} cannot be used ({error.strerror})", "make room, or set TMPDIR") from None
+        raise UnavailableError(
+            f"{parent} cannot be used ({error.strerror})", "make room on the disk, or set TMPDIR to another folder"
+        ) from None
     with folder as name:
         yield Path(name)
 

@@ -93,17 +93,15 @@ def judge(figures: RunFigures) -> Judgement:
         return Judgement(Regime.UNKNOWN, f"too few pairs ({figures.pairs}) to tell whether the processor starves")
     if figures.busy >= _BUSY:
         return _backlog(figures)
-    waits = f"the processor has nothing to do for {100 * (1 - figures.busy):.0f} % of the time"
+    waits = f"the processor is idle for {100 * (1 - figures.busy):.0f} % of the time"
     if not figures.period_ns or figures.arrival_ns <= _SLOWER * figures.period_ns:
         rate = _rate(figures.arrival_ns)
-        text = (
-            f"{waits}: it keeps up with the cameras, {_ms(figures.processing_ns)} ms of work for each of {rate} pairs/s"
-        )
+        text = f"{waits}: it keeps up with the cameras; each of the {rate} pairs per second takes it {_ms(figures.processing_ns)} ms"
         return Judgement(Regime.STARVED_BY_CAMERAS, text, _room(figures))
     if figures.arrival_ns <= _SLOWER * figures.period_ns * figures.received:
         lost = 100 * (1 - 1 / figures.received)
         text = f"{waits}: frames arrive at the cameras' rate, but {lost:.0f} % of them find no partner"
-        remedy = "a larger --tolerance, equal rates of both cameras, or a look at frames.orphaned in the report"
+        remedy = "give a larger --tolerance, or run both cameras at the same rate; frames.orphaned in report.json has the reasons"
         return Judgement(Regime.STARVED_BY_PAIRING, text, (remedy,))
     return _starved_by_link(figures, waits)
 
@@ -114,15 +112,15 @@ def _starved_by_link(figures: RunFigures, waits: str) -> Judgement:
     wanted_bytes = figures.frame_bytes * 1e9 / figures.period_ns
     fitting_bytes = figures.frame_bytes * figures.period_ns / figures.arrival_ns
     text = (
-        f"{waits}: the link brings {_rate(figures.arrival_ns)} of the cameras' {_rate(figures.period_ns)} frames/s "
+        f"{waits}: the link carries only {_rate(figures.arrival_ns)} of the cameras' {_rate(figures.period_ns)} frames per second "
         f"(propagation {_ms(figures.propagation_ns)} ms, processing {_ms(figures.processing_ns)} ms)"
     )
     scale = math.sqrt(figures.period_ns / figures.arrival_ns)
     how = f"(about {100 * scale:.0f} % of width and height, or a lower JPEG quality)"
     remedies = (
-        f"smaller frames: {fitting_bytes / 1000:.1f} instead of {figures.frame_bytes / 1000:.1f} kB would bring them all {how}",
-        f"another link: it would have to carry {wanted_bytes / 1e6:.2f} MB/s, this one carries {rate_bytes / 1e6:.2f}",
-        f"fewer frames asked of the camera (fps={_rate(figures.arrival_ns)}): no more pairs, but none dropped on the board",
+        f"send smaller frames: with {fitting_bytes / 1000:.1f} instead of {figures.frame_bytes / 1000:.1f} kB the link carries all of them {how}",
+        f"use another link: {wanted_bytes / 1e6:.2f} MB/s are needed, this one carries {rate_bytes / 1e6:.2f}",
+        f"lower the camera's rate (fps={_rate(figures.arrival_ns)}): that gives no more pairs, but the board drops no frames",
     )
     return Judgement(Regime.STARVED_BY_LINK, text, remedies)
 
@@ -136,22 +134,21 @@ def _backlog(figures: RunFigures) -> Judgement:
     scale = _fitting_scale(figures, arrival_ns)
     others = "the others wait in the FIFO or are dropped" if scale < 1 else "it just keeps up"
     text = (
-        f"the processor is busy for {100 * figures.busy:.0f} % of the time: {_ms(figures.processing_ns)} ms of work for each pair, "
-        f"while {_rate(arrival_ns)} a second are offered; {others}"
+        f"the processor is busy for {100 * figures.busy:.0f} % of the time: a pair takes it {_ms(figures.processing_ns)} ms, "
+        f"and {_rate(arrival_ns)} pairs arrive per second; {others}"
     )
     remedies = []
     if scale < 1:
         remedies.append(
-            f"smaller images: {100 * scale:.0f} % of width and height would do "
-            "(estimate: work goes with the pixels, matching with the disparities, too)"
+            f"use smaller images: {100 * scale:.0f} % of width and height are enough (estimated from pixels and disparities)"
         )
         rest_ns = figures.processing_ns - figures.match_ns
         if figures.match_ns > 0 and rest_ns < arrival_ns:
             remedies.append(
-                f"another matcher: it may take {_ms(arrival_ns - rest_ns)} ms, this one takes {_ms(figures.match_ns)} ms"
+                f"use a faster matcher: it may take {_ms(arrival_ns - rest_ns)} ms, this one takes {_ms(figures.match_ns)} ms"
             )
         remedies.append(
-            f"fewer frames: fps={_rate(figures.processing_ns)} is what the processor does; the link is spared"
+            f"lower the camera's rate: the processor manages fps={_rate(figures.processing_ns)}, and the link carries less"
         )
     return Judgement(Regime.BACKLOG, text, tuple(remedies))
 
@@ -161,7 +158,7 @@ def _room(figures: RunFigures) -> tuple[str, ...]:
     factor = figures.arrival_ns / figures.processing_ns
     if factor < 1.5:
         return ()
-    return (f"nothing is wrong; there is time for {factor:.1f} times the work on each pair",)
+    return (f"nothing is wrong; there is time for {factor:.1f} times as much work on each pair",)
 
 
 def _fitting_scale(figures: RunFigures, arrival_ns: float) -> float:

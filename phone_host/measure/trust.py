@@ -66,23 +66,27 @@ def stamp_doubt(offset: TimeOffset, own: CameraHealth) -> StampDoubt:
         What is left. A latency's uncertainty counts only where the time offset was not measured: the measurement took the latency along.
     """
     late_ns = own.jitter_ns or 0
-    late = "" if own.jitter_ns is None else f", and the own images arrive up to {late_ns / 1e6:.1f} ms late"
+    late = "" if own.jitter_ns is None else f", and this machine's images arrive up to {late_ns / 1e6:.1f} ms late"
     if offset != TimeOffset():
-        why = f"the cameras' stamps are known to agree to +-{offset.uncertainty_ns / 1e6:.1f} ms only{late}"
-        remedy = "a longer phone-host calibrate-time"
-        return StampDoubt(offset.uncertainty_ns + late_ns, why, remedy if not late else f"{remedy}; a steadier network")
-    unmeasured = f"nobody has measured by how much the cameras' stamps differ, +-{offset.uncertainty_ns / 1e6:.1f} ms"
+        why = f"the time offset between the two cameras is only known to +-{offset.uncertainty_ns / 1e6:.1f} ms{late}"
+        remedy = "measure longer: phone-host calibrate-time --seconds 60"
+        return StampDoubt(
+            offset.uncertainty_ns + late_ns, why, remedy if not late else f"{remedy}; use a steadier network"
+        )
+    unmeasured = f"the time offset between the two cameras was never measured, +-{offset.uncertainty_ns / 1e6:.1f} ms"
     if own.jitter_ns is None:
-        return StampDoubt(offset.uncertainty_ns, unmeasured, "phone-host calibrate-time")
-    remedy = "phone-host calibrate-time, or latency_ms= and latency_uncertainty_ms= in the own camera's address"
+        return StampDoubt(offset.uncertainty_ns, unmeasured, "measure it with phone-host calibrate-time")
+    remedy = "measure it with phone-host calibrate-time, or give latency_ms= and latency_uncertainty_ms= in the camera's address"
     if own.latency_ns is None:
-        why = f"{unmeasured}, nor the own camera's latency, some {_LEAST_LATENCY_NS / 1e6:.0f} ms or more{late}"
+        why = f"{unmeasured}, nor was the latency of this machine's camera, some {_LEAST_LATENCY_NS / 1e6:.0f} ms or more{late}"
         return StampDoubt(offset.uncertainty_ns + _LEAST_LATENCY_NS + late_ns, why, remedy)
     stated_ns = own.latency_uncertainty_ns
     if stated_ns is None:
-        return StampDoubt(offset.uncertainty_ns + late_ns, f"{unmeasured}, nor how exact latency_ms is{late}", remedy)
-    why = f"{unmeasured}, the own camera's latency is known to +-{stated_ns / 1e6:.1f} ms{late}"
-    return StampDoubt(offset.uncertainty_ns + stated_ns + late_ns, why, "phone-host calibrate-time")
+        return StampDoubt(
+            offset.uncertainty_ns + late_ns, f"{unmeasured}, nor is it known how exact latency_ms is{late}", remedy
+        )
+    why = f"{unmeasured}, the latency of this machine's camera is known to +-{stated_ns / 1e6:.1f} ms{late}"
+    return StampDoubt(offset.uncertainty_ns + stated_ns + late_ns, why, "measure it with phone-host calibrate-time")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,10 +145,8 @@ class Unbelieved:
 
 
 _OF_THE_CLOCK: Final = frozenset({"clock_in_doubt", "proven_by_no_echo"})
-_STOOD_STILL: Final = "none of them was used; if it goes on, see what stops one of the two programs or machines"
-_LIES: Final = (
-    "none of them was used; if it goes on, update the board's software and check its camera and who else uses the link"
-)
+_STOOD_STILL: Final = "none of them was used; if this goes on, find out what stops one of the two programs or machines"
+_LIES: Final = "none of them was used; if this goes on, update the board's software, check its camera, and check who else uses the link"
 
 
 def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
@@ -152,22 +154,22 @@ def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
     found = []
     if unbelieved.clock_steps:
         suspect = (
-            f"; up to {unbelieved.suspect_frames} pairs before that was noticed are suspect"
+            f"; up to {unbelieved.suspect_frames} pairs may be wrong because they came before that was noticed"
             if unbelieved.suspect_frames
             else ""
         )
         found.append(
             Concern(
                 Doubt.CLOCK_STEPPED,
-                f"one of the two clocks stepped {unbelieved.clock_steps} times{suspect}",
-                "do not let the board or the host sleep during a run; leave the suspect pairs out (report.json names them)",
+                f"one of the two clocks jumped {unbelieved.clock_steps} times{suspect}",
+                "do not let the board or the host sleep during a run; ignore the suspect pairs, which report.json names",
             )
         )
     if unbelieved.spoiled_images:
         found.append(
             Concern(
                 Doubt.SPOILED_IMAGES,
-                f"{sum(unbelieved.spoiled_images.values())} images were spoiled and not used ({_reasons(unbelieved.spoiled_images)})",
+                f"{sum(unbelieved.spoiled_images.values())} spoiled images were not used ({_reasons(unbelieved.spoiled_images)})",
                 "check the cable, the camera and its format; one now and then does no harm",
             )
         )
@@ -176,7 +178,7 @@ def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
         found.append(
             Concern(
                 Doubt.DISBELIEVED,
-                f"{sum(unbelieved.disbelieved.values())} frames of {unbelieved.received} were not believed and dropped ({reasons})",
+                f"{sum(unbelieved.disbelieved.values())} of {unbelieved.received} frames could not be true and were dropped ({reasons})",
                 _STOOD_STILL if _OF_THE_CLOCK.issuperset(unbelieved.disbelieved) else _LIES,
             )
         )
@@ -200,7 +202,7 @@ def timing_concerns(timing: Timing) -> tuple[Concern, ...]:
             Concern(
                 Doubt.TIME_SKEW,
                 f"frames of a pair are up to {timing.time_skew_ns / 1e6:.1f} ms apart while {moves}: {skew_px:.1f} px of error, depth is wrong",
-                "move slower; --align-phase or --interpolate; a smaller --tolerance; higher rates of both cameras",
+                "move slower; use --align-phase or --interpolate; give a smaller --tolerance; raise the rate of both cameras",
             )
         )
     clock_px = timing.uncertainty_ns / 1e9 * motion
@@ -208,8 +210,8 @@ def timing_concerns(timing: Timing) -> tuple[Concern, ...]:
         found.append(
             Concern(
                 Doubt.CLOCK,
-                f"the board's clock is known to +-{timing.uncertainty_ns / 1e6:.1f} ms only while {moves}: {clock_px:.1f} px may be wrong",
-                "wait until the estimate settles; a link with shorter or steadier round trips",
+                f"the board's clock is only known to +-{timing.uncertainty_ns / 1e6:.1f} ms while {moves}: {clock_px:.1f} px may be wrong",
+                "wait some seconds; use a link with shorter or steadier round trips",
             )
         )
     stamps_px = timing.stamps.half_width_ns / 1e9 * motion
@@ -222,7 +224,7 @@ def timing_concerns(timing: Timing) -> tuple[Concern, ...]:
             Concern(
                 Doubt.AGE,
                 f"results are {timing.end_to_end_ns / 1e6:.0f} ms old while {moves}: the scene has moved {lag_px:.0f} px since",
-                "move slower; see the regime for what holds the results up",
+                "move slower; the summary says what delays the results",
             )
         )
     return tuple(found)

@@ -41,27 +41,27 @@ def _on_the_way(run: RunSnapshot) -> Iterator[Unused]:
     yield Unused("frames that came too late over another link", "", late)
     yield Unused("frames delivered again", "", sum(account.duplicate for account in sessions))
     yield Unused("frames of an earlier session", "", sum(account.old_session for account in sessions))
-    yield Unused("packets that were none of ours", "", run.link.garbage)
+    yield Unused("packets of something else", "", run.link.garbage)
     yield Unused("frames that came before the clock was known", "", run.link.no_clock)
     for reason, count in disbelieved(run).items():
-        yield Unused("frames not believed", reason, count)
+        yield Unused("frames that could not be true", reason, count)
 
 
 def _on_the_host(run: RunSnapshot) -> Iterator[Unused]:
     counts = run.counts
-    yield Unused("own frames that were no whole images", "", run.spoiled)
+    yield Unused("own frames that were not whole images", "", run.spoiled)
     yield Unused("own frames replaced by newer ones", "", run.skipped)
     for reason, count in counts.board_orphans:
         yield Unused("board frames without partner", reason, count)
     for reason, count in counts.host_orphans:
         yield Unused("own frames without partner", reason, count)
-    yield Unused("pairs that gave way in a full FIFO", "", counts.dropped)
+    yield Unused("pairs dropped from a full FIFO", "", counts.dropped)
     spoiled = sum(count for _, count in run.spoiled_images)
     for reason, count in run.spoiled_images:
         yield Unused("pairs with a spoiled image", reason, count)
     yield Unused("pairs that could not be processed", "", run.undecodable - spoiled)
     if run.ended != "running":
-        yield Unused("pairs that still waited at the end", "", run.stopped)
+        yield Unused("pairs still waiting at the end", "", run.stopped)
     for sink in run.sinks:
         yield Unused("results that came too fast for the sink", sink.name, sink.dropped)
         yield Unused("results that the sink could not write", sink.name, sink.failed)

@@ -161,7 +161,7 @@ class ListedFolder:
         except DataError as error:
             raise self._in_the_way(error.problem) from None
         if not text.startswith(_HEAD):
-            raise self._in_the_way(f"{path} is none of ours")
+            raise self._in_the_way(f"{path} was not written by this program")
         # Of a last line without its end nothing was made yet.
         return set(text.removeprefix(_HEAD).rpartition("\n")[0].splitlines())
 
@@ -179,7 +179,7 @@ class ListedFolder:
             if stat.S_ISLNK(mode):
                 raise self._in_the_way(f"{path} is a link")
             if plain_name(name) not in listed or not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-                raise self._in_the_way(f"{path} is not known to be from an earlier run")
+                raise self._in_the_way(f"{path} was not written by an earlier run")
         return found
 
     def _check_inside(self, name: str) -> None:
@@ -191,7 +191,7 @@ class ListedFolder:
             for entry in _entries(folder):
                 mode = os.lstat(entry, dir_fd=folder).st_mode
                 if not (self._inner.fullmatch(plain_name(entry)) and stat.S_ISREG(mode)):
-                    raise self._in_the_way(f"{self._path / name / entry} is not known to be from an earlier run")
+                    raise self._in_the_way(f"{self._path / name / entry} was not written by an earlier run")
         finally:
             os.close(folder)
 

@@ -53,7 +53,7 @@ def read_pfm(path: Path) -> Disparity:
         raise DataError(f"{path} cannot be read ({error.strerror})", "give a PFM file that exists") from error
     header = _HEADER.match(content[:_HEADER_LIMIT_BYTES])
     if header is None:
-        raise DataError(f"{path} is no PFM file", "its header must read 'Pf', width and height, and the scale")
+        raise DataError(f"{path} is not a PFM file", "its header must read 'Pf', width and height, and the scale")
     magic, width_text, height_text, scale_text = header.groups()
     if magic == b"PF":
         raise DataError(f"{path} is a PFM of three channels", "a disparity map has one channel ('Pf')")

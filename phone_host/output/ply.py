@@ -112,7 +112,7 @@ def read_ply(path: Path) -> PointCloud:
         raise DataError(f"{path} cannot be read ({error.strerror})", "give a PLY file that exists") from error
     header = _HEADER.match(content)
     if header is None:
-        raise DataError(f"{path} is no coloured binary PLY", "give a cloud.ply that this program wrote")
+        raise DataError(f"{path} is not a coloured binary PLY file", "give a cloud.ply that this program wrote")
     count = int(header.group(1))
     if len(content) - header.end() != count * _VERTEX.itemsize:
         raise DataError(f"{path} does not hold the {count} points its header names", "write the file again")

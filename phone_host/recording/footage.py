@@ -121,7 +121,7 @@ def film(
         camera.close()
         for link in links:
             link.close()
-        raise DataError("a camera with pace=demand has no time of its own", "use pace=clock")
+        raise DataError("a camera with pace=demand has no clock", "give it pace=clock")
     keeper = _Keeper()
     own = OwnCamera(camera, keeper.add_host, DemandClock(pacing))
     receiver = Receiver(links, now.random_id(), keeper)
@@ -155,7 +155,7 @@ def _check(receiver: Receiver, own: OwnCamera) -> None:
             raise failure
     hello = receiver.hello
     if hello is not None and not has_own_time(hello.camera.pacing):
-        raise DataError("the board's camera has pace=demand and so no time of its own", "use pace=clock")
+        raise DataError("the board's camera has pace=demand and so has no clock", "give it pace=clock")
 
 
 def keep(footage: Footage, folder: Path) -> None:
@@ -193,7 +193,7 @@ def read(folder: Path) -> Footage:
         shots = []
         for path in paths:
             if not path.stem.isdecimal():
-                raise DataError(f"{path}: the name is no stamp", "name each image by its exposure in ns")
+                raise DataError(f"{path}: the name is not a time stamp", "name each image by its exposure in ns")
             image = load(path)
             encoded = EncodedImage(
                 payload=image.payload,

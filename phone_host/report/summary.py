@@ -27,8 +27,8 @@ def summary(run: RunSnapshot) -> str:
             lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value / _MS:9.3f}" for value in values))
     if run.estimate is not None:
         lines.append(
-            f"clock known to +-{run.estimate.uncertainty_ns / 1000:.0f} us"
-            f" (+-{run.estimate.bound_ns / 1000:.0f} us whatever the link does), skew {run.estimate.skew * 1e6:+.1f} ppm"
+            f"the board's clock is known to +-{run.estimate.uncertainty_ns / 1000:.0f} us"
+            f" (+-{run.estimate.bound_ns / 1000:.0f} us at worst), skew {run.estimate.skew * 1e6:+.1f} ppm"
         )
     lines += _agreement(run)
     lines += phase_lines(run.phase, run.alignment)
@@ -48,7 +48,7 @@ def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
         drift = (
             ""
             if not math.isfinite(phase.beat_s)
-            else f", drifts by {phase.drift * 1e6:+.1f} ppm, comes round in {phase.beat_s:.0f} s"
+            else f", drifts by {phase.drift * 1e6:+.1f} ppm, one full turn in {phase.beat_s:.0f} s"
         )
         side = "before" if phase.time_skew_ns < 0 else "after"
         lines.append(
@@ -71,7 +71,7 @@ def camera_troubles(health: CameraHealth) -> list[str]:
         *([f"{health.distrusted_stamps} stamps not believed"] if health.distrusted_stamps else []),
         *([f"{health.refused_controls} controls refused"] if health.refused_controls else []),
     ]
-    return [f"own camera: {', '.join(parts)}".replace("_", " ")] if parts else []
+    return [f"this machine's camera: {', '.join(parts)}".replace("_", " ")] if parts else []
 
 
 def _agreement(run: RunSnapshot) -> list[str]:
@@ -79,25 +79,29 @@ def _agreement(run: RunSnapshot) -> list[str]:
     offset = run.time_offset
     known = f"+-{offset.uncertainty_ns / _MS:.2f} ms"
     if offset != TimeOffset():
-        return [f"the cameras' stamps differ by {offset.offset_ns / _MS:+.2f} {known}, which is taken out"]
+        return [f"the cameras' stamps differ by {offset.offset_ns / _MS:+.2f} {known}, which is corrected"]
     if run.stamps_exact:
         return []
-    return [f"the cameras' stamps agree to {known}: not measured (phone-host calibrate-time)"]
+    return [f"the cameras' stamps agree to {known}: not measured; phone-host calibrate-time measures it"]
 
 
 def _arrivals(health: CameraHealth, offset: TimeOffset) -> list[str]:
     """What the stamps of an own camera mean that tells of arrivals only."""
     if health.jitter_ns is None:
         return []
-    jitter = f"they arrive up to {health.jitter_ns / _MS:.1f} ms late (p95)"
+    jitter = f"images arrive up to {health.jitter_ns / _MS:.1f} ms late (p95)"
     if health.latency_ns is not None:
         stated = health.latency_uncertainty_ns
         known = "" if stated is None else f", known to +-{(stated + health.jitter_ns) / _MS:.1f} ms"
-        return [f"own camera: stamps are arrivals - {health.latency_ns / _MS:g} ms{known}; {jitter}"]
+        return [
+            f"this machine's camera: stamps are arrival times minus {health.latency_ns / _MS:g} ms{known}; {jitter}"
+        ]
     if offset != TimeOffset():
-        return [f"own camera: stamps are arrivals, its latency part of the measured difference; {jitter}"]
+        return [
+            f"this machine's camera: stamps are arrival times; the measured time offset includes its latency; {jitter}"
+        ]
     return [
-        f"own camera: its latency is not known, every time skew is off by it (calibrate-time, or ?latency_ms=); {jitter}"
+        f"this machine's camera: its latency is unknown, and every time skew is wrong by it; measure it with phone-host calibrate-time; {jitter}"
     ]
 
 

@@ -356,7 +356,7 @@ def require_same_shape(image_px: tuple[int, int], asked_px: tuple[int, int], nam
         raise ImageSizeError(
             FrameFault.TOO_LARGE,
             f"{name} is {px_text(image_px)} px, its camera was asked for {px_text(asked_px)}",
-            "look at the camera that sends it",
+            "check the camera that sends it",
         )
     if width * asked_height != height * asked_width:
         raise ImageSizeError(

@@ -116,7 +116,7 @@ class SgbmMatcher:
         if searched > GREATEST_SEARCH:
             raise SettingsError(
                 f"disparities = {self._disparities} is more than sgbm can hold ({GREATEST_SEARCH})",
-                "reduce the images or the number of disparities, or take the block matcher",
+                "use smaller images, fewer disparities, or --matcher block",
             )
         engine.setNumDisparities(searched)
         padded = (cv2.copyMakeBorder(image, 0, 0, searched, 0, cv2.BORDER_REPLICATE) for image in (left, right))

@@ -13,7 +13,7 @@ from phone_host.model import Image
 from phone_host.stereo.images import EncodedFile, decode_file, decode_files, examine, require_same_shape
 
 _KINDS: Final = {PixelFormat.MJPEG: ImageKind.JPEG, PixelFormat.PNG: ImageKind.PNG}
-_LOOK: Final = "look at the camera that sends it"
+_LOOK: Final = "check the camera that sends it"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

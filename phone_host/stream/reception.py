@@ -308,7 +308,7 @@ class Reception:
                     return
                 raise UnavailableError(
                     f"links {names} lead to different boards ({ours.camera.name} and, on link {link + 1}, {hello.camera.name})",
-                    "give --link only addresses of one board",
+                    "give --link only addresses of the same board",
                 )
 
     @property

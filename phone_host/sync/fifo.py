@@ -44,8 +44,8 @@ class FifoSettings:
         sound_depth = depth.isascii() and depth.isdigit() and len(depth) <= 4 and 1 <= int(depth) <= 1000
         if not sound_depth or full not in {item.value for item in Overflow}:
             raise SettingsError(
-                f"--fifo {text!r} is no DEPTH:POLICY",
-                "give a depth from 1 to 1000 and drop-oldest, drop-newest or block",
+                f"--fifo {text!r} is not of the form DEPTH:POLICY",
+                "give a depth from 1 to 1000, a colon, and drop-oldest, drop-newest or block",
             )
         return cls(int(depth), Overflow(full))
 

@@ -50,7 +50,7 @@ def spare_inputs(out: Path, names: str, inputs: Mapping[str, Path]) -> None:
         inside = path.resolve()
         if folder in inside.parents and re.fullmatch(names, inside.relative_to(folder).parts[0]):
             raise SettingsError(
-                f"{what} {path} lies in what --out {out} would replace", "give another folder with --out"
+                f"{what} {path} lies inside --out {out}, which is replaced", "give another folder with --out"
             )
 
 
@@ -66,7 +66,7 @@ def require_file(out: Path, option: str = "--out") -> None:
     """
     _require_folder(out.parent, out, option)
     if out.exists() and not out.is_file():
-        raise UnavailableError(f"{out} is no file", f"name another {option}")
+        raise UnavailableError(f"{out} is not a file", f"name another {option}")
 
 
 def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableError:
@@ -80,7 +80,10 @@ def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableE
     Returns:
         The error to raise.
     """
-    return UnavailableError(f"{out} cannot be written ({error.strerror})", f"free the disk, or name another {option}")
+    return UnavailableError(
+        f"{out} cannot be written ({error.strerror})",
+        f"check that the folder exists, that you may write to it and that the disk has room, or name another {option}",
+    )
 
 
 def _require_folder(folder: Path, out: Path, option: str) -> None:
@@ -89,4 +92,4 @@ def _require_folder(folder: Path, out: Path, option: str) -> None:
     except OSError as error:
         raise unwritable(out, error, option) from None
     if not there.is_dir():
-        raise UnavailableError(f"{there} is no folder", f"name another {option}")
+        raise UnavailableError(f"{there} is not a folder", f"name another {option}")

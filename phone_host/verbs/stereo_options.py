@@ -34,9 +34,9 @@ def build_core(
     """
     chosen = matcher_named(matcher)
     if not (math.isfinite(options.near) and options.near > 0):
-        raise SettingsError(f"--near {options.near:g}", "give millimetres above 0")
+        raise SettingsError(f"--near is {options.near:g}", "give a number of millimetres above 0")
     if calibration and options.rectified:
-        raise SettingsError("--calibration and --rectified contradict each other", "give one of them")
+        raise SettingsError("--calibration and --rectified contradict each other", "give only one of the two")
     _refuse_idle_geometry(options, calibration)
     if calibration:
         rig = read_rig(Path(calibration))
@@ -63,11 +63,11 @@ def _refuse_idle_geometry(options: argparse.Namespace, calibration: str) -> None
     """Refuse options of the geometry that would say nothing: the user means something by them."""
     given = [f"--{name}" for name in ("focal", "baseline", "doffs", "center") if getattr(options, name) is not None]
     if given and calibration:
-        raise SettingsError(f"{given[0]} contradicts --calibration", "leave it out: the rig has its own geometry")
+        raise SettingsError(f"{given[0]} contradicts --calibration", "leave it out: the calibration has its own")
     if given and not options.rectified:
         raise SettingsError(f"{given[0]} without --rectified", "add --rectified, or leave it out")
     if given and options.focal is None and options.baseline is None:
-        raise SettingsError(f"{given[0]} without --focal and --baseline", "give both, or leave it out")
+        raise SettingsError(f"{given[0]} without --focal and --baseline", "add --focal and --baseline, or leave it out")
 
 
 def rectified_geometry(options: argparse.Namespace, size_px: tuple[int, int]) -> StereoGeometry | None:
@@ -77,7 +77,7 @@ def rectified_geometry(options: argparse.Namespace, size_px: tuple[int, int]) ->
         SettingsError: one without the other, or numbers of no use.
     """
     if (options.focal is None) != (options.baseline is None):
-        raise SettingsError("--focal and --baseline belong together", "give both, or neither for no point cloud")
+        raise SettingsError("only one of --focal and --baseline is given", "give both for a point cloud, or neither")
     if options.focal is None:
         return None
     for name, value in (("--focal", options.focal), ("--baseline", options.baseline)):
@@ -85,7 +85,7 @@ def rectified_geometry(options: argparse.Namespace, size_px: tuple[int, int]) ->
             raise SettingsError(f"{name} {value:g}", "give a number above 0")
     doffs_px = 0.0 if options.doffs is None else options.doffs
     if not math.isfinite(doffs_px):
-        raise SettingsError(f"--doffs {doffs_px:g}", "give a number of px")
+        raise SettingsError(f"--doffs is {doffs_px:g}", "give a number of pixels")
     cx_px, cy_px = ((n - 1) / 2 for n in size_px) if options.center is None else _center(options.center)
     return StereoGeometry(
         focal_px=options.focal, baseline_m=options.baseline / 1000, cx_px=cx_px, cy_px=cy_px, doffs_px=doffs_px
@@ -98,5 +98,5 @@ def _center(text: str) -> tuple[float, float]:
     except ValueError:
         cx_px = cy_px = math.nan
     if not (math.isfinite(cx_px) and math.isfinite(cy_px)):
-        raise SettingsError(f"--center {text!r}", "give CX,CY in px, for example 319.5,239.5")
+        raise SettingsError(f"--center is {text!r}", "give CX,CY in px, for example 319.5,239.5")
     return cx_px, cy_px

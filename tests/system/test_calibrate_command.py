@@ -186,7 +186,7 @@ def test_what_is_no_file_is_not_replaced(boards: Path, tmp_path: Path) -> None:
     """--out that is a folder or a pipe, or lies in a file, is exit 3 at once; it stays what it was."""
     (tmp_path / "file").write_text("no folder")
     os.mkfifo(tmp_path / "pipe")
-    for out, said in (("", "is no file"), ("pipe", "pipe is no file"), ("file/rig.yaml", "file is no folder")):
+    for out, said in (("", "is not a file"), ("pipe", "pipe is not a file"), ("file/rig.yaml", "file is not a folder")):
         done = _phone_host(
             "calibrate", boards / "left", boards / "right", "--board", "9x6", "--square", 25, "--out", tmp_path / out
         )

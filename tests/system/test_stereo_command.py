@@ -169,9 +169,13 @@ def _bad_cases(folder: Path) -> dict[str, tuple[list[object], int, str]]:
         "center alone": ([left, right, *rectified, "--center", "99,59", *out], 2, "--center without --focal"),
         "doffs alone": ([left, right, *rectified, "--doffs", 0, *out], 2, "--doffs without --focal"),
         "near": ([left, right, "--calibration", folder / "rig.yaml", "--near", 0, *out], 2, "--near"),
-        "out is a file": ([left, right, *rectified, "--out", folder / "file"], 3, "file is no folder: name another"),
-        "out lies in a file": ([left, right, *rectified, "--out", folder / "file" / "a" / "b"], 3, "file is no folder"),
-        "out is a device": ([left, right, *rectified, "--out", "/dev/null"], 3, "/dev/null is no folder"),
+        "out is a file": ([left, right, *rectified, "--out", folder / "file"], 3, "file is not a folder: name another"),
+        "out lies in a file": (
+            [left, right, *rectified, "--out", folder / "file" / "a" / "b"],
+            3,
+            "file is not a folder",
+        ),
+        "out is a device": ([left, right, *rectified, "--out", "/dev/null"], 3, "/dev/null is not a folder"),
     }
 
 

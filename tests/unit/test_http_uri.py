@@ -49,17 +49,17 @@ def test_addresses(uri: str, settings: HttpSettings) -> None:
 @pytest.mark.parametrize(
     ("uri", "named"),
     [
-        ("http://", "no address"),
-        ("http://phone:99999/video", "no address"),
-        ("http://phone:0/video", "no address"),
-        ("http://[phone/video", "no address"),
-        ("http://phone/vi deo", "no address"),
-        ("http://phone/a\r\nX: y", "no address"),
+        ("http://", "not a valid address"),
+        ("http://phone:99999/video", "not a valid address"),
+        ("http://phone:0/video", "not a valid address"),
+        ("http://[phone/video", "not a valid address"),
+        ("http://phone/vi deo", "not a valid address"),
+        ("http://phone/a\r\nX: y", "not a valid address"),
         ("http://phone/v?latency_ms=soon", "latency_ms=soon"),
         ("http://phone/v?latency_ms=-1", "latency_ms=-1"),
         ("http://phone/v?latency_ms=1e999999999", "latency_ms=1e999999999"),
         ("http://phone/v?verify=maybe", "verify=maybe"),
-        ("http://phone/v?latency_uncertainty_ms=5", "latency_uncertainty_ms without the latency_ms"),
+        ("http://phone/v?latency_uncertainty_ms=5", "latency_uncertainty_ms but no latency_ms"),
     ],
 )
 def test_what_is_no_address_is_refused(uri: str, named: str) -> None:

@@ -222,7 +222,7 @@ def test_a_tiff_that_is_to_be_turned_is_refused(orientation: int) -> None:
     if orientation <= 1:
         assert read_head(content, "a.tif").size_px == (70, 50)
         return
-    with pytest.raises(DataError, match=f"a.tif is to be turned.*orientation {orientation}.*save it upright"):
+    with pytest.raises(DataError, match=f"a.tif must be turned.*orientation {orientation}.*save it upright"):
         read_head(content, "a.tif")
 
 

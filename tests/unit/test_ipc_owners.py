@@ -161,7 +161,7 @@ def test_a_folder_where_anybody_may_exchange_sockets_is_refused(
     """Neither side uses a folder that others may write to and that is not sticky; the line names it and chmod."""
     for mode in (0o777, 0o702):
         tmp_path.chmod(mode)
-        with pytest.raises(UnavailableError, match=f"others may write to {tmp_path}.*chmod go-w"):
+        with pytest.raises(UnavailableError, match=f"other users may write to {tmp_path}.*chmod go-w"):
             open_end(f"ipc://{tmp_path}/board")
     for mode in (0o1777, 0o755):
         tmp_path.chmod(mode)

@@ -98,7 +98,7 @@ def test_a_link_to_a_file_of_roots_is_neither_read_nor_written(place: Path, fold
     as_nobody(lambda: (folder / name).symlink_to(secret))
     keys = KeyFolder(folder)
     read = {"key": keys.own, "peers.json": keys.peers, "spent-codes": keys.spent_codes}[name]
-    with pytest.raises(DataError, match=f"{name} is no plain file") as caught:
+    with pytest.raises(DataError, match=f"{name} is not a plain file") as caught:
         read()
     assert SECRET not in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -118,7 +118,7 @@ def test_the_command_survives_a_link_in_place_of_the_key(place: Path, folder: Pa
     as_nobody(lambda: (folder / "key").symlink_to(place / "secret"))
     told = keys_command(folder)
     assert told.returncode == 4
-    assert re.fullmatch(r"board-agent: error: .*/key is no plain file .*\n", told.stderr)
+    assert re.fullmatch(r"board-agent: error: .*/key is not a plain file .*\n", told.stderr)
     assert SECRET not in told.stderr
     assert keys_command(folder, "--new").returncode == 0
     assert not (folder / "key").is_symlink()
@@ -155,7 +155,7 @@ def test_a_pipe_or_folder_under_a_files_name_is_one_line(folder: Path, name: str
     """Root waits for nobody at the pipe's other end, and says which file is none."""
     as_nobody(lambda: make(folder / name))
     keys = KeyFolder(folder)
-    with pytest.raises(DataError, match=f"{name} is no plain file"):
+    with pytest.raises(DataError, match=f"{name} is not a plain file"):
         {"key": keys.own, "peers.json": keys.peers, "spent-codes": keys.spent_codes}[name]()
 
 

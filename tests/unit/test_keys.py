@@ -111,7 +111,7 @@ def test_peers_are_added_renewed_and_forgotten(tmp_path: Path) -> None:
     assert [peer.name for peer in folder.peers()] == ["phone-2"]
     with pytest.raises(SettingsError, match="phone-2"):
         folder.forget("phone")
-    with pytest.raises(SettingsError, match="is no public key"):
+    with pytest.raises(SettingsError, match="is not a public key"):
         folder.add(Peer(name="phone", key="short", added=WHEN))
 
 

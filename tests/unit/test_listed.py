@@ -229,7 +229,7 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
 def test_names_are_claimed_before_they_are_written(tmp_path: Path) -> None:
     """A verb that writes single files refuses those of others before its work, replaces those of earlier runs, and is replaced itself."""
     (tmp_path / "report.json").write_text("mine")
-    with pytest.raises(UnavailableError, match=r"report\.json is not known to be from an earlier run"):
+    with pytest.raises(UnavailableError, match=r"report\.json was not written by an earlier run"):
         claim(tmp_path, "report.json", "plot.svg")
     (tmp_path / "report.json").unlink()
     for _ in range(2):
@@ -242,7 +242,7 @@ def test_names_are_claimed_before_they_are_written(tmp_path: Path) -> None:
 def test_what_is_read_is_not_replaced(tmp_path: Path) -> None:
     """Images or a rig that lie under a name which the results would take end the run before anything has changed; beside them they do no harm."""
     names = NAMES
-    with pytest.raises(SettingsError, match=r"--camera .*pair-000003 lies in what --out"):
+    with pytest.raises(SettingsError, match=r"--camera .*pair-000003 lies inside --out"):
         spare_inputs(tmp_path, names, {"--camera": tmp_path / "pair-000003"})
     with pytest.raises(SettingsError, match="--calibration"):
         spare_inputs(tmp_path, names, {"--calibration": tmp_path / "pair-000003" / "rig.yaml"})

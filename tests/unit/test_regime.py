@@ -65,14 +65,14 @@ def test_a_backlog_behind_a_slow_link_names_what_the_link_brings() -> None:
     run = figures(period_ms=100 / 3, arrival_ms=200 / 3, processing_ms=100, match_ms=80)
     judgement = judge(run)
     assert judgement.regime is Regime.BACKLOG
-    assert "while 15 a second are offered" in judgement.sentence
+    assert "15 pairs arrive per second" in judgement.sentence
     assert numbers(judgement.remedies[1])[0] == pytest.approx(200 / 3 - 20, abs=0.05)
 
 
 def test_a_fifo_that_blocks_hides_what_the_cameras_offer() -> None:
     """With `block` the board sends no more than is taken: what the processor misses is told from the cameras' rate."""
     run = replace(figures(period_ms=100 / 3, arrival_ms=100, processing_ms=100), overflow=Overflow.BLOCK)
-    assert "while 30 a second are offered" in judge(run).sentence
+    assert "30 pairs arrive per second" in judge(run).sentence
 
 
 def test_a_processor_that_just_keeps_up_is_not_said_to_drop() -> None:
@@ -86,7 +86,7 @@ def test_a_processor_that_keeps_up_waits_for_the_cameras() -> None:
     """With 10 ms of work for each of 30 pairs a second nothing is wrong, and the room that is left is told."""
     judgement = judge(figures(period_ms=100 / 3, arrival_ms=100 / 3, processing_ms=10))
     assert judgement.regime is Regime.STARVED_BY_CAMERAS
-    assert "3.3 times the work" in judgement.remedies[0]
+    assert "3.3 times as much work" in judgement.remedies[0]
 
 
 def test_frames_without_partner_are_told_from_a_slow_link() -> None:

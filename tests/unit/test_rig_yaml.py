@@ -106,7 +106,7 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
     """What is no FileStorage YAML is refused in one line, by name."""
     path = tmp_path / "rig.yaml"
     path.write_bytes(content)
-    with pytest.raises(DataError, match=r"rig\.yaml is no OpenCV FileStorage YAML"):
+    with pytest.raises(DataError, match=r"rig\.yaml is not a calibration file"):
         read_rig(path)
 
 

@@ -92,7 +92,7 @@ def test_the_phase_is_told_with_its_side() -> None:
         "phase: the board exposes 5.0 of 50.0 ms before the host"
     ]
     assert (
-        "5.0 of 50.0 ms after the host, drifts by +100.0 ppm, comes round in 500 s"
+        "5.0 of 50.0 ms after the host, drifts by +100.0 ppm, one full turn in 500 s"
         in phase_lines(Phase(time_skew_ns=5.0 * MS, period_ns=50 * MS, drift=1e-4, first_ns=0), None)[0]
     )
 
@@ -138,7 +138,7 @@ def test_what_was_not_believed_is_told_everywhere() -> None:
     assert told["frames"]["disbelieved"] == dropped
     assert {item["doubt"] for item in told["warnings"]} == {"clock_stepped", "disbelieved", "spoiled_images"}
     for text in (summary(seen), run_page(seen, None, Side.LEFT, ())):
-        for words in ("stepped 1 times", "7 pairs", "from the future", "beyond credit", "too large"):
+        for words in ("jumped 1 times", "7 pairs", "from the future", "beyond credit", "too large"):
             assert words in text
 
 
@@ -196,8 +196,8 @@ def test_everything_that_a_run_knows_is_told() -> None:
         "+-30 us", "skew +2.0 ppm", "alignment: aligned", "unplugged 4 times", "stalled 2 times", "failed 3 times",
         "back 5 times", "1 frames missed", "6 stamps not believed", "7 controls refused", "8 frames no end",
         "5 frames dropped on the board: replaced", "9 board frames without partner: no partner",
-        "3 pairs that gave way in a full FIFO", "2 pairs that could not be processed",
-        "4 pairs that still waited at the end", "4 lines, 6 pairs (disk full)",
+        "3 pairs dropped from a full FIFO", "2 pairs that could not be processed",
+        "4 pairs still waiting at the end", "4 lines, 6 pairs (disk full)",
     ):  # fmt: skip
         assert words in text
     [head, ipc, tcp] = text[text.index("link  ") :].splitlines()[:3]
@@ -209,10 +209,10 @@ def test_everything_that_a_run_knows_is_told() -> None:
 @pytest.mark.parametrize(
     ("latency_ms", "stated_ms", "offset", "words"),
     [
-        (None, None, TimeOffset(), "latency is not known"),
-        (None, None, TimeOffset(3 * MS, MS), "part of the measured difference"),
-        (90, None, TimeOffset(), "arrivals - 90 ms; they"),
-        (90, 20, TimeOffset(), "arrivals - 90 ms, known to +-24.0 ms; they"),
+        (None, None, TimeOffset(), "latency is unknown"),
+        (None, None, TimeOffset(3 * MS, MS), "offset includes its latency"),
+        (90, None, TimeOffset(), "arrival times minus 90 ms; images"),
+        (90, 20, TimeOffset(), "arrival times minus 90 ms, known to +-24.0 ms; images"),
     ],
 )
 def test_stamps_that_are_arrivals_say_so(

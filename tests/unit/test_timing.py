@@ -140,7 +140,7 @@ def read_as(number: int) -> Reading:
 
 @pytest.mark.parametrize(
     ("count", "moves", "words"),
-    [(10, True, "too short"), (60, False, "did not count"), (60, None, "saw the pattern in 0 of 60")],
+    [(10, True, "too short"), (60, False, "did not change"), (60, None, "saw the pattern in 0 of 60")],
 )
 def test_a_screen_that_cannot_serve_is_named(count: int, moves: bool | None, words: str) -> None:  # noqa: FBT001
     """Too few frames, a still pattern and none at all are three different errors, each with its remedy."""

@@ -113,7 +113,7 @@ def test_who_is_not_root_is_told_so(sysfs: Path) -> None:
     board = find_usb_board(None, sysfs)
     os.seteuid(65534)
     try:
-        with pytest.raises(UnavailableError, match=r"root alone.*sudo"):
+        with pytest.raises(UnavailableError, match=r"by root.*sudo"):
             write_rule(board, Path("/etc/70-tandemscan.rules"))
     finally:
         os.seteuid(0)

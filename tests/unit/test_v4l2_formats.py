@@ -74,13 +74,13 @@ def test_an_absent_format_is_refused_with_the_list() -> None:
 
 def test_a_camera_with_h264_alone_is_refused() -> None:
     """H.264 is no sequence of images; the error says so, and what to use instead."""
-    with pytest.raises(UnavailableError, match=r"has only H264, which is not passed on.*MJPEG"):
+    with pytest.raises(UnavailableError, match=r"has only H264, which cannot be sent.*MJPEG"):
         choose((_H264,), Wanted(), "x")
 
 
 def test_a_camera_without_any_format_is_not_there_yet() -> None:
     """A loopback device that nobody feeds offers nothing: unavailable now, not wrong."""
-    with pytest.raises(UnavailableError, match="no format now"):
+    with pytest.raises(UnavailableError, match="no format at the moment"):
         choose((), Wanted(), "x")
 
 

@@ -90,7 +90,7 @@ def test_an_unknown_option_is_refused_with_the_list() -> None:
 
 @pytest.mark.parametrize(
     ("uri", "said"),
-    [("v4l2:/dev/there-is-none", "cannot be opened"), ("v4l2:/dev/null", "no V4L2 node")],
+    [("v4l2:/dev/there-is-none", "cannot be opened"), ("v4l2:/dev/null", "not a V4L2 device")],
 )
 def test_what_is_no_camera_is_refused_in_words(uri: str, said: str) -> None:
     """A missing node and a node of another kind are unavailable, each with its reason."""

@@ -191,7 +191,7 @@ def _interval(left: _Read, right: _Read, refresh_s: float) -> tuple[float, float
             return float(least), float(most), float(np.median(ticks_s[possible]))
     raise DataError(
         "the stamps do not fit the screen's count",
-        "use a screen with a constant refresh rate, or --by lamp",
+        "use a screen with a constant refresh rate, or use --by lamp",
     )
 
 
@@ -233,8 +233,8 @@ def _unwrap(board: Counted, host: Counted) -> tuple[float, Times, Times]:
     rate_hz = float(np.median(rates)) if rates else 0.0
     if not rate_hz > _SLOWEST_HZ:
         raise DataError(
-            "the pattern did not count: a still picture?",
-            "show the page of --pattern in a browser; it counts by itself",
+            "the pattern on the screen did not change",
+            "open the page of --pattern in a browser, not a picture of it",
         )
     times = np.concatenate([board.times_s, host.times_s])
     numbers = np.concatenate([board.numbers, host.numbers]).astype(np.float64)

@@ -78,7 +78,7 @@ def require_shots(board: int, host: int) -> None:
         if count < LEAST_SHOTS:
             raise DataError(
                 f"too short: {count} frames of the {whose}'s camera, at least {LEAST_SHOTS} are needed",
-                "give --seconds more, or check that its frames come",
+                "film longer with --seconds, or check that the camera delivers frames",
             )
 
 

@@ -70,14 +70,14 @@ def _check(options: argparse.Namespace) -> None:
         )
     if options.by == "scene" and options.calibration is None:
         raise SettingsError(
-            "--by scene without --calibration", "a scene says nothing without a calibrated rig: use --by screen or lamp"
+            "--by scene without --calibration", "add --calibration rig.yaml, or use --by screen or --by lamp"
         )
     if not (math.isfinite(options.seconds) and 0 < options.seconds <= 600):
-        raise SettingsError(f"--seconds {options.seconds:g}", "give 1 to 600")
+        raise SettingsError(f"--seconds is {options.seconds:g}", "give 1 to 600 seconds")
     if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
-        raise SettingsError(f"--wait {options.wait}", "give seconds, 0 or more; leave it out to wait for ever")
+        raise SettingsError(f"--wait is {options.wait}", "give 0 or more seconds, or leave it out to wait for ever")
     if options.keep and (options.out is None or options.frames is not None):
-        raise SettingsError("--keep has nothing to keep", "give it with --camera and --out")
+        raise SettingsError("--keep needs --camera and --out", "add both, or leave --keep out")
 
 
 def _write_pattern(options: argparse.Namespace) -> int:

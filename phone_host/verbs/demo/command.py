@@ -35,7 +35,7 @@ _CHECK_FAILED = 4
 def run(options: argparse.Namespace) -> int:
     """Render, stream, measure, compare with the truth."""
     if not 1 <= options.seconds <= 3600:
-        raise SettingsError(f"--seconds {options.seconds:g}", "give 1 to 3600")
+        raise SettingsError(f"--seconds is {options.seconds:g}", "give 1 to 3600 seconds")
     logs.set_up(30)
     signals = StopSignals()
     console = Console(stderr=True)
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     except OSError as error:
         raise UnavailableError(
             f"{error.filename or out} cannot be written ({error.strerror})",
-            "make room, or give another folder with --out",
+            "make room on the disk, or give another folder with --out",
         ) from None
     print(json.dumps(report) if options.json else summary(snapshot))
     print(_closing(out, film, errors), file=sys.stderr)

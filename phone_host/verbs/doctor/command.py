@@ -13,7 +13,7 @@ from phone_host.settings import key_folder, resolve_settings
 def run(options: argparse.Namespace) -> int:
     """Check, and print what was found."""
     if not (math.isfinite(options.wait) and options.wait >= 0):
-        raise SettingsError(f"--wait {options.wait}", "give seconds, 0 or more")
+        raise SettingsError(f"--wait is {options.wait}", "give 0 or more seconds")
     settings = resolve_settings(options).values
     question = Question(
         camera=settings.camera,

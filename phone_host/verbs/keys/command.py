@@ -13,7 +13,7 @@ def run(options: argparse.Namespace) -> int:
     folder = chosen_keys(options.config, options.keys)
     name, address, key = options.add or ("", "", "")
     if options.add and not address.startswith("tcp://"):
-        raise SettingsError(f"{address!r} is no tcp link", "give tcp://HOST:PORT")
+        raise SettingsError(f"{address!r} is not a tcp link", "give tcp://HOST:PORT")
     add = (name, key) if options.add else None
     change(folder, forget=options.forget, new=options.new, add=add, address=address, when=now.wall_time())
     print(listing(folder, as_json=options.json))

@@ -42,10 +42,13 @@ def run(options: argparse.Namespace) -> int:
 def _name_device(options: argparse.Namespace) -> int:
     """Write the rule, and have udev read it."""
     if options.code is not None or options.pairing_port is not None:
-        raise SettingsError("--udev pairs nobody", "give it without --code and --pairing-port")
+        raise SettingsError("--udev does not pair: it only writes a rule", "leave --code and --pairing-port out")
     link = options.link and parse_link(options.link, listens_by_default=False)
     if link and not link.address.startswith("serial:"):
-        raise SettingsError(f"link {options.link!r} is no USB cable", "give --link serial:DEVICE, or none")
+        raise SettingsError(
+            f"link {options.link!r} is not a serial port on a USB cable",
+            "give --link serial:DEVICE, or leave --link out",
+        )
     board = find_usb_board(Path(link.address.removeprefix("serial:")) if link else None)
     write_rule(board)
     if udevadm := shutil.which("udevadm"):
@@ -80,7 +83,7 @@ def _door(address: str, port: int | None) -> tuple[str, int]:
     if port is None:
         return pairing_address(address)
     if not 1 <= port <= 65535:
-        raise SettingsError(f"--pairing-port {port}", "give 1 to 65535")
+        raise SettingsError(f"--pairing-port is {port}", "give a port from 1 to 65535")
     return pairing_address(address)[0], port
 
 
@@ -91,5 +94,5 @@ def _code(given: str | None, name: str) -> int:
         print(words, end="", file=sys.stderr, flush=True)
         given = sys.stdin.readline()
         if not given:
-            raise UnavailableError("no code was typed", "type what the board shows, or give --code")
+            raise UnavailableError("no code was typed", "type the code that the board shows, or give it with --code")
     return read_code(given)

@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
     check(settings)
     logs.set_up(log_level(settings.log_level))
     if not settings.camera:
-        raise SettingsError("no own camera is given", f"use --camera {EXAMPLE}")
+        raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
     _check_numbers(options)
     if options.out is not None:
         inputs = {"--camera": replayed(settings.camera), "--calibration": settings.calibration}
@@ -135,4 +135,4 @@ def _check_numbers(options: argparse.Namespace) -> None:
         if value < 0:
             raise SettingsError(f"{name} {value}", "give 0 or more")
     if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
-        raise SettingsError(f"--wait {options.wait}", "give seconds, 0 or more; leave it out to wait for ever")
+        raise SettingsError(f"--wait is {options.wait}", "give 0 or more seconds, or leave it out to wait for ever")
