@@ -126,7 +126,7 @@ def check_rig(rig: RigReadings) -> Finding:
     if rig.problem:
         return fail("rig", rig.problem, rig.remedy)
     width_px, height_px = rig.host_size_px
-    text = f"{rig.path}: baseline {rig.baseline_m * 1000:.1f} mm, own camera {width_px}x{height_px}"
+    text = f"{rig.path}: baseline {rig.baseline_m * 1000:.1f} mm, host camera {width_px}x{height_px}"
     if rig.rms_px == rig.rms_px:
         text += f", stereo RMS {rig.rms_px:.2f} px"
     asked_px = rig.asked_size_px

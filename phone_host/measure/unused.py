@@ -49,12 +49,12 @@ def _on_the_way(run: RunSnapshot) -> Iterator[Unused]:
 
 def _on_the_host(run: RunSnapshot) -> Iterator[Unused]:
     counts = run.counts
-    yield Unused("own frames that were not whole images", "", run.spoiled)
-    yield Unused("own frames replaced by newer ones", "", run.skipped)
+    yield Unused("host frames that were not whole images", "", run.spoiled)
+    yield Unused("host frames replaced by newer ones", "", run.skipped)
     for reason, count in counts.board_orphans:
         yield Unused("board frames without partner", reason, count)
     for reason, count in counts.host_orphans:
-        yield Unused("own frames without partner", reason, count)
+        yield Unused("host frames without partner", reason, count)
     yield Unused("pairs dropped from a full FIFO", "", counts.dropped)
     spoiled = sum(count for _, count in run.spoiled_images)
     for reason, count in run.spoiled_images:

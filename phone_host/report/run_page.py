@@ -53,7 +53,7 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
     judgement = judge(figures(run))
     return (
         f"Queue: {judgement.sentence}.",
-        *(f"Would help: {remedy}." for remedy in judgement.remedies),
+        *(f"What would help: {remedy}." for remedy in judgement.remedies),
         *(f"Warning: {item.sentence}. Remedy: {item.remedy}." for item in concerns(run)),
         *phase_lines(run.phase, run.alignment),
         *rung_lines(run.link),
@@ -69,7 +69,7 @@ def links_tables(run: RunSnapshot) -> tuple[Table, ...]:
         age = tally.age.spread()
         ages = f"{age.p50_ns / 1e6:.1f} ms; {age.p95_ns / 1e6:.1f} ms" if age.count else "-"
         rows.append((tally.name, str(tally.frames), str(tally.carried), str(tally.lost), ages))
-    title = f"Links: the stream went from one to another {run.link.switches} times"
+    title = f"Links: the stream changed links {run.link.switches} times"
     columns = ("link", "frames", "times it took over", "times it was lost", "age of frames on arrival: median; p95")
     return (Table(title, columns, tuple(rows)),)
 
@@ -81,21 +81,21 @@ def camera_table(health: CameraHealth) -> Table:
         ("unplugged", str(health.unplugged)),
         ("stalled", str(health.stalls)),
         ("failed", str(health.failures)),
-        ("came back after any of these", str(health.returned)),
+        ("came back afterwards", str(health.returned)),
         ("frames that its driver missed", str(health.missed)),
         *((f"spoiled frames: {fault.value.replace('_', ' ')}", str(count)) for fault, count in health.faults),
         ("stamps not believed", str(health.distrusted_stamps)),
         ("controls that its driver refused", str(health.refused_controls)),
         *((f"held: {name.replace('_', ' ')}", str(value)) for name, value in health.held),
     ]
-    return Table("The own camera", ("what", "value"), tuple(rows))
+    return Table("This machine's camera", ("what", "value"), tuple(rows))
 
 
 def _verdict(run: RunSnapshot, judgement: Judgement, found: Sequence[Concern]) -> tuple[Headline, str]:
     if not run.processed and run.spoiled_images:
-        return Headline.BAD, "Not one pair had two sound images: look at the cameras."
+        return Headline.BAD, "No pair had two whole images: check the cameras."
     if not run.processed:
-        return Headline.BAD, "Not one pair was processed: the two cameras or the programs did not meet."
+        return Headline.BAD, "No pair was processed: no frames of the two cameras came together."
     if found:
         return Headline.WARNING, f"{found[0].sentence}: {found[0].remedy}."
     fine = judgement.regime in {Regime.STARVED_BY_CAMERAS, Regime.UNKNOWN}
@@ -123,7 +123,7 @@ def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
         Figure(
             label="clock uncertainty", value=f"{uncertainty.p50_ns / 1e3:.0f}", unit="us", note="median over the pairs"
         ),
-        _measured("image motion", run.motion_px_s, 0, "px/s", "the fastest tenth of the own camera's image"),
+        _measured("image motion", run.motion_px_s, 0, "px/s", "the fastest tenth of the host camera's image"),
     )
 
 
