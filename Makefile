@@ -15,7 +15,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test test-slow coverage soak attack $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
+.PHONY: help venv demo docs test test-slow coverage soak attack $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -68,6 +68,14 @@ attack: $(READY) ## every attack on the running programs for ten minutes in all 
 
 .venv/.ready-bench: $(READY) requirements/bench.txt
 	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: --no-binary cobs --no-build-isolation -r requirements/bench.txt
+	@touch $@
+
+docs: .venv/.ready-docs ## the documentation as a site that opens offline, in build/site
+	@$(BIN)/python -m mkdocs build --strict --config-file .ci/mkdocs.yml
+	@echo "look at build/site/index.html"
+
+.venv/.ready-docs: $(READY) requirements/docs.txt
+	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: -r requirements/docs.txt
 	@touch $@
 
 fuzz: .venv/.ready-fuzz ## hostile bytes for every reader, guided by coverage (BYTES=1e9, MINUTES=10, TARGETS="deframer wire")

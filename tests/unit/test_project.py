@@ -73,7 +73,7 @@ def test_packages_are_typed(package: str) -> None:
     assert (ROOT / package / "py.typed").is_file()
 
 
-@pytest.mark.parametrize("name", ["dev.txt", "bench.txt", "fuzz.txt"])
+@pytest.mark.parametrize("name", ["dev.txt", "bench.txt", "docs.txt", "fuzz.txt"])
 def test_pins_have_hashes_and_no_address(name: str) -> None:
     """Every requirement is one exact version with hashes, and no line names an index or a path of some machine."""
     text = (ROOT / "requirements" / name).read_text(encoding="utf-8")
@@ -101,7 +101,7 @@ def test_pins_satisfy_the_ranges(markers: dict[str, str]) -> None:
         assert version != "none" and wanted.specifier.contains(version), f"{wanted}: pinned {version}; run make lock"  # noqa: PT018
 
 
-@pytest.mark.parametrize("name", ["bench.txt", "fuzz.txt"])
+@pytest.mark.parametrize("name", ["bench.txt", "docs.txt", "fuzz.txt"])
 def test_other_pins_agree_with_the_rest(name: str) -> None:
     """What benchmarks and fuzzing add never changes the version of a package the product was tested with."""
     tested = {str(without_hashes(line)).split(";")[0].strip() for line in pinned("dev.txt")}
@@ -112,7 +112,9 @@ def test_other_pins_agree_with_the_rest(name: str) -> None:
 
 def test_only_one_opencv_is_pinned() -> None:
     """Two OpenCV distributions overwrite each other's files, so exactly one is ever installed."""
-    names = {without_hashes(line).name for name in ("dev.txt", "bench.txt", "fuzz.txt") for line in pinned(name)}
+    names = {
+        without_hashes(line).name for name in ("dev.txt", "bench.txt", "docs.txt", "fuzz.txt") for line in pinned(name)
+    }
     assert {name for name in names if "opencv" in name} == {"opencv-python-headless"}
 
 

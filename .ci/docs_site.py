@@ -1,0 +1,56 @@
+"""Hooks of mkdocs: README.md, CONTRIBUTING.md and CHANGELOG.md become pages, and the decisions an index with a place in the menu.
+
+The three lie at the project's root, where people look for them; links are written so that they work there, too.
+"""
+
+import re
+from pathlib import Path
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+_ROOT = Path(__file__).parent.parent
+_AT_ROOT = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+_TITLE = re.compile(r"^# *(.+)$", re.MULTILINE)
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Put every decision into the menu."""
+    decisions = [f"decisions/{path.name}" for path in _decisions()]
+    assert config.nav is not None
+    config.nav = [
+        {"Decisions": ["decisions/README.md", *decisions]} if "Decisions" in item else item for item in config.nav
+    ]
+    return config
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages that lie elsewhere, and the index of the decisions."""
+    for name, page in _AT_ROOT.items():
+        text = (_ROOT / name).read_text(encoding="utf-8").replace("](docs/decisions)", "](decisions/README.md)")
+        files.append(File.generated(config, page, content=_linked(text.replace("](docs/", "]("), "")))
+    rows = [f"- [{_title(path)}]({path.name})" for path in _decisions()]
+    text = "\n".join(["# Decisions", "", "What could be contested, and why it is so.", "", *rows, ""])
+    files.append(File.generated(config, "decisions/README.md", content=text))
+    return files
+
+
+def on_page_markdown(markdown: str, **_kwargs: object) -> str:
+    """Let links to the files at the root lead to their pages."""
+    return _linked(markdown, "../")
+
+
+def _linked(text: str, up: str) -> str:
+    for name, page in _AT_ROOT.items():
+        text = re.sub(rf"\]\({re.escape(up + name)}(#[^)]*)?\)", rf"]({page}\1)", text)
+    # Code is read in the repository; the site has no copy of it.
+    return re.sub(rf"\[([^\]]+)\]\({re.escape(up)}examples\)", r"\1", text)
+
+
+def _decisions() -> list[Path]:
+    return sorted((_ROOT / "docs" / "decisions").glob("[0-9]*.md"))
+
+
+def _title(path: Path) -> str:
+    found = _TITLE.search(path.read_text(encoding="utf-8"))
+    return found[1] if found else path.stem
