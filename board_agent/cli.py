@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from common.camera.options import EXAMPLE
-from common.program.commandline import ExamplesFirstParser, run_command
+from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
 
 _EXAMPLES = """examples:
   board-agent run --camera 'v4l2:/dev/video0?size=640x480&fps=30' --link 'tcp://*:5555'
@@ -50,6 +50,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = ExamplesFirstParser("board-agent", description=_EXAMPLES)
+    add_version_option(parser)
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     run = verbs.add_parser("run", help="serve frames until stopped", description=_EXAMPLES)
     show = verbs.add_parser("settings", help="print each setting with its origin", description=_EXAMPLES)

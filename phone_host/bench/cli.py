@@ -5,7 +5,7 @@ import importlib
 import sys
 from collections.abc import Sequence
 
-from common.program.commandline import ExamplesFirstParser, run_command
+from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
 from phone_host.bench.arguments import EXAMPLES, add_arguments
 
 
@@ -19,6 +19,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0 done, 2 wrong usage, 3 a link, a process or stdout cannot be had, 4 nothing was measured, 130 interrupted.
     """
     parser = ExamplesFirstParser("delay-bench", description=EXAMPLES)
+    add_version_option(parser)
     add_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     parser.add_argument("--debug", action="store_true", help="show tracebacks")

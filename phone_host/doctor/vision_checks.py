@@ -37,7 +37,7 @@ def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
     link = open_link(parse_link(uri, listens_by_default=False), keys)
     receiver = Receiver([link], now.random_id(), NoFrames())
     patience = BoardPatience(round(wait_s * 1e9), now.monotonic_ns())
-    answer = Answer.BOARD
+    answer, said = Answer.BOARD, {}
     receiver.start()
     try:
         await_board(receiver, patience, lambda: receiver.hello is not None and receiver.estimate is not None)
@@ -45,15 +45,15 @@ def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
         answer = Answer.SILENT
     except BusyBoardError:
         answer = Answer.BUSY
-    except OtherVersionError:
-        answer = Answer.OTHER_VERSION
+    except OtherVersionError as error:
+        answer, said = Answer.OTHER_VERSION, {"problem": error.problem, "remedy": error.remedy}
     finally:
         hello, estimate = receiver.hello, receiver.estimate
         receiver.stop()
     if receiver.failure is not None:
         raise receiver.failure
     if hello is None or estimate is None:
-        return BoardReadings(uri, answer, wait_s)
+        return BoardReadings(uri, answer, wait_s, **said)
     camera = f"{hello.camera.name} {hello.camera.width_px}x{hello.camera.height_px}"
     return BoardReadings(uri, answer, 0.0, camera, estimate.round_trip_ns, estimate.uncertainty_ns)
 

@@ -13,7 +13,7 @@ import msgpack
 import pytest
 import zmq
 
-from common.protocol.message import PROTOCOL_VERSION
+from common.versions import PROTOCOL_VERSION
 from tests.support.numbered import draw, saved_numbers, write_film
 from tests.support.programs import Program, board, free_port, host, ledgers, lines, until
 
@@ -96,13 +96,14 @@ def test_a_host_of_another_version_is_refused_in_its_own_words(tmp_path: Path) -
         stranger.connect(link)
         stranger.send(msgpack.packb([99, 0, "future", 0]))
         assert stranger.poll(60_000)
-        version, kind, reason = msgpack.unpackb(stranger.recv())
+        told = [msgpack.unpackb(stranger.recv()) for _ in range(2)]
         context.destroy(linger=0)
-        assert (version, kind, reason) == (99, 3, 1)  # a Refusal because of the version
+        # A Refusal because of the version: in the board's own, which says what that is, and in the stranger's, which it can read.
+        assert told == [[PROTOCOL_VERSION, 3, 1], [99, 3, 1]]
         with host(["run", "--camera", f"replay:{film}?loop=1", "--link", link, "--pairs", "2"], tmp_path) as receiver:
             assert receiver.wait() == 0
         assert "host_refused" in sender.stderr
-        assert f"ours={PROTOCOL_VERSION}" in sender.stderr
+        assert f"the host speaks protocol 99, this board protocol {PROTOCOL_VERSION}" in sender.stderr
 
 
 def test_a_board_of_another_version_ends_the_host_with_one_line(tmp_path: Path) -> None:
@@ -115,7 +116,7 @@ def test_a_board_of_another_version_ends_the_host_with_one_line(tmp_path: Path) 
         assert future.poll(60_000)
         future.send_multipart([future.recv_multipart()[0], msgpack.packb([99, 1, "anything"])])
         assert receiver.wait() == 3
-        assert "version" in complaint(receiver)
+        assert "update this host's tandemscan" in complaint(receiver)
     context.destroy(linger=0)
 
 
