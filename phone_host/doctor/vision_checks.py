@@ -1,5 +1,6 @@
 """What the doctor can only ask with numpy and OpenCV: a board, as a run does, and a rig. Imported when both were seen to work."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,25 +38,25 @@ def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
     link = open_link(parse_link(uri, listens_by_default=False), keys)
     receiver = Receiver([link], now.random_id(), NoFrames())
     patience = BoardPatience(round(wait_s * 1e9), now.monotonic_ns())
-    answer, said = Answer.BOARD, {}
+    said = BoardReadings(uri, Answer.BOARD, wait_s)
     receiver.start()
     try:
         await_board(receiver, patience, lambda: receiver.hello is not None and receiver.estimate is not None)
     except AbsentBoardError:
-        answer = Answer.SILENT
+        said = replace(said, answer=Answer.SILENT)
     except BusyBoardError:
-        answer = Answer.BUSY
+        said = replace(said, answer=Answer.BUSY)
     except OtherVersionError as error:
-        answer, said = Answer.OTHER_VERSION, {"problem": error.problem, "remedy": error.remedy}
+        said = replace(said, answer=Answer.OTHER_VERSION, problem=error.problem, remedy=error.remedy)
     finally:
         hello, estimate = receiver.hello, receiver.estimate
         receiver.stop()
     if receiver.failure is not None:
         raise receiver.failure
     if hello is None or estimate is None:
-        return BoardReadings(uri, answer, wait_s, **said)
+        return said
     camera = f"{hello.camera.name} {hello.camera.width_px}x{hello.camera.height_px}"
-    return BoardReadings(uri, answer, 0.0, camera, estimate.round_trip_ns, estimate.uncertainty_ns)
+    return BoardReadings(uri, Answer.BOARD, 0.0, camera, estimate.round_trip_ns, estimate.uncertainty_ns)
 
 
 def read_rig_readings(calibration: str, camera: str) -> RigReadings:
