@@ -90,6 +90,6 @@ def refusal_text(refusal: BoardRefusal) -> tuple[str, str]:
         case RefusalReason.VERSION:
             if refusal.protocol is not None:
                 return other_protocol(refusal.protocol, peer="the board", own="this host")
-            # Not told by boards of 0.1 (protocol 3); a refusal in our own words says only that theirs are others.
-            problem = f"the board speaks another protocol version than {PROTOCOL_VERSION}, which this host speaks"
-            return problem, "update the older of the two; --version tells which one that is"
+            # A board that does not tell its version is of 0.1, where the newest was 3: ours is newer, or it would talk to us.
+            problem = f"the board speaks an older protocol than {PROTOCOL_VERSION}, which this host speaks"
+            return problem, "update the board's tandemscan"
