@@ -167,7 +167,7 @@ class _Reader:
         if node.empty():
             return
         value = node.real() if node.isInt() or node.isReal() else math.nan
-        if not (value >= 1 and value == int(value)):
+        if not (math.isfinite(value) and value >= 1 and value == int(value)):
             raise self.problem("format_version", "is no version", "calibrate again")
         if value > RIG_FORMAT:
             known = f"is {value:.0f}, this program reads up to {RIG_FORMAT}"
