@@ -117,7 +117,9 @@ def test_a_refusal_that_ends_while_it_is_told_is_a_refusal(tmp_path: Path) -> No
     def flicker() -> None:
         while not done.is_set():
             reception.refuse_version(dialled, 4, now.monotonic_ns())
+            sum(range(200))  # neither state may be so short that the threads never meet in it
             reception._refusals.accepted()  # as when a board accepts
+            sum(range(200))
 
     usual_s = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
