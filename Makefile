@@ -15,7 +15,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo docs test test-slow coverage soak attack $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
+.PHONY: help venv demo docs docs-run test test-slow coverage soak attack $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -37,7 +37,7 @@ $(PARTS:%=test-%): test-%: $(READY) # one part alone: make test-unit
 test-slow: $(READY) ## the samples that are too large for every day, of which the unit tests draw small ones
 	@$(BIN)/python -m pytest -q -n 2 -m slow tests/unit
 
-coverage: $(READY) ## the unit tests, and which branches of the pure modules none of them takes (CI fails below 98 %)
+coverage: $(READY) ## the unit tests, and which branches of the pure modules none of them takes (CI fails below 98 % of them)
 	@COVERAGE=1 .ci/test unit
 
 test-board: $(READY) ## tests on booted virtual boards (the first time builds their images: apt and root)
@@ -71,8 +71,12 @@ attack: $(READY) ## every attack on the running programs for ten minutes in all 
 	@touch $@
 
 docs: .venv/.ready-docs ## the documentation as a site that opens offline, in build/site
-	@$(BIN)/python -m mkdocs build --strict --config-file .ci/mkdocs.yml
+	@$(BIN)/python -m tests.docs.troubleshooting
+	@$(BIN)/python -m mkdocs build --strict --config-file tests/docs/mkdocs.yml
 	@echo "look at build/site/index.html"
+
+docs-run: $(READY) ## every command line of the documentation that needs no hardware; exit 4 when one fails
+	@$(BIN)/python -m tests.docs.run
 
 .venv/.ready-docs: $(READY) requirements/docs.txt
 	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: -r requirements/docs.txt

@@ -12,7 +12,7 @@ from common.errors import UnavailableError
 _KNOWN = {letters: kind.value for letters, kind in PREFERENCE}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Listed:
     """One camera.
 
@@ -61,7 +61,13 @@ def _ask(device: Device) -> Listed:
         sizes = offer.sizes_px or _ends(offer)
         formats.append((offer, tuple((size_px, device.rates(offer.letters, size_px)) for size_px in sizes)))
     controls = tuple((control, _read(device, control)) for control in device.controls())
-    return Listed(device.path, device.path.resolve(), device.identity, tuple(formats), controls)
+    return Listed(
+        path=device.path,
+        node=device.path.resolve(),
+        identity=device.identity,
+        formats=tuple(formats),
+        controls=controls,
+    )
 
 
 def _ends(offer: FormatOffer) -> tuple[tuple[int, int], ...]:

@@ -33,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout not to be had, 4 bad data or a failed check, 130 interrupted.
     """
-    return run_command(_parser(), arguments, _run)
+    return run_command(parser(), arguments, _run)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -48,16 +48,27 @@ def _run(options: argparse.Namespace) -> int:
     return code
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = ExamplesFirstParser("board-agent", description=_EXAMPLES)
-    add_version_option(parser)
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
-    run = verbs.add_parser("run", help="serve frames until stopped", description=_EXAMPLES)
-    show = verbs.add_parser("settings", help="print each setting with its origin", description=_EXAMPLES)
-    cameras = verbs.add_parser("cameras", help="list formats, rates and controls", description=_EXAMPLES)
-    doctor = verbs.add_parser("doctor", help="check camera, links, clocks, disk and power", description=_EXAMPLES)
-    keys = verbs.add_parser("keys", help="show or change this board's key and its hosts", description=_EXAMPLES)
-    pair = verbs.add_parser("pair", help="show a code with which a new host may connect", description=_EXAMPLES)
+def parser() -> argparse.ArgumentParser:
+    """All verbs with their options."""
+    made = ExamplesFirstParser("board-agent", description=_EXAMPLES)
+    add_version_option(made)
+    verbs = made.add_subparsers(dest="verb", required=True, metavar="VERB")
+    run = verbs.add_parser("run", help="stream the camera's frames to a host until stopped", description=_EXAMPLES)
+    show = verbs.add_parser(
+        "settings", help="print each setting, its value and where the value comes from", description=_EXAMPLES
+    )
+    cameras = verbs.add_parser(
+        "cameras", help="list the cameras with their formats, rates and controls", description=_EXAMPLES
+    )
+    doctor = verbs.add_parser(
+        "doctor", help="check camera, links, clocks, disk and power, and say what to mend", description=_EXAMPLES
+    )
+    keys = verbs.add_parser(
+        "keys",
+        help="list the hosts that this board lets in, or change the list or the board's key",
+        description=_EXAMPLES,
+    )
+    pair = verbs.add_parser("pair", help="show a code that lets a new host in", description=_EXAMPLES)
     _add_keys_options(keys, pair)
     for verb in (run, show, cameras, doctor, keys, pair):
         verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
@@ -73,31 +84,37 @@ def _parser() -> argparse.ArgumentParser:
             "--link",
             action="append",
             metavar="URI",
-            help="tcp://HOST:PORT, ipc://PATH[?owner=USER], serial:DEVICE or rfcomm://*; may be given again",
+            help="where to listen: tcp://HOST:PORT, ipc://PATH[?owner=USER], serial:DEVICE or rfcomm://*; repeat the option for several",
         )
         verb.add_argument(
             "--adapt",
             metavar="WAYS",
-            help="what gives way where the link is slow: quality, rate, size (default quality,rate; '' for nothing)",
+            help="what may be lowered when the link is too slow: quality, rate, size (default quality,rate; '' for nothing)",
         )
         verb.add_argument(
             "--least-fps",
             type=float,
             metavar="FPS",
-            help="lower the camera's rate to this at most (default: not at all)",
+            help="never lower the frame rate below FPS (default: never lower the rate)",
         )
         verb.add_argument(
-            "--log-level", choices=("debug", "info", "warning", "error"), help="how much to log to stderr"
+            "--log-level",
+            choices=("debug", "info", "warning", "error"),
+            help="least important messages that are logged to stderr",
         )
-    return parser
+    return made
 
 
 def _add_keys_options(keys: argparse.ArgumentParser, pair: argparse.ArgumentParser) -> None:
     what = keys.add_mutually_exclusive_group()
-    what.add_argument("--forget", metavar="NAME", help="let this host in no longer")
-    what.add_argument("--new", action="store_true", help="make a new key; every host must be paired again")
+    what.add_argument("--forget", metavar="NAME", help="stop letting this host in")
+    what.add_argument(
+        "--new", action="store_true", help="replace this board's key; every host must then be paired again"
+    )
     what.add_argument("--add", nargs=2, metavar=("NAME", "KEY"), help="let in a host without pairing")
-    pair.add_argument("--seconds", type=float, default=300.0, metavar="S", help="wait so long for a host (default 300)")
+    pair.add_argument(
+        "--seconds", type=float, default=300.0, metavar="S", help="seconds to wait for a host (default 300)"
+    )
     for verb in (keys, pair):
         verb.set_defaults(camera=None, link=None, log_level=None, adapt=None, least_fps=None)
 

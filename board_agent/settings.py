@@ -30,26 +30,24 @@ SERVICE_SETTINGS: Final = Path("/etc/tandemscan/board-agent.toml")
 class BoardSettings:
     """Settings of board-agent, from /etc/tandemscan/board-agent.toml or another file, the environment and options."""
 
-    camera: str = setting("", "camera URI, for example v4l2:auto or v4l2:/dev/video0?size=640x480&fps=30")
-    link: tuple[str, ...] = setting(("tcp://127.0.0.1:5555",), "links to serve; loopback unless told otherwise")
-    wait_for_camera: bool = setting(
-        default=False, doc="whether a missing camera is waited for; else it ends the program with exit 3"
+    camera: str = setting("", "the camera, for example v4l2:auto or v4l2:/dev/video0?size=640x480&fps=30")
+    link: tuple[str, ...] = setting(
+        ("tcp://127.0.0.1:5555",), "addresses to listen at; by default only this machine can connect"
     )
-    idle_after: float = setting(
-        10.0, "seconds without a host after which the camera's stream is switched off; 0: never"
-    )
+    wait_for_camera: bool = setting(default=False, doc="wait for a missing camera; otherwise exit with code 3")
+    idle_after: float = setting(10.0, "switch the camera off after so many seconds without a host; 0: never")
     adapt: tuple[str, ...] = setting(
         ("quality", "rate"),
-        "what of the camera gives way where the link does not carry it: quality, rate, size (in this order), or nothing",
+        "what may be lowered when the link is too slow, in this order: quality, rate, size; or nothing",
     )
     least_fps: float = setting(
-        0.0, "frames per second below which the rate is not lowered; 0: it stays as it was asked for"
+        0.0, "never lower the frame rate below so many frames per second; 0: never lower the rate"
     )
     keys: str = setting(
         "",
-        "folder of this machine's key and those that may connect; empty: /var/lib/tandemscan or ~/.config/tandemscan",
+        "folder with this machine's key and the keys of the hosts it lets in; empty: /var/lib/tandemscan or ~/.config/tandemscan",
     )
-    log_level: str = setting("info", "debug, info, warning or error")
+    log_level: str = setting("info", "least important messages that are logged: debug, info, warning or error")
 
 
 def key_folder(keys: str) -> KeyFolder:

@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout not to be had, 4 bad data, 130 interrupted.
     """
-    return run_command(_parser(), arguments, _run)
+    return run_command(parser(), arguments, _run)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -67,16 +67,17 @@ def _run(options: argparse.Namespace) -> int:
     return code
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = ExamplesFirstParser("phone-host", description=_EXAMPLES)
-    add_version_option(parser)
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
+def parser() -> argparse.ArgumentParser:
+    """All verbs with their options."""
+    made = ExamplesFirstParser("phone-host", description=_EXAMPLES)
+    add_version_option(made)
+    verbs = made.add_subparsers(dest="verb", required=True, metavar="VERB")
     for name, arguments in _VERBS.items():
         verb = verbs.add_parser(name, help=arguments.SUMMARY, description=f"examples:\n{arguments.EXAMPLES}")
         arguments.add_arguments(verb)
         verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
         verb.add_argument("--debug", action="store_true", help="show tracebacks")
-    return parser
+    return made
 
 
 if __name__ == "__main__":

@@ -10,9 +10,7 @@ from common.imagesize.head import MEGAPIXEL, MOST_PIXELS
 from common.program.declaration import setting
 
 _USUAL_MEGAPIXELS: Final = MOST_PIXELS // MEGAPIXEL
-MAX_MEGAPIXELS_HELP: Final = (
-    f"an image that claims to be larger is refused before it is decoded (1 = 2^20 px; default {_USUAL_MEGAPIXELS})"
-)
+MAX_MEGAPIXELS_HELP: Final = f"refuse larger images before decoding them, in megapixels (default {_USUAL_MEGAPIXELS})"
 
 
 NEAR_M: Final = 0.3
@@ -25,21 +23,27 @@ class PhoneHostSettings:
 
     link: tuple[str, ...] = setting(
         (),
-        "links to the board; frames come over the best that is up, the first where some are alike; none: the last board that was used, the one"
-        " on the USB cable, one on this machine, or one that announces itself on the network",
+        "addresses of the board; frames come over the best link that is up, the first if several are equal; if empty, look for the last"
+        " board, the board on the USB cable, one on this machine, or one that announces itself on the network",
     )
-    camera: str = setting("", "own camera URI, for example replay:PATH?fps=30&loop=1")
+    camera: str = setting("", "camera of this machine, for example v4l2:/dev/video0")
     calibration: str = setting("", "rig.yaml of the two cameras")
     matcher: str = setting("sgbm", "stereo matcher")
-    tolerance: float = setting(0.0, "greatest time skew of a pair, ms; 0 = half of the longer frame period")
-    fifo: str = setting("1:drop-oldest", "DEPTH:POLICY of the queue before the stereo pipeline")
-    align_phase: str = setting(
-        "", "which camera is steered until both expose together: either, board or host; empty: none"
+    tolerance: float = setting(
+        0.0, "greatest difference of the two exposure times in a pair, ms; 0: half of the longer frame period"
     )
-    interpolate: bool = setting(default=False, doc="move the board's image to the host's moment along the optical flow")
-    keys: str = setting("", "folder of this machine's key and the boards that it knows; empty: ~/.config/tandemscan")
+    fifo: str = setting(
+        "1:drop-oldest", "length of the queue before the matcher and what happens when it is full, DEPTH:POLICY"
+    )
+    align_phase: str = setting(
+        "", "which camera may be shifted until both expose together: either, board or host; empty: none"
+    )
+    interpolate: bool = setting(
+        default=False, doc="move the board's image along the optical flow to the moment of the other camera's exposure"
+    )
+    keys: str = setting("", "folder with this machine's key and the keys of known boards; empty: ~/.config/tandemscan")
     max_megapixels: int = setting(_USUAL_MEGAPIXELS, MAX_MEGAPIXELS_HELP)
-    log_level: str = setting("warning", "debug, info, warning or error")
+    log_level: str = setting("warning", "least important messages that are logged: debug, info, warning or error")
 
     @property
     def most_pixels(self) -> int:

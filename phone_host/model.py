@@ -24,7 +24,7 @@ CloudImage = NDArray[np.float32]
 """(H, W, 3) float32, metres: X, Y, Z of each left pixel in the left camera's axes, NaN = none."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StereoGeometry:
     """What turns a disparity into metres for a rectified pair: z = focal_px * baseline_m / (disparity + doffs_px).
 
@@ -97,7 +97,7 @@ class TimeOffset:
     uncertainty_ns: int = UNMEASURED_NS
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Rig:
     """Two calibrated cameras, possibly of different size, and how they stand to each other.
 
@@ -152,7 +152,7 @@ class Rectification:
     Q: NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BoardFrame:
     """A frame that came over a link, with its marks on the host's clock.
 
@@ -175,7 +175,7 @@ class BoardFrame:
     asked_px: tuple[int, int] = (0, 0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FramePair:
     """Two frames that belong together, on their way to the stereo pipeline.
 
@@ -230,7 +230,7 @@ class Result:
     ledger: PairLedger
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PairCounts:
     """What became of the frames that reached the host, and of the pairs.
 

@@ -6,7 +6,7 @@ from common.doctor.access import Holder
 from common.doctor.finding import Finding, fail, ok, warn
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LinkReadings:
     """What was found out about one link.
 

@@ -50,9 +50,9 @@ def _readings(uri: str, address: str, account: Account, *, listens: bool) -> Lin
         terminals = machine.terminals_on(device)
         console = machine.is_console(device)
         others = tuple(holder for holder in holders if holder not in terminals)
-        return LinkReadings(uri, others, all_seen, console, terminals)
+        return LinkReadings(uri=uri, holders=others, all_seen=all_seen, console=console, terminals=terminals)
     if not listens:
-        return LinkReadings(uri)
+        return LinkReadings(uri=uri)
     if address.startswith("tcp:"):
         targets = machine.socket_targets(urlsplit(address.replace("*", "0.0.0.0")).port)  # noqa: S104 - only to parse it
     elif address.startswith("ipc:"):
@@ -66,12 +66,16 @@ def _readings(uri: str, address: str, account: Account, *, listens: bool) -> Lin
         seen_all &= all_seen
         found.update(dict.fromkeys(holders))
     # The same port of another address is none of ours, so a holder counts only where opening fails, too.
-    return LinkReadings(uri, all_seen=seen_all) if not found else _blamed(uri, tuple(found), account, all_seen=seen_all)
+    return (
+        LinkReadings(uri=uri, all_seen=seen_all)
+        if not found
+        else _blamed(uri, tuple(found), account, all_seen=seen_all)
+    )
 
 
 def _blamed(uri: str, holders: tuple[Holder, ...], account: Account, *, all_seen: bool) -> LinkReadings:
-    tried = _tried(LinkReadings(uri, all_seen=all_seen), account, listens_by_default=True)
-    return LinkReadings(uri, holders, all_seen) if tried.taken else tried
+    tried = _tried(LinkReadings(uri=uri, all_seen=all_seen), account, listens_by_default=True)
+    return LinkReadings(uri=uri, holders=holders, all_seen=all_seen) if tried.taken else tried
 
 
 def _tried(readings: LinkReadings, account: Account, *, listens_by_default: bool) -> LinkReadings:
@@ -83,6 +87,6 @@ def _tried(readings: LinkReadings, account: Account, *, listens_by_default: bool
     except TandemError as error:
         taken = isinstance(error, TakenError)
         return LinkReadings(
-            readings.uri, all_seen=readings.all_seen, problem=error.problem, remedy=error.remedy, taken=taken
+            uri=readings.uri, all_seen=readings.all_seen, problem=error.problem, remedy=error.remedy, taken=taken
         )
     return readings

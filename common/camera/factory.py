@@ -17,7 +17,7 @@ from common.program.extensions import make_registered, named, registered_names
 _CAMERAS: Final = "tandemscan.cameras"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CameraRequest:
     """A camera of another package that is to be opened.
 
@@ -76,7 +76,7 @@ def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
         settings = _read(scheme, uri, path, options, clock)
         camera: Camera = named(_KINDS[scheme].open)(settings, now_ns)
         return camera
-    request = CameraRequest(uri, path, tuple(options.items()), clock, now_ns)
+    request = CameraRequest(uri=uri, path=path, options=tuple(options.items()), clock=clock, now_ns=now_ns)
     extension: Camera = make_registered(_CAMERAS, scheme, Camera, request)
     return extension
 

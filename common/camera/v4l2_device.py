@@ -24,7 +24,7 @@ _MOST_ITEMS: Final = 256
 """An enumeration that goes on beyond this is a driver's endless loop."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
     """What a node says of itself.
 
@@ -190,7 +190,14 @@ class Device:
             if not self._enumerate(abi.ENUM_FMT, item):
                 break
             sizes, size_range = self._sizes(item.pixelformat)
-            offers.append(FormatOffer(abi.fourcc_name(item.pixelformat), _text(item.description), sizes, size_range))
+            offers.append(
+                FormatOffer(
+                    letters=abi.fourcc_name(item.pixelformat),
+                    text=_text(item.description),
+                    sizes_px=sizes,
+                    size_range=size_range,
+                )
+            )
         return tuple(offers)
 
     def rates(self, letters: str, size_px: tuple[int, int]) -> Rates:
@@ -307,7 +314,7 @@ class Device:
         item = abi.Capability()
         ioctl(self.fd, abi.QUERYCAP, item)
         own = item.device_caps if item.capabilities & abi.CAP_DEVICE_CAPS else item.capabilities
-        return Identity(_text(item.driver), _text(item.card), _text(item.bus_info), own)
+        return Identity(driver=_text(item.driver), card=_text(item.card), bus=_text(item.bus_info), capabilities=own)
 
     def _sizes(self, pixelformat: int) -> tuple[tuple[tuple[int, int], ...], SizeRange | None]:
         sizes = []

@@ -41,6 +41,14 @@ class SizeRange:
             for value, (low, high, step) in zip(size_px, (self.width_px, self.height_px), strict=True)
         )
 
+    def within(self, size_px: tuple[int, int]) -> tuple[int, int]:
+        """The largest of these sizes, px, that is neither wider nor higher than one; of a side that has no such length, the shortest."""
+        width, height = (
+            low + max(0, min(value, high) - low) // max(1, step) * max(1, step)
+            for value, (low, high, step) in zip(size_px, (self.width_px, self.height_px), strict=True)
+        )
+        return width, height
+
 
 @dataclass(frozen=True, slots=True)
 class Rates:
@@ -67,7 +75,7 @@ class Rates:
         return " to ".join(rate_text(rate) for rate in self.between_hz) if self.between_hz else "unknown"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FormatOffer:
     """One encoding of a camera.
 
@@ -258,8 +266,7 @@ def _usual_size(offer: FormatOffer) -> tuple[int, int]:
     if offer.has(_USUAL_PX):
         return _USUAL_PX
     if offer.size_range is not None:
-        (w0, w1, _), (h0, h1, _) = offer.size_range.width_px, offer.size_range.height_px
-        return (w0, h0) if _area((w1, h1)) > _area(_USUAL_PX) else (w1, h1)
+        return offer.size_range.within(_USUAL_PX)
     smaller = [size for size in offer.sizes_px if _area(size) <= _area(_USUAL_PX)]
     return max(smaller, key=_area) if smaller else min(offer.sizes_px, key=_area)
 

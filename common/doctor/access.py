@@ -24,7 +24,7 @@ class Account:
     is_me: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Node:
     """A device node.
 

@@ -19,7 +19,7 @@ class Grade(Enum):
     FAIL = "fail"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
     """What one check found.
 
@@ -38,17 +38,17 @@ class Finding:
 
 def ok(what: str, text: str) -> Finding:
     """A thing that is as it should be."""
-    return Finding(what, Grade.OK, text)
+    return Finding(what=what, verdict=Grade.OK, text=text)
 
 
 def warn(what: str, text: str, remedy: str) -> Finding:
     """A thing that works badly, or could not be seen."""
-    return Finding(what, Grade.WARN, text, remedy)
+    return Finding(what=what, verdict=Grade.WARN, text=text, remedy=remedy)
 
 
 def fail(what: str, text: str, remedy: str) -> Finding:
     """A thing without which nothing works."""
-    return Finding(what, Grade.FAIL, text, remedy)
+    return Finding(what=what, verdict=Grade.FAIL, text=text, remedy=remedy)
 
 
 def table(findings: Sequence[Finding]) -> str:

@@ -68,7 +68,9 @@ def read_node(path: Path) -> Node | None:
     except KeyError:
         group = str(state.st_gid)
     usable = os.access(real, os.R_OK | os.W_OK)
-    return Node(str(real), state.st_uid, state.st_gid, group, state.st_mode & 0o777, usable)
+    return Node(
+        path=str(real), uid=state.st_uid, gid=state.st_gid, group=group, mode=state.st_mode & 0o777, open_to_me=usable
+    )
 
 
 def holders_of(target: str) -> tuple[tuple[Holder, ...], bool]:

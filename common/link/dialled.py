@@ -12,6 +12,7 @@ from typing import Final
 import zmq
 
 from common.errors import UnavailableError
+from common.link.waiter import is_readable
 from common.program.logs import event
 
 _LOG = logging.getLogger(__name__)
@@ -55,6 +56,7 @@ class Dialled:
     def __init__(self, sock: "zmq.Socket[bytes]", address: str, peer: str, lane: str) -> None:
         self.socket = sock
         self.monitor = sock.get_monitor_socket(_WATCHED)
+        is_readable(self.monitor)  # its descriptor tells of news only behind a look that found none
         self.due_ns = _NEVER
         self._address, self._peer, self._lane = address, peer, lane
         self._hang_ups = 0

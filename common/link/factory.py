@@ -49,7 +49,7 @@ def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = Fals
         UnavailableError: the port or path is taken, the device is missing, or the peer is not known.
         DataError: the files of keys are bad.
     """
-    request = LinkRequest(uri, keys, board, waits)
+    request = LinkRequest(uri=uri, keys=keys, board=board, waits=waits)
     if uri.extension:
         extension: Link = make_registered(LINKS, uri.extension, Link, request)
         return extension

@@ -30,7 +30,7 @@ _MORE_OPTIONS = {
 _EXAMPLES = "give tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LinkUri:
     """A link as the user named it.
 
@@ -55,7 +55,7 @@ class LinkUri:
     options: tuple[tuple[str, str], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LinkRequest:
     """A link that is to be opened; all that a transport is told.
 
@@ -115,7 +115,14 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
             f"link {uri!r} has options {query!r}",
             "?bind=1 and ?connect=1 are the only ones, one at a time" + _MORE_OPTIONS.get(scheme, ""),
         )
-    return LinkUri(address, listens_by_default if not options else "bind" in options, baud, unpaired, insecure, owner)
+    return LinkUri(
+        address=address,
+        listens=listens_by_default if not options else "bind" in options,
+        baud=baud,
+        unpaired=unpaired,
+        insecure=insecure,
+        owner=owner,
+    )
 
 
 def needs_keys(uri: LinkUri) -> bool:
@@ -140,7 +147,7 @@ def _extension(uri: str, *, listens_by_default: bool) -> LinkUri | None:
     if len(sides) > 1 or set(sides.values()) - {"1"}:
         raise SettingsError(f"link {uri!r} has options {query!r}", "give ?bind=1 or ?connect=1")
     listens = "bind" in sides if sides else listens_by_default
-    return LinkUri(address, listens, extension=scheme, options=tuple(options.items()))
+    return LinkUri(address=address, listens=listens, extension=scheme, options=tuple(options.items()))
 
 
 def _check_port(uri: str, address: str) -> None:

@@ -307,7 +307,7 @@ class ZeroMqDialer(_AlwaysReady):
             UnavailableError: the peer does not talk to us, or only with keys, or is another user's; it is dialled again later.
         """
         now_ns = now.monotonic_ns()
-        broken = []
+        broken, refused = [], None
         for known in self._connections.values():
             known.redial(now_ns)
         going_on = True
@@ -323,8 +323,13 @@ class ZeroMqDialer(_AlwaysReady):
             for connection, known in self._connections.items():
                 if is_readable(known.monitor):
                     going_on = True
-                    if known.broke(now_ns):
-                        broken.append(Broken(connection))
+                    try:
+                        if known.broke(now_ns):
+                            broken.append(Broken(connection))
+                    except UnavailableError as error:
+                        refused = error  # for when no news is left: a monitor wakes nobody a second time
+        if refused is not None:
+            raise refused
         yield from broken
 
     def _received(self, known: Dialled, connection: bytes, now_ns: int) -> Incoming:

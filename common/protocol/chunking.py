@@ -78,7 +78,9 @@ class Cutter:
 
     def __init__(self, side: LinkEnd, frame_bytes: int = 1) -> None:
         self._side = side
-        self._queues: dict[Lane, deque[_Parcel]] = {lane: deque() for lane in Lane}
+        self._frames: deque[_Parcel] = deque()
+        self._control: deque[_Parcel] = deque()
+        self._queues = {Lane.FRAMES: self._frames, Lane.CONTROL: self._control}
         self._numbers = dict.fromkeys(Lane, 0)
         self._acknowledge: int | None = None
         self._window = Window(frame_bytes)
@@ -104,7 +106,7 @@ class Cutter:
     @property
     def due_ns(self) -> int:
         """When `take` wants to be called next even if nothing has happened; 2^63 - 1: never."""
-        queue = self._queues[Lane.FRAMES]
+        queue = self._frames
         if not queue or not queue[0].at:
             return self._window.due_ns
         return min(self._window.due_ns, self._looked_ns + min(_ATTENTION_NS, _ABANDON_NS - self._silent_ns))
@@ -153,16 +155,16 @@ class Cutter:
             At most about 64 KB; empty while nothing may be sent.
         """
         self._window.tick(now_ns)
-        frames = self._queues[Lane.FRAMES]
+        frames, control = self._frames, self._control
         self._listen(now_ns)
         parts: list[Buffer] = []
         size = 0
         if self._acknowledge is not None:
             parts += unit_parts(
-                self._side, Unit(UnitKind.ACK, first=True, last=True, number=self._acknowledge, body=b"")
+                self._side, Unit(kind=UnitKind.ACK, first=True, last=True, number=self._acknowledge, body=b"")
             )
             self._acknowledge = None
-        while size < _BATCH_BYTES and self._queues[Lane.CONTROL]:
+        while size < _BATCH_BYTES and control:
             size += self._cut(Lane.CONTROL, self._window.chunk_bytes, parts)
         while size < _BATCH_BYTES and frames:
             chunk = self._window.chunk_bytes
@@ -182,7 +184,9 @@ class Cutter:
         body, first, last = queue[0].take(count)
         if last:
             queue.popleft()
-        parts += unit_parts(self._side, Unit(_KIND_OF[lane], first, last, self._numbers[lane], body))
+        parts += unit_parts(
+            self._side, Unit(kind=_KIND_OF[lane], first=first, last=last, number=self._numbers[lane], body=body)
+        )
         self._numbers[lane] = (self._numbers[lane] + 1) % _NUMBERS
         return len(body) + UNIT_OVERHEAD_BYTES
 
@@ -190,7 +194,7 @@ class Cutter:
         """Give a frame up that has begun to leave and of which nothing was heard for too long."""
         passed_ns = min(now_ns - self._looked_ns, _ATTENTION_NS)
         self._looked_ns = now_ns
-        frames = self._queues[Lane.FRAMES]
+        frames = self._frames
         if not frames or not frames[0].at:
             self._silent_ns = 0
             return

@@ -94,7 +94,7 @@ class Contact:
         said = tuple(self._say)
         self._say.clear()
         return [
-            Unit(UnitKind.CONTACT, first=True, last=True, number=0, body=_WORD.pack(word.value, number))
+            Unit(kind=UnitKind.CONTACT, first=True, last=True, number=0, body=_WORD.pack(word.value, number))
             for word, number in said
         ]
 

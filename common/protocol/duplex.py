@@ -5,7 +5,7 @@ Joins the parts: units (`framing`), who is there (`contact`), chunks of both lan
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Final, assert_never
 
 from common.frame import Buffer
 from common.protocol.chunking import Cutter, Joiner, Whole
@@ -170,7 +170,8 @@ class Duplex:
 
     def _hear(self, unit: Unit) -> list[Whole | Change]:
         had_met = self.is_up
-        match self._contact.hear(bytes(unit.body)):
+        news = self._contact.hear(bytes(unit.body))
+        match news:
             case News.NONE:
                 return []
             case News.MET:
@@ -179,3 +180,5 @@ class Duplex:
             case News.PARTED:
                 self._anew()
                 return [Change.PARTED]
+            case _:
+                assert_never(news)

@@ -52,7 +52,7 @@ class UnitKind(Enum):
     CONTACT = 3
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Unit:
     """What was written at one go.
 
@@ -179,5 +179,7 @@ class Deframer:
                 at += 1
                 continue
             kind = _KINDS[head >> _KIND_SHIFT]
-            units.append(Unit(kind, bool(head & _FIRST), bool(head & _LAST), number, view[body:tail]))
+            units.append(
+                Unit(kind=kind, first=bool(head & _FIRST), last=bool(head & _LAST), number=number, body=view[body:tail])
+            )
             at = tail + _CRC.size

@@ -54,7 +54,7 @@ class InterfaceFit:
     fit: DelayFit
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Checked:
     """One run beside what the model says of it from all other runs.
 
@@ -145,7 +145,13 @@ def analyse(results: Sequence[CaseResult], fifo: FifoSettings, changes: Sequence
     useful = [result for result in results if result.ledgers]
     cells = [_cell(result, fifo) for result in useful]
     checked = [
-        Checked(result.case, len(result.ledgers), measured(cell), held_out(cell, cells), with_own_delays(cell, cells))
+        Checked(
+            case=result.case,
+            pairs=len(result.ledgers),
+            measured=measured(cell),
+            predicted=held_out(cell, cells),
+            queues=with_own_delays(cell, cells),
+        )
         for result, cell in zip(useful, cells, strict=True)
     ]
     by_interface: dict[str, list[CaseResult]] = {}
@@ -211,10 +217,10 @@ def _cell(result: CaseResult, fifo: FifoSettings) -> Cell:
         interface=interface,
         self_paced=case.interface.link.startswith(_SELF_PACED),
         images=Images(
-            case.size.width_px,
-            case.size.height_px,
-            1e9 / case.rate_hz,
-            values_of(result.ledgers, lambda ledger: ledger.bytes),
+            width_px=case.size.width_px,
+            height_px=case.size.height_px,
+            period_ns=1e9 / case.rate_hz,
+            size_bytes=values_of(result.ledgers, lambda ledger: ledger.bytes),
         ),
         fifo=fifo,
         ledgers=result.ledgers,
@@ -284,7 +290,12 @@ def _images(images: Images) -> str:
 def _changes(target: Target) -> list[tuple[str, Target]]:
     images = target.images
     # A JPEG's bytes go with its pixels, at the same quality of the same scene.
-    smaller = Images(images.width_px // 2, images.height_px // 2, images.period_ns, images.size_bytes / 4)
+    smaller = Images(
+        width_px=images.width_px // 2,
+        height_px=images.height_px // 2,
+        period_ns=images.period_ns,
+        size_bytes=images.size_bytes / 4,
+    )
     return [
         (f"{_images(images)}, as it was run", target),
         ("camera twice as fast", replace(target, images=replace(images, period_ns=images.period_ns / 2))),

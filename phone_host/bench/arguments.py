@@ -11,10 +11,10 @@ EXAMPLES = """examples:
   delay-bench --size 320x240,640x480 --predict size=1280x720,fps=30 --predict link=bluetooth,processing=4
   delay-bench --emulate list
 
-Runs a board-agent process and the host for each link, size, quality and rate, and prints each delay's p50, p95, p99 and maximum. The
-first second of each run is left out of the statistics. A board elsewhere is measured with what its own camera shows: its size, quality and
-rate cannot be set from here. --out gets
-delay-bench.json, delay-bench.html (plots, the queueing model beside the measurement), delay-bench.svg and trace.json for Perfetto.
+For each link, size, quality and rate, the command runs a board-agent process and the host, and prints the median, 95th and 99th
+percentile and maximum of each delay. It leaves the first second of each run out. A board on another machine is measured as it is:
+its size, quality and rate cannot be set from here. --out receives delay-bench.json, delay-bench.html (plots, and the queueing model
+beside the measurement), delay-bench.svg and trace.json for Perfetto.
 """
 
 
@@ -24,10 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--links",
         default="",
         metavar="NAMES",
-        help="tcp, ipc, serial (over a pseudo terminal), rfcomm, or URIs of boards (default: every kind that is there)",
+        help="tcp, ipc, serial (over a pseudo terminal), rfcomm, or addresses of boards (default: every kind that works here)",
     )
     parser.add_argument(
-        "--emulate", default="", metavar="NAMES", help="let links behave as these interfaces; `list` shows them"
+        "--emulate", default="", metavar="NAMES", help="make links behave like these interfaces; `list` shows them"
     )
     parser.add_argument(
         "--size", default="320x240,640x480", metavar="SIZES", help="image sizes (default 320x240,640x480)"
@@ -35,14 +35,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quality", default="80", metavar="PERCENTS", help="JPEG qualities (default 80)")
     parser.add_argument("--fps", default="15,30", metavar="RATES", help="frames per second (default 15,30)")
     parser.add_argument(
-        "--seconds", type=float, default=4.0, metavar="S", help="length of each run after its warm-up (default 4)"
+        "--seconds", type=float, default=4.0, metavar="S", help="seconds of each run after its warm-up (default 4)"
     )
     parser.add_argument(
         "--predict",
         action="append",
         default=[],
         metavar="CHANGES",
-        help="predict a setting that is not run, for example fps=60,size=640x480,kB=40,fifo=4:block,processing=0.5,link=wifi",
+        help="predict the delays of a setting without running it, for example fps=60,size=640x480,kB=40,fifo=4:block,processing=0.5,link=wifi",
     )
     parser.add_argument("--matcher", default="sgbm", metavar="NAME", help="stereo matcher (default sgbm)")
     parser.add_argument(

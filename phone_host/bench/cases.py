@@ -57,7 +57,7 @@ class Interface:
         return self.link if self.profile is None else f"{self.profile.name} ({self.link})"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
     """One combination that is measured.
 
@@ -177,7 +177,7 @@ def cases(
 ) -> tuple[Case, ...]:
     """All combinations; interfaces side by side, so that a change of the machine's load touches all of them."""
     return tuple(
-        Case(interface, size, quality, rate_hz)
+        Case(interface=interface, size=size, quality_percent=quality, rate_hz=rate_hz)
         for size, quality, rate_hz, interface in product(sizes, qualities, rates_hz, measured)
     )
 

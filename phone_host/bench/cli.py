@@ -18,12 +18,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 done, 2 wrong usage, 3 a link, a process or stdout cannot be had, 4 nothing was measured, 130 interrupted.
     """
-    parser = ExamplesFirstParser("delay-bench", description=EXAMPLES)
-    add_version_option(parser)
-    add_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object on stdout")
-    parser.add_argument("--debug", action="store_true", help="show tracebacks")
-    return run_command(parser, arguments, _run)
+    return run_command(parser(), arguments, _run)
+
+
+def parser() -> argparse.ArgumentParser:
+    """All options."""
+    made = ExamplesFirstParser("delay-bench", description=EXAMPLES)
+    add_version_option(made)
+    add_arguments(made)
+    made.add_argument("--json", action="store_true", help="print one JSON object on stdout")
+    made.add_argument("--debug", action="store_true", help="show tracebacks")
+    return made
 
 
 def _run(options: argparse.Namespace) -> int:

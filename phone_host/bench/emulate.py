@@ -31,7 +31,7 @@ _LEAST_QUEUE_BYTES: Final = 2 * SEGMENT_BYTES
 """... but no less than two packets, else the line would run dry."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
     """How an interface behaves, the same in both directions.
 
@@ -66,72 +66,72 @@ class Profile:
         return int(max(_LEAST_QUEUE_BYTES, self.bytes_per_s * _QUEUE_NS / _S) + on_the_way)
 
 
-NOTHING: Final = Profile("none", "serial", 0.0, 0)
+NOTHING: Final = Profile(name="none", carrier="serial", bytes_per_s=0.0, delay_ns=0)
 """A line that adds nothing: what joins two pseudo terminals."""
 
 # The figures are those of the study of transports where it has any (section 2 and goal 7 there, its sources in brackets); the rest is said.
 PROFILES: Final = (
     Profile(
-        "usb-serial",
-        "serial",
-        1_000_000,  # 1 to 1.1 MB/s of a BeagleBone and a CDC device (raspberrypi/firmware#223); 8 Mbit/s in the study's goal 7
-        1 * _MS,  # a full-speed frame of USB is 1 ms long (USB 2.0, 5.3.3)
-        1 * _MS,
+        name="usb-serial",
+        carrier="serial",
+        bytes_per_s=1_000_000,  # 1 to 1.1 MB/s of a BeagleBone and a CDC device (raspberrypi/firmware#223); 8 Mbit/s in the study's goal 7
+        delay_ns=1 * _MS,  # a full-speed frame of USB is 1 ms long (USB 2.0, 5.3.3)
+        jitter_ns=1 * _MS,
         source="1 MB/s measured on a BeagleBone's CDC device; USB frames of 1 ms",
     ),
     Profile(
-        "usb-serial-lossy",
-        "serial",
-        1_000_000,
-        1 * _MS,
-        1 * _MS,
+        name="usb-serial-lossy",
+        carrier="serial",
+        bytes_per_s=1_000_000,
+        delay_ns=1 * _MS,
+        jitter_ns=1 * _MS,
         byte_loss=1.2e-6,  # 3 % of 25 KB frames spoiled, as gadget serial did in a full-speed run (docs/decisions/0005)
         source="as usb-serial, with 3 % of 25 KB frames spoiled",
     ),
     Profile(
-        "usb-ethernet",
-        "tcp",
-        4_800_000,  # SCP over a USB-Ethernet gadget of a comparable processor (sdmay23-47)
-        250_000,  # two micro-frames of high-speed USB, 125 us each (USB 2.0, 5.3.3)
-        250_000,
+        name="usb-ethernet",
+        carrier="tcp",
+        bytes_per_s=4_800_000,  # SCP over a USB-Ethernet gadget of a comparable processor (sdmay23-47)
+        delay_ns=250_000,  # two micro-frames of high-speed USB, 125 us each (USB 2.0, 5.3.3)
+        jitter_ns=250_000,
         source="4.8 MB/s over a gadget of a comparable processor; USB micro-frames of 125 us",
     ),
     Profile(
-        "bluetooth",
-        "serial",
-        80_000,  # RFCOMM between a phone and a small board (flutter_bluetooth_serial#102)
-        3_750_000,  # a five-slot packet and its answer take six slots of 0.625 ms (osted.dk/tinyblue)
-        7_500_000,  # one of them sent again costs as much once more, two twice
+        name="bluetooth",
+        carrier="serial",
+        bytes_per_s=80_000,  # RFCOMM between a phone and a small board (flutter_bluetooth_serial#102)
+        delay_ns=3_750_000,  # a five-slot packet and its answer take six slots of 0.625 ms (osted.dk/tinyblue)
+        jitter_ns=7_500_000,  # one of them sent again costs as much once more, two twice
         source="RFCOMM between a phone and a small board, 80 kB/s; slots of 0.625 ms",
     ),
     Profile(
-        "bluetooth-fast",
-        "serial",
-        187_500,  # 1.5 Mbit/s: RFCOMM of 200 kB/s and more between embedded devices (btstack#147), 3-DH5 before its own losses 2178 kbit/s
-        3_750_000,
-        7_500_000,
+        name="bluetooth-fast",
+        carrier="serial",
+        bytes_per_s=187_500,  # 1.5 Mbit/s: RFCOMM of 200 kB/s and more between embedded devices (btstack#147), 3-DH5 before its own losses 2178 kbit/s
+        delay_ns=3_750_000,
+        jitter_ns=7_500_000,
         source="RFCOMM at 1.5 Mbit/s, between embedded devices; slots of 0.625 ms",
     ),
     Profile(
-        "uart",
-        "serial",
-        11_520,  # 115200 baud, ten bits for a byte (8N1)
-        1 * _MS,  # an adapter's packets, one each ms
+        name="uart",
+        carrier="serial",
+        bytes_per_s=11_520,  # 115200 baud, ten bits for a byte (8N1)
+        delay_ns=1 * _MS,  # an adapter's packets, one each ms
         source="115200 baud, 8N1",
     ),
     Profile(
-        "ethernet",
-        "tcp",
-        11_760_000,  # 100BASE-TX, the board's socket: 1448 of the 1538 bytes that a frame takes on the wire
-        120_000,  # a full frame of 1538 bytes takes 123 us at 100 Mbit/s
+        name="ethernet",
+        carrier="tcp",
+        bytes_per_s=11_760_000,  # 100BASE-TX, the board's socket: 1448 of the 1538 bytes that a frame takes on the wire
+        delay_ns=120_000,  # a full frame of 1538 bytes takes 123 us at 100 Mbit/s
         source="100BASE-TX with full frames",
     ),
     Profile(
-        "wifi",
-        "tcp",
-        4_000_000,  # half of 65 Mbit/s, the highest rate of one stream in 20 MHz (IEEE 802.11n, MCS 7): contention and acknowledgements take the rest
-        1 * _MS,
-        9
+        name="wifi",
+        carrier="tcp",
+        bytes_per_s=4_000_000,  # half of 65 Mbit/s, the highest rate of one stream in 20 MHz (IEEE 802.11n, MCS 7): contention and acknowledgements take the rest
+        delay_ns=1 * _MS,
+        jitter_ns=9
         * _MS,  # 2 to 10 ms of jitter, as libsoftwaresync's setting is taken to have (study, goal 7; issue of the clocks)
         stall_share=1e-4,  # a guess: what 802.11's own retries leave over
         stall_ns=200 * _MS,  # TCP's least retransmission timeout in Linux (TCP_RTO_MIN, include/net/tcp.h)

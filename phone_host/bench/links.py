@@ -141,7 +141,12 @@ def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | No
             f"the board at {uri} shows images on demand", "start it with a camera, or a replay with pace=clock"
         )
     rate_hz = max(1, round(1e9 / camera.period_ns))
-    return Case(Interface(uri), Size(camera.width_px, camera.height_px), BOARD_SETS, rate_hz)
+    return Case(
+        interface=Interface(uri),
+        size=Size(camera.width_px, camera.height_px),
+        quality_percent=BOARD_SETS,
+        rate_hz=rate_hz,
+    )
 
 
 def _account_of(seen: LinkAccount) -> BoardAccount:

@@ -151,7 +151,7 @@ def _scatter(one: InterfaceFit, numbers: dict[int, int]) -> str:
     size = values_of(ledgers, lambda ledger: ledger.bytes)
     delay = values_of(ledgers, lambda ledger: ledger.propagation_ns)
     runs = tuple(numbers[result.case.rate_hz] for result in one.results for _ in result.ledgers)
-    scatter = Scatter(size, delay, runs, one.fit)
+    scatter = Scatter(size_bytes=size, delay_ns=delay, number=runs, fit=one.fit)
     return two_widths(lambda width: against_bytes(scatter, width), HALF_PX)
 
 
@@ -162,10 +162,10 @@ def _model(analysis: Analysis) -> str:
     numbers = {name: index for index, name in enumerate(names)}
     points = [
         Compared(
-            f"{one.case.interface} {one.case.short}",
-            one.measured.end_to_end_p50_ns,
-            one.predicted.end_to_end_p50_ns,
-            numbers[str(one.case.interface)],
+            name=f"{one.case.interface} {one.case.short}",
+            measured_ns=one.measured.end_to_end_p50_ns,
+            predicted_ns=one.predicted.end_to_end_p50_ns,
+            number=numbers[str(one.case.interface)],
         )
         for one in analysis.checked
         if isinstance(one.predicted, Figures)

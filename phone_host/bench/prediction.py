@@ -29,7 +29,7 @@ _LEAST_GAPS: Final = 10
 """Fewer tell no median that a single hitch would not move."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Images:
     """What the board's camera shows.
 
@@ -100,7 +100,7 @@ class Unknown:
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Figures:
     """What is compared, predicted or measured; delays in ns.
 
@@ -233,7 +233,12 @@ def learn_link(interface: str, images: Images, cells: Sequence[Cell]) -> LinkMod
         full = [one.ns_per_byte for one in taken if one.is_full]
         # Lines that were full tell how long a byte takes them, others only that it takes no longer.
         ns_per_byte = float(np.median(full)) if full else min(ns_per_byte, *(one.ns_per_byte for one in taken))
-    return LinkModel(latency_ns, ns_per_byte, delay - latency_ns - ns_per_byte * size, mine[0].self_paced)
+    return LinkModel(
+        latency_ns=latency_ns,
+        ns_per_byte=ns_per_byte,
+        spread_ns=delay - latency_ns - ns_per_byte * size,
+        self_paced=mine[0].self_paced,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,7 +268,12 @@ def nominal_link(profile: Profile, *, self_paced: bool) -> LinkModel:
     random = np.random.default_rng(_SEED)
     middle_ns = profile.jitter_ns / 2.0
     spread_ns = random.uniform(-middle_ns, middle_ns, 1000) if profile.jitter_ns else np.zeros(1)
-    return LinkModel(profile.delay_ns + middle_ns, 1e9 / profile.bytes_per_s, spread_ns, self_paced)
+    return LinkModel(
+        latency_ns=profile.delay_ns + middle_ns,
+        ns_per_byte=1e9 / profile.bytes_per_s,
+        spread_ns=spread_ns,
+        self_paced=self_paced,
+    )
 
 
 def _services(images: Images, cells: Sequence[Cell]) -> Values:

@@ -26,7 +26,7 @@ _SWIFT: Final = 4
 takes less than a quarter of a period."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LinkModel:
     """What the link does to a frame.
 
@@ -43,7 +43,7 @@ class LinkModel:
     self_paced: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Setting:
     """Everything that decides what becomes of the frames.
 

@@ -229,6 +229,6 @@ def after_warm_up(ledgers: Sequence[PairLedger]) -> tuple[tuple[PairLedger, ...]
 def _core(size: Size, matcher: AnyMatcher) -> StereoCore:
     rig = rig_of(size)
     focal_px, cx_px, cy_px = (float(rig.left.matrix[at]) for at in ((0, 0), (0, 2), (1, 2)))
-    geometry = StereoGeometry(focal_px, -float(rig.t_right_left_m[0]), cx_px, cy_px)
+    geometry = StereoGeometry(focal_px=focal_px, baseline_m=-float(rig.t_right_left_m[0]), cx_px=cx_px, cy_px=cy_px)
     disparities = disparities_for_near(geometry, NEAR_M, size.width_px)
     return StereoCore(create_matcher(MatchSettings(matcher, disparities)), None, geometry)

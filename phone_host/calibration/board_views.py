@@ -31,7 +31,7 @@ class BoardViews:
     sizes_px: tuple[Size, Size]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Seen:
     name: str
     sizes: tuple[Size, Size]
@@ -69,7 +69,9 @@ def look_for_boards(
             rejected.append(Rejected(name, Reason.UNREADABLE, error.problem))
         else:
             sizes = _size(images[0]), _size(images[1])
-            seen.append(_Seen(name, sizes, find_corners(images[0], board), find_corners(images[1], board)))
+            seen.append(
+                _Seen(name=name, sizes=sizes, left=find_corners(images[0], board), right=find_corners(images[1], board))
+            )
         advance()
     if not seen:
         raise DataError(

@@ -159,7 +159,7 @@ def camera_arrays(parameters: Vector) -> tuple[Vector, Vector]:
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]), parameters[4:].copy()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _System:
     """Normal equations in blocks: G of the globals, P_v of each pose, C_v between them; gradients g and p_v."""
 
@@ -221,7 +221,7 @@ class _Problem:
             coupling[index] = by_globals.T @ (weights * by_pose)
             poses[index] = by_pose.T @ (weights * by_pose)
             pose_gradient[index] = (weights * by_pose).T @ flat
-        return _System(matrix, coupling, poses, gradient, pose_gradient)
+        return _System(G=matrix, C=coupling, P=poses, g=gradient, p=pose_gradient)
 
 
 def _minimise(problem: _Problem, state: BundleState, free: NDArray[np.bool_]) -> BundleState:

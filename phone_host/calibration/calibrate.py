@@ -295,7 +295,7 @@ def _summed_up(
 def _rig(state: BundleState, sizes_px: Sizes) -> Rig:
     left, right = _model(sizes_px[0], state.left), _model(sizes_px[1], state.right)
     rotation = np.asarray(cv2.Rodrigues(state.rotation)[0], dtype=np.float64)
-    return Rig(left, right, rotation, state.translation_m)
+    return Rig(left=left, right=right, R_right_left=rotation, t_right_left_m=state.translation_m)
 
 
 def _model(size_px: tuple[int, int], parameters: Vector) -> CameraModel:

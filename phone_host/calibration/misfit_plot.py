@@ -24,8 +24,10 @@ def misfit_svg(measured: Measured) -> str:
     """
     use = np.isfinite(measured.misfits)
     offsets_ms, misfits = measured.offsets_s[use] * 1e3, measured.misfits[use]
-    across = Linear(*span(offsets_ms), _LEFT_PX, _WIDTH_PX - _RIGHT_PX)
-    up = Linear(*span(misfits), _HEIGHT_PX - _BOTTOM_PX, _TOP_PX)
+    first_ms, last_ms = span(offsets_ms)
+    least, most = span(misfits)
+    across = Linear(low=first_ms, high=last_ms, start_px=_LEFT_PX, end_px=_WIDTH_PX - _RIGHT_PX)
+    up = Linear(low=least, high=most, start_px=_HEIGHT_PX - _BOTTOM_PX, end_px=_TOP_PX)
     found_ms, doubt_ms = measured.offset.offset_ns / 1e6, measured.offset.uncertainty_ns / 1e6
     parts = [f'<rect width="{_WIDTH_PX}" height="{_HEIGHT_PX}" fill="#fff"/>']
     for value in ticks(across.low, across.high, 8):

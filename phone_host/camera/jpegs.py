@@ -12,7 +12,7 @@ looked at once; never more than MAX_IMAGE_BYTES are kept.
 import re
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Final, assert_never
 
 from common.frame import FrameFault
 from common.imagesize.jpeg import FRAME_HEADERS
@@ -32,7 +32,7 @@ _LEAST_CODE: Final = 0xC0
 """Codes below are reserved (Table B.1)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Whole:
     """An image that came in whole.
 
@@ -116,6 +116,8 @@ class JpegStream:
                 return self._segment(now_ns, events)
             case _Phase.ENTROPY:
                 return self._entropy()
+            case _:
+                assert_never(self._phase)
 
     def _seek(self, now_ns: int) -> bool:
         found = self._data.find(_BEGIN)
@@ -176,7 +178,15 @@ class JpegStream:
         width_px, height_px = self._size_px
         if not (1 <= width_px <= MAX_SIZE_PX and 1 <= height_px <= MAX_SIZE_PX):
             return self._give_up(end, events, FrameFault.WRONG_LENGTH)
-        events.append(Whole(bytes(self._data[:end]), width_px, height_px, self._began_ns, now_ns))
+        events.append(
+            Whole(
+                payload=bytes(self._data[:end]),
+                width_px=width_px,
+                height_px=height_px,
+                began_ns=self._began_ns,
+                ended_ns=now_ns,
+            )
+        )
         del self._data[:end]
         self._old_bytes = max(0, self._old_bytes - end)
         self._phase = _Phase.BETWEEN
@@ -184,8 +194,7 @@ class JpegStream:
 
     def _give_up(self, at: int, events: list[Whole | Broken], fault: FrameFault = FrameFault.NO_END) -> bool:
         """What has begun is no image: go on behind the place that was wrong."""
-        if self._phase is not _Phase.BETWEEN:
-            events.append(Broken(fault))
+        events.append(Broken(fault))
         self._drop(at)
         self._phase = _Phase.BETWEEN
         return True

@@ -59,21 +59,36 @@ def _figures(run: RunSnapshot, errors: DepthErrors) -> tuple[Figure, ...]:
     uncertainty = run.delays.spread("uncertainty")
     return (
         Figure(
-            "pairs per second",
-            f"{run.pairs_per_second:.1f}",
-            "/s",
-            f"{run.processed} pairs in {run.seconds:.1f} s",
+            label="pairs per second",
+            value=f"{run.pairs_per_second:.1f}",
+            unit="/s",
+            note=f"{run.processed} pairs in {run.seconds:.1f} s",
         ),
         Figure(
-            "depth error",
-            f"{errors.depth_mm:.1f}",
-            "mm",
-            f"median; {errors.at_1_m_mm:.1f} mm at 1 m, {errors.at_2_m_mm:.1f} mm at 2 m",
+            label="depth error",
+            value=f"{errors.depth_mm:.1f}",
+            unit="mm",
+            note=f"median; {errors.at_1_m_mm:.1f} mm at 1 m, {errors.at_2_m_mm:.1f} mm at 2 m",
         ),
-        Figure("pixels with depth", f"{errors.density * 100:.0f}", "%", "of those that both cameras see"),
         Figure(
-            "end-to-end", f"{end_to_end.p50_ns / 1e6:.0f}", "ms", f"median; 99 % below {end_to_end.p99_ns / 1e6:.0f} ms"
+            label="pixels with depth",
+            value=f"{errors.density * 100:.0f}",
+            unit="%",
+            note="of those that both cameras see",
         ),
-        Figure("time skew", f"{skew.p50_ns / 1e3:.0f}", "us", f"median; 99 % below {skew.p99_ns / 1e3:.0f} us"),
-        Figure("clock uncertainty", f"{uncertainty.p50_ns / 1e3:.0f}", "us", "median over the pairs"),
+        Figure(
+            label="end-to-end",
+            value=f"{end_to_end.p50_ns / 1e6:.0f}",
+            unit="ms",
+            note=f"median; 99 % below {end_to_end.p99_ns / 1e6:.0f} ms",
+        ),
+        Figure(
+            label="time skew",
+            value=f"{skew.p50_ns / 1e3:.0f}",
+            unit="us",
+            note=f"median; 99 % below {skew.p99_ns / 1e3:.0f} us",
+        ),
+        Figure(
+            label="clock uncertainty", value=f"{uncertainty.p50_ns / 1e3:.0f}", unit="us", note="median over the pairs"
+        ),
     )

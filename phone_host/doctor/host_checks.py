@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Final, assert_never
 
 from common.doctor.finding import Finding, fail, ok, warn
 
@@ -19,7 +19,7 @@ _USABLE_PX: Final = 1.0
 """A stereo RMS above a pixel leaves rows that do not meet: no matcher finds much then."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Package:
     """A Python package that the host imports.
 
@@ -75,7 +75,7 @@ class Answer(Enum):
     UNKNOWN_NAME = "unknown name"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BoardReadings:
     """What a board has answered.
 
@@ -163,6 +163,8 @@ def check_board(board: BoardReadings) -> Finding:  # noqa: PLR0911 - one for eac
         case Answer.SILENT:
             remedy = "run board-agent doctor there; is it the right port, and the right end of the cable?"
             return fail("board", f"{board.uri}: no answer within {board.waited_s:g} s", remedy)
+        case _:
+            assert_never(board.answer)
 
 
 def check_ports(ports: tuple[str, ...], problem: str) -> Finding:

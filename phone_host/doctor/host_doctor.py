@@ -43,7 +43,7 @@ from phone_host.doctor.host_checks import (
 _CONNECT_S: Final = 2.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Question:
     """What a run would use.
 
@@ -129,9 +129,11 @@ def _package(name: str, least: str, below: str = "", wheels: tuple[str, ...] = (
     try:
         module = importlib.import_module(name)
     except Exception as error:  # noqa: BLE001 - a broken package may raise anything (ImportError, AttributeError, OSError)
-        return Package(name, "", f"{type(error).__name__}: {error}", least, below, wheels)
+        return Package(
+            name=name, version="", problem=f"{type(error).__name__}: {error}", least=least, below=below, wheels=wheels
+        )
     version = getattr(module, "__version__", None) or ".".join(map(str, getattr(module, "version", ())))
-    return Package(name, str(version), "", least, below, wheels)
+    return Package(name=name, version=str(version), problem="", least=least, below=below, wheels=wheels)
 
 
 def _server(uri: str) -> Finding:
@@ -168,15 +170,15 @@ def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> 
     if address.startswith("serial:") and (node := machine.read_node(Path(address.removeprefix("serial:")))) is not None:
         findings.append(check_access("permission", node, machine.own_account()))
     if not works:
-        return [*findings, check_board(BoardReadings(uri, _way(address), 0.0))]
+        return [*findings, check_board(BoardReadings(uri=uri, answer=_way(address), waited_s=0.0))]
     from phone_host.doctor.vision_checks import ask_board  # noqa: PLC0415 - numpy and OpenCV, seen to work
 
     try:
         board = ask_board(uri, wait_s, keys)
     except TandemError as error:
-        return [*findings, Finding("board", Grade.FAIL, error.problem, error.remedy)]
+        return [*findings, Finding(what="board", verdict=Grade.FAIL, text=error.problem, remedy=error.remedy)]
     if board.answer is Answer.SILENT:
-        board = BoardReadings(board.uri, _way(address), board.waited_s)
+        board = BoardReadings(uri=board.uri, answer=_way(address), waited_s=board.waited_s)
     return [*findings, check_board(board)]
 
 

@@ -38,7 +38,7 @@ def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
     link = open_link(parse_link(uri, listens_by_default=False), keys)
     receiver = Receiver([link], now.random_id(), NoFrames())
     patience = BoardPatience(round(wait_s * 1e9), now.monotonic_ns())
-    said = BoardReadings(uri, Answer.BOARD, wait_s)
+    said = BoardReadings(uri=uri, answer=Answer.BOARD, waited_s=wait_s)
     receiver.start()
     try:
         await_board(receiver, patience, lambda: receiver.hello is not None and receiver.estimate is not None)
@@ -56,7 +56,14 @@ def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
     if hello is None or estimate is None:
         return said
     camera = f"{hello.camera.name} {hello.camera.width_px}x{hello.camera.height_px}"
-    return BoardReadings(uri, Answer.BOARD, 0.0, camera, estimate.round_trip_ns, estimate.uncertainty_ns)
+    return BoardReadings(
+        uri=uri,
+        answer=Answer.BOARD,
+        waited_s=0.0,
+        camera=camera,
+        round_trip_ns=estimate.round_trip_ns,
+        uncertainty_ns=estimate.uncertainty_ns,
+    )
 
 
 def read_rig_readings(calibration: str, camera: str) -> RigReadings:

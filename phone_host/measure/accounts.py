@@ -3,7 +3,7 @@
 from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Final, assert_never
 
 from common.protocol.message import BoardCounts, Rung
 from common.protocol.session import StaleReason
@@ -61,6 +61,8 @@ class SessionAccount:
                 self.late += 1
             case StaleReason.BEYOND_CREDIT:
                 self.disbelieved[Disbelief.CREDIT] += 1
+            case _:
+                assert_never(reason)
 
 
 @dataclass(slots=True)

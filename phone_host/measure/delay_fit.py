@@ -33,7 +33,7 @@ _LEAST_BLOCKS: Final = 8
 """... but of a short series fewer, else every draw would be the same and the interval would claim to know all."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DelayFit:
     """delay = latency + ns_per_byte * bytes, with intervals that hold the true line in 95 % of like measurements.
 
@@ -92,7 +92,16 @@ def fit_delay(size_bytes: Values, delay_ns: Values, draws: int = _DRAWS) -> Dela
     x, y = size_bytes[::every], delay_ns[::every]
     nan = float("nan")
     if x.size < 2 or x.max() < LIKE_SIZES * x.min():
-        return DelayFit(nan, nan, nan, nan, nan, nan, int(size_bytes.size), nan)
+        return DelayFit(
+            latency_ns=nan,
+            latency_low_ns=nan,
+            latency_high_ns=nan,
+            ns_per_byte=nan,
+            slope_low=nan,
+            slope_high=nan,
+            points=int(size_bytes.size),
+            typical_error_ns=nan,
+        )
     latency, slope = _line(x, y)
     left = float(np.median(np.abs(y - latency - slope * x)))
     low: Values = np.full(2, nan)
@@ -102,7 +111,16 @@ def fit_delay(size_bytes: Values, delay_ns: Values, draws: int = _DRAWS) -> Dela
         drawn = np.array([_line(x[chosen], y[chosen]) for chosen in _blocks(x, draws, generator)])
         if len(drawn) == draws:
             low, high = np.asarray(np.percentile(drawn, (2.5, 97.5), axis=0), np.float64)
-    return DelayFit(latency, low[0], high[0], slope, low[1], high[1], int(size_bytes.size), left)
+    return DelayFit(
+        latency_ns=latency,
+        latency_low_ns=low[0],
+        latency_high_ns=high[0],
+        ns_per_byte=slope,
+        slope_low=low[1],
+        slope_high=high[1],
+        points=int(size_bytes.size),
+        typical_error_ns=left,
+    )
 
 
 def _line(x: Values, y: Values) -> tuple[float, float]:

@@ -18,7 +18,7 @@ STAGES: Final = tuple(stage.name for stage in fields(StageTimes))
 OTHERS: Final = ("time_skew", "uncertainty")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
     """How a quantity was distributed; all in ns, NaN where nothing was measured.
 
@@ -82,10 +82,12 @@ class Series:
         values = self._values[max(0, self._kept - wanted) : self._kept]
         if not len(values) or self._max is None:
             nan = float("nan")
-            return Spread(0, nan, nan, nan, nan, nan)
+            return Spread(count=0, p50_ns=nan, p95_ns=nan, p99_ns=nan, max_ns=nan, mean_ns=nan)
         p50, p95, p99 = (float(p) for p in np.percentile(values, (50, 95, 99)))
         greatest = float(self._max if last is None else values.max())
-        return Spread(self._count, p50, p95, p99, greatest, self._sum / self._count)
+        return Spread(
+            count=self._count, p50_ns=p50, p95_ns=p95, p99_ns=p99, max_ns=greatest, mean_ns=self._sum / self._count
+        )
 
 
 class Sample:

@@ -31,7 +31,7 @@ class Regime(Enum):
     BACKLOG = "backlog"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RunFigures:
     """What the regime is judged by; means over a run or over its last pairs, ns; NaN = not measured.
 

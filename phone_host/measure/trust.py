@@ -85,7 +85,7 @@ def stamp_doubt(offset: TimeOffset, own: CameraHealth) -> StampDoubt:
     return StampDoubt(offset.uncertainty_ns + stated_ns + late_ns, why, "phone-host calibrate-time")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Timing:
     """What time and motion are, over the last pairs or a run; NaN = not measured.
 
@@ -121,7 +121,7 @@ class Concern:
     remedy: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Unbelieved:
     """What was not believed of what arrived.
 

@@ -81,7 +81,13 @@ class _Keeper:
 
     def _keep(self, shots: list[Shot], exposed_ns: int, frame: Frame | FrameMessage, whose: str) -> None:
         name = f"{whose} frame {frame.sequence}"
-        image = EncodedImage(bytes(frame.payload), frame.pixel_format, frame.width_px, frame.height_px, name)
+        image = EncodedImage(
+            payload=bytes(frame.payload),
+            pixel_format=frame.pixel_format,
+            width_px=frame.width_px,
+            height_px=frame.height_px,
+            name=name,
+        )
         if self.kept_bytes < _ENOUGH_BYTES and (not shots or exposed_ns > shots[-1].exposed_ns):
             shots.append(Shot(exposed_ns, image))
             self.kept_bytes += len(image.payload)
@@ -189,7 +195,13 @@ def read(folder: Path) -> Footage:
             if not path.stem.isdecimal():
                 raise DataError(f"{path}: the name is no stamp", "name each image by its exposure in ns")
             image = load(path)
-            encoded = EncodedImage(image.payload, image.pixel_format, image.width_px, image.height_px, str(path))
+            encoded = EncodedImage(
+                payload=image.payload,
+                pixel_format=image.pixel_format,
+                width_px=image.width_px,
+                height_px=image.height_px,
+                name=str(path),
+            )
             shots.append(Shot(int(path.stem), encoded))
         sides.append(tuple(sorted(shots, key=lambda shot: shot.exposed_ns)))
     return Footage(*sides)

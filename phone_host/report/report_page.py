@@ -51,7 +51,7 @@ class Headline(Enum):
     BAD = "bad"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
     """One number to read first.
 
@@ -174,15 +174,17 @@ def delay_series(ledgers: Sequence[PairLedger]) -> DelaySeries:
     return DelaySeries(
         time_s=column(lambda ledger: ledger.done_ns - first_ns) / 1e9,
         delays=tuple(
-            Quantity(name, attribute(f"{name}_ns"), colour, meaning) for colour, (name, meaning) in enumerate(MEANINGS)
+            Quantity(label=name, values_ns=attribute(f"{name}_ns"), colour=colour, meaning=meaning)
+            for colour, (name, meaning) in enumerate(MEANINGS)
         ),
-        end_to_end=Quantity("end-to-end", attribute("end_to_end_ns"), 7, _END_TO_END),
-        starvation=Quantity("starvation", attribute("starvation_ns"), 6, _STARVATION),
+        end_to_end=Quantity(label="end-to-end", values_ns=attribute("end_to_end_ns"), colour=7, meaning=_END_TO_END),
+        starvation=Quantity(label="starvation", values_ns=attribute("starvation_ns"), colour=6, meaning=_STARVATION),
         stages=tuple(
-            Quantity(field.name, stage(field.name), colour) for colour, field in enumerate(fields(StageTimes))
+            Quantity(label=field.name, values_ns=stage(field.name), colour=colour)
+            for colour, field in enumerate(fields(StageTimes))
         ),
-        time_skew=Quantity("time skew", attribute("time_skew_ns"), 5),
-        uncertainty=Quantity("clock uncertainty", attribute("uncertainty_ns"), 2),
+        time_skew=Quantity(label="time skew", values_ns=attribute("time_skew_ns"), colour=5),
+        uncertainty=Quantity(label="clock uncertainty", values_ns=attribute("uncertainty_ns"), colour=2),
     )
 
 

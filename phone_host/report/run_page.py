@@ -109,10 +109,20 @@ def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
     return (
         _measured("pairs per second", run.pairs_per_second, 1, "/s", pairs),
         Figure(
-            "end-to-end", f"{end_to_end.p50_ns / 1e6:.0f}", "ms", f"median; 99 % below {end_to_end.p99_ns / 1e6:.0f} ms"
+            label="end-to-end",
+            value=f"{end_to_end.p50_ns / 1e6:.0f}",
+            unit="ms",
+            note=f"median; 99 % below {end_to_end.p99_ns / 1e6:.0f} ms",
         ),
-        Figure("time skew", f"{skew.p50_ns / 1e6:.1f}", "ms", f"median; 95 % below {skew.p95_ns / 1e6:.1f} ms"),
-        Figure("clock uncertainty", f"{uncertainty.p50_ns / 1e3:.0f}", "us", "median over the pairs"),
+        Figure(
+            label="time skew",
+            value=f"{skew.p50_ns / 1e6:.1f}",
+            unit="ms",
+            note=f"median; 95 % below {skew.p95_ns / 1e6:.1f} ms",
+        ),
+        Figure(
+            label="clock uncertainty", value=f"{uncertainty.p50_ns / 1e3:.0f}", unit="us", note="median over the pairs"
+        ),
         _measured("image motion", run.motion_px_s, 0, "px/s", "the fastest tenth of the own camera's image"),
     )
 
@@ -120,9 +130,9 @@ def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
 def _measured(label: str, value: float, decimals: int, unit: str, note: str) -> Figure:
     """A figure that may not be known (NaN)."""
     return (
-        Figure(label, "-", "", f"not measured; {note}")
+        Figure(label=label, value="-", unit="", note=f"not measured; {note}")
         if np.isnan(value)
-        else Figure(label, f"{value:.{decimals}f}", unit, note)
+        else Figure(label=label, value=f"{value:.{decimals}f}", unit=unit, note=note)
     )
 
 

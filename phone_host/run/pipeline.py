@@ -103,4 +103,11 @@ def _at_asked_size(image: Image, frame: BoardFrame) -> Image:
 
 def _encoded(frame: FrameMessage | Frame, whose: str, asked_px: tuple[int, int] = (0, 0)) -> EncodedImage:
     name = f"{whose} frame {frame.sequence}"
-    return EncodedImage(memoryview(frame.payload), frame.pixel_format, frame.width_px, frame.height_px, name, asked_px)
+    return EncodedImage(
+        payload=memoryview(frame.payload),
+        pixel_format=frame.pixel_format,
+        width_px=frame.width_px,
+        height_px=frame.height_px,
+        name=name,
+        asked_px=asked_px,
+    )

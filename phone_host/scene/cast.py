@@ -91,7 +91,10 @@ def project(points_m: Floats, model: CameraModel, pose: Pose) -> NDArray[np.floa
     local = pose.R_camera_scene @ (points_m - pose.centre_m[:, None])
     ahead = local[2] > 0.0
     pixels = np.full((2, points_m.shape[1]), np.nan)
-    if np.any(ahead):
+    if not np.any(model.distortion):
+        across = model.matrix[:2] @ local[:, ahead]
+        pixels[:, ahead] = across / local[2, ahead]
+    elif np.any(ahead):
         seen = np.ascontiguousarray(local[:, ahead].T)
         pixels[:, ahead] = cv2.projectPoints(seen, np.zeros(3), np.zeros(3), model.matrix, model.distortion)[0][:, 0].T
     return pixels
@@ -184,6 +187,8 @@ def faces_and_normals(shape: Shape, points: Floats) -> tuple[NDArray[np.int16], 
             normals = np.zeros_like(points)
             normals[axis, each] = side
             return (2 * axis + (side > 0)).astype(np.int16), normals
+        case _:
+            assert_never(shape)
 
 
 def dot(a: Floats, b: Floats) -> Floats:

@@ -30,12 +30,12 @@ def matched_rig() -> Rig:
     """Two ideal pinhole cameras of 640x480, f = 525 px, 100 mm apart, already rectified: for accuracy tests."""
     matrix = np.array([[FOCAL_PX, 0.0, 319.5], [0.0, FOCAL_PX, 239.5], [0.0, 0.0, 1.0]])
     model = CameraModel(width_px=640, height_px=480, matrix=matrix, distortion=np.zeros(5))
-    return Rig(model, model, np.eye(3), np.array([-BASELINE_M, 0.0, 0.0]))
+    return Rig(left=model, right=model, R_right_left=np.eye(3), t_right_left_m=np.array([-BASELINE_M, 0.0, 0.0]))
 
 
 def matched_view() -> RectifiedView:
     """The rectified view of `matched_rig`: its own left camera."""
-    return RectifiedView(StereoGeometry(FOCAL_PX, BASELINE_M, 319.5, 239.5), 640, 480)
+    return RectifiedView(StereoGeometry(focal_px=FOCAL_PX, baseline_m=BASELINE_M, cx_px=319.5, cy_px=239.5), 640, 480)
 
 
 def unlike_rig() -> Rig:
@@ -58,7 +58,7 @@ def unlike_rig() -> Rig:
     turn = rotation((0.3, 1.0, 0.45), math.radians(-1.5))
     centre = np.array([0.0998, -0.004, -0.005])
     centre *= BASELINE_M / np.linalg.norm(centre)
-    return Rig(webcam, phone, turn, -turn @ centre)
+    return Rig(left=webcam, right=phone, R_right_left=turn, t_right_left_m=-turn @ centre)
 
 
 WEBCAM_LOOK = Look(gain_bgr=(0.95, 0.97, 1.02), offset=4.0, gamma=2.0, vignetting=0.25, noise_sigma=1.2, seed=1)
@@ -90,17 +90,44 @@ def demo_scene() -> Scene:
     table_y = 0.32
     turn = 2.0 * math.pi / DEMO_PERIOD_S
     quarter = math.pi / 2.0
-    roll = Path((0.20, 0.0, 0.14), (0.0, 0.0, quarter), DEMO_PERIOD_S, (0.3, 1.0, 0.2), turn)
-    hover = Path((0.03, 0.04, 0.06), (1.0, 0.0, 2.0), DEMO_PERIOD_S, (0.4, 1.0, 0.2), -turn)
-    sway = Path((0.05, 0.0, 0.0), (0.5, 0.0, 0.0), DEMO_PERIOD_S, upright, turn)
-    wall = Texture(11, (0.58, 0.62, 0.63), (0.50, 0.53, 0.51), 0.36, shortest_m=0.008)
-    wood = Texture(12, (0.24, 0.42, 0.64), (0.12, 0.24, 0.42), 0.45, longest_m=0.13, stretch=(1.0, 2.5, 1.0))
-    poster = Texture(17, (0.50, 0.44, 0.22), (0.34, 0.26, 0.10), 0.45, shortest_m=0.008)
-    red = Texture(13, (0.16, 0.22, 0.80), (0.06, 0.08, 0.45), longest_m=0.13)
-    blue = Texture(14, (0.72, 0.46, 0.16), (0.44, 0.20, 0.06), longest_m=0.13)
-    green = Texture(16, (0.28, 0.60, 0.30), (0.12, 0.36, 0.12), longest_m=0.13)
-    yellow = Texture(15, (0.14, 0.62, 0.84), (0.08, 0.36, 0.60), longest_m=0.13)
-    violet = Texture(18, (0.62, 0.34, 0.52), (0.34, 0.14, 0.28), longest_m=0.06)
+    roll = Path(
+        amplitude_m=(0.20, 0.0, 0.14),
+        phase_rad=(0.0, 0.0, quarter),
+        period_s=DEMO_PERIOD_S,
+        spin_axis=(0.3, 1.0, 0.2),
+        spin_rad_s=turn,
+    )
+    hover = Path(
+        amplitude_m=(0.03, 0.04, 0.06),
+        phase_rad=(1.0, 0.0, 2.0),
+        period_s=DEMO_PERIOD_S,
+        spin_axis=(0.4, 1.0, 0.2),
+        spin_rad_s=-turn,
+    )
+    sway = Path(
+        amplitude_m=(0.05, 0.0, 0.0),
+        phase_rad=(0.5, 0.0, 0.0),
+        period_s=DEMO_PERIOD_S,
+        spin_axis=upright,
+        spin_rad_s=turn,
+    )
+    wall = Texture(seed=11, light_bgr=(0.58, 0.62, 0.63), dark_bgr=(0.50, 0.53, 0.51), contrast=0.36, shortest_m=0.008)
+    wood = Texture(
+        seed=12,
+        light_bgr=(0.24, 0.42, 0.64),
+        dark_bgr=(0.12, 0.24, 0.42),
+        contrast=0.45,
+        longest_m=0.13,
+        stretch=(1.0, 2.5, 1.0),
+    )
+    poster = Texture(
+        seed=17, light_bgr=(0.50, 0.44, 0.22), dark_bgr=(0.34, 0.26, 0.10), contrast=0.45, shortest_m=0.008
+    )
+    red = Texture(seed=13, light_bgr=(0.16, 0.22, 0.80), dark_bgr=(0.06, 0.08, 0.45), longest_m=0.13)
+    blue = Texture(seed=14, light_bgr=(0.72, 0.46, 0.16), dark_bgr=(0.44, 0.20, 0.06), longest_m=0.13)
+    green = Texture(seed=16, light_bgr=(0.28, 0.60, 0.30), dark_bgr=(0.12, 0.36, 0.12), longest_m=0.13)
+    yellow = Texture(seed=15, light_bgr=(0.14, 0.62, 0.84), dark_bgr=(0.08, 0.36, 0.60), longest_m=0.13)
+    violet = Texture(seed=18, light_bgr=(0.62, 0.34, 0.52), dark_bgr=(0.34, 0.14, 0.28), longest_m=0.06)
     return Scene(
         (
             Body("wall", Plane(), (0.0, 0.0, 2.5), wall),

@@ -18,7 +18,7 @@ JPEG_QUALITY: Final = 92
 _NS: Final = 1_000_000_000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Film:
     """Images of both cameras, taken at the same moments.
 
@@ -106,7 +106,7 @@ def render_films(
         OSError: a folder cannot be written to.
     """
     films = {
-        quality: Film(folder / "left", folder / "right", round(fps * seconds), fps)
+        quality: Film(left=folder / "left", right=folder / "right", frames=round(fps * seconds), fps=fps)
         for quality, folder in folders.items()
     }
     poses = rig_poses(rig)

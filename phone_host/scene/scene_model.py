@@ -5,7 +5,7 @@ Scene axes are the axes of the rig's left camera: x right, y down, z forward, me
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +61,7 @@ class Sphere:
 Shape = Plane | Box | Sphere
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Texture:
     """A solid texture: band-limited noise of several octaves, a function of the point in the body's axes.
 
@@ -84,7 +84,7 @@ class Texture:
     stretch: Vector = (1.0, 1.0, 1.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Path:
     """A periodic motion about the body's rest pose: each coordinate swings as amplitude * sin(2 pi t / period + phase).
 
@@ -146,6 +146,8 @@ class Body:
                 return math.hypot(*size_m) / 2.0
             case Sphere(radius_m):
                 return radius_m
+            case _:
+                assert_never(self.shape)
 
     def at(self, t_s: float) -> "Body":
         """The same body where its path has taken it at time `t_s`, standing still."""

@@ -11,6 +11,7 @@ pixels: nothing aliases.
 
 import functools
 import math
+from typing import assert_never
 
 import cv2
 import numpy as np
@@ -85,6 +86,8 @@ def _texture_places(body: Body, points: Floats) -> tuple[Floats, bool]:
             # Another piece of the paper, a metre away, for each face.
             places[0] += faces
             return places, True
+        case _:
+            assert_never(body.shape)
 
 
 def wavelengths_m(texture: Texture) -> list[float]:
@@ -169,6 +172,8 @@ def lamp_reaching(body: Body, points: Floats, towards: Floats) -> Floats:
             return np.where(far > 0.0, through, np.float32(1.0))
         case Plane():
             return np.ones(points.shape[1], dtype=np.float32)
+        case _:
+            assert_never(body.shape)
 
 
 def _ball_radius_m(body: Body) -> float:
@@ -180,6 +185,8 @@ def _ball_radius_m(body: Body) -> float:
             return sum(size_m) / 6.0
         case Plane():
             return 0.0
+        case _:
+            assert_never(body.shape)
 
 
 def shadow_balls(light: Light, caster: Body, plane: Body) -> tuple[tuple[NDArray[np.float64], float], ...]:

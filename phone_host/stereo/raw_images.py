@@ -16,7 +16,7 @@ _KINDS: Final = {PixelFormat.MJPEG: ImageKind.JPEG, PixelFormat.PNG: ImageKind.P
 _LOOK: Final = "look at the camera that sends it"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class EncodedImage:
     """A frame's bytes and what its header says of them.
 

@@ -64,7 +64,9 @@ def rectify_rig(rig: Rig) -> Rectification:
             f"the two cameras' fields of view overlap by {max(width_px, 0)}x{max(height_px, 0)} px only",
             f"turn the cameras towards the same scene and {_RECALIBRATE}",
         )
-    geometry = StereoGeometry(focal_px, baseline_m, cx_px=float(-focal_px * x0), cy_px=float(-focal_px * y0))
+    geometry = StereoGeometry(
+        focal_px=focal_px, baseline_m=baseline_m, cx_px=float(-focal_px * x0), cy_px=float(-focal_px * y0)
+    )
     projection = np.array([[focal_px, 0, geometry.cx_px, 0], [0, focal_px, geometry.cy_px, 0], [0, 0, 1, 0]])
     shift = np.zeros((3, 4))
     shift[0, 3] = -focal_px * baseline_m
@@ -248,6 +250,11 @@ def _filled_window(model: CameraModel, rotation: Matrix, side: Side) -> tuple[fl
         return (
             float(left[:, 0].max()), float(top[:, 1].max()), float(right[:, 0].min()), float(bottom[:, 1].min())
         )  # fmt: skip
+    if rotation[2, 2] < math.hypot(rotation[0, 2], rotation[1, 2]):  # its axis leads more aside than forward
+        raise DataError(
+            f"the {side.value} camera looks too far aside of what both cameras could see",
+            f"turn the cameras towards the same scene and {_RECALIBRATE}",
+        )
     raise DataError(
         f"the {side.value} camera's distortion folds back inside its image",
         f"{_RECALIBRATE}, with views that also cover the corners",

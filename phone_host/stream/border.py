@@ -24,7 +24,7 @@ _MOST_HELD: Final = 4
 """While so many frames wait for an echo no more are asked for."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Arrival:
     """A frame that came, with what was known of it at that moment: link, session's account, camera, and its last byte's arrival, ns."""
 
@@ -183,7 +183,15 @@ class Border:
         offset_ns, uncertainty_ns = estimate.offset_at(sent_ns), estimate.uncertainty_at(sent_ns)
         name, asked_px = self._account.links[arrival.link].name, (arrival.camera.width_px, arrival.camera.height_px)
         marks = frame.marks.moved_to(sent_ns + offset_ns)
-        known = BoardFrame(frame, name, marks, arrival.received_ns, offset_ns, uncertainty_ns, asked_px)
+        known = BoardFrame(
+            message=frame,
+            link=name,
+            marks=marks,
+            received_ns=arrival.received_ns,
+            offset_ns=offset_ns,
+            uncertainty_ns=uncertainty_ns,
+            asked_px=asked_px,
+        )
         return [(arrival.link, known)]
 
     def _doubts(self, arrival: Arrival, estimate: ClockEstimate) -> Disbelief | None:

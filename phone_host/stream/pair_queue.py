@@ -86,10 +86,18 @@ class PairQueue:
     def counts(self) -> PairCounts:
         """The account now."""
         with self._changed:
-            held = (self._pairing.held_board, self._pairing.held_host) if self._pairing else (0, 0)
-            orphans = (tuple(self._board_orphans.items()), tuple(self._host_orphans.items()))
-            pairs = (self._paired, self._dropped, self._taken, len(self._fifo))
-            return PairCounts(self._received, self._host_frames, *pairs, *held, *orphans)
+            return PairCounts(
+                received=self._received,
+                host_frames=self._host_frames,
+                paired=self._paired,
+                dropped=self._dropped,
+                taken=self._taken,
+                waiting=len(self._fifo),
+                held_board=self._pairing.held_board if self._pairing else 0,
+                held_host=self._pairing.held_host if self._pairing else 0,
+                board_orphans=tuple(self._board_orphans.items()),
+                host_orphans=tuple(self._host_orphans.items()),
+            )
 
     @property
     def phase(self) -> Phase | None:
@@ -261,7 +269,14 @@ class PairQueue:
                     self._board_bytes -= len(board.message.payload)
                     paired_ns = self._clock()
                     self._paired += 1
-                    pair = FramePair(board, host, time_skew_ns, paired_ns, self._clock(), self._before(board))
+                    pair = FramePair(
+                        board=board,
+                        host=host,
+                        time_skew_ns=time_skew_ns,
+                        paired_ns=paired_ns,
+                        queued_ns=self._clock(),
+                        before=self._before(board),
+                    )
                     self._dropped += len(self._fifo.put(pair))
                     self._changed.notify()
                 case BoardOrphan(frame, reason):

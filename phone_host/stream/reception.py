@@ -375,7 +375,9 @@ class Reception:
         tally.frames += 1
         tally.bytes += len(frame.payload)
         assert self._hello is not None
-        for passed in self._border.admit(Arrival(frame, link, account, self._hello.camera, now_ns)):
+        for passed in self._border.admit(
+            Arrival(frame=frame, link=link, account=account, camera=self._hello.camera, received_ns=now_ns)
+        ):
             self._pass(*passed)
 
     def _pass(self, link: int, frame: BoardFrame) -> None:

@@ -38,7 +38,7 @@ class FittedLine(Protocol):
         """Its delay for a frame, ns."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Scatter:
     """Delays of frames of different size.
 
@@ -69,10 +69,10 @@ def against_bytes(scatter: Scatter, width_px: int, height_px: int = 240) -> str:
         An <svg> element.
     """
     size, delay, fit = scatter.size_bytes, scatter.delay_ns, scatter.fit
-    x = Linear(0.0, 1.05 * span(size)[1], LEFT_PX, width_px - RIGHT_PX)
+    x = Linear(low=0.0, high=1.05 * span(size)[1], start_px=LEFT_PX, end_px=width_px - RIGHT_PX)
     wanted = max(2.5 * float(np.percentile(delay, 75)), 1.25 * fit.delay_ns(x.high) if fit.ns_per_byte > 0 else 0.0)
     top = min(1.06 * float(delay.max()), wanted)
-    y = Linear(0.0, max(1.0, top), height_px - BOTTOM_PX, TOP_PX)
+    y = Linear(low=0.0, high=max(1.0, top), start_px=height_px - BOTTOM_PX, end_px=TOP_PX)
     dots = []
     every = max(1, -(-size.size // _MOST_DOTS))
     late = set(np.flatnonzero(delay > y.high).tolist())
@@ -96,7 +96,7 @@ def against_bytes(scatter: Scatter, width_px: int, height_px: int = 240) -> str:
     )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Compared:
     """One figure, measured and predicted.
 
@@ -126,8 +126,8 @@ def compared(points: Sequence[Compared], width_px: int, height_px: int = 300) ->
     """
     values = np.array([value for one in points for value in (one.measured_ns, one.predicted_ns)])
     low, high = 0.8 * float(values.min()), 1.25 * float(values.max())
-    x = Log(low, high, LEFT_PX, width_px - RIGHT_PX)
-    y = Log(low, high, height_px - BOTTOM_PX, TOP_PX)
+    x = Log(low=low, high=high, start_px=LEFT_PX, end_px=width_px - RIGHT_PX)
+    y = Log(low=low, high=high, start_px=height_px - BOTTOM_PX, end_px=TOP_PX)
     parts = ['<text x="0" y="11">predicted</text>']
     for value in _steps(low, high):
         across, up = x.px(value), y.px(value)
@@ -185,7 +185,7 @@ def lives(pairs: Sequence[Life], width_px: int) -> str:
     longest = max((pair.ledger.end_to_end_ns for pair in pairs), default=0)
     if longest <= 0:
         return empty(width_px, "no pairs")
-    x = Linear(0.0, 1.02 * longest, LEFT_PX, width_px - RIGHT_PX)
+    x = Linear(low=0.0, high=1.02 * longest, start_px=LEFT_PX, end_px=width_px - RIGHT_PX)
     height = 4.0
     rows = []
     for pair in pairs:

@@ -61,7 +61,7 @@ def number_text(value: float) -> str:
     return f"{value:.6g}".replace("-", "\u2212")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Linear:
     """A straight scale: `low` stands at `start_px`, `high` at `end_px`."""
 
@@ -76,7 +76,7 @@ class Linear:
         return self.start_px + share * (self.end_px - self.start_px)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Log:
     """A logarithmic scale over whole decades of positive numbers; zero and less stand at its start."""
 
@@ -107,10 +107,10 @@ def log_scale(values: Values, start_px: float, end_px: float) -> Log:
     """
     positive = values[np.isfinite(values) & (values > 0.0)]
     if not positive.size:
-        return Log(1e3, 1e6, start_px, end_px)
+        return Log(low=1e3, high=1e6, start_px=start_px, end_px=end_px)
     low = math.floor(math.log10(float(positive.min())))
     high = max(low + 1, math.ceil(math.log10(float(positive.max()))))
-    return Log(10.0**low, 10.0**high, start_px, end_px)
+    return Log(low=10.0**low, high=10.0**high, start_px=start_px, end_px=end_px)
 
 
 def span(values: Values) -> tuple[float, float]:

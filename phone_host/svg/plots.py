@@ -26,7 +26,7 @@ _OUTLIER = 2.5
 """A total this many times above the 98th percentile would flatten all others: it is cut off and marked."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Quantity:
     """One named delay of every pair.
 
@@ -106,8 +106,8 @@ def stacked_over_time(time_s: Values, layers: Sequence[Quantity], width_px: int,
     usual = float(np.percentile(sums, 98))
     highest = float(sums.max())
     top = max(1.0, highest if highest <= _OUTLIER * usual else 1.25 * usual)
-    x = Linear(columns[0].start_s, columns[-1].end_s, LEFT_PX, width_px - RIGHT_PX)
-    y = Linear(0.0, top, height_px - BOTTOM_PX, TOP_PX)
+    x = Linear(low=columns[0].start_s, high=columns[-1].end_s, start_px=LEFT_PX, end_px=width_px - RIGHT_PX)
+    y = Linear(low=0.0, high=top, start_px=height_px - BOTTOM_PX, end_px=TOP_PX)
     paths = [""] * len(layers)
     hits, late = [], []
     for column, total in zip(columns, sums, strict=True):
@@ -161,8 +161,9 @@ def over_time(
     both = values if band_ns is None else np.concatenate([values, band_ns, -band_ns])
     low, high = span(np.append(both[np.isfinite(both)], 0.0))
     edge = 0.06 * (high - low)
-    x = Linear(*span(time_s), LEFT_PX, width_px - RIGHT_PX)
-    y = Linear(low - edge if low < 0.0 else 0.0, high + edge, height_px - BOTTOM_PX, TOP_PX)
+    first_s, last_s = span(time_s)
+    x = Linear(low=first_s, high=last_s, start_px=LEFT_PX, end_px=width_px - RIGHT_PX)
+    y = Linear(low=low - edge if low < 0.0 else 0.0, high=high + edge, start_px=height_px - BOTTOM_PX, end_px=TOP_PX)
     parts = [axes(x, y, (width_px, height_px), "time, s")]
     if band_ns is not None:
         parts.append(_band(time_s=time_s, half_ns=band_ns, x=x, y=y, colour=quantity.colour))
@@ -234,7 +235,7 @@ def budgets(rows: Sequence[Budget], width_px: int) -> str:
     totals = [math.fsum(part.value_ns for part in row.parts) for row in rows]
     if not totals or not max(totals) > 0.0:
         return empty(width_px, "nothing measured")
-    x = Linear(0.0, max(totals), 0.0, float(width_px))
+    x = Linear(low=0.0, high=max(totals), start_px=0.0, end_px=float(width_px))
     parts = []
     for index, (row, total) in enumerate(zip(rows, totals, strict=True)):
         top = index * 56
@@ -258,7 +259,7 @@ def budgets(rows: Sequence[Budget], width_px: int) -> str:
     return svg(width_px, 56.0 * len(rows) - 6.0, "shares of the delays", parts)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Column:
     """One column of a stacked plot: when, what it stands for, and the mean of each layer, ns."""
 
@@ -279,14 +280,21 @@ def _columns(time_s: Values, layers: Sequence[Quantity], room_px: int) -> Iterat
         wide = float(np.median(np.diff(time_s))) if count > 1 else 1.0
         ends = np.minimum(np.append(time_s[1:], math.inf), time_s + max(wide, 1e-6))
         for index in range(count):
-            yield _Column(float(time_s[index]), float(ends[index]), f"pair {index + 1}", table[:, index])
+            yield _Column(
+                start_s=float(time_s[index]),
+                end_s=float(ends[index]),
+                name=f"pair {index + 1}",
+                values_ns=table[:, index],
+            )
         return
     edges = np.linspace(time_s[0], time_s[-1], most + 1)
     slots = np.clip(np.searchsorted(edges, time_s, side="right") - 1, 0, most - 1)
     for slot in np.unique(slots):
         mine = np.flatnonzero(slots == slot)
         name = f"pair {mine[0] + 1}" if mine.size == 1 else f"mean of pairs {mine[0] + 1} to {mine[-1] + 1}"
-        yield _Column(float(edges[slot]), float(edges[slot + 1]), name, table[:, mine].mean(axis=1))
+        yield _Column(
+            start_s=float(edges[slot]), end_s=float(edges[slot + 1]), name=name, values_ns=table[:, mine].mean(axis=1)
+        )
 
 
 def _strip(quantity: Quantity, px: Callable[[float], float], top: float, width_px: int) -> str:

@@ -11,6 +11,7 @@ from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
 from enum import Enum
+from statistics import median
 from typing import Final
 
 import numpy as np
@@ -47,7 +48,7 @@ _TRIES: Final = 6
 """A restart of a board under full load may miss by more than the goal several times in a row (an emulated one did three times)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Phase:
     """Where the two cameras stand to each other now.
 
@@ -85,6 +86,10 @@ class PhaseMeter:
         self.has_phase = abs(ratio - round(ratio)) <= _RATIO_OFF * ratio
         self._host: deque[int] = deque(maxlen=_KEPT_HOST)
         self._samples: deque[tuple[int, float]] = deque(maxlen=_DRIFT_SAMPLES)
+        # The same in rings, whose order a straight line does not care for: the drift is asked for with each frame.
+        self._moments_ns = np.zeros(_DRIFT_SAMPLES, dtype=np.int64)
+        self._skews_ns = np.zeros(_DRIFT_SAMPLES)
+        self._taken = 0
 
     @property
     def phase(self) -> Phase | None:
@@ -92,9 +97,15 @@ class PhaseMeter:
         if not self.has_phase or len(self._samples) < _RECENT:
             return None
         recent = [self._samples[index] for index in range(len(self._samples) - _RECENT, len(self._samples))]
-        middle = float(np.median([value for _, value in recent]))
-        scatter_ns = float(np.median([abs(value - middle) for _, value in recent]))
-        return Phase(self._wrapped(middle), self._period_ns, self._drift(), recent[0][0], scatter_ns)
+        middle = median(value for _, value in recent)
+        scatter_ns = median(abs(value - middle) for _, value in recent)
+        return Phase(
+            time_skew_ns=self._wrapped(middle),
+            period_ns=self._period_ns,
+            drift=self._drift(),
+            first_ns=recent[0][0],
+            scatter_ns=scatter_ns,
+        )
 
     def add_host(self, stamp_ns: int) -> None:
         """Take note of a frame of the host's camera; stamps that go back are left out."""
@@ -111,10 +122,14 @@ class PhaseMeter:
         if self._samples:  # without jumps where it passes half a period
             skew = self._samples[-1][1] + self._wrapped(skew - self._samples[-1][1])
         self._samples.append((stamp_ns, skew))
+        place = self._taken % _DRIFT_SAMPLES
+        self._moments_ns[place], self._skews_ns[place] = stamp_ns, skew
+        self._taken += 1
 
     def restart(self) -> None:
         """Forget what was measured: one of the cameras has been steered."""
         self._samples.clear()
+        self._taken = 0
 
     def _near(self, after: int) -> list[int]:
         """The host stamps before and after a place among them."""
@@ -128,8 +143,10 @@ class PhaseMeter:
         first_ns, last_ns = self._samples[0][0], self._samples[-1][0]
         if last_ns - first_ns < _DRIFT_SPAN_NS:
             return math.nan
-        times = np.array([time_ns - first_ns for time_ns, _ in self._samples], dtype=np.float64)
-        return float(np.polyfit(times, [value for _, value in self._samples], 1)[0])
+        count = len(self._samples)
+        times = (self._moments_ns[:count] - first_ns).astype(np.float64)
+        times -= times.mean()
+        return float(times @ self._skews_ns[:count] / (times @ times))  # the slope of least squares
 
 
 class Aligning(Enum):

@@ -72,7 +72,7 @@ def disbelief(marks: BoardMarks, received_ns: int, bound_ns: int, *, labelled: b
     return None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Held(Generic[F]):
     """A frame that waits: when it was sent (board's clock), how long it took, and since when it waits (host's clock), ns."""
 
@@ -110,7 +110,7 @@ class Quarantine(Generic[F]):
         if not self._held and self._is_usual(transit_ns, period_ns):
             self._recent.append(transit_ns)
             return True
-        self._held.append(_Held(frame, sent_ns, transit_ns, now_ns))
+        self._held.append(_Held(frame=frame, sent_ns=sent_ns, transit_ns=transit_ns, since_ns=now_ns))
         return False
 
     def confirmed(self, board_ns: int, before_ns: int) -> list[F]:
@@ -148,7 +148,7 @@ class Quarantine(Generic[F]):
         return max(self._recent) - slack_ns < transit_ns < min(self._recent) + slack_ns
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Suspects:
     """Frames that were believed although a clock had stepped: the step was too small to be seen before an echo told of it.
 
@@ -191,4 +191,4 @@ class Unproven:
         session = self._frames[-1][1]
         numbers = [number for _, of, number in self._frames if of == session]
         self._frames.clear()
-        return Suspects(session, min(numbers), max(numbers), len(numbers))
+        return Suspects(session=session, first=min(numbers), last=max(numbers), frames=len(numbers))

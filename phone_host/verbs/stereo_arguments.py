@@ -14,29 +14,34 @@ RealSense D435 280 mm). Nearer costs time: the number of disparities goes with 1
 def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare --calibration, --rectified and what goes with them."""
     parser.add_argument(
-        "--calibration", metavar="rig.yaml", help="the two cameras' calibration, from phone-host calibrate"
+        "--calibration", metavar="rig.yaml", help="calibration of the two cameras, made by phone-host calibrate"
     )
-    parser.add_argument("--rectified", action="store_true", help="the images come rectified")
+    parser.add_argument("--rectified", action="store_true", help="the images are already rectified")
     parser.add_argument(
-        "--disparities", type=int, metavar="N", help="search 0 <= d < N (with a rig the default follows from --near)"
+        "--disparities",
+        type=int,
+        metavar="N",
+        help="search disparities from 0 to N-1 px (default with --calibration: as --near needs)",
     )
     parser.add_argument(
         "--near",
         type=float,
         default=_DEFAULT_NEAR_MM,
         metavar="MM",
-        help=f"nearest depth with --calibration (default {_DEFAULT_NEAR_MM:g})",
+        help=f"nearest depth to look for, with --calibration (default {_DEFAULT_NEAR_MM:g})",
     )
-    parser.add_argument("--focal", type=float, metavar="PX", help="focal length of rectified images")
-    parser.add_argument("--baseline", type=float, metavar="MM", help="baseline of rectified images")
+    parser.add_argument("--focal", type=float, metavar="PX", help="focal length of the rectified images")
+    parser.add_argument(
+        "--baseline", type=float, metavar="MM", help="distance of the two cameras, for rectified images"
+    )
     parser.add_argument(
         "--doffs",
         type=float,
         metavar="PX",
         help="x of the right principal point minus the left (default 0)",
     )
-    parser.add_argument("--center", metavar="CX,CY", help="left principal point of rectified images")
+    parser.add_argument("--center", metavar="CX,CY", help="principal point of the left rectified image")
     own = " or ".join(name.value for name in MatcherName)
     parser.add_argument(
-        "--matcher", metavar="NAME", help=f"{own}, or one that an installed package registers (default sgbm)"
+        "--matcher", metavar="NAME", help=f"stereo matcher: {own}, or one from an installed package (default sgbm)"
     )

@@ -87,7 +87,9 @@ def rectified_geometry(options: argparse.Namespace, size_px: tuple[int, int]) ->
     if not math.isfinite(doffs_px):
         raise SettingsError(f"--doffs {doffs_px:g}", "give a number of px")
     cx_px, cy_px = ((n - 1) / 2 for n in size_px) if options.center is None else _center(options.center)
-    return StereoGeometry(options.focal, options.baseline / 1000, cx_px, cy_px, doffs_px)
+    return StereoGeometry(
+        focal_px=options.focal, baseline_m=options.baseline / 1000, cx_px=cx_px, cy_px=cy_px, doffs_px=doffs_px
+    )
 
 
 def _center(text: str) -> tuple[float, float]:

@@ -50,7 +50,7 @@ _HWM = 10
 _STAMP = struct.Struct("<q")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
     """Ages in one stretch of time, ms; NaN where nothing came."""
 
@@ -60,7 +60,7 @@ class Window:
     max_ms: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
     """One way of sending.
 
@@ -122,7 +122,7 @@ def windows(ages: Sequence[tuple[int, int]]) -> tuple[Window, Window]:
         ages: (moment, age), ns, in order.
     """
     if not ages:
-        nothing = Window(0, float("nan"), float("nan"), float("nan"))
+        nothing = Window(frames=0, p50_ms=float("nan"), p95_ms=float("nan"), max_ms=float("nan"))
         return nothing, nothing
     begin_ns, end_ns = ages[0][0] + round(_WARM_UP_S * 1e9), ages[-1][0]
     length_ns = round(_WINDOW_S * 1e9)
@@ -149,8 +149,13 @@ def ours(policy: str, folder: Path, seconds: float) -> Row:
     # The board's count begins with its life and ends with it; the first frame that came tells when frame `before` was exposed.
     grabbed, since_ns = account.grabbed - before, host.link_ages[0][0] - host.link_ages[0][1]
     pipeline = [(ledger.dequeued_ns, ledger.dequeued_ns - ledger.board.exposed_ns) for ledger in host.ledgers]
-    rates = (grabbed / ((stopped_ns - since_ns) / 1e9), run.pairs_per_second)
-    return Row(f"FIFO 1:{policy}", windows(host.link_ages), windows(pipeline), *rates)
+    return Row(
+        name=f"FIFO 1:{policy}",
+        link=windows(host.link_ages),
+        pipeline=windows(pipeline),
+        camera_hz=grabbed / ((stopped_ns - since_ns) / 1e9),
+        used_hz=run.pairs_per_second,
+    )
 
 
 def bare(folder: Path, seconds: float) -> Row:
@@ -192,7 +197,9 @@ def bare(folder: Path, seconds: float) -> Row:
         stop.set()
         thread.join()
     both = windows(ages)
-    return Row("bare PUSH/PULL", both, both, grabbed[0] / elapsed_s, len(ages) / elapsed_s)
+    return Row(
+        name="bare PUSH/PULL", link=both, pipeline=both, camera_hz=grabbed[0] / elapsed_s, used_hz=len(ages) / elapsed_s
+    )
 
 
 def main() -> int:
@@ -229,9 +236,9 @@ def main() -> int:
 
 def _window(ages_ns: Sequence[int]) -> Window:
     if not ages_ns:
-        return Window(0, float("nan"), float("nan"), float("nan"))
+        return Window(frames=0, p50_ms=float("nan"), p95_ms=float("nan"), max_ms=float("nan"))
     p50, p95, longest = (float(np.percentile(ages_ns, q)) / 1e6 for q in (50, 95, 100))
-    return Window(len(ages_ns), p50, p95, longest)
+    return Window(frames=len(ages_ns), p50_ms=p50, p95_ms=p95, max_ms=longest)
 
 
 def _print(rows: Sequence[Row]) -> None:

@@ -159,7 +159,7 @@ def simulate(profile: Profile, seed: int, seconds: float, errors: Errors) -> Non
         errors.violations += abs(error) > estimate.bound_at(board_ns)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
     """One case's figures, us; NaN: not measured."""
 
@@ -196,20 +196,20 @@ def row_of(case: Case, errors: Errors) -> Row:
     """Sum up a case."""
     contained = float(np.mean(np.array(errors.ours) <= np.array(errors.uncertainty)))
     return Row(
-        case.name,
-        case.target_us,
-        case.symmetric,
-        _percentile(errors.ours, 50),
-        _percentile(errors.ours, 99),
-        _percentile(errors.least, 99),
-        _percentile(errors.mean, 99),
-        float(np.mean(errors.uncertainty)),
-        contained,
-        _percentile(errors.bound, 50),
-        errors.violations,
-        _percentile(errors.before, 99),
-        _percentile(errors.held, 99),
-        errors.cpu_s / errors.waves * 1e6,
+        name=case.name,
+        target_us=case.target_us,
+        symmetric=case.symmetric,
+        p50_us=_percentile(errors.ours, 50),
+        p99_us=_percentile(errors.ours, 99),
+        least_p99_us=_percentile(errors.least, 99),
+        mean_p99_us=_percentile(errors.mean, 99),
+        uncertainty_us=float(np.mean(errors.uncertainty)),
+        contained=contained,
+        bound_us=_percentile(errors.bound, 50),
+        violations=errors.violations,
+        learnt_p99_us=_percentile(errors.before, 99),
+        held_p99_us=_percentile(errors.held, 99),
+        cpu_us=errors.cpu_s / errors.waves * 1e6,
     )
 
 

@@ -36,7 +36,7 @@ _NEAR = 24
 _BLOCK_NS = 15e9
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
     """A simulated link and the range of its least one-way delay, ns."""
 
@@ -47,14 +47,14 @@ class Link:
 
 
 LINKS = (
-    Link("Wi-Fi, jitter 2-10 ms", wifi, 0.6 * MS, 1.2 * MS),
-    Link("serial 8 Mbit/s", loaded_line(8e6, 0.3 * MS, 0.125 * MS), 0.24 * MS, 0.36 * MS),
-    Link("radio 1.5 Mbit/s", loaded_line(1.5e6, 1.5 * MS, 1.25 * MS), 1.2 * MS, 1.8 * MS),
-    Link("radio 0.64 Mbit/s", loaded_line(0.64e6, 2.5 * MS, 1.25 * MS), 2.0 * MS, 3.0 * MS),
+    Link(name="Wi-Fi, jitter 2-10 ms", profile=wifi, low_ns=0.6 * MS, high_ns=1.2 * MS),
+    Link(name="serial 8 Mbit/s", profile=loaded_line(8e6, 0.3 * MS, 0.125 * MS), low_ns=0.24 * MS, high_ns=0.36 * MS),
+    Link(name="radio 1.5 Mbit/s", profile=loaded_line(1.5e6, 1.5 * MS, 1.25 * MS), low_ns=1.2 * MS, high_ns=1.8 * MS),
+    Link(name="radio 0.64 Mbit/s", profile=loaded_line(0.64e6, 2.5 * MS, 1.25 * MS), low_ns=2.0 * MS, high_ns=3.0 * MS),
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Run:
     """The tightest facts of each wave of one run; times from the end of the echoes on, offsets less ours at that moment and less our skew; ns.
 
@@ -111,16 +111,16 @@ def collect(link: Link, seed: int) -> Run:
         return rest(board_ns, clocks.offset(board_ns))
 
     return Run(
-        np.array([x - end_ns for x, _ in lower], float),
-        np.array([rest(x, y - clocks.origin_ns) for x, y in lower]),
-        np.array([x - end_ns for x, _ in upper], float),
-        np.array([rest(x, y - clocks.origin_ns) for x, y in upper]),
-        np.array([truth(x) for x, _ in lower]),
-        np.array([truth(x) for x, _ in upper]),
-        truth(end_ns),
-        truth(held_ns),
-        float(held_ns - end_ns),
-        (there_ns - back_ns) / 2,
+        lower_x=np.array([x - end_ns for x, _ in lower], float),
+        below=np.array([rest(x, y - clocks.origin_ns) for x, y in lower]),
+        upper_x=np.array([x - end_ns for x, _ in upper], float),
+        above=np.array([rest(x, y - clocks.origin_ns) for x, y in upper]),
+        true_lower=np.array([truth(x) for x, _ in lower]),
+        true_upper=np.array([truth(x) for x, _ in upper]),
+        true_end=truth(end_ns),
+        true_held=truth(held_ns),
+        hold_ns=float(held_ns - end_ns),
+        asymmetry_ns=(there_ns - back_ns) / 2,
     )
 
 
@@ -149,7 +149,7 @@ def hulls(run: Run, seconds: float, bends: int, *, shaped: bool = False) -> Foun
     return strip.offset_ns + (beyond(strip.there) - beyond(strip.back)) / 2, strip.skew
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Strip:
     """Mean of the middles of all allowed curves, their skew, and the scatter of the delays around the likeliest, rising; ns."""
 
@@ -178,7 +178,9 @@ def _strip(run: Run, seconds: float, bends: int) -> _Strip:
         best = np.unravel_index(np.argmax(logs), logs.shape)
     weight = np.exp(logs - logs.max())
     weight /= weight.sum()
-    return _Strip(float(((low + high) / 2 * weight).sum()), float((_SKEWS * weight).sum()), there, back)
+    return _Strip(
+        offset_ns=float(((low + high) / 2 * weight).sum()), skew=float((_SKEWS * weight).sum()), there=there, back=back
+    )
 
 
 def _spacing_ns(scatter: Values) -> float:

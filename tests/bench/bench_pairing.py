@@ -167,7 +167,7 @@ class Tally:
             self.forbidden += len(forbidden_pairs(pairs, streams.board_ns, streams.host_ns, regime.tolerance_ns))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
     """One line of the table."""
 
@@ -207,18 +207,18 @@ def row_of(regime: Regime, loss: float, method: str, tally: Tally) -> Row:
     """Sum up; rivals are not asked to reach the figures."""
     waits = tally.waits_ms or [float("nan")]
     return Row(
-        regime.name,
-        loss,
-        method,
-        tally.pairs / tally.best_pairs,
-        (tally.skew_ns / max(1, tally.pairs)) / (tally.best_skew_ns / tally.best_pairs),
-        tally.equal / tally.streams,
-        tally.beyond,
-        tally.forbidden,
-        float(np.percentile(waits, 50)),
-        float(np.percentile(waits, 99)),
-        max(waits),
-        failures(regime, tally) if METHODS[method] is ours else (),
+        regime=regime.name,
+        loss=loss,
+        method=method,
+        pairs=tally.pairs / tally.best_pairs,
+        skew=(tally.skew_ns / max(1, tally.pairs)) / (tally.best_skew_ns / tally.best_pairs),
+        equal=tally.equal / tally.streams,
+        beyond=tally.beyond,
+        forbidden=tally.forbidden,
+        wait_p50_ms=float(np.percentile(waits, 50)),
+        wait_p99_ms=float(np.percentile(waits, 99)),
+        wait_max_ms=max(waits),
+        missed=failures(regime, tally) if METHODS[method] is ours else (),
     )
 
 

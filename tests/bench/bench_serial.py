@@ -45,7 +45,7 @@ _SETTLING_NS = 11_000_000_000
 """For ten seconds the host learns the skew of the clocks with more echoes."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SlowLine:
     """A line to emulate, and what is to be reached on it.
 
@@ -63,8 +63,8 @@ class SlowLine:
 
 
 _SLOW = (
-    SlowLine("1.5 Mbit/s", 187_500, 0.95, 20),
-    SlowLine("115200 baud 8N1", 11_520, 0.93, float("nan")),
+    SlowLine(name="1.5 Mbit/s", bytes_per_s=187_500, goodput=0.95, echo_ms=20),
+    SlowLine(name="115200 baud 8N1", bytes_per_s=11_520, goodput=0.93, echo_ms=float("nan")),
 )
 _FILM_BYTES = 25_000
 

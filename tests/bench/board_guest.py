@@ -148,7 +148,7 @@ class HttpReader(_Counting):
             time.sleep(0.2)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
     """What a program took while it streamed.
 
@@ -233,11 +233,11 @@ class Board:
         time.sleep(seconds)
         after, got = self.meter(pid), frames() - frames_before
         return Cost(
-            got,
-            (after.read_ns - before.read_ns) / 1e9,
-            after.cpu_ns - before.cpu_ns,
-            after.system_ns - before.system_ns,
-            self.resident_bytes(pid),
+            frames=got,
+            seconds=(after.read_ns - before.read_ns) / 1e9,
+            cpu_ns=after.cpu_ns - before.cpu_ns,
+            system_ns=after.system_ns - before.system_ns,
+            resident_bytes=self.resident_bytes(pid),
         )
 
     def resident_bytes(self, pid: int) -> int:

@@ -23,7 +23,7 @@ _LENGTH_S = 13.0
 _STEP_S = 0.02
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RealRow:
     """One load's figures, us; how busy each core was, by anybody, %."""
 
@@ -88,20 +88,22 @@ def _measured(load: str, folder: Path, fps: int, runs: int, *, fifo: bool) -> Re
     errors = [(age_s, abs(estimate.offset_at(at_ns)) / 1e3) for age_s, at_ns, estimate in seen]
     early, late = [e for age, e in errors if 1 <= age < 2], [e for age, e in errors if age >= 10]
     return RealRow(
-        load,
-        "SCHED_FIFO, a core each" if fifo else "ordinary",
-        float(np.percentile(early, 50)),
-        float(np.percentile(early, 99)),
-        float(np.percentile(late, 50)),
-        float(np.percentile(late, 99)),
-        float(np.median([estimate.uncertainty_at(at_ns) / 1e3 for age, at_ns, estimate in seen if age >= 10])),
-        float(
+        load=load,
+        scheduling="SCHED_FIFO, a core each" if fifo else "ordinary",
+        early_p50_us=float(np.percentile(early, 50)),
+        early_p99_us=float(np.percentile(early, 99)),
+        late_p50_us=float(np.percentile(late, 50)),
+        late_p99_us=float(np.percentile(late, 99)),
+        uncertainty_us=float(
+            np.median([estimate.uncertainty_at(at_ns) / 1e3 for age, at_ns, estimate in seen if age >= 10])
+        ),
+        contained=float(
             np.mean([abs(estimate.offset_at(at_ns)) <= estimate.uncertainty_at(at_ns) for _, at_ns, estimate in seen])
         ),
-        float(np.median([estimate.bound_at(at_ns) / 1e3 for age, at_ns, estimate in seen if age >= 10])),
-        float(np.median([estimate.round_trip_ns / 1e3 for age, _, estimate in seen if age >= 10])),
-        os.getloadavg()[0],
-        busyness.percents,
+        bound_us=float(np.median([estimate.bound_at(at_ns) / 1e3 for age, at_ns, estimate in seen if age >= 10])),
+        round_trip_us=float(np.median([estimate.round_trip_ns / 1e3 for age, _, estimate in seen if age >= 10])),
+        load_average=os.getloadavg()[0],
+        busy_percents=busyness.percents,
     )
 
 

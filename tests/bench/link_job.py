@@ -56,7 +56,7 @@ class Tally:
         return json.dumps({"cpu_us_per_frame": per_frame, "delays_ns": self.delays_ns, "mb_per_s": mb_per_s})
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
     """What a worker is asked for; `fps` 0: as fast as it goes."""
 

@@ -138,7 +138,7 @@ def main(arguments: list[str]) -> None:
     module, send, receive = _WORKERS[transport]
     worker: Worker = getattr(importlib.import_module(module), send if role == "send" else receive)
     be_quiet(0 if role == "send" else 1)
-    print(worker(Job(address, Path(folder), fps, warm_up, frames)).report())
+    print(worker(Job(address=address, folder=Path(folder), fps=fps, warm_up=warm_up, frames=frames)).report())
 
 
 if __name__ == "__main__":

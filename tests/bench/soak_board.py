@@ -75,12 +75,18 @@ def soak_board(folder: Path, minutes: float, tell: Callable[[float], None]) -> l
     age = f"p50 {p50_ms:.1f}, p99 {p99_ms:.1f} ms over {len(ages_ns)} frames"
     lost = {reason: number for reason, number in dropped.items() if reason not in {"no_host", "stopped"}}
     return [
-        Check(_PART, "the service's process is the first one", str(still_the_same), "True", still_the_same),
+        Check(
+            part=_PART,
+            what="the service's process is the first one",
+            found=str(still_the_same),
+            limit="True",
+            holds=still_the_same,
+        ),
         count(_PART, "frames that the driver left out", camera["missed"], 0),
         count(_PART, f"frames dropped by the board {lost or ''}".rstrip(), sum(lost.values()), 0),
         count(_PART, "frames lost on the link", account.lost, 0),
         count(_PART, "grabbed = sent + dropped", int(grabbed), int(sent) + sum(dropped.values())),
         count(_PART, "sent = received", int(sent), account.received),
-        Check(_PART, "age at the host", age, f"p99 < {limit_ms:.0f} ms", p99_ms < limit_ms),
+        Check(part=_PART, what="age at the host", found=age, limit=f"p99 < {limit_ms:.0f} ms", holds=p99_ms < limit_ms),
         memory(_PART, "board-agent", samples),
     ]

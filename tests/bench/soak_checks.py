@@ -21,7 +21,7 @@ _DRIFT_SHARE: Final = 0.1
 """No drift: first and last median differ by less than 1 ms or a tenth."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
     """One line of the table.
 
@@ -57,7 +57,13 @@ def memory(part: str, name: str, samples: Sequence[Resident]) -> Check:
     growth_bytes = slope * float(hours[-1])
     limit_bytes = max(_GROWTH_BYTES, _GROWTH_SHARE * float(sizes.mean()))
     found = f"{sizes[-1] / 1e6:.1f} MB, slope {slope / 1e6:+.2f} MB/h, {growth_bytes / 1e6:+.2f} MB in this time"
-    return Check(part, f"memory of {name}", found, f"+{limit_bytes / 1e6:.1f} MB", growth_bytes <= limit_bytes)
+    return Check(
+        part=part,
+        what=f"memory of {name}",
+        found=found,
+        limit=f"+{limit_bytes / 1e6:.1f} MB",
+        holds=growth_bytes <= limit_bytes,
+    )
 
 
 def drift(part: str, name: str, delays_ns: Sequence[int], window: int) -> Check:
@@ -68,9 +74,9 @@ def drift(part: str, name: str, delays_ns: Sequence[int], window: int) -> Check:
     limit_ns = max(_DRIFT_NS, _DRIFT_SHARE * medians[0])
     found = f"p50 {medians[0] / 1e6:.2f} -> {medians[1] / 1e6:.2f} ms, p95 {p95[0] / 1e6:.2f} -> {p95[1] / 1e6:.2f} ms"
     holds = abs(medians[1] - medians[0]) <= limit_ns
-    return Check(part, f"drift of {name}", found, f"p50 +- {limit_ns / 1e6:.1f} ms", holds)
+    return Check(part=part, what=f"drift of {name}", found=found, limit=f"p50 +- {limit_ns / 1e6:.1f} ms", holds=holds)
 
 
 def count(part: str, what: str, found: int, wanted: int) -> Check:
     """Whether a count is exactly what it must be."""
-    return Check(part, what, str(found), str(wanted), found == wanted)
+    return Check(part=part, what=what, found=str(found), limit=str(wanted), holds=found == wanted)

@@ -71,7 +71,13 @@ def _conservation(report: dict[str, Any], account: dict[str, Any], ledger_lines:
     orphaned, dropped = sum(frames["orphaned"].values()), sum(account["dropped"].values())
     used = pairs["processed"] + pairs["undecodable"] + pairs["dropped_fifo"]
     return [
-        Check(_PART, "the end of the session", session["tail"], "known", session["tail"] == "known"),
+        Check(
+            part=_PART,
+            what="the end of the session",
+            found=session["tail"],
+            limit="known",
+            holds=session["tail"] == "known",
+        ),
         count(_PART, "grabbed = sent + dropped (board)", account["grabbed"], account["sent"] + dropped),
         count(_PART, "sent: the board's account = the host's", account["sent"], session["sent"]),
         count(_PART, "sent = received (lost: 0)", session["sent"], session["received"]),
@@ -83,11 +89,11 @@ def _conservation(report: dict[str, Any], account: dict[str, Any], ledger_lines:
         ),
         # One pair may be with the matcher when the run is ended, one in the FIFO.
         Check(
-            _PART,
-            "paired = processed + dropped + stopped",
-            str(frames["paired"]),
-            f"{used} + 0..2",
-            0 <= frames["paired"] - used <= 2,
+            part=_PART,
+            what="paired = processed + dropped + stopped",
+            found=str(frames["paired"]),
+            limit=f"{used} + 0..2",
+            holds=0 <= frames["paired"] - used <= 2,
         ),
         count(_PART, "a ledger for each processed pair", ledger_lines, pairs["processed"]),
     ]

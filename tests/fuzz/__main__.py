@@ -32,7 +32,7 @@ _COVERAGE = re.compile(r"cov: (\d+) ft: \d+ corp: (\d+)")
 _FOUND = 4
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
     """What became of one target.
 
@@ -123,7 +123,14 @@ def _fuzz(name: str, target: Target, budget: int, limit_s: float | None, show: C
     runs, fed_bytes = _COUNTS.unpack(meter.read_bytes())
     edges, inputs = (_COVERAGE.findall(text) or [("?", "?")])[-1]
     failed = not stopped and worker.returncode != 0
-    return Outcome(runs, fed_bytes, seconds, edges, inputs, _problem(text, log) if failed else "")
+    return Outcome(
+        runs=runs,
+        fed_bytes=fed_bytes,
+        seconds=seconds,
+        edges=edges,
+        inputs=inputs,
+        problem=_problem(text, log) if failed else "",
+    )
 
 
 def _problem(text: str, log: Path) -> str:

@@ -91,7 +91,7 @@ def _wire(side: LinkEnd, unit: Unit) -> bytes:
     return b"".join(unit_parts(side, unit))
 
 
-_GOOD = Unit(UnitKind.CONTROL, first=True, last=True, number=77, body=b"the next good packet")
+_GOOD = Unit(kind=UnitKind.CONTROL, first=True, last=True, number=77, body=b"the next good packet")
 
 
 def deframer(data: bytes) -> None:
@@ -121,7 +121,10 @@ def deframer(data: bytes) -> None:
 def deframer_seeds() -> list[bytes]:
     chance = random.Random(1)
     sizes = (0, 1, 20, 300, MAX_BODY_BYTES)
-    sound = [_wire(LinkEnd.LISTENER, Unit(UnitKind.FRAMES, True, False, n, chance.randbytes(n))) for n in sizes]  # noqa: FBT003 - first, not last
+    sound = [
+        _wire(LinkEnd.LISTENER, Unit(kind=UnitKind.FRAMES, first=True, last=False, number=n, body=chance.randbytes(n)))
+        for n in sizes
+    ]
     return [*sound, b"".join(sound), sound[2][:-3] + sound[3], chance.randbytes(60_000), b"\xc6" * 3000, b"login: "]
 
 
@@ -168,7 +171,13 @@ def line(data: bytes) -> None:
             kind = UnitKind(flags & 3)
             length = (low | high << 8) % (MAX_BODY_BYTES + 1) if flags & 16 else low % 32
             number = extra * 257 if flags & 32 else numbers[kind.value]
-            unit = Unit(kind, bool(flags & 4), bool(flags & 8), number, data[at + 4 : at + 4 + length])
+            unit = Unit(
+                kind=kind,
+                first=bool(flags & 4),
+                last=bool(flags & 8),
+                number=number,
+                body=data[at + 4 : at + 4 + length],
+            )
             numbers[kind.value] = (number + 1) % 65536
             at += 4 + len(unit.body)
             for event in end.feed(_wire(side.peer, unit), now_ns):

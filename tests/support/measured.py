@@ -4,8 +4,11 @@
 test of a pure module.
 """
 
+import functools
 import os
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from typing import Any, Final
 
 import coverage
 import pytest
@@ -18,19 +21,59 @@ _MEASURED = coverage.Coverage(
     data_suffix=str(os.getpid()),
     include=[str(file) for file in pure_modules().values()],
 )
-_MEASURED.start()
+
+_EXAMPLES: Final = 30
+
+
+def pytest_collectstart(collector: pytest.Collector) -> None:
+    """The first test module is about to import its pure modules; the process that only hands out the tests collects none."""
+    if isinstance(collector, pytest.Session):
+        _MEASURED.start()
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
-    """A test that computes long is left alone."""
-    followed = item.get_closest_marker("long") is None
-    if not followed:
-        _MEASURED.stop()
+    """A test that computes long is left alone, and a property after its first examples: the tracer makes all Python slow, hypothesis' own too."""
+    handle = getattr(getattr(item, "obj", None), "hypothesis", None)
+    if item.get_closest_marker("long") is not None:
+        with _left_alone():
+            yield
+    elif handle is not None:
+        with _begun(handle):
+            yield
+    else:
+        yield
+
+
+@contextmanager
+def _left_alone() -> Generator[None, None, None]:
+    _MEASURED.stop()
     try:
         yield
     finally:
-        if not followed:
+        _MEASURED.start()
+
+
+@contextmanager
+def _begun(handle: Any) -> Generator[None, None, None]:
+    """Follow only the first examples of a property; `handle` is what hypothesis hangs on its test."""
+    prove: Callable[..., Any] = handle.inner_test
+    count = 0
+
+    @functools.wraps(prove)
+    def counted(*given: Any, **named: Any) -> Any:
+        nonlocal count
+        count += 1
+        if count == _EXAMPLES + 1:
+            _MEASURED.stop()
+        return prove(*given, **named)
+
+    handle.inner_test = counted
+    try:
+        yield
+    finally:
+        handle.inner_test = prove
+        if count > _EXAMPLES:
             _MEASURED.start()
 
 

@@ -30,7 +30,7 @@ def unlike_rig(right_centre_m: tuple[float, float, float] = (0.1, 0.004, -0.006)
         distortion=np.array([0.12, -0.3, -0.001, 0.0008, 0.1]),
     )
     rotation = np.asarray(cv2.Rodrigues(np.array([0.02, -0.05, 0.03]) * turn)[0], dtype=np.float64)
-    return Rig(left, right, rotation, -rotation @ np.array(right_centre_m))
+    return Rig(left=left, right=right, R_right_left=rotation, t_right_left_m=-rotation @ np.array(right_centre_m))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -29,8 +29,8 @@ from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.reception import LinkFacts, Reception
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.quarantine import Disbelief
+from tests.support.witness import PERIOD_NS, Witness, WrongPair
 
-PERIOD_NS: Final = 33_333_333
 _STEP_NS: Final = 5 * MS
 _BOARD_GRABS_NS: Final = 4 * MS
 _HOST_PHASE_NS: Final = 3 * MS
@@ -56,21 +56,6 @@ class Machine:
     told: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class WrongPair:
-    """A pair whose images were exposed too far apart, although what was known of the clocks said otherwise.
-
-    `excusable`: since the last echo that was answered the clocks had stepped, and when the board sent the frame by less than two periods in all. (A frame
-    that is under way while the host's machine is stopped looks like any other; only the next echo tells.)
-    """
-
-    session: str
-    sequence: int
-    apart_ns: int
-    allowed_ns: int
-    excusable: bool
-
-
 class SteppingWorld:
     """The world.
 
@@ -89,23 +74,17 @@ class SteppingWorld:
         self.board = Machine(7 * 10**12)
         self.lives = 0
         self.boot_id = "boot"
-        self._wires: dict[tuple[Lane, str], deque[tuple[int, Message]]] = {}
+        self._wires: dict[str, dict[Lane, deque[tuple[int, Message]]]] = {
+            to: {lane: deque() for lane in Lane} for to in ("board", "host")
+        }
         self._outbox: Frame | None = None
         self._sent = self._grabbed = self._sequence = self._host_sequence = 0
         self._board_shot_ns = self._host_shot_ns = self.true_ns
-        self._exposed: dict[tuple[str, int], int] = {}
-        self._apart_at_sending: dict[tuple[str, int], int] = {}
-        self._host_exposed: dict[int, int] = {}
-        self._bound_ns = 0
         self.queue = PairQueue(FifoSettings(64, Overflow.DROP_OLDEST), None, PERIOD_NS, clock=self.host_clock)
         facts = [LinkFacts("tcp", dict(_NAMES), self_paced=False)]
         self.reception = Reception(facts, "host", self.queue, self._host_says, self)
         self._new_board()
-        self.pairs = 0
-        self.wrong: list[WrongPair] = []
-        self._asked_ns = self._stepped_ns = self._untold_ns = 0
-        self._asked: dict[int, tuple[int, int]] = {}
-        self._settled_ns = self._apart_ns
+        self.witness = Witness(self._apart_ns)
 
     def host_clock(self) -> int:
         """What the host's CLOCK_MONOTONIC shows."""
@@ -128,14 +107,17 @@ class SteppingWorld:
             self._run_board()
             self._deliver("host")
             self._run_host()
-            self._judge()
+            while len(self.queue._fifo):  # its counts would be made anew at each step
+                pair = self.queue.take()
+                assert pair is not None
+                self.witness.judge(pair, self.queue.tolerance_ns)
 
     def step(self, which: Machine, by_ns: int) -> None:
         """A clock steps while everything runs. A frame that waits in the board's outbox meanwhile has marks of both clocks, which nobody can tell: it is lost here."""
         which.shift_ns += by_ns
         if which is self.board:
             self._outbox = None
-        self._stepped_ns = self.true_ns
+        self.witness.stepped(self.true_ns)
 
     def sleep(self, which: Machine, duration_ns: int, *, told: bool) -> None:
         """A machine sleeps: it is not run, and its clock stands still. When it wakes its kernel tells, or does not.
@@ -144,7 +126,7 @@ class SteppingWorld:
         had come before is not judged.
         """
         if which is self.host and not told:
-            self._untold_ns = self.host_clock()
+            self.witness.slept_untold(self.host_clock())
         which.asleep_until_ns = self.true_ns + duration_ns
         which.told |= told
 
@@ -187,8 +169,8 @@ class SteppingWorld:
     def false_frame(self, by_ns: int) -> FrameMessage:
         """A frame that the board might send next, with stamps that are off; its image is of this moment."""
         board_ns = self.board_clock()
-        self._exposed[self._board.session, 10**9 + self._sequence] = self.true_ns - _BOARD_GRABS_NS
-        self._apart_at_sending[self._board.session, 10**9 + self._sequence] = self._apart_ns + 2 * PERIOD_NS
+        self.witness.board_exposed(self._board.session, 10**9 + self._sequence, self.true_ns - _BOARD_GRABS_NS)
+        self.witness.sent(self._board.session, 10**9 + self._sequence, self._apart_ns + 2 * PERIOD_NS)
         marks = BoardMarks(
             exposed_ns=board_ns - _BOARD_GRABS_NS + by_ns, grabbed_ns=board_ns + by_ns, sent_ns=board_ns + by_ns
         )
@@ -205,11 +187,6 @@ class SteppingWorld:
         )
 
     # What is watched.
-
-    @property
-    def unsettled(self) -> bool:
-        """Whether a clock has stepped and no echo that was asked for since then has been answered."""
-        return self._asked_ns < self._stepped_ns
 
     @property
     def _apart_ns(self) -> int:
@@ -232,6 +209,11 @@ class SteppingWorld:
             for told in self.reception.account.suspects
         )
 
+    @property
+    def _swift_ns(self) -> int:
+        """The longest that an answer takes which has waited nowhere."""
+        return round(2 * self.latency_ns * (1 + self._jitter / 4)) + 4 * _STEP_NS
+
     # The listener of the reception.
 
     def session_began(self) -> None:
@@ -242,7 +224,7 @@ class SteppingWorld:
         del exposed_ns, index
         estimate = self.reception.estimate
         assert estimate is not None
-        self._bound_ns = max(self._bound_ns, estimate.bound_at(self.board_clock()))
+        self.witness.bounded(estimate.bound_at(self.board_clock()))
 
     # How the shells of both sides behave.
 
@@ -255,7 +237,7 @@ class SteppingWorld:
             if self.true_ns < machine.asleep_until_ns:
                 machine.shift_ns -= _STEP_NS
                 machine.slept_ns += _STEP_NS
-                self._stepped_ns = self.true_ns
+                self.witness.stepped(self.true_ns)
             elif machine.told and machine.slept_ns and self._is_there(machine):
                 self._tell_sleep(machine)
             elif self._is_there(machine) and machine.slept_ns:
@@ -281,7 +263,7 @@ class SteppingWorld:
         self._board = BoardSession(f"board-{self.lives}", self.boot_id, _CAMERA)
 
     def _wire(self, lane: Lane, to: str) -> deque[tuple[int, Message]]:
-        return self._wires.setdefault((lane, to), deque())
+        return self._wires[to][lane]
 
     def _put(self, lane: Lane, to: str, message: Message) -> None:
         part = self._jitter if isinstance(message, FrameMessage) else self._jitter / 4
@@ -305,7 +287,7 @@ class SteppingWorld:
                     exposure_ns=None,
                     payload=b"",
                 )
-                self._exposed[self._board.session, self._sequence] = self._board_shot_ns
+                self.witness.board_exposed(self._board.session, self._sequence, self._board_shot_ns)
                 self._sequence += 1
                 self._grabbed += 1
         while self._host_shot_ns + PERIOD_NS + _HOST_PHASE_NS <= self.true_ns:
@@ -313,7 +295,7 @@ class SteppingWorld:
             if self.true_ns > self.host.asleep_until_ns and self._is_there(self.host):
                 true_ns = self._host_shot_ns + _HOST_PHASE_NS
                 exposed = Stamp(true_ns + self.host.shift_ns, HOST_CLOCK)
-                self._host_exposed[self._host_sequence] = true_ns
+                self.witness.host_exposed(self._host_sequence, true_ns)
                 self.queue.add_host(
                     Frame(
                         sequence=self._host_sequence,
@@ -331,8 +313,7 @@ class SteppingWorld:
     def _deliver(self, to: str) -> None:
         if not self._is_there(self.board if to == "board" else self.host):
             return
-        for lane in Lane:
-            wire = self._wire(lane, to)
+        for lane, wire in self._wires[to].items():
             while wire and wire[0][0] <= self.true_ns:
                 _, message = wire.popleft()
                 if to == "board":
@@ -341,7 +322,7 @@ class SteppingWorld:
                         self._board_says(outgoing)
                 else:
                     if isinstance(message, Pong):
-                        self._note_answer(message.wave)
+                        self.witness.answered(message.wave, self.true_ns, self._swift_ns)
                     self.reception.receive(_NAMES[lane], message, self.host_clock())
 
     @property
@@ -369,7 +350,7 @@ class SteppingWorld:
     def _board_says(self, outgoing: Outgoing) -> None:
         message = outgoing.message
         if isinstance(message, FrameMessage):
-            self._apart_at_sending[message.session, message.sequence] = self._apart_ns
+            self.witness.sent(message.session, message.sequence, self._apart_ns)
             message = replace(message, marks=replace(message.marks, sent_ns=self.board_clock()))
         elif isinstance(message, Pong):
             if not self.answers_echoes:
@@ -381,28 +362,8 @@ class SteppingWorld:
         message = outgoing.message
         if isinstance(message, Ping):
             message = replace(message, t0_ns=self.host_clock())
-            self._asked[message.wave] = self.true_ns, self._apart_ns
+            self.witness.asked(message.wave, self.true_ns, self._apart_ns)
         self._put(_lane(outgoing.connection), "board", message)
-
-    def _note_answer(self, wave: int) -> None:
-        """An answer that waited while a program was stopped bounds nothing by which a step could be seen."""
-        asked_ns, apart_ns = self._asked.get(wave, (0, 0))
-        swift = self.true_ns - asked_ns <= 2 * self.latency_ns * (1 + self._jitter / 4) + 4 * _STEP_NS
-        if asked_ns > self._asked_ns and swift:
-            self._asked_ns, self._settled_ns = asked_ns, apart_ns
-
-    def _judge(self) -> None:
-        while self.queue.counts.waiting:
-            pair = self.queue.take()
-            assert pair is not None
-            self.pairs += 1
-            message = pair.board.message
-            apart_ns = abs(self._exposed[message.session, message.sequence] - self._host_exposed[pair.host.sequence])
-            allowed_ns = self.queue.tolerance_ns + self._bound_ns
-            if apart_ns > allowed_ns and pair.board.received_ns > self._untold_ns:
-                stepped_ns = self._apart_at_sending[message.session, message.sequence] - self._settled_ns
-                excusable = self.unsettled and abs(stepped_ns) < 2 * PERIOD_NS
-                self.wrong.append(WrongPair(message.session, message.sequence, apart_ns, allowed_ns, excusable))
 
 
 def _lane(connection: bytes) -> Lane:

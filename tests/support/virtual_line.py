@@ -87,9 +87,11 @@ class VirtualLine:
             self.now_ns = max(self.now_ns, min(until_ns, arrival, max(due, self.now_ns + 1000)))
             while self._arrivals and self._arrivals[0][0] <= self.now_ns:
                 _, _, side, data = heapq.heappop(self._arrivals)
-                self._note(side, self.ends[side].feed(data, self.now_ns))
+                if events := self.ends[side].feed(data, self.now_ns):
+                    self._note(side, events)
             for side, end in self.ends.items():
-                self._note(side, end.silence(self.now_ns))
+                if changes := end.silence(self.now_ns):
+                    self._note(side, changes)
             act(self)
             self.write()
 

@@ -152,7 +152,7 @@ def test_the_examples_do_what_they_say(example: str, live: tuple[str, str], tmp_
     """Each example ends well and leaves what it announces."""
     matrix = np.array([[150.0, 0, WIDTH_PX / 2], [0, 150.0, HEIGHT_PX / 2], [0, 0, 1]])
     model = CameraModel(width_px=WIDTH_PX, height_px=HEIGHT_PX, matrix=matrix, distortion=np.zeros(5))
-    rig = Rig(model, model, np.eye(3), np.array([-0.1, 0, 0]))
+    rig = Rig(left=model, right=model, R_right_left=np.eye(3), t_right_left_m=np.array([-0.1, 0, 0]))
     write_rig(tmp_path / "rig.yaml", rig, rectify_rig(rig))
     arguments = [*live, *([] if example == "plot_delays" else [str(tmp_path / "rig.yaml")]), "12"]
     done = subprocess.run(

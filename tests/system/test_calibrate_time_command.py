@@ -31,7 +31,7 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 @pytest.fixture(scope="module")
 def film(tmp_path_factory: pytest.TempPathFactory) -> Film:
     """A cube and a ball that swing up and down, seen by a small copy of the demo's rig; it repeats."""
-    swing = Motion((0.04, 0.09, 0.0), (0.5, 0.0, 0.0), SECONDS)
+    swing = Motion(amplitude_m=(0.04, 0.09, 0.0), phase_rad=(0.5, 0.0, 0.0), period_s=SECONDS)
     base = demo_scene()
     names = {"wall", "table", "poster", "cube", "ball"}
     bodies = [replace(body, path=swing) if body.path.moves else body for body in base.bodies if body.name in names]

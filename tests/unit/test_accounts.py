@@ -35,14 +35,14 @@ def test_a_copy_of_an_account_stays_as_it_was() -> None:
     """Nothing that the receiver counts afterwards reaches a copy: sessions, links, suspects, reasons."""
     seen = LinkAccount([SessionAccount("s", BoardCounts(), BoardCounts())], links=(LinkTally("tcp"),))
     seen.sessions[0].disbelieved[Disbelief.FUTURE] = 2
-    seen.suspects.append(Suspects("s", 1, 2, 2))
+    seen.suspects.append(Suspects(session="s", first=1, last=2, frames=2))
     seen.links[0].age.add(7)
     copied = seen.copy()
     seen.sessions[0].disbelieved[Disbelief.FUTURE] += 1
     for reason in StaleReason:
         seen.sessions[0].count_stale(reason)
     seen.sessions.append(SessionAccount("t", BoardCounts(), BoardCounts(), received=3))
-    seen.suspects.append(Suspects("t", 3, 4, 2))
+    seen.suspects.append(Suspects(session="t", first=3, last=4, frames=2))
     seen.links[0].age.add(9)
     seen.links[0].frames = 5
     assert dict(copied.disbelieved) == {Disbelief.FUTURE: 2}

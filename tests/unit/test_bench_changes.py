@@ -11,8 +11,13 @@ from phone_host.bench.prediction import Images, Target
 from phone_host.bench.queue_model import LinkModel
 from phone_host.sync.fifo import FifoSettings, Overflow
 
-LINK = LinkModel(1e6, 10.0, np.zeros(1), self_paced=False)
-TARGET = Target("tcp", LINK, Images(640, 480, 1e9 / 30, np.array([30_000.0, 50_000.0])), FifoSettings())
+LINK = LinkModel(latency_ns=1e6, ns_per_byte=10.0, spread_ns=np.zeros(1), self_paced=False)
+TARGET = Target(
+    "tcp",
+    LINK,
+    Images(width_px=640, height_px=480, period_ns=1e9 / 30, size_bytes=np.array([30_000.0, 50_000.0])),
+    FifoSettings(),
+)
 
 
 def test_each_change_changes_what_it_names() -> None:

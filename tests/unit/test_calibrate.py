@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from common.errors import DataError
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
 from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.verdict import Verdict, judge, vertical_p95_px
+from phone_host.calibration.verdict import Assessment, Verdict, judge, vertical_p95_px
 from phone_host.model import Rig
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
@@ -147,3 +147,25 @@ def test_remedies_fit_what_is_wrong() -> None:
     open_by_half = replace(found, baseline_sigma_m=0.05)
     assert judge(open_by_half, ()).verdict is Verdict.REJECT
     assert any("nearer and farther" in remedy for remedy in judge(open_by_half, ()).remedies)
+
+
+def test_a_baseline_known_to_two_percent_limits_the_verdict() -> None:
+    """A hundredth is good, a twentieth is no scale at all; between them the calibration is usable, and says what would better it."""
+    found = calibrate(exact_pairs(_rig(), poses(10, seed=1)), BOARD, _SIZES)
+    wide = replace(found, spread=0.9, tilts_deg=np.array([30.0]))
+    assert judge(wide, ()) == Assessment(Verdict.GOOD, ())
+    judgement = judge(replace(wide, baseline_sigma_m=0.002), ())
+    assert judgement.verdict is Verdict.USABLE
+    assert len(judgement.remedies) == 1
+    assert "open by 2.00 of 100.3 mm" in judgement.remedies[0]
+    assert "nearer and farther" in judgement.remedies[0]
+
+
+def test_a_lens_that_takes_all_five_terms_gets_them() -> None:
+    """Where boards reach so far out that the third radial term shows, it is estimated, and comes back; in all other tests here four are enough."""
+    rig = _rig()
+    rig.left.distortion[:] = (-0.25, 0.08, 0.0, 0.0, 0.4)
+    found = calibrate(exact_pairs(rig, poses(10, seed=3, depth_m=(0.3, 0.4)), noise_px=0.02, seed=1), BOARD, _SIZES)
+    assert found.distortion_terms == 5
+    assert found.rig.left.distortion[4] == pytest.approx(0.4, abs=0.05)
+    assert found.rejected == ()

@@ -12,14 +12,16 @@ from common.camera.v4l2_formats import FormatOffer, Rates
 
 _RATES = Rates((Fraction(10_000_000, 333_333), Fraction(15)))
 _CAMERA = Listed(
-    Path("/dev/v4l/by-id/usb-Some_Cam-video-index0"),
-    Path("/dev/video2"),
-    Identity("uvcvideo", "Some Cam", "usb-1.1", abi.CAP_VIDEO_CAPTURE | abi.CAP_STREAMING),
-    (
-        (FormatOffer("MJPG", "Motion-JPEG", ((640, 480),)), (((640, 480), _RATES),)),
-        (FormatOffer("H264", "H.264", ((1920, 1080),)), (((1920, 1080), _RATES),)),
+    path=Path("/dev/v4l/by-id/usb-Some_Cam-video-index0"),
+    node=Path("/dev/video2"),
+    identity=Identity(
+        driver="uvcvideo", card="Some Cam", bus="usb-1.1", capabilities=abi.CAP_VIDEO_CAPTURE | abi.CAP_STREAMING
     ),
-    (
+    formats=(
+        (FormatOffer(letters="MJPG", text="Motion-JPEG", sizes_px=((640, 480),)), (((640, 480), _RATES),)),
+        (FormatOffer(letters="H264", text="H.264", sizes_px=((1920, 1080),)), (((1920, 1080), _RATES),)),
+    ),
+    controls=(
         (Control(id=1, name="Gain", kind=abi.CTRL_TYPE_INTEGER, minimum=0, maximum=100, step=5, default=20), 25),
         (
             Control(

@@ -170,3 +170,20 @@ def test_a_link_that_is_not_heard_is_not_chosen(late_ns: int) -> None:
         choice.echo(1, MS, now_ns)
         choice.frame(1, 2 * MS, now_ns)
         assert choice.best(now_ns) is None
+
+
+def test_a_late_frame_of_the_link_before_pays_no_debt_of_the_new_one() -> None:
+    """After a change frames that were under way on the old link still come: the new one, over which none comes, gives way all the same."""
+    choice = LinkChoice(2)
+    for link in range(2):
+        choice.up(link, 0)
+    choice.carries(0, 0)
+    chosen = []
+    for number in range(1, 41):
+        now_ns = number * STEP_NS
+        for link in range(2):
+            choice.echo(link, MS, now_ns)
+        choice.account(number, now_ns, has_credit=True)
+        choice.frame(1, 5 * MS, now_ns)
+        chosen.append(choice.best(now_ns))
+    assert 1 in chosen

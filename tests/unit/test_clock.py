@@ -69,6 +69,7 @@ CLOCKS = st.builds(
 )
 
 
+@pytest.mark.long
 @given(
     CLOCKS,
     st.integers(0, 2**32),

@@ -77,6 +77,7 @@ PROFILES: list[Profile] = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("profile", PROFILES, ids=lambda profile: profile.__name__)
 def test_the_bound_contains_the_truth_on_any_link(profile: Profile) -> None:
     """Over half a minute of waves and twenty seconds of silence, however unequal and changing the ways, no error exceeds the bound."""

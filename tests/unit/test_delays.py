@@ -141,9 +141,16 @@ def test_a_copy_stays_as_it_was() -> None:
     for number in range(1, 4):
         statistic.add(replace(LEDGER, uncertainty_ns=number))
     copied = statistic.copy()
-    for _ in range(EXACT + 1):
-        statistic.add(replace(LEDGER, uncertainty_ns=1000))
+    late = replace(LEDGER, uncertainty_ns=1000)
+    for _ in range(100):
+        statistic.add(late)
     assert (copied.spread("uncertainty").p50_ns, copied.spread("uncertainty").max_ns) == (2, 3)
     assert copied.spread("capture").count == 3
     assert copied.frame_bytes == 9
     assert statistic.spread("uncertainty").p50_ns == 1000
+    one = series([1, 2, 3])  # of what all the statistics are made: thinned, after it was copied
+    copied_one = one.copy()
+    for _ in range(EXACT + 1):
+        one.add(1000)
+    assert (copied_one.spread().count, copied_one.spread().p50_ns, copied_one.spread().max_ns) == (3, 2, 3)
+    assert one.spread().p50_ns == 1000

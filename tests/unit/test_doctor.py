@@ -48,9 +48,9 @@ from common.peers import Peer
 OK, WARN, FAIL = Grade.OK, Grade.WARN, Grade.FAIL
 SERVICE = Account("tandemscan", 995, frozenset({995, 44, 20}), is_me=False)
 ME = Account("me", 1000, frozenset({1000}), is_me=True)
-VIDEO = Node("/dev/video0", 0, 44, "video", 0o660, open_to_me=False)
+VIDEO = Node(path="/dev/video0", uid=0, gid=44, group="video", mode=0o660, open_to_me=False)
 
-MJPG = FormatOffer("MJPG", "Motion-JPEG", ((640, 480), (320, 240)))
+MJPG = FormatOffer(letters="MJPG", text="Motion-JPEG", sizes_px=((640, 480), (320, 240)))
 OFFERED = Offered((MJPG,), {("MJPG", (640, 480)): Rates((Fraction(30), Fraction(10)))})
 
 SOUND = Sample(
@@ -88,12 +88,16 @@ def test_every_finding_is_one_line_and_the_exit_code_follows_the_worst() -> None
         (VIDEO, SERVICE, True),
         (VIDEO, Account("nobody", 65534, frozenset({65534}), is_me=False), False),
         (VIDEO, Account("root", 0, frozenset({0}), is_me=False), True),
-        (Node("/dev/video0", 0, 44, "video", 0o600, open_to_me=False), SERVICE, False),
-        (Node("/dev/video0", 0, 44, "video", 0o640, open_to_me=False), SERVICE, False),
-        (Node("/dev/video0", 995, 0, "root", 0o600, open_to_me=False), SERVICE, True),
-        (Node("/dev/video0", 0, 0, "root", 0o666, open_to_me=False), SERVICE, True),
+        (Node(path="/dev/video0", uid=0, gid=44, group="video", mode=0o600, open_to_me=False), SERVICE, False),
+        (Node(path="/dev/video0", uid=0, gid=44, group="video", mode=0o640, open_to_me=False), SERVICE, False),
+        (Node(path="/dev/video0", uid=995, gid=0, group="root", mode=0o600, open_to_me=False), SERVICE, True),
+        (Node(path="/dev/video0", uid=0, gid=0, group="root", mode=0o666, open_to_me=False), SERVICE, True),
         (VIDEO, ME, False),
-        (Node("/dev/video0", 0, 44, "video", 0o660, open_to_me=True), ME, True),  # by an access list
+        (
+            Node(path="/dev/video0", uid=0, gid=44, group="video", mode=0o660, open_to_me=True),
+            ME,
+            True,
+        ),  # by an access list
     ],
 )
 def test_access_follows_owner_group_and_mode(node: Node, account: Account, *, may: bool) -> None:
@@ -106,7 +110,9 @@ def test_a_user_outside_the_group_is_told_to_join_and_a_changed_mode_is_named() 
     """Where the group would do, the remedy is usermod; where not even the group may, it is the node itself."""
     outside = check_access("permission", VIDEO, Account("pi", 1000, frozenset({1000}), is_me=False))
     assert "usermod -aG video pi" in outside.remedy
-    shut = check_access("permission", Node("/dev/video0", 0, 44, "video", 0o600, open_to_me=False), SERVICE)
+    shut = check_access(
+        "permission", Node(path="/dev/video0", uid=0, gid=44, group="video", mode=0o600, open_to_me=False), SERVICE
+    )
     assert "chmod 660 /dev/video0" in shut.remedy
 
 
@@ -178,6 +184,7 @@ def test_stamps_and_refused_controls_have_lines_of_their_own() -> None:
     doubtful = check_stream(replace(SOUND, distrusted=30, stamps=StampClock.UNKNOWN, driver="vivid", refused=2))
     assert [(item.what, item.verdict) for item in doubtful] == [("stream", OK), ("stamps", WARN), ("controls", WARN)]
     assert "unnamed clock" in doubtful[1].text
+    assert "a copied clock" in check_stream(replace(SOUND, stamps=StampClock.COPY))[1].text
     assert len(check_stream(replace(SOUND, frames=0))) == 1
 
 
@@ -206,15 +213,15 @@ def test_a_taken_camera_is_judged_by_who_has_it(
 @pytest.mark.parametrize(
     ("link", "verdict", "word"),
     [
-        (LinkReadings("tcp://*:5555"), OK, "free"),
-        (LinkReadings("tcp://127.0.0.1:5555"), OK, "this machine only"),
-        (LinkReadings("tcp://*:5555", (AGENT,)), OK, "our own service"),
-        (LinkReadings("tcp://*:5555", (OTHER,)), FAIL, "motion (pid 77)"),
-        (LinkReadings("tcp://*:5555", all_seen=False, problem="in use", taken=True), WARN, "only root"),
-        (LinkReadings("tcp://*:5555", problem="no such address", remedy="ip address"), FAIL, "no such address"),
-        (LinkReadings("serial:/dev/ttyGS0", terminals=(Holder(9, "agetty"),)), FAIL, "serial-getty@ttyGS0"),
-        (LinkReadings("serial:/dev/ttyS0", terminals=(Holder(9, "bash"),)), FAIL, "two readers"),
-        (LinkReadings("serial:/dev/ttyS0", console=True), FAIL, "console=ttyS0"),
+        (LinkReadings(uri="tcp://*:5555"), OK, "free"),
+        (LinkReadings(uri="tcp://127.0.0.1:5555"), OK, "this machine only"),
+        (LinkReadings(uri="tcp://*:5555", holders=(AGENT,)), OK, "our own service"),
+        (LinkReadings(uri="tcp://*:5555", holders=(OTHER,)), FAIL, "motion (pid 77)"),
+        (LinkReadings(uri="tcp://*:5555", all_seen=False, problem="in use", taken=True), WARN, "only root"),
+        (LinkReadings(uri="tcp://*:5555", problem="no such address", remedy="ip address"), FAIL, "no such address"),
+        (LinkReadings(uri="serial:/dev/ttyGS0", terminals=(Holder(9, "agetty"),)), FAIL, "serial-getty@ttyGS0"),
+        (LinkReadings(uri="serial:/dev/ttyS0", terminals=(Holder(9, "bash"),)), FAIL, "two readers"),
+        (LinkReadings(uri="serial:/dev/ttyS0", console=True), FAIL, "console=ttyS0"),
     ],
 )
 def test_a_link_is_judged_by_who_has_it(link: LinkReadings, verdict: Grade, word: str) -> None:
@@ -345,7 +352,7 @@ def test_the_service_is_judged_by_its_state(state: Unit, verdict: Grade, word: s
 @given(st.lists(st.tuples(st.sampled_from(Grade), st.text(max_size=5))))
 def test_exit_code_and_counts_agree(drawn: list[tuple[Grade, str]]) -> None:
     """Exit 4 exactly when the object counts a failed check."""
-    findings = [Finding("x", verdict, text) for verdict, text in drawn]
+    findings = [Finding(what="x", verdict=verdict, text=text) for verdict, text in drawn]
     assert (exit_code(findings) == 4) is (values(findings)["failed"] > 0)
 
 
@@ -370,3 +377,18 @@ def test_keys_are_judged_without_making_any(tmp_path: Path) -> None:
     opened = check_keys(folder, me)
     assert opened.verdict is Grade.FAIL
     assert "chmod 600" in opened.remedy
+
+
+def test_a_log_that_may_not_be_read_is_no_all_clear() -> None:
+    """Where only root may read the kernel's log the check of USB warns, and says how to ask again."""
+    finding = check_usb_log(KernelLog(readable=False))
+    assert (finding.verdict, finding.remedy) == (WARN, "ask again as root: sudo")
+
+
+@pytest.mark.parametrize(
+    ("age_s", "told"), [(119, "119 s ago"), (120, "2 min ago"), (7140, "119 min ago"), (7200, "2 h ago")]
+)
+def test_the_age_of_trouble_is_told_in_a_unit_that_people_read(age_s: float, told: str) -> None:
+    """Seconds below two minutes, minutes below two hours, then hours."""
+    trouble = LogLine(age_s, "usb 1-1: device descriptor read/64, error -71")
+    assert f"once, {told}" in check_usb_log(KernelLog(readable=True, lines=(trouble,))).text

@@ -67,10 +67,11 @@ class Film:
             name = b"p%d" % len(self.pings)
             self.pings[name] = on.now_ns
             on.ends[HOST].put(Lane.CONTROL, name.ljust(30), b"")
-        for _, event in on.came[BOARD][self._seen :]:
+        came = on.came[BOARD]
+        for _, event in came[self._seen :]:
             if isinstance(event, Whole):
                 board.put(Lane.CONTROL, bytes(event.header), b"")
-        self._seen = len(on.came[BOARD])
+        self._seen = len(came)
 
     def round_trips_ns(self, on: VirtualLine, after_ns: int) -> list[int]:
         """How long each echo took."""
@@ -230,7 +231,6 @@ def test_a_lost_chunk_costs_one_frame() -> None:
     assert made.ends[HOST].counts.broken == 1
 
 
-@pytest.mark.long
 def test_acknowledgements_that_all_get_lost_do_not_stop_the_stream() -> None:
     """While the way back is dead little is written; when it lives again the stream is back within a second, with fresh frames."""
     made = line(500_000, MS)
@@ -272,6 +272,7 @@ def test_only_a_silence_that_was_listened_to_gives_a_frame_up() -> None:
         assert listened_ns == S
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("restarts", [BOARD, HOST])
 def test_a_restarted_end_is_met_anew(restarts: LinkEnd) -> None:
     """When either end's program is replaced without a word, the other is told that the first has gone, and packets flow again."""
@@ -320,7 +321,13 @@ def test_hostile_units_neither_fill_memory_nor_raise() -> None:
     for number in range(20_000):
         kind = chance.choice(list(UnitKind))
         body = chance.randbytes(chance.choice([0, 1, 5, 6, 30, 300]))
-        unit = Unit(kind, chance.random() < 0.5, chance.random() < 0.5, chance.choice([number % 65536, 3]), body)
+        unit = Unit(
+            kind=kind,
+            first=chance.random() < 0.5,
+            last=chance.random() < 0.5,
+            number=chance.choice([number % 65536, 3]),
+            body=body,
+        )
         for event in end.feed(b"".join(unit_parts(BOARD, unit)), made.now_ns):
             if isinstance(event, Whole):
                 assert len(event.header) <= MAX_HEADER_BYTES
@@ -335,7 +342,7 @@ def test_a_peer_that_talks_and_never_reads_is_not_answered_for_ever() -> None:
         for unit in (
             _word(0, number),
             _word(3, number),
-            Unit(UnitKind.CONTROL, first=True, last=True, number=0, body=b"?"),
+            Unit(kind=UnitKind.CONTROL, first=True, last=True, number=0, body=b"?"),
         ):  # OPEN, CLOSE
             end.feed(b"".join(unit_parts(HOST, unit)), number * S)
     said = [bytes(unit.body) for unit in Deframer(BOARD).feed(end.take(10_000 * S))]
@@ -345,7 +352,7 @@ def test_a_peer_that_talks_and_never_reads_is_not_answered_for_ever() -> None:
 
 def _word(value: int, number: int) -> Unit:
     """A unit of contact, by its number on the wire."""
-    return Unit(UnitKind.CONTACT, first=True, last=True, number=0, body=struct.pack("<BI", value, number))
+    return Unit(kind=UnitKind.CONTACT, first=True, last=True, number=0, body=struct.pack("<BI", value, number))
 
 
 @pytest.mark.parametrize("lost_by", [BOARD, HOST])
@@ -378,7 +385,7 @@ def test_a_goodbye_before_the_meeting_says_nothing() -> None:
 def test_a_word_that_is_none_changes_nothing(body: bytes) -> None:
     """A unit of contact of another length, or with a word that nobody knows, neither meets nor parts."""
     made = line()
-    unit = Unit(UnitKind.CONTACT, first=True, last=True, number=0, body=body)
+    unit = Unit(kind=UnitKind.CONTACT, first=True, last=True, number=0, body=body)
     for side in LinkEnd:
         assert made.ends[side].feed(b"".join(unit_parts(side.peer, unit)), made.now_ns) == []
         assert made.ends[side].is_up

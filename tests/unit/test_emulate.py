@@ -11,7 +11,7 @@ from common.errors import SettingsError
 from phone_host.bench.emulate import NOTHING, PROFILES, SEGMENT_BYTES, Profile, Way, parse_profiles
 
 MS = 1_000_000
-PLAIN = Profile("plain", "tcp", 1_000_000, 3 * MS)
+PLAIN = Profile(name="plain", carrier="tcp", bytes_per_s=1_000_000, delay_ns=3 * MS)
 
 
 def drained(way: Way[str]) -> list[tuple[int, str, bytes]]:
@@ -26,7 +26,15 @@ def drained(way: Way[str]) -> list[tuple[int, str, bytes]]:
 @given(st.lists(st.tuples(st.sampled_from("ab"), st.binary(min_size=1, max_size=5000), st.integers(0, 10 * MS))))
 def test_every_byte_arrives_once_and_in_order(puts: list[tuple[str, bytes, int]]) -> None:
     """Without byte loss each connection gets exactly its bytes in their order, whatever jitter and stalls do."""
-    profile = Profile("p", "tcp", 500_000, 2 * MS, 5 * MS, stall_share=0.2, stall_ns=50 * MS)
+    profile = Profile(
+        name="p",
+        carrier="tcp",
+        bytes_per_s=500_000,
+        delay_ns=2 * MS,
+        jitter_ns=5 * MS,
+        stall_share=0.2,
+        stall_ns=50 * MS,
+    )
     way: Way[str] = Way(profile, 3)
     now_ns = 0
     for key, data, later_ns in puts:
@@ -127,3 +135,13 @@ def test_profiles_are_sound() -> None:
         assert profile.bytes_per_s > 0
         assert profile.byte_loss == 0 or profile.carrier == "serial"
         assert profile.held_bytes >= 2 * SEGMENT_BYTES
+
+
+def test_a_line_without_a_rate_still_holds_no_more_than_a_pipe() -> None:
+    """What adds no time takes 64 KiB, as a pipe of Linux does (pipe(7)), and no more until they were taken."""
+    way: Way[str] = Way(NOTHING)
+    assert way.room_bytes == 65_536
+    way.put("a", bytes(65_000), 5)
+    assert way.room_bytes == 536
+    assert way.take(5) == [("a", bytes(65_000))]
+    assert way.room_bytes == 65_536

@@ -49,7 +49,9 @@ def pair_of(left: Image, right: Image, board_side: Side, asked_px: tuple[int, in
         marks=marks,
         payload=encoded(".png", board),
     )
-    frame = BoardFrame(message, "tcp", marks, 1, 0, 0, asked_px)
+    frame = BoardFrame(
+        message=message, link="tcp", marks=marks, received_ns=1, offset_ns=0, uncertainty_ns=0, asked_px=asked_px
+    )
     own = Frame(
         sequence=0,
         exposed=stamp,
@@ -60,7 +62,7 @@ def pair_of(left: Image, right: Image, board_side: Side, asked_px: tuple[int, in
         exposure_ns=None,
         payload=encoded(".png", host),
     )
-    return FramePair(frame, own, 0, 1, 1)
+    return FramePair(board=frame, host=own, time_skew_ns=0, paired_ns=1, queued_ns=1)
 
 
 def disparity_error_px(scene: Plane, left: Image, right: Image, side: Side) -> float:

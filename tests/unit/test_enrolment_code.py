@@ -361,3 +361,33 @@ def test_a_host_takes_no_word_out_of_turn(word: Word) -> None:
     else:
         with pytest.raises(ProtocolError):
             asking.receive(word)
+
+
+def test_a_board_that_does_not_know_the_code_is_not_trusted() -> None:
+    """Whoever stands in for the board and opens what it did not commit to is found out by the host, which then trusts nobody."""
+    asking = Asking(HOST, chance(15))
+    asking.receive(Shown(BOARD))
+    asking.begin(123_456)
+    assert isinstance(asking.receive(Commit(0, bytes(32))), Open)
+    with pytest.raises(ProtocolError, match=r"not proved.*ask for a new code"):
+        asking.receive(Open(0, bytes(32)))
+    assert not asking.proved
+
+
+def test_a_pardon_does_not_spoil_a_proof_under_way() -> None:
+    """The owner who lifts the pause while a host proves its code leaves that code in force: the host gets in."""
+    desk, asking = Desk(BOARD, chance(16)), Asking(HOST, chance(17))
+    code = start(desk, asking)
+    word: Word | None = asking.begin(code)
+    outputs: list[Output] = []
+    shown = set()
+    while word is not None:
+        outputs = desk.receive(b"a", word, 0)
+        desk.pardon()
+        if desk.is_proving(b"a"):
+            shown.add(desk.code(0))
+        (answer,) = said(outputs)
+        word = asking.receive(answer)
+    assert Enrolled(HOST) in outputs
+    assert asking.proved
+    assert shown == {code}

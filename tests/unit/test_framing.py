@@ -15,11 +15,11 @@ MARKER = bytes((SIDE.value,))
 
 UNITS = st.builds(
     Unit,
-    st.sampled_from(UnitKind),
-    st.booleans(),
-    st.booleans(),
-    st.integers(0, 65535),
-    st.one_of(
+    kind=st.sampled_from(UnitKind),
+    first=st.booleans(),
+    last=st.booleans(),
+    number=st.integers(0, 65535),
+    body=st.one_of(
         st.binary(max_size=40),
         st.lists(st.sampled_from([MARKER, b"\0", b"\xff"]), max_size=60).map(b"".join),
         st.builds(
@@ -41,7 +41,7 @@ def found(deframer: Deframer, data: bytes) -> list[Unit]:
 
 def plain(unit: Unit) -> Unit:
     """The same unit with a body that can be compared."""
-    return Unit(unit.kind, unit.first, unit.last, unit.number, bytes(unit.body))
+    return Unit(kind=unit.kind, first=unit.first, last=unit.last, number=unit.number, body=bytes(unit.body))
 
 
 def everything(data: bytes) -> list[Unit]:
@@ -53,7 +53,13 @@ def everything(data: bytes) -> list[Unit]:
 def numbered(count: int, chance: random.Random, most_bytes: int = MAX_BODY_BYTES) -> list[Unit]:
     """Units with random bodies."""
     return [
-        Unit(UnitKind.FRAMES, i % 7 == 0, i % 7 == 6, i % 65536, chance.randbytes(chance.randrange(most_bytes + 1)))
+        Unit(
+            kind=UnitKind.FRAMES,
+            first=i % 7 == 0,
+            last=i % 7 == 6,
+            number=i % 65536,
+            body=chance.randbytes(chance.randrange(most_bytes + 1)),
+        )
         for i in range(count)
     ]
 
@@ -63,7 +69,7 @@ def test_the_bytes_of_a_unit_are_fixed() -> None:
     head = b"\xc6" + (0b01_1_0_000000000011).to_bytes(2, "little") + (0x1234).to_bytes(2, "little")
     crc = crc32(head)
     expected = head + (crc & 0xFFFF).to_bytes(2, "little") + b"abc" + crc32(head + b"abc").to_bytes(4, "little")
-    assert wire(Unit(UnitKind.CONTROL, first=True, last=False, number=0x1234, body=b"abc")) == expected
+    assert wire(Unit(kind=UnitKind.CONTROL, first=True, last=False, number=0x1234, body=b"abc")) == expected
     assert len(expected) == UNIT_OVERHEAD_BYTES + 3
 
 
@@ -119,7 +125,7 @@ def test_a_good_unit_behind_garbage_is_found(garbage: bytes, unit: Unit) -> None
 
 def test_the_own_echo_is_garbage() -> None:
     """What a line echoes back is no unit for its sender."""
-    unit = Unit(UnitKind.CONTROL, first=True, last=True, number=1, body=b"hello")
+    unit = Unit(kind=UnitKind.CONTROL, first=True, last=True, number=1, body=b"hello")
     deframer = Deframer(SIDE.peer)
     assert deframer.feed(wire(unit)) == []
     assert deframer.garbage_bytes == len(wire(unit))
@@ -129,7 +135,7 @@ def test_ten_million_random_bytes_are_no_unit() -> None:
     """Of 10^7 random bytes none makes a unit, memory stays below two megabytes, and the good unit behind them is found."""
     chance = random.Random(1)
     deframer = Deframer(SIDE)
-    unit = Unit(UnitKind.FRAMES, first=True, last=True, number=7, body=b"good")
+    unit = Unit(kind=UnitKind.FRAMES, first=True, last=True, number=7, body=b"good")
     tracemalloc.start()
     for _ in range(160):
         assert deframer.feed(chance.randbytes(62_500)) == []
@@ -181,8 +187,8 @@ def test_of_many_units_with_flipped_bits_none_comes_altered() -> None:
 @pytest.mark.parametrize("hole_bytes", [1, 5, 400, 4000])
 def test_a_hole_is_given_up_when_the_line_falls_silent(hole_bytes: int) -> None:
     """A unit whose middle was lost swallows what follows only until the line is silent: then the followers come."""
-    long = Unit(UnitKind.FRAMES, first=True, last=True, number=1, body=bytes(MAX_BODY_BYTES))
-    short = Unit(UnitKind.CONTROL, first=True, last=True, number=2, body=b"echo")
+    long = Unit(kind=UnitKind.FRAMES, first=True, last=True, number=1, body=bytes(MAX_BODY_BYTES))
+    short = Unit(kind=UnitKind.CONTROL, first=True, last=True, number=2, body=b"echo")
     stream = wire(long)
     deframer = Deframer(SIDE)
     assert deframer.feed(stream[:50] + stream[50 + hole_bytes :]) == []

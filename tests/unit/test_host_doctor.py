@@ -28,16 +28,33 @@ def test_python_must_be_3_11(version: tuple[int, int, int], verdict: Grade) -> N
 @pytest.mark.parametrize(
     ("package", "verdict", "word"),
     [
-        (Package("cv2", "4.10.0", "", "4.10", "5", ("opencv-python-headless",)), OK, "4.10.0"),
-        (Package("cv2", "4.9.0", "", "4.10", "5"), WARN, "4.10 or newer"),
-        (Package("cv2", "5.0.0-pre", "", "4.10", "5"), WARN, "below 5"),
-        (Package("cv2", "", "ImportError: libGL.so.1", "4.10", "5"), FAIL, "libGL.so.1"),
         (
-            Package("cv2", "4.10.0", "", "4.10", "5", ("opencv-python-headless", "opencv-python")),
+            Package(
+                name="cv2", version="4.10.0", problem="", least="4.10", below="5", wheels=("opencv-python-headless",)
+            ),
+            OK,
+            "4.10.0",
+        ),
+        (Package(name="cv2", version="4.9.0", problem="", least="4.10", below="5"), WARN, "4.10 or newer"),
+        (Package(name="cv2", version="5.0.0-pre", problem="", least="4.10", below="5"), WARN, "below 5"),
+        (
+            Package(name="cv2", version="", problem="ImportError: libGL.so.1", least="4.10", below="5"),
+            FAIL,
+            "libGL.so.1",
+        ),
+        (
+            Package(
+                name="cv2",
+                version="4.10.0",
+                problem="",
+                least="4.10",
+                below="5",
+                wheels=("opencv-python-headless", "opencv-python"),
+            ),
             FAIL,
             "pip uninstall opencv-python,",
         ),
-        (Package("numpy", "1.26.4", "", "1.24"), OK, "1.26.4"),
+        (Package(name="numpy", version="1.26.4", problem="", least="1.24"), OK, "1.26.4"),
     ],
 )
 def test_packages_are_judged_by_version_and_company(package: Package, verdict: Grade, word: str) -> None:
@@ -71,7 +88,16 @@ def test_a_rig_must_be_sound_and_fit_the_camera(rig: RigReadings, verdict: Grade
 @pytest.mark.parametrize("answer", Answer)
 def test_every_answer_of_a_board_is_judged(answer: Answer) -> None:
     """Only a board that answers is fine, a busy one warns, everything else fails with a remedy."""
-    finding = check_board(BoardReadings("tcp://board:5555", answer, 5.0, "Cam", 400_000, 20_000))
+    finding = check_board(
+        BoardReadings(
+            uri="tcp://board:5555",
+            answer=answer,
+            waited_s=5.0,
+            camera="Cam",
+            round_trip_ns=400_000,
+            uncertainty_ns=20_000,
+        )
+    )
     assert finding.verdict is {Answer.BOARD: OK, Answer.BUSY: WARN}.get(answer, FAIL)
     assert bool(finding.remedy) is (answer is not Answer.BOARD)
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from common.errors import SettingsError
 from phone_host.camera.arrivals import Arrivals
-from phone_host.camera.http_uri import HttpSettings, http_settings
+from phone_host.camera.http_uri import HttpSettings, http_settings, without_password
 
 MS = 1_000_000
 
@@ -97,3 +97,18 @@ def test_jitter_is_how_late_nineteen_of_twenty_are() -> None:
     assert 15 * MS < arrivals.jitter_ns < 21 * MS
     arrivals.restart()
     assert arrivals.jitter_ns is None
+
+
+@pytest.mark.parametrize(
+    ("uri", "shown"),
+    [
+        ("http://me:secret@phone:8080/video?a=b@c", "http://phone:8080/video?a=b@c"),
+        ("HTTPS://me@phone", "HTTPS://phone"),
+        ("http://phone/video", "http://phone/video"),
+        ("v4l2:/dev/video0?size=640x480", "v4l2:/dev/video0?size=640x480"),
+        ("replay:some@where/left", "replay:some@where/left"),
+    ],
+)
+def test_a_camera_is_named_in_files_without_its_password(uri: str, shown: str) -> None:
+    """Name and password of a server are left out, the rest stays; what is no server's address stays as it is."""
+    assert without_password(uri) == shown

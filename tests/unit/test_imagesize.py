@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from common.errors import DataError
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
 from common.imagesize.head import MEGAPIXEL, MOST_PIXELS, ImageKind, require_believable
 from common.imagesize.read import read_head, whole_image
@@ -100,6 +101,19 @@ def test_a_tile_counts_like_an_image() -> None:
     assert fault_of(content) is FrameFault.TOO_LARGE
 
 
+def short_tiff(*entries: tuple[int, int, int]) -> bytes:
+    """A TIFF of 32 bits with a directory of tags, kinds and values, and nothing else."""
+    fields = b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in entries)
+    return b"II*\0" + struct.pack("<IH", 8, len(entries)) + fields
+
+
+def webp(kind: bytes, body: bytes) -> bytes:
+    """A WebP of one chunk (RFC 9649, 2.3 and 2.4)."""
+    return b"RIFF" + struct.pack("<I", 12 + len(body)) + b"WEBP" + kind + struct.pack("<I", len(body)) + body
+
+
+EMPTY_TEXT = bombs.chunk(b"tEXt", b"")
+
 BAD = {
     "a small JPEG of 30000x30000": (bombs.SMALL_BOMB, FrameFault.TOO_LARGE),
     "a small JPEG of 8000x8000": (bombs.claiming(jpeg(16, 8), 8000, 8000), FrameFault.TOO_SHORT),
@@ -116,6 +130,12 @@ BAD = {
     "nothing": (b"", FrameFault.EMPTY),
     "a text": (b"text", FrameFault.NO_START),
     "a film": (b"GIF89a" + bytes(100), FrameFault.NO_START),
+    "a TIFF whose width is a fraction": (short_tiff((256, 5, 8), (257, 4, 50)), FrameFault.NO_START),
+    "a TIFF of 64 bits without the room": (short_tiff((256, 16, 8), (257, 4, 50)), FrameFault.NO_START),
+    "a lossy WebP without its start code": (webp(b"VP8 ", bytes(3) + b"\0\0\0" + bytes(4)), FrameFault.NO_START),
+    "a lossless WebP without its signature": (webp(b"VP8L", b"\x2e" + bytes(4)), FrameFault.NO_START),
+    "a JPEG with a segment shorter than its length": (b"\xff\xd8\xff\xe0\0\1" + jpeg()[2:], FrameFault.CORRUPT),
+    "a PNG of too many chunks": (bombs.black_png(8, 8, extra=EMPTY_TEXT * 2**17), FrameFault.NO_END),
     "a JPEG cut before its image": (jpeg()[:40], FrameFault.NO_END),
     "a JPEG without its end": (jpeg()[:-2], FrameFault.NO_END),
     "a PNG without its end": (bombs.black_png(8, 8)[:-12], FrameFault.NO_END),
@@ -193,6 +213,30 @@ def test_what_is_decoded_has_the_size_that_was_read(suffix: str, data: st.DataOb
     except SpoiledImageError:
         return
     assert (image.shape[1], image.shape[0]) == read_head(bytes(content), "image").size_px
+
+
+@pytest.mark.parametrize("orientation", [0, 1, 3, 6])
+def test_a_tiff_that_is_to_be_turned_is_refused(orientation: int) -> None:
+    """Decoders turn a TIFF by its orientation tag, so that its size would not be the one that was read: only upright ones are taken (TIFF 6.0: 1)."""
+    content = short_tiff((256, 3, 70), (257, 3, 50), (274, 3, orientation))
+    if orientation <= 1:
+        assert read_head(content, "a.tif").size_px == (70, 50)
+        return
+    with pytest.raises(DataError, match=f"a.tif is to be turned.*orientation {orientation}.*save it upright"):
+        read_head(content, "a.tif")
+
+
+def test_markers_without_a_length_are_passed_over() -> None:
+    """A JPEG with TEM and restart markers before its frame header, which carry no length (T.81, table B.1), has the size that it was written with."""
+    content = jpeg(41, 29)
+    assert read_head(content[:2] + b"\xff\x01\xff\xd0\xff\xd7" + content[2:], "image").size_px == (41, 29)
+
+
+def test_a_foreign_marker_between_scans_is_no_segment() -> None:
+    """Behind a marker that may not stand between scans the search goes on at once: its would-be length is not believed, and the end is found."""
+    content = jpeg(16, 8)
+    inside = content[:-2] + b"\xff\x02\xff\xff" + b"\xff\xd9"
+    assert whole_image(inside, read_head(inside, "image"), "image") == inside
 
 
 def test_real_files_of_a_folder_keep_their_bytes(tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def test_nothing_is_done_for_no_time() -> None:
 @cache
 def scene() -> Scene:
     """The demo's still life with a ball and a cube that cross it quickly."""
-    sideways = Path((0.16, 0.05, 0.0), (2.2, 0.9, 0.0), 2.0)
+    sideways = Path(amplitude_m=(0.16, 0.05, 0.0), phase_rad=(2.2, 0.9, 0.0), period_s=2.0)
     bodies = [
         replace(body, path=sideways) if body.name in {"ball", "cube"} else resting(body) for body in demo_scene().bodies
     ]
@@ -124,3 +124,12 @@ def test_depth_of_what_moves_is_right_again(part: float) -> None:
     assert skewed_mm > 30
     assert interpolated_mm < skewed_mm / 4
     assert best_mm < 5
+
+
+def test_the_second_image_of_a_size_is_moved_like_the_first() -> None:
+    """What is kept of a size between images changes nothing, also when another size came between."""
+    large, small = textured((240, 320)), textured((120, 160))
+    keeps = Interpolator()
+    for picture in (large, large, small, large):
+        later = np.roll(picture, 3, axis=1)
+        np.testing.assert_array_equal(keeps.back(picture, later, 0.4), Interpolator().back(picture, later, 0.4))

@@ -77,7 +77,7 @@ def test_an_image_is_there_with_its_last_byte() -> None:
     assert stream.feed(image[:1], 10) == []
     assert stream.feed(image[1:100], 20) == []
     assert stream.feed(image[100:-1], 30) == []
-    assert stream.feed(image[-1:], 40) == [Whole(image, 32, 8, 10, 40)]
+    assert stream.feed(image[-1:], 40) == [Whole(payload=image, width_px=32, height_px=8, began_ns=10, ended_ns=40)]
 
 
 def test_a_thumbnail_ends_no_image() -> None:
@@ -178,3 +178,11 @@ def test_illegal_markers_break_the_image_and_only_that(spoiled: bytes) -> None:
     last = events[-1]
     assert isinstance(last, Whole)
     assert last.payload == IMAGES[0]
+
+
+def test_what_is_no_marker_is_told_with_its_first_byte() -> None:
+    """Where a marker has to stand and another byte comes the image is broken at once, not when more has come; the next one is whole."""
+    stream = JpegStream()
+    assert stream.feed(b"\xff\xd8\xff\xe0\0\4JF", 1) == []
+    assert stream.feed(b"\x20", 2) == [Broken(FrameFault.NO_END)]
+    assert parts(stream, IMAGES[1]) == [IMAGES[1]]

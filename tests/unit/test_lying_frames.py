@@ -53,7 +53,15 @@ def pair_of(
         exposure_ns=None,
         payload=jpeg(*own_px),
     )
-    return FramePair(BoardFrame(message, "tcp", marks, 1, 0, 0, asked_px), own, 0, 1, 1)
+    return FramePair(
+        board=BoardFrame(
+            message=message, link="tcp", marks=marks, received_ns=1, offset_ns=0, uncertainty_ns=0, asked_px=asked_px
+        ),
+        host=own,
+        time_skew_ns=0,
+        paired_ns=1,
+        queued_ns=1,
+    )
 
 
 SIZE = (64, 48)
@@ -135,8 +143,12 @@ def test_the_frame_before_may_lie_too() -> None:
     pair = pair_of(jpeg(*SIZE), SIZE, SIZE)
     before = pair_of(bombs.SMALL_BOMB, SIZE, SIZE).board
     marks = BoardMarks(exposed_ns=-33_000_000, grabbed_ns=-33_000_000, sent_ns=-33_000_000)
-    earlier = BoardFrame(before.message, "tcp", marks, 1, 0, 0, SIZE)
-    doubled = FramePair(pair.board, pair.host, 5_000_000, 1, 1, earlier)
+    earlier = BoardFrame(
+        message=before.message, link="tcp", marks=marks, received_ns=1, offset_ns=0, uncertainty_ns=0, asked_px=SIZE
+    )
+    doubled = FramePair(
+        board=pair.board, host=pair.host, time_skew_ns=5_000_000, paired_ns=1, queued_ns=1, before=earlier
+    )
     done = Pipeline(None, Side.LEFT, now.monotonic_ns, Interpolator()).process(doubled)
     expected = cv2.imdecode(np.frombuffer(jpeg(*SIZE), np.uint8), cv2.IMREAD_UNCHANGED)
     assert expected is not None

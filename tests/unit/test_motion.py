@@ -75,3 +75,12 @@ def test_nothing_is_measured_on_a_blank_wall() -> None:
     chance = np.random.default_rng(1)
     other, another = (chance.integers(0, 256, (120, 160), dtype=np.uint8) for _ in range(2))
     assert np.isnan(fast_shift_px(other, another))
+
+
+def test_a_moment_without_anything_to_follow_leaves_the_speed_as_it_was() -> None:
+    """A hand before the lens says nothing: the speed measured before stays, and no NaN spoils the median."""
+    image, blank = texture(), np.full((480, 640), 128, np.uint8)
+    meter = MotionMeter()
+    for number, shown in enumerate([view(image, 0, 0), view(image, 6, 0), blank, blank]):
+        meter.add(shown, number * 100 * MS, number * 1000 * MS)
+    assert meter.px_s == pytest.approx(60.0, rel=0.1)

@@ -36,7 +36,14 @@ def board_frame(sequence: int, exposed_ns: int, received_ns: int | None = None) 
         marks=marks,
         payload=b"",
     )
-    return BoardFrame(message, "tcp", marks, exposed_ns if received_ns is None else received_ns, 0, 0)
+    return BoardFrame(
+        message=message,
+        link="tcp",
+        marks=marks,
+        received_ns=exposed_ns if received_ns is None else received_ns,
+        offset_ns=0,
+        uncertainty_ns=0,
+    )
 
 
 def host_frame(sequence: int, exposed_ns: int, payload: bytes = b"") -> Frame:

@@ -6,7 +6,7 @@ from itertools import accumulate, pairwise
 from typing import assert_never
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from phone_host.sync.pairing import BoardOrphan, HostOrphan, OrphanReason, Outcome, Paired, Pairing, PairingSettings
@@ -192,7 +192,7 @@ def test_of_two_rates_each_slow_frame_gets_the_nearest_fast_one(
             assert abs(chosen[stamp_ns] - stamp_ns) == min(abs(other - stamp_ns) for other in fast)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Cameras:
     """Two equally fast cameras: tolerance in periods, jitter and transport delays at random."""
 
@@ -232,16 +232,23 @@ def paired(cameras: Cameras) -> tuple[list[tuple[int, int]], int]:
 
 @pytest.mark.long
 @given(st.floats(0.2, 1.0), st.floats(0, 1), st.sampled_from([0.0, 0.02, 0.1]), st.integers(0, 2**32))
+@example(0.5, 0.5, 0.0, 7)
 @settings(deadline=None, max_examples=100)
 def test_dense_streams_lose_hardly_a_pair_and_wait_a_period_at_most(
     tolerance: float, phase: float, loss: float, seed: int
 ) -> None:
-    """Whatever the tolerance, the phase and the losses: at least 98 % of the optimum's pairs over five seconds, and no wait beyond a period."""
-    cameras = Cameras(tolerance, phase, loss, seed)
+    """Whatever the tolerance, the phase and the losses: at least 98 % of the optimum's pairs over five seconds, and no wait beyond a period.
+
+    Where phase and tolerance both are half a period to within the jitter, now this neighbour is near enough, now the other. Who knows the future changes
+    sides each time; ours keeps one side, so that the partner does not flip, and finds at least 92 %.
+    """
+    cameras = Cameras(tolerance=tolerance, phase=phase, loss=loss, seed=seed)
     board, host, _ = cameras.streams()
     pairs, longest_ns = paired(cameras)
     best = best_score(board, host, round(tolerance * PERIOD_NS))
-    assert len(pairs) >= 0.98 * best.pairs - 1
+    jitter = MS / PERIOD_NS  # of a difference of two stamps
+    undecided = abs(phase - 0.5) <= jitter and abs(tolerance - 0.5) <= jitter
+    assert len(pairs) >= (0.92 if undecided else 0.98) * best.pairs - 1
     assert longest_ns <= PERIOD_NS + MS
 
 
@@ -249,18 +256,19 @@ def test_dense_streams_lose_hardly_a_pair_and_wait_a_period_at_most(
 @settings(deadline=None, max_examples=50)
 def test_no_pair_is_one_that_the_optimum_forbids(tolerance: float, phase: float, loss: float, seed: int) -> None:
     """With frames further apart than twice the tolerance every pair belongs to the best pairing, and none has waited."""
-    cameras = Cameras(tolerance, phase, loss, seed)
+    cameras = Cameras(tolerance=tolerance, phase=phase, loss=loss, seed=seed)
     board, host, _ = cameras.streams()
     pairs, longest_ns = paired(cameras)
     assert forbidden_pairs(pairs, board, host, round(tolerance * PERIOD_NS)) == []
     assert longest_ns == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("tolerance", [0.55, 0.6, 0.75])
 def test_at_half_a_period_the_partner_does_not_flip(tolerance: float) -> None:
     """Cameras exactly half a period apart: jitter favours now the previous, now the next frame, but all pairs stay with one of the two."""
     for seed in range(20):
-        pairs, _ = paired(Cameras(tolerance, 0.5, 0.0, seed))
+        pairs, _ = paired(Cameras(tolerance=tolerance, phase=0.5, loss=0.0, seed=seed))
         assert len({board > host for board, host in pairs}) == 1
         assert len(pairs) >= 149
 

@@ -26,7 +26,12 @@ def numbers(path: str) -> list[float]:
 def test_dots_and_line_stand_at_their_bytes_and_delays() -> None:
     """Frames on a line: every dot lies on the drawn line, and the line begins at zero bytes at the latency."""
     size = np.linspace(10_000.0, 50_000.0, 30)
-    scatter = Scatter(size, 2 * MS + 100.0 * size, (1,) * 30, fit_delay(size, 2 * MS + 100.0 * size, draws=0))
+    scatter = Scatter(
+        size_bytes=size,
+        delay_ns=2 * MS + 100.0 * size,
+        number=(1,) * 30,
+        fit=fit_delay(size, 2 * MS + 100.0 * size, draws=0),
+    )
     root = svg(against_bytes(scatter, 500))
     line = root.find("path[@class='mark fit']")
     assert line is not None
@@ -45,7 +50,11 @@ def test_a_frame_held_up_for_long_is_marked_at_the_top() -> None:
     size = np.linspace(10_000.0, 50_000.0, 100)
     delay = 1 * MS + 100.0 * size
     delay[50] = 5000.0 * MS
-    root = svg(against_bytes(Scatter(size, delay, (0,) * 100, fit_delay(size, delay, draws=0)), 500))
+    root = svg(
+        against_bytes(
+            Scatter(size_bytes=size, delay_ns=delay, number=(0,) * 100, fit=fit_delay(size, delay, draws=0)), 500
+        )
+    )
     assert len(root.findall("circle")) == 99
     titles = [title.text or "" for path in root.findall("path") for title in path.iter("title")]
     assert [text for text in titles if "5.00\u202fs" in text] == titles
@@ -57,7 +66,9 @@ def test_a_frame_held_up_for_long_is_marked_at_the_top() -> None:
 def test_frames_of_one_size_have_no_line() -> None:
     """Without two sizes there are dots and no line."""
     size, delay = np.full(9, 30_000.0), np.arange(9.0) * MS
-    root = svg(against_bytes(Scatter(size, delay, (0,) * 9, fit_delay(size, delay)), 400))
+    root = svg(
+        against_bytes(Scatter(size_bytes=size, delay_ns=delay, number=(0,) * 9, fit=fit_delay(size, delay)), 400)
+    )
     assert root.find("path[@class='mark fit']") is None
     assert root.findall("circle")
 
@@ -116,7 +127,11 @@ def test_no_pairs_are_said() -> None:
 
 def test_what_is_foretold_rightly_stands_on_the_line() -> None:
     """Equal figures lie on the diagonal, a prediction too long above it, one too short below."""
-    points = [Compared("a", 1e7, 1e7, 0), Compared("b", 1e8, 2e8, 1), Compared("c", 1e9, 4e8, 2)]
+    points = [
+        Compared(name="a", measured_ns=1e7, predicted_ns=1e7, number=0),
+        Compared(name="b", measured_ns=1e8, predicted_ns=2e8, number=1),
+        Compared(name="c", measured_ns=1e9, predicted_ns=4e8, number=2),
+    ]
     root = svg(compared(points, 500, 300))
     diagonal = root.findall("path[@class='axis']")[-1]
     x0, y0, x1, y1 = numbers(diagonal.get("d", ""))
@@ -133,7 +148,10 @@ def test_what_is_foretold_rightly_stands_on_the_line() -> None:
 
 def test_things_by_the_dozen_have_marks_of_their_own() -> None:
     """Of 32 interfaces no two are drawn alike, and the legend shows each one's mark as the plot does."""
-    points = [Compared(f"interface {number}", 1e7 * (number + 1), 1e8, number) for number in range(32)]
+    points = [
+        Compared(name=f"interface {number}", measured_ns=1e7 * (number + 1), predicted_ns=1e8, number=number)
+        for number in range(32)
+    ]
     drawn: dict[str, tuple[str, ...]] = {}
     for mark in svg(compared(points, 500)).iter():
         for title in mark.findall("title"):

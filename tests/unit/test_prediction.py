@@ -29,7 +29,12 @@ LATENCY_NS, NS_PER_BYTE = 2 * MS, 1000
 
 def cell(interface: str = "tcp", size_bytes: int = 10_000, period_ms: int = 40, width_px: int = 320) -> Cell:
     """An unhurried camera: capture 1 ms, processing 10 ms for 320 x 240 and by pixels times width for others, nothing waits."""
-    images = Images(width_px, width_px * 3 // 4, period_ms * MS, np.full(1, float(size_bytes)))
+    images = Images(
+        width_px=width_px,
+        height_px=width_px * 3 // 4,
+        period_ns=period_ms * MS,
+        size_bytes=np.full(1, float(size_bytes)),
+    )
     processing_ns = round(10 * MS * (width_px / 320) ** 3)
     ledgers = []
     for number in range(50):
@@ -147,7 +152,7 @@ def test_frames_of_one_size_stand_for_their_like() -> None:
 @pytest.mark.parametrize("others", [[cell(width_px=320)], [cell(width_px=320), cell(width_px=480)]])
 def test_processing_of_a_size_that_was_not_run_follows_its_work(others: list[Cell]) -> None:
     """Twice the width and height: eight times the pixels times disparities, so 80 ms where 320 x 240 took 10."""
-    images = Images(640, 480, 1000.0 * MS, np.array([10_000.0]))
+    images = Images(width_px=640, height_px=480, period_ns=1000.0 * MS, size_bytes=np.array([10_000.0]))
     link = learn_link("tcp", images, others)
     assert not isinstance(link, Unknown)
     made = figures(foretell(Target("tcp", link, images, FifoSettings()), others))

@@ -124,5 +124,5 @@ def test_frames_since_the_last_echo_are_suspect() -> None:
     for number in range(10, 20):
         unproven.passed(number * 100, "s", number)
     unproven.confirmed(1299)
-    assert unproven.stepped() == Suspects("s", 13, 19, 7)
+    assert unproven.stepped() == Suspects(session="s", first=13, last=19, frames=7)
     assert unproven.stepped() is None

@@ -21,9 +21,16 @@ def constant(value: float) -> np.ndarray:
 
 def setting(period_ms: float = 20.0, service_ms: float = 5.0, fifo: FifoSettings | None = None) -> Setting:
     """Everything constant: capture 1 ms, latency 1 ms, 10 000 bytes at 1 us each, pairing and waking at once."""
-    link = LinkModel(1 * MS, 1000.0, constant(0.0), self_paced=False)
-    parts = (constant(10_000.0), constant(1 * MS), link, constant(0.0), constant(0.0), constant(service_ms * MS))
-    return Setting(period_ms * MS, *parts, fifo or FifoSettings(depth=ENDLESS))
+    return Setting(
+        period_ns=period_ms * MS,
+        size_bytes=constant(10_000.0),
+        capture_ns=constant(1 * MS),
+        link=LinkModel(latency_ns=1 * MS, ns_per_byte=1000.0, spread_ns=constant(0.0), self_paced=False),
+        pairing_ns=constant(0.0),
+        wake_ns=constant(0.0),
+        service_ns=constant(service_ms * MS),
+        fifo=fifo or FifoSettings(depth=ENDLESS),
+    )
 
 
 @given(st.lists(st.tuples(st.integers(0, 100), st.integers(0, 100)), min_size=1, max_size=200))
@@ -54,6 +61,7 @@ def test_who_gives_way_does_not_change_how_many(steps: list[tuple[int, int]], de
     assert kept[0] == kept[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("load", [0.3, 0.6, 0.8])
 def test_mean_wait_of_poisson_arrivals_and_constant_service(load: float) -> None:
     """M/D/1: mean wait = load / (2 (1 - load)) services (Pollaczek-Khinchine with a variance of zero; Kleinrock, Queueing Systems 1, chapter 5)."""
@@ -75,6 +83,7 @@ def test_mean_wait_of_poisson_arrivals_and_drawn_service() -> None:
     assert float((served.start_ns - queued).mean()) == pytest.approx(expected, rel=0.03)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("load", "depth"), [(0.5, 1), (0.9, 2), (1.5, 3)])
 def test_loss_of_a_full_queue_under_poisson_arrivals(load: float, depth: int) -> None:
     """M/M/1/K with K = depth + 1 loses (1 - load) load^K / (1 - load^(K + 1)) of all (Kleinrock, Queueing Systems 1, section 3.6)."""
@@ -124,7 +133,7 @@ def test_a_processor_slower_than_the_camera_sets_the_rate(policy: Overflow, dept
 
 def test_a_link_slower_than_the_camera_sets_the_rate_and_replaces_frames() -> None:
     """With 100 ms a frame on the line and one frame under way, a frame follows the one before by 100 ms and twice the latency, the rest is replaced."""
-    slow = LinkModel(1 * MS, 10_000.0, constant(0.0), self_paced=False)
+    slow = LinkModel(latency_ns=1 * MS, ns_per_byte=10_000.0, spread_ns=constant(0.0), self_paced=False)
     made = predict(replace(setting(), link=slow), 3000, np.random.default_rng(0))
     assert made.pairs_per_s == pytest.approx(1000.0 / 102.0, rel=0.01)
     assert made.replaced_share == pytest.approx(1.0 - 20.0 / 102.0, abs=0.01)
@@ -135,7 +144,7 @@ def test_a_link_slower_than_the_camera_sets_the_rate_and_replaces_frames() -> No
 
 def test_a_self_paced_link_is_never_idle_under_load() -> None:
     """Where credit runs one frame ahead and the board waits for the line, frames follow each other by their time on the line alone."""
-    slow = LinkModel(5 * MS, 10_000.0, constant(0.0), self_paced=True)
+    slow = LinkModel(latency_ns=5 * MS, ns_per_byte=10_000.0, spread_ns=constant(0.0), self_paced=True)
     made = predict(replace(setting(), link=slow), 3000, np.random.default_rng(0))
     assert made.pairs_per_s == pytest.approx(10.0, rel=0.01)
     assert np.allclose(made.propagation_ns, 105 * MS)
@@ -153,7 +162,9 @@ def test_delays_add_up_and_order_is_kept(
     period_ms: float, service_ms: list[float], spread_ms: list[float], fifo: FifoSettings, self_paced: object
 ) -> None:
     """For any setting end-to-end is the sum of the delays, no delay is negative, and shares are shares."""
-    link = LinkModel(1 * MS, 500.0, np.array(spread_ms) * MS, self_paced=bool(self_paced))
+    link = LinkModel(
+        latency_ns=1 * MS, ns_per_byte=500.0, spread_ns=np.array(spread_ms) * MS, self_paced=bool(self_paced)
+    )
     base = setting(period_ms, 0.0, fifo)
     made = predict(replace(base, link=link, service_ns=np.array(service_ms) * MS), 200, np.random.default_rng(4))
     parts = (made.capture_ns, made.outbox_ns, made.propagation_ns, made.pairing_ns, made.queuing_ns, made.processing_ns)

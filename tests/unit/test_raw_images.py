@@ -15,7 +15,7 @@ _RED = (81, 90, 240)
 
 
 def _image(payload: bytes, pixel_format: PixelFormat) -> EncodedImage:
-    return EncodedImage(payload, pixel_format, _WIDTH, _HEIGHT, "frame 3")
+    return EncodedImage(payload=payload, pixel_format=pixel_format, width_px=_WIDTH, height_px=_HEIGHT, name="frame 3")
 
 
 def _yuyv(y: int, u: int, v: int) -> bytes:
@@ -63,3 +63,23 @@ def test_a_raw_and_an_encoded_frame_make_a_pair() -> None:
     png = cv2.imencode(".png", shade)[1].tobytes()
     left, right = decode_frames(_image(shade.tobytes(), PixelFormat.GREY), _image(png, PixelFormat.PNG))
     np.testing.assert_array_equal(left, right)
+
+
+@pytest.mark.parametrize(
+    ("pixel_format", "size_px", "size_bytes"),
+    [(PixelFormat.YUYV, (7, 4), 56), (PixelFormat.NV12, (7, 4), 42), (PixelFormat.NV12, (8, 3), 36)],
+)
+def test_a_size_that_a_format_cannot_have_is_refused(
+    pixel_format: PixelFormat, size_px: tuple[int, int], size_bytes: int
+) -> None:
+    """Two pixels share their colour in YUYV, two by two in NV12: an odd side cannot be, however many bytes came."""
+    with pytest.raises(DataError, match=rf"frame 9 is {size_px[0]}x{size_px[1]}, which {pixel_format.value} cannot be"):
+        decode_raw(
+            EncodedImage(
+                payload=bytes(size_bytes),
+                pixel_format=pixel_format,
+                width_px=size_px[0],
+                height_px=size_px[1],
+                name="frame 9",
+            )
+        )

@@ -6,21 +6,16 @@ from dataclasses import replace
 import pytest
 
 from common.errors import UnavailableError
-from common.frame import PixelFormat
 from common.ledger import BoardMarks
-from common.protocol.board_session import BoardSession
 from common.protocol.message import (
     BoardCounts,
     BoardHello,
     Bye,
     CameraDescription,
-    FrameMessage,
     HostHello,
     Knock,
     Lane,
-    Message,
     Pacing,
-    Ping,
     Pong,
     Refusal,
     RefusalReason,
@@ -31,7 +26,6 @@ from common.protocol.session import (
     MS,
     ClockVoid,
     OtherBoard,
-    Outgoing,
     Refused,
     Stepped,
     Unbelievable,
@@ -39,81 +33,12 @@ from common.protocol.session import (
 )
 from phone_host.model import BoardFrame
 from phone_host.stream.frame_sink import FrameSink, NoFrames
-from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.reception import LinkFacts, Reception
 from phone_host.stream.refusals import BoardRefusal, refusal_text
-from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.quarantine import Disbelief
 from tests.support.session_world import CAMERA
+from tests.support.talk import NAMES, Talk
 from tests.support.unkept import Unkept
-
-NAMES = {lane: connection_name(0, lane.name.encode()) for lane in Lane}
-
-
-class Talk:
-    """A host's reception and a board's session that answer each other at once; board and host share a clock.
-
-    Args:
-        dialled: whether the host called the board.
-        sink: where frames go; None: to a pair queue beside an own camera with a clock.
-        camera: the board's.
-    """
-
-    def __init__(
-        self, *, dialled: bool = True, sink: FrameSink | None = None, camera: CameraDescription = CAMERA
-    ) -> None:
-        self.camera = camera
-        self.now_ns = 10**12
-        self.said: list[Outgoing] = []
-        self.queue = PairQueue(FifoSettings(8), None, CAMERA.period_ns, clock=lambda: self.now_ns)
-        facts = [LinkFacts("tcp", dict(NAMES) if dialled else {}, self_paced=False)]
-        self.reception = Reception(facts, "host", sink or self.queue, self.said.append)
-        self.begin("first")
-
-    def begin(self, session: str) -> None:
-        """A new life of the board."""
-        self.board = BoardSession(session, "boot", self.camera)
-        self.sent = 0
-
-    def run(self, ticks: int = 20) -> None:
-        """Let both talk for a while, without frames."""
-        for _ in range(ticks):
-            self.now_ns += 10 * MS
-            self.reception.tick(self.now_ns)
-            self.answer()
-
-    def answer(self) -> None:
-        """Let everything that was said be answered."""
-        while self.said:
-            outgoing = self.said.pop(0)
-            message: Message = outgoing.message
-            if isinstance(message, Ping):
-                message = replace(message, t0_ns=self.now_ns - MS)
-            for reply in self.board.receive(
-                outgoing.connection, message, self.now_ns, BoardCounts(self.sent, self.sent)
-            ):
-                self.reception.receive(reply.connection, reply.message, self.now_ns)
-
-    def frame(self, **changes: object) -> FrameMessage:
-        """The board's next frame, exposed 5 ms ago."""
-        marks = BoardMarks(exposed_ns=self.now_ns - 5 * MS, grabbed_ns=self.now_ns - 2 * MS, sent_ns=self.now_ns - MS)
-        made = FrameMessage(
-            session=self.board.session,
-            sent_index=self.sent,
-            sequence=self.sent,
-            width_px=CAMERA.width_px,
-            height_px=CAMERA.height_px,
-            pixel_format=PixelFormat.MJPEG,
-            exposure_ns=None,
-            marks=marks,
-            payload=b"image",
-        )
-        self.sent += 1
-        return replace(made, **changes)  # type: ignore[arg-type]
-
-    def show(self, frame: FrameMessage) -> None:
-        """A frame comes."""
-        self.reception.receive(NAMES[Lane.FRAMES], frame, self.now_ns)
 
 
 def test_an_account_from_before_the_goodbye_is_not_the_last_one() -> None:

@@ -1,5 +1,8 @@
 """Rectification of two unlike cameras, against projections through their full models."""
 
+import math
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -166,3 +169,13 @@ def test_a_distortion_that_folds_inside_the_image_is_told() -> None:
     rig.left.distortion[:] = (-3.0, 0.0, 0.0, 0.0, 0.0)
     with pytest.raises(DataError, match="left"):
         rectify_rig(rig)
+
+
+@pytest.mark.parametrize(("outwards_deg", "words"), [(70, "overlap by 0x"), (80, "left camera looks too far aside")])
+def test_cameras_that_look_to_opposite_sides_are_told(outwards_deg: float, words: str) -> None:
+    """Two cameras turned outwards, each by so much that it sees points behind the common view, are refused in words: not their lenses are to blame."""
+    half = np.asarray(cv2.Rodrigues(np.array([0.0, math.radians(outwards_deg), 0.0]))[0], np.float64)
+    rig = replace(unlike_rig(), R_right_left=half @ half, t_right_left_m=-half @ np.array([0.1, 0.0, 0.0]))
+    with pytest.raises(DataError, match=words) as caught:
+        rectify_rig(rig)
+    assert "towards the same scene" in caught.value.remedy

@@ -105,7 +105,33 @@ def test_images_on_demand_are_never_slow() -> None:
 
 
 @pytest.mark.parametrize(
-    "run", [RunFigures(0, NAN, NAN, NAN, NAN, 0, 1.0, 1.0, NAN, NAN), RunFigures(9, 1e8, 1e7, 0, 1e7, 0, 1, 1, 1, 1)]
+    "run",
+    [
+        RunFigures(
+            pairs=0,
+            interval_ns=NAN,
+            processing_ns=NAN,
+            match_ns=NAN,
+            starvation_ns=NAN,
+            period_ns=0,
+            received=1.0,
+            offered=1.0,
+            frame_bytes=NAN,
+            propagation_ns=NAN,
+        ),
+        RunFigures(
+            pairs=9,
+            interval_ns=1e8,
+            processing_ns=1e7,
+            match_ns=0,
+            starvation_ns=1e7,
+            period_ns=0,
+            received=1,
+            offered=1,
+            frame_bytes=1,
+            propagation_ns=1,
+        ),
+    ],
 )
 def test_nothing_is_said_of_too_few_pairs(run: RunFigures) -> None:
     """Below ten pairs no regime is named."""

@@ -21,7 +21,7 @@ _GEOMETRIES = st.builds(
 
 def test_middlebury_motorcycle_numbers() -> None:
     """Depth is f b / (d + doffs), with the numbers Middlebury publishes: d = 40 px is 994.978 * 0.193001 / 71.086 = 2.70140 m."""
-    geometry = StereoGeometry(994.978, 0.193001, 311.193, 254.877, 31.086)
+    geometry = StereoGeometry(focal_px=994.978, baseline_m=0.193001, cx_px=311.193, cy_px=254.877, doffs_px=31.086)
     disparity = np.full((300, 400), np.nan, dtype=np.float32)
     disparity[255, 311] = 40
     point = reproject(disparity, geometry)[255, 311]
@@ -56,7 +56,7 @@ def test_project_undoes_reproject(geometry: StereoGeometry, disparity: Disparity
 
 def test_depth_of_a_disparity_of_zero_is_none() -> None:
     """Infinity is not a measurement: d + doffs = 0 and below give NaN, without a warning."""
-    geometry = StereoGeometry(500, 0.1, 0, 0, doffs_px=-3)
+    geometry = StereoGeometry(focal_px=500, baseline_m=0.1, cx_px=0, cy_px=0, doffs_px=-3)
     cloud = reproject(np.array([[3.0, 2.0, 4.0]], dtype=np.float32), geometry)
     assert np.isnan(cloud[0, :2]).all()
     assert cloud[0, 2, 2] == 50.0
@@ -74,10 +74,12 @@ def test_depth_of_a_disparity_of_zero_is_none() -> None:
 )
 def test_disparities_reach_the_nearest_depth(near_m: float, expected: int) -> None:
     """N is f b / near rounded up to 16, at most half the width."""
-    geometry = StereoGeometry(525, 0.1, 320, 240)
+    geometry = StereoGeometry(focal_px=525, baseline_m=0.1, cx_px=320, cy_px=240)
     assert disparities_for_near(geometry, near_m, width_px=640) == expected
 
 
 def test_nearest_depth_is_that_of_the_largest_disparity() -> None:
     """N = 105 with f b = 52.5 reaches down to 0.5 m."""
-    assert nearest_depth_m(StereoGeometry(525, 0.1, 320, 240), 105) == pytest.approx(0.5)
+    assert nearest_depth_m(StereoGeometry(focal_px=525, baseline_m=0.1, cx_px=320, cy_px=240), 105) == pytest.approx(
+        0.5
+    )

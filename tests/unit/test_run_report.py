@@ -88,12 +88,12 @@ def test_a_rate_needs_two_pairs() -> None:
 
 def test_the_phase_is_told_with_its_side() -> None:
     """A board that exposes 5 ms earlier exposes before the host, and a phase that does not drift never comes round."""
-    assert phase_lines(Phase(-5.0 * MS, 50 * MS, 0.0, 0), None) == [
+    assert phase_lines(Phase(time_skew_ns=-5.0 * MS, period_ns=50 * MS, drift=0.0, first_ns=0), None) == [
         "phase: the board exposes 5.0 of 50.0 ms before the host"
     ]
     assert (
         "5.0 of 50.0 ms after the host, drifts by +100.0 ppm, comes round in 500 s"
-        in phase_lines(Phase(5.0 * MS, 50 * MS, 1e-4, 0), None)[0]
+        in phase_lines(Phase(time_skew_ns=5.0 * MS, period_ns=50 * MS, drift=1e-4, first_ns=0), None)[0]
     )
 
 
@@ -128,7 +128,7 @@ def test_what_was_not_believed_is_told_everywhere() -> None:
     account.disbelieved[Disbelief.FUTURE] = 3
     account.disbelieved[Disbelief.CREDIT] = 2
     link = LinkAccount([account], clock_doubts=2, clock_steps=1)
-    link.suspects.append(Suspects("s", 11, 17, 7))
+    link.suspects.append(Suspects(session="s", first=11, last=17, frames=7))
     seen = replace(run(30), link=link, own_future=4, spoiled_images=(("too_large", 5),))
     told: Any = build(seen)
     assert told["clock"]["steps"] == 1
@@ -167,7 +167,7 @@ def test_everything_that_a_run_knows_is_told() -> None:
         run(31),
         estimate=estimate,
         link=LinkAccount([account], links=links, switches=2),
-        phase=Phase(5.0 * MS, 50 * MS, 1e-4, 0),
+        phase=Phase(time_skew_ns=5.0 * MS, period_ns=50 * MS, drift=1e-4, first_ns=0),
         alignment=Alignment(
             state=Aligning.ALIGNED, words="within 1 ms", corrections=3, before_ns=9.0 * MS, after_ns=0.5 * MS
         ),

@@ -40,8 +40,9 @@ from phone_host.scene.scene import (
 )
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.rectify import Rectifier
+from tests.support.rigs import small_rig
 
-SMALL_VIEW = RectifiedView(StereoGeometry(200.0, 0.1, 79.5, 59.5), 160, 120)
+SMALL_VIEW = RectifiedView(StereoGeometry(focal_px=200.0, baseline_m=0.1, cx_px=79.5, cy_px=59.5), 160, 120)
 FOCAL_PX, BASELINE_M = 525.0, 0.1
 
 depths = st.floats(0.4, 5.0)
@@ -72,7 +73,7 @@ def test_sphere_is_nearest_where_its_centre_is_seen(x: float, y: float, z: float
     centre = np.array([x, y, z])
     distance = float(np.linalg.norm(centre))
     turn = np.linalg.inv(np.column_stack(frame_with_third(centre / distance)))
-    view = RectifiedView(StereoGeometry(200.0, 0.1, 80.0, 60.0), 161, 121, turn)
+    view = RectifiedView(StereoGeometry(focal_px=200.0, baseline_m=0.1, cx_px=80.0, cy_px=60.0), 161, 121, turn)
     found = truth(scene, view)
     assert found.depth_m[60, 80] == pytest.approx(distance - radius, rel=1e-12)
     # The outline stands at the angle asin(r / distance); (u, v) is that angle's tangent away from the middle.
@@ -132,7 +133,9 @@ def test_left_and_right_truth_agree(t_s: float) -> None:
             [[geometry.focal_px, 0.0, geometry.cx_px - x_right], [0.0, geometry.focal_px, geometry.cy_px - y]]
         )
         eye = RectifiedView(
-            StereoGeometry(geometry.focal_px, geometry.baseline_m, matrix[0, 2], matrix[1, 2]),
+            StereoGeometry(
+                focal_px=geometry.focal_px, baseline_m=geometry.baseline_m, cx_px=matrix[0, 2], cy_px=matrix[1, 2]
+            ),
             1,
             1,
             view.R_rectified_left,
@@ -214,12 +217,12 @@ def test_sensors_limit_what_counts_as_visible() -> None:
     """With the real cameras given, visible points project inside both of their images; others are not visible."""
     rig = unlike_rig()
     sensors = tuple(zip((rig.left, rig.right), rig_poses(rig), strict=True))
-    view = RectifiedView(StereoGeometry(525.0, 0.1, 449.5, 349.5), 900, 700)
+    view = RectifiedView(StereoGeometry(focal_px=262.5, baseline_m=0.1, cx_px=224.5, cy_px=174.5), 450, 350)
     free, limited = truth(plane_scene(1.0), view), truth(plane_scene(1.0), view, sensors)
     assert not np.any(limited.visible & ~free.visible)
     assert 0.3 < limited.visible.sum() / free.visible.sum() < 0.8
     v, u = np.nonzero(limited.visible)
-    points = np.stack([(u - 449.5) / 525.0, (v - 349.5) / 525.0, np.ones(u.size)])
+    points = np.stack([(u - 224.5) / 262.5, (v - 174.5) / 262.5, np.ones(u.size)])
     for model, pose in sensors:
         x, y = project(points, model, pose)
         assert x.min() >= 0.0
@@ -242,7 +245,13 @@ def test_doffs_shifts_disparity_and_right_camera() -> None:
 @pytest.mark.parametrize("t_s", [0.0, 0.5, 3.0, 7.9])
 def test_bodies_follow_their_paths(t_s: float) -> None:
     """At time t a body stands at rest + a sin(2 pi t / T + phase) and has turned by rate * t about its axis."""
-    path = Path((0.1, 0.0, 0.2), (0.0, 0.0, math.pi / 2.0), 4.0, (0.0, 1.0, 0.0), 0.5)
+    path = Path(
+        amplitude_m=(0.1, 0.0, 0.2),
+        phase_rad=(0.0, 0.0, math.pi / 2.0),
+        period_s=4.0,
+        spin_axis=(0.0, 1.0, 0.0),
+        spin_rad_s=0.5,
+    )
     body = Body("box", Box((0.1, 0.1, 0.1)), (0.0, 0.0, 1.0), path=path).at(t_s)
     angle = 2.0 * math.pi * t_s / 4.0
     assert body.position_m == pytest.approx((0.1 * math.sin(angle), 0.0, 1.0 + 0.2 * math.cos(angle)))
@@ -262,7 +271,7 @@ def test_texture_moves_with_its_body() -> None:
 
 def test_film_equals_single_renders() -> None:
     """A frame of a film, with its cached background, equals the scene rendered from nothing at that time."""
-    rig = unlike_rig()
+    rig = small_rig()
     pose = rig_poses(rig)[0]
     film = Renderer(demo_scene(), rig.left, pose)
     film.frame(3.3)
@@ -273,7 +282,7 @@ def test_film_equals_single_renders() -> None:
 
 def test_film_is_repeatable_and_periodic() -> None:
     """Equal arguments give equal bytes, noise included; after one period the scene is back where it was."""
-    rig = unlike_rig()
+    rig = small_rig()
     pose = rig_poses(rig)[1]
     one, two = (Renderer(demo_scene(), rig.right, pose, PHONE_LOOK) for _ in range(2))
     assert np.array_equal(one.frame(0.8), two.frame(0.8))
@@ -367,3 +376,18 @@ def test_finite_plane_is_seen_only_where_it_is() -> None:
     """A plane of 0.4 x 0.2 m at 1 m covers 80 x 40 pixels at f = 200 px; the rest is background."""
     scene = Scene((Body("card", Plane(0.4, 0.2), (0.0, 0.0, 1.0)),))
     assert (~truth(scene, SMALL_VIEW).background).sum() == 80 * 40
+
+
+def test_a_poster_that_moves_close_by_is_drawn_as_if_it_stood_there() -> None:
+    """A wide plane that moves, so near that the ball around it holds the camera, gives the frame of a still one in its place; planes throw no shadows."""
+    base = Scene((Body("wall", Plane(), (0.0, 0.0, 2.5)), Body("ball", Sphere(0.2), (0.3, 0.2, 1.6))))
+    swing = Path(
+        amplitude_m=(0.1, 0.05, 0.0), phase_rad=(0.0, 0.0, 0.0), period_s=2.0, spin_axis=(0.0, 1.0, 0.0), spin_rad_s=0.0
+    )
+    scene = replace(base, bodies=(*base.bodies, Body("poster", Plane(2.4, 0.2), (-0.2, -0.1, 1.0), path=swing)))
+    camera, pose = rectified_cameras(SMALL_VIEW)[0]
+    film = Renderer(scene, camera, pose)
+    for t_s in (0.2, 0.5):
+        difference = np.abs(film.frame(t_s).astype(int) - render(scene.at(t_s), camera, pose).astype(int))
+        assert difference.max() <= 1
+    assert (film.frame(0.5) != film.frame(0.2)).any()

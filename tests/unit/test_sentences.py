@@ -53,7 +53,9 @@ REGIMES: Final = {
     ),
     "just keeps up": replace(CALM, processing_ns=95 * MS, starvation_ns=5 * MS),
 }
-FAST: Final = Timing(16 * MS, 5 * MS, 80 * MS, 1000.0, 640)
+FAST: Final = Timing(
+    time_skew_ns=16 * MS, uncertainty_ns=5 * MS, end_to_end_ns=80 * MS, motion_px_s=1000.0, width_px=640
+)
 ARRIVALS: Final = CameraHealth(jitter_ns=4 * MS)
 STAMPS: Final = {
     "never measured": (TimeOffset(), CameraHealth()),
@@ -79,7 +81,18 @@ def sentences() -> Iterator[str]:
         doubt = stamp_doubt(offset, own)
         yield f"stamps, {name}: {doubt.why}\n    {doubt.remedy}"
     for reason in ("clock_in_doubt", "from_the_future"):
-        yield from map(told, unbelieved_concerns(Unbelieved(2, 7, {reason: 3}, 100, {"too_large": 5})))
+        yield from map(
+            told,
+            unbelieved_concerns(
+                Unbelieved(
+                    clock_steps=2,
+                    suspect_frames=7,
+                    disbelieved={reason: 3},
+                    received=100,
+                    spoiled_images={"too_large": 5},
+                )
+            ),
+        )
     for refused in RefusalReason:
         problem, remedy = refusal_text(BoardRefusal(refused))
         yield f"refused, {refused.name.lower()}: {problem}\n    {remedy}"

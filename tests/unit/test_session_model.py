@@ -8,7 +8,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 from common.protocol.message import Knock, Lane, Pong
 from common.protocol.session import MS
 from phone_host.sync.quarantine import Disbelief
-from tests.support.stepping_world import PERIOD_NS, Machine, SteppingWorld
+from tests.support.stepping_world import Machine, SteppingWorld
+from tests.support.witness import PERIOD_NS
 
 SECOND_NS = 1000 * MS
 FAR_NS = st.one_of(
@@ -32,9 +33,9 @@ class Happenings(RuleBasedStateMachine):
         """Two machines that have met."""
         self.world = SteppingWorld(latency_ns, jitter, seed)
         self.world.run(2500 * MS)
-        before = self.world.pairs
+        before = self.world.witness.pairs
         self.world.run(2 * SECOND_NS)
-        self.usual = self.world.pairs - before
+        self.usual = self.world.witness.pairs - before
 
     def machine(self, *, of_board: bool) -> Machine:
         """One of the two."""
@@ -53,19 +54,19 @@ class Happenings(RuleBasedStateMachine):
     @rule(by_ns=NEAR_NS, back=st.booleans())
     def the_boards_clock_steps_a_little(self, *, by_ns: int, back: bool) -> None:
         """By less than two periods, either way; two steps between two echoes could undo each other, and nobody would ever know."""
-        if not self.world.unsettled:
+        if not self.world.witness.unsettled:
             self.world.step(self.world.board, -by_ns if back else by_ns)
 
     @rule(by_ns=st.one_of(FAR_NS, NEAR_NS))
     def the_hosts_clock_steps(self, by_ns: int) -> None:
         """Forward: CLOCK_MONOTONIC never goes back."""
-        if not self.world.unsettled:
+        if not self.world.witness.unsettled:
             self.world.step(self.world.host, by_ns)
 
     @rule(of_board=st.booleans(), duration_ns=st.one_of(FAR_NS, NEAR_NS), told=st.booleans())
     def a_machine_sleeps(self, *, of_board: bool, duration_ns: int, told: bool) -> None:
         """Its clock stands still; its kernel tells, or does not. What no echo can have proven before the clock's life ends nobody can judge."""
-        if self.world.unsettled or self.world.reception.estimate is None:
+        if self.world.witness.unsettled or self.world.reception.estimate is None:
             return
         self.world.sleep(self.machine(of_board=of_board), duration_ns, told=told)
         self.world.run(duration_ns)
@@ -119,7 +120,7 @@ class Happenings(RuleBasedStateMachine):
         """After a step of two periods none is wrong; after a smaller one none from the first answered echo on."""
         if not hasattr(self, "world"):
             return
-        assert all(pair.excusable for pair in self.world.wrong), self.world.wrong
+        assert all(pair.excusable for pair in self.world.witness.wrong), self.world.witness.wrong
 
     @invariant()
     def accounts_conserve(self) -> None:
@@ -132,16 +133,16 @@ class Happenings(RuleBasedStateMachine):
         if not hasattr(self, "world"):
             return
         self.world.run(6 * SECOND_NS)
-        before = self.world.pairs
+        before = self.world.witness.pairs
         self.world.run(2 * SECOND_NS)
-        assert self.world.pairs - before >= 0.2 * self.usual, "pairs come again"
+        assert self.world.witness.pairs - before >= 0.2 * self.usual, "pairs come again"
         self.world.check_accounts()
         self.no_wrong_pair()
-        unnamed = [pair for pair in self.world.wrong if not self.world.is_suspect(pair)]
+        unnamed = [pair for pair in self.world.witness.wrong if not self.world.is_suspect(pair)]
         assert unnamed == []
 
 
-TestHappenings = Happenings.TestCase
+TestHappenings = pytest.mark.long(Happenings.TestCase)
 TestHappenings.settings = settings(deadline=None, max_examples=25, stateful_step_count=15)
 
 
@@ -152,10 +153,10 @@ def test_a_step_that_hides_in_a_slow_link(seed: int) -> None:
     world.run(2500 * MS + seed * 41 * MS)
     world.step(world.board, 2 * PERIOD_NS + seed * 2 * MS)
     world.run(3 * SECOND_NS)
-    assert world.wrong == []
-    before = world.pairs
+    assert world.witness.wrong == []
+    before = world.witness.pairs
     world.run(2 * SECOND_NS)
-    assert world.pairs > before
+    assert world.witness.pairs > before
 
 
 @pytest.mark.parametrize("latency_ns", [300 * MS, 700 * MS, 1500 * MS])
@@ -165,10 +166,10 @@ def test_a_link_that_becomes_slow(latency_ns: int) -> None:
     world.run(3 * SECOND_NS)
     world.latency_ns = latency_ns
     world.run(5 * SECOND_NS)
-    before = world.pairs
+    before = world.witness.pairs
     world.run(20 * SECOND_NS)
-    assert world.pairs - before >= 20 * SECOND_NS // (4 * latency_ns)
-    assert world.wrong == []
+    assert world.witness.pairs - before >= 20 * SECOND_NS // (4 * latency_ns)
+    assert world.witness.wrong == []
     assert world.reception.account.clock_steps == 0
 
 
@@ -180,18 +181,19 @@ def test_a_board_that_answers_no_echo_is_named() -> None:
     world.latency_ns = 120 * MS
     world.run(200 * MS)
     world.latency_ns = 2 * MS
-    before = world.pairs
+    before = world.witness.pairs
     world.run(30 * SECOND_NS)
-    assert world.pairs - before <= 8
+    assert world.witness.pairs - before <= 8
     assert world.reception.account.disbelieved[Disbelief.UNPROVEN] >= 8
     world.check_accounts()
     world.answers_echoes = True
     world.run(2 * SECOND_NS)
-    before = world.pairs
+    before = world.witness.pairs
     world.run(1 * SECOND_NS)
-    assert world.pairs - before >= 25
+    assert world.witness.pairs - before >= 25
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lane", Lane)
 @pytest.mark.parametrize("after_ms", range(0, 150, 15))
 def test_a_connection_that_breaks_in_a_doubt_forgets_no_step(lane: Lane, after_ms: int) -> None:
@@ -205,7 +207,7 @@ def test_a_connection_that_breaks_in_a_doubt_forgets_no_step(lane: Lane, after_m
     world.break_lane(lane)
     world.run(3 * SECOND_NS)
     assert world.reception.account.clock_steps == 1
-    assert all(world.is_suspect(pair) for pair in world.wrong)
+    assert all(world.is_suspect(pair) for pair in world.witness.wrong)
     assert world.reception.account.suspects
 
 
@@ -218,4 +220,4 @@ def test_a_wave_that_lies_is_not_confirmed_by_slow_echoes(seed: int) -> None:
     world.lie(Pong(wave=world.reception._session._paths[0].waves._wave, t0_ns=asked_ns, t1_ns=told_ns, t2_ns=told_ns))
     world.run(4 * SECOND_NS)
     assert world.reception.account.clock_steps == 0
-    assert world.wrong == []
+    assert world.witness.wrong == []

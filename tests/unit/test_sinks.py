@@ -40,7 +40,7 @@ def result(number: int) -> Result:
         marks=marks,
         payload=b"\0" * 12,
     )
-    board = BoardFrame(message, "ipc", marks, number + 3, 0, 0)
+    board = BoardFrame(message=message, link="ipc", marks=marks, received_ns=number + 3, offset_ns=0, uncertainty_ns=0)
     exposed, grabbed = Stamp(number, HOST_CLOCK), Stamp(number + 1, HOST_CLOCK)
     host = Frame(
         sequence=number,
@@ -71,7 +71,7 @@ def result(number: int) -> Result:
         uncertainty_ns=0,
         host=HostMarks(exposed_ns=number, grabbed_ns=number + 1),
     )
-    pair = FramePair(board, host, 0, number + 4, number + 5)
+    pair = FramePair(board=board, host=host, time_skew_ns=0, paired_ns=number + 4, queued_ns=number + 5)
     processed = Processed(RectifiedPair(image, image), np.full((3, 4), np.nan, np.float32), None, StageTimes())
     return Result(number, pair, processed, ledger)
 

@@ -13,7 +13,7 @@ from phone_host.stereo.rectify import Rectifier
 from tests.support.planes import noise
 from tests.support.rigs import unlike_rig
 
-GEOMETRY = StereoGeometry(500.0, 0.1, 31.5, 15.5)
+GEOMETRY = StereoGeometry(focal_px=500.0, baseline_m=0.1, cx_px=31.5, cy_px=15.5)
 
 
 def shifted(px: int) -> tuple[Image, Image]:

@@ -92,3 +92,9 @@ def test_corners_from_a_detector_that_looks_from_behind_are_turned_over() -> Non
     grid = corners.reshape(BOARD.rows, BOARD.columns, 2)
     for changed in (grid[:, ::-1], grid[::-1], grid[::-1, ::-1]):
         np.testing.assert_array_equal(order_by_colour(changed.reshape(-1, 2), image, BOARD), corners)
+
+
+def test_a_board_whose_colours_tell_keeps_its_corners_as_they_are() -> None:
+    """On a board of 9x6 the first corner is known by its colours: a right view on its head is not turned to look like the left one."""
+    left = np.dstack(np.meshgrid(np.arange(9) * 20.0, np.arange(6) * 20.0)).reshape(-1, 2)
+    np.testing.assert_array_equal(agree(left, left[::-1], BOARD), left[::-1])

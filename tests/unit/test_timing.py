@@ -41,6 +41,9 @@ from tests.support.rigs import small_rig
 REFRESH_S = 1 / 59.94
 START_S = 12.3
 
+UNIT_PX = 12
+"""Of the pattern as it is shown; it is filmed at half that, so that its markers are about as small as they may be."""
+
 
 def stamps(seconds: float, fps: float, phase_s: float) -> Times:
     """Moments at which a camera exposes."""
@@ -58,27 +61,26 @@ def offset_ms(measured: Measured) -> tuple[float, float]:
 @cache
 def shown(number: int) -> Image:
     """The pattern on a screen, drawn once."""
-    return draw(number % COUNT, 12)
+    return draw(number % COUNT, UNIT_PX)
 
 
 def filmed(moment_s: float, exposure_s: float, *, host: bool) -> Image:
     """A screen in a room as a camera sees it: slanted, blurred, with less light, and mixed where a refresh falls into the exposure."""
-    corners = np.array([[0, 0], [WIDTH, 0], [WIDTH, HEIGHT], [0, HEIGHT]], dtype=np.float32) * 12
-    seen = [[94, 59], [284, 75], [281, 231], [103, 222]] if host else [[75, 81], [325, 69], [316, 228], [81, 231]]
+    corners = np.array([[0, 0], [WIDTH, 0], [WIDTH, HEIGHT], [0, HEIGHT]], dtype=np.float32) * UNIT_PX
+    seen = [[66, 41], [199, 53], [197, 162], [72, 155]] if host else [[53, 57], [228, 48], [221, 160], [57, 162]]
     turn = cv2.getPerspectiveTransform(corners, np.array(seen, dtype=np.float32))
     first, last = (math.floor((moment_s + way * exposure_s / 2) / REFRESH_S) for way in (-1, 1))
-    light: np.ndarray = np.zeros((300, 400))
+    light = np.full((210, 280), 25, dtype=np.float32)
     for number in range(first, last + 1):
         begin_s = max(moment_s - exposure_s / 2, number * REFRESH_S)
         end_s = min(moment_s + exposure_s / 2, (number + 1) * REFRESH_S)
-        picture = cv2.warpPerspective(shown(number), turn, (400, 300), flags=cv2.INTER_AREA, borderValue=(70,))
-        light += np.asarray(picture, dtype=np.float64) * ((end_s - begin_s) / exposure_s)
-    light = cv2.GaussianBlur(25 + 0.6 * light, (0, 0), 0.8)
+        picture = cv2.warpPerspective(shown(number), turn, (280, 210), flags=cv2.INTER_AREA, borderValue=(70,))
+        light += picture * np.float32(0.6 * (end_s - begin_s) / exposure_s)
     noise = NOISE[round(moment_s * 1e6) % len(NOISE)]
-    return np.asarray(np.clip(light + noise, 0, 255), dtype=np.uint8)
+    return np.asarray(np.clip(cv2.GaussianBlur(light, (0, 0), 0.8) + noise, 0, 255), dtype=np.uint8)
 
 
-NOISE = np.random.default_rng(6).normal(0, 3, (13, 300, 400))
+NOISE = np.random.default_rng(6).normal(0, 3, (13, 210, 280)).astype(np.float32)
 
 
 @cache
@@ -167,15 +169,15 @@ def side_of_lamp(
     """What one camera sees of the lamp; filmed once."""
     moments = stamps(switches[-1] + 0.5, fps, phase_s)
     chance = np.random.default_rng(int(host))
+    noise = chance.normal(0, 4, (97, 96, 128)).astype(np.float32)
     cells = []
     for moment in moments:
         inside = np.linspace(moment - exposure_s / 2, moment + exposure_s / 2, 50)
         light = float(np.mean(np.searchsorted(switches, inside) % 2))
-        image = np.full((96, 128), 60.0)
+        image = 60 + noise[chance.integers(len(noise))]
         place = (slice(40, 56), slice(50, 70)) if host else (slice(0, 96), slice(0, 30))
         image[place] += 90 * light
-        noisy = image + chance.normal(0, 4, image.shape)
-        cells.append(brightness(np.asarray(np.clip(noisy, 0, 255), dtype=np.uint8)))
+        cells.append(brightness(np.asarray(np.clip(image, 0, 255), dtype=np.uint8)))
     return Brightness(moments, np.array(cells))
 
 
@@ -213,12 +215,18 @@ def test_a_lamp_that_says_too_little_is_named(switches: int, words: str) -> None
 
 # A scene.
 
-FRAMES = 33
+FRAMES = 30
 
 
 def moving(amplitude_m: tuple[float, float, float], spin_rad_s: float) -> Scene:
     """The demo's scene with a cube and a ball that swing and turn."""
-    swing = Path(amplitude_m, (0.5, 0.0, 0.0), 1.6, (0.0, 1.0, 0.0), spin_rad_s)
+    swing = Path(
+        amplitude_m=amplitude_m,
+        phase_rad=(0.5, 0.0, 0.0),
+        period_s=1.6,
+        spin_axis=(0.0, 1.0, 0.0),
+        spin_rad_s=spin_rad_s,
+    )
     base = demo_scene()
     names = {"wall", "table", "poster", "cube", "ball"}
     bodies = [replace(body, path=swing) if body.path.moves else body for body in base.bodies if body.name in names]
@@ -247,7 +255,13 @@ def film_scene(film: dict[Side, list[tuple[float, Image]]], offset_s: float, boa
         for k, (moment_s, image) in enumerate(frames):
             name = f"{side.value} {k}"
             images[name] = image
-            encoded = EncodedImage(b"", PixelFormat.MJPEG, image.shape[1], image.shape[0], name)
+            encoded = EncodedImage(
+                payload=b"",
+                pixel_format=PixelFormat.MJPEG,
+                width_px=image.shape[1],
+                height_px=image.shape[0],
+                name=name,
+            )
             sides[side].append(Shot(10**14 + round((moment_s + late_s) * 1e9), encoded))
     progress: list[float] = []
     rectifier = Rectifier(replace(small_rig(), board_side=board_side))

@@ -19,9 +19,9 @@ from common.errors import SettingsError, UnavailableError
 from common.frame import PixelFormat
 
 _SIZES = ((1920, 1080), (1280, 720), (640, 480), (320, 240))
-_MJPEG = FormatOffer("MJPG", "Motion-JPEG", _SIZES)
-_YUYV = FormatOffer("YUYV", "YUYV 4:2:2", ((640, 480), (800, 600)))
-_H264 = FormatOffer("H264", "H.264", _SIZES)
+_MJPEG = FormatOffer(letters="MJPG", text="Motion-JPEG", sizes_px=_SIZES)
+_YUYV = FormatOffer(letters="YUYV", text="YUYV 4:2:2", sizes_px=((640, 480), (800, 600)))
+_H264 = FormatOffer(letters="H264", text="H.264", sizes_px=_SIZES)
 
 
 def test_jpeg_at_the_usual_size_without_a_wish() -> None:
@@ -41,7 +41,7 @@ def test_without_the_usual_size_the_nearest_is_taken(
     sizes: tuple[tuple[int, int], ...], expected: tuple[int, int]
 ) -> None:
     """A camera without 640x480 gives its largest size below that, or its smallest."""
-    assert choose((FormatOffer("MJPG", "", sizes),), Wanted(), "x").size_px == expected
+    assert choose((FormatOffer(letters="MJPG", text="", sizes_px=sizes),), Wanted(), "x").size_px == expected
 
 
 def test_a_size_that_only_raw_has_is_taken_raw() -> None:
@@ -86,7 +86,7 @@ def test_a_camera_without_any_format_is_not_there_yet() -> None:
 
 def test_a_scaling_camera_takes_sizes_on_its_grid() -> None:
     """Between minimum and maximum a size counts as offered if it is a whole number of steps away."""
-    offer = FormatOffer("YUYV", "", (), SizeRange((48, 1920, 2), (32, 1080, 8)))
+    offer = FormatOffer(letters="YUYV", text="", sizes_px=(), size_range=SizeRange((48, 1920, 2), (32, 1080, 8)))
     assert choose((offer,), Wanted((642, 480)), "x").size_px == (642, 480)
     for size in ((641, 480), (640, 484), (1922, 480), (640, 24)):
         with pytest.raises(SettingsError, match="48x32 to 1920x1080"):
@@ -138,9 +138,9 @@ def test_slower_rates_are_those_below() -> None:
 def test_smaller_sizes_have_exactly_one_shape() -> None:
     """Of the sizes below one, those of exactly its shape are offered, the largest first; a scaling camera's are its halves, thirds and quarters."""
     sizes = ((1280, 960), (640, 480), (640, 360), (352, 288), (320, 240), (160, 120))
-    assert smaller_sizes(FormatOffer("MJPG", "", sizes), (640, 480)) == ((320, 240), (160, 120))
-    assert smaller_sizes(FormatOffer("MJPG", "", sizes), (352, 288)) == ()
-    scaling = FormatOffer("MJPG", "", (), SizeRange((16, 1280, 8), (16, 960, 8)))
+    assert smaller_sizes(FormatOffer(letters="MJPG", text="", sizes_px=sizes), (640, 480)) == ((320, 240), (160, 120))
+    assert smaller_sizes(FormatOffer(letters="MJPG", text="", sizes_px=sizes), (352, 288)) == ()
+    scaling = FormatOffer(letters="MJPG", text="", sizes_px=(), size_range=SizeRange((16, 1280, 8), (16, 960, 8)))
     assert smaller_sizes(scaling, (640, 480)) == ((320, 240), (160, 120))  # 213x160 is no third
     assert smaller_sizes(scaling, (96, 96)) == ((48, 48), (32, 32), (24, 24))
 
@@ -152,3 +152,26 @@ def test_a_size_must_have_the_rates() -> None:
     assert not has_rates(rates, [Fraction(30), Fraction(10)])
     assert has_rates(Rates(between_hz=(Fraction(1), Fraction(30))), [Fraction(30), Fraction(5, 2)])
     assert not has_rates(Rates(between_hz=(Fraction(1), Fraction(30))), [Fraction(60)])
+
+
+@pytest.mark.parametrize(
+    ("width_px", "height_px", "expected"),
+    [
+        ((16, 320, 2), (16, 240, 2), (320, 240)),
+        ((800, 1920, 2), (600, 1080, 2), (800, 600)),
+        ((40, 1920, 32), (30, 1080, 20), (616, 470)),  # 640 is no 40 + 32 n, 480 no 30 + 20 n
+    ],
+)
+def test_a_scaling_camera_without_the_usual_size_gives_the_nearest(
+    width_px: tuple[int, int, int], height_px: tuple[int, int, int], expected: tuple[int, int]
+) -> None:
+    """Where 640x480 is beyond a scaling camera's sizes, or not on their grid, the largest of them below it is taken, or the smallest there is."""
+    scaling = FormatOffer(letters="YUYV", text="", sizes_px=(), size_range=SizeRange(width_px, height_px))
+    assert choose((scaling,), Wanted(), "x").size_px == expected
+
+
+def test_the_highest_rate_is_the_first_of_a_list_or_the_end_of_a_range() -> None:
+    """The shortest time that an exposure may take follows from it; a driver that names no rate leaves it open."""
+    assert Rates((Fraction(60), Fraction(30))).highest_hz == 60
+    assert Rates(between_hz=(Fraction(1), Fraction(90))).highest_hz == 90
+    assert Rates().highest_hz is None

@@ -64,6 +64,8 @@ def test_auto_and_nothing_mean_the_first_camera(path: str) -> None:
         ("latency_ms", "1e999999999"),
         ("fps", "1e-999999999"),
         ("gain", "much"),
+        ("gain", "2147483648"),  # one more than a control's 32 bits hold
+        ("white_balance", "-99999999999999999999"),
         ("power_line", "55"),
         ("lock", "yes"),
         ("readout_ms", "-1"),

@@ -19,7 +19,7 @@ SET_CUR, GET_CUR, GET_MIN, GET_MAX, GET_RES, GET_LEN, GET_INFO, GET_DEF = 0x01, 
 PROBE, COMMIT = 1, 2
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Control:
     """A control as requests see it.
 
@@ -65,16 +65,22 @@ POWER_LINE: Final = (_PROCESSING, 0x05)
 WHITE_BALANCE: Final = (_PROCESSING, 0x0A)
 WHITE_BALANCE_AUTO: Final = (_PROCESSING, 0x0B)
 CONTROLS: Final = {
-    EXPOSURE_MODE: Control(1, 0, 8, 9, 8),  # as a bit map its "step" tells: 1 manual, 8 aperture priority
-    EXPOSURE_PRIORITY: Control(1, 0, 1, 1, 1),  # may the rate fall in the dark
-    EXPOSURE: Control(4, 1, 2000, 1, 100, EXPOSURE_MODE, (2, 8), 100),  # 100 us
-    FOCUS: Control(2, 0, 250, 5, 0, FOCUS_AUTO, (1,), 45),
-    FOCUS_AUTO: Control(1, 0, 1, 1, 1),
-    (_PROCESSING, 0x02): Control(2, 0, 255, 1, 128),  # brightness
-    (_PROCESSING, 0x04): Control(2, 0, 255, 1, 64),  # gain
-    POWER_LINE: Control(1, 0, 2, 1, 2),  # off, 50 Hz, 60 Hz
-    WHITE_BALANCE: Control(2, 2800, 6500, 10, 4600, WHITE_BALANCE_AUTO, (1,), 5100),  # K
-    WHITE_BALANCE_AUTO: Control(1, 0, 1, 1, 1),
+    EXPOSURE_MODE: Control(
+        size=1, least=0, most=8, step=9, default=8
+    ),  # as a bit map its "step" tells: 1 manual, 8 aperture priority
+    EXPOSURE_PRIORITY: Control(size=1, least=0, most=1, step=1, default=1),  # may the rate fall in the dark
+    EXPOSURE: Control(
+        size=4, least=1, most=2000, step=1, default=100, automatism=EXPOSURE_MODE, automatic=(2, 8), found=100
+    ),  # 100 us
+    FOCUS: Control(size=2, least=0, most=250, step=5, default=0, automatism=FOCUS_AUTO, automatic=(1,), found=45),
+    FOCUS_AUTO: Control(size=1, least=0, most=1, step=1, default=1),
+    (_PROCESSING, 0x02): Control(size=2, least=0, most=255, step=1, default=128),  # brightness
+    (_PROCESSING, 0x04): Control(size=2, least=0, most=255, step=1, default=64),  # gain
+    POWER_LINE: Control(size=1, least=0, most=2, step=1, default=2),  # off, 50 Hz, 60 Hz
+    WHITE_BALANCE: Control(
+        size=2, least=2800, most=6500, step=10, default=4600, automatism=WHITE_BALANCE_AUTO, automatic=(1,), found=5100
+    ),  # K
+    WHITE_BALANCE_AUTO: Control(size=1, least=0, most=1, step=1, default=1),
 }
 """By (unit, selector); 1.0a, tables 4-6 and following."""
 

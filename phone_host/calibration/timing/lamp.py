@@ -28,6 +28,9 @@ _LEAST_EDGES: Final = 8
 _IRREGULAR: Final = 3.0
 """Pauses between changes must differ by so many periods: seen a period more or less exactly, even equal ones differ by two."""
 
+_MOST_PAUSES: Final = (10, 90)
+"""Percent of the pauses that are compared: those around a change that fell into a gap of the frames are longer, also of a regular lamp."""
+
 _SEARCH_S: Final = 0.5
 """No camera with its driver is later than another one by more."""
 
@@ -88,7 +91,7 @@ def measure_lamp(board: Brightness, host: Brightness) -> Measured:
     if len(differences) < _LEAST_EDGES:
         raise DataError(f"only {len(differences)} changes of the lamp were seen by both cameras", _REMEDY)
     pauses_s = np.diff([moment for moment, _ in edges[0]])
-    if np.ptp(pauses_s) < _IRREGULAR * max(periods):
+    if np.ptp(np.percentile(pauses_s, _MOST_PAUSES)) < _IRREGULAR * max(periods):
         raise DataError("the lamp blinks regularly and may keep step with the cameras", _REMEDY)
     uncertainty_s = SIGMAS * float(differences.std(ddof=1)) / math.sqrt(len(differences))
     uncertainty_s += rolling_s(left.row, periods[0]) + rolling_s(right.row, periods[1])
@@ -128,7 +131,7 @@ def _edges(signal: _Signal) -> list[tuple[float, bool]]:
     edges: list[tuple[float, bool]] = []
     times, values = signal.times_s, signal.values
     is_bright = bool(values[0] > 0.5)
-    crossing: float | None = None
+    crossing = math.nan
     for before, after in zip(range(len(times) - 1), range(1, len(times)), strict=True):
         low, high = values[before], values[after]
         if (low <= 0.5) != (high <= 0.5):
@@ -138,7 +141,7 @@ def _edges(signal: _Signal) -> list[tuple[float, bool]]:
         now_bright = bool(high > (_LOW if is_bright else _HIGH))
         if now_bright is not is_bright:
             is_bright = now_bright
-            if crossing is not None and not math.isnan(crossing):
+            if not math.isnan(crossing):
                 edges.append((crossing, is_bright))
     return edges
 

@@ -37,6 +37,10 @@ _SLOWEST_HZ: Final = 5.0
 _RATE_OFF: Final = 0.002
 """How far the screen's rate as first fitted may be off: a refresh in eight seconds at 60 Hz is 0.2 %."""
 
+_FITS: Final = 4
+_FAR_OFF: Final = 3.0
+"""A time is left out of the fit of the rate if it is off by so many medians, or refreshes: the two cameras' may lie to either side of the line."""
+
 _SLACKS_S: Final = (0.0003, 0.001, 0.002, 0.004, 0.008)
 """How far stamps may be off by themselves: the least that makes all frames agree is taken."""
 
@@ -59,7 +63,7 @@ class Reading:
     row: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Counted:
     """What one camera read.
 
@@ -210,11 +214,11 @@ def counted(times_s: Times, readings: list[Reading | None]) -> Counted:
     """
     found = [(t, reading) for t, reading in zip(times_s, readings, strict=True) if reading is not None]
     return Counted(
-        len(times_s),
-        np.array([t for t, _ in found]),
-        np.array([reading.number for _, reading in found], dtype=np.int64),
-        float(np.mean([reading.row for _, reading in found])) if found else 0.5,
-        period_s(times_s) if len(times_s) > 1 else 0.0,
+        shots=len(times_s),
+        times_s=np.array([t for t, _ in found]),
+        numbers=np.array([reading.number for _, reading in found], dtype=np.int64),
+        row=float(np.mean([reading.row for _, reading in found])) if found else 0.5,
+        period=period_s(times_s) if len(times_s) > 1 else 0.0,
     )
 
 
@@ -241,9 +245,18 @@ def _unwrap(board: Counted, host: Counted) -> tuple[float, Times, Times]:
         unwrapped[index] = numbers[index] + COUNT * round((expected - numbers[index]) / COUNT)
         if abs(unwrapped[index] - expected) < COUNT / 8:
             last_s, last = float(times[index]), float(unwrapped[index])
-    slope = np.polyfit(unwrapped, times, 1)[0]
     split = len(board.times_s)
-    return float(slope), unwrapped[:split], unwrapped[split:]
+    return _refresh_s(times, unwrapped), unwrapped[:split], unwrapped[split:]
+
+
+def _refresh_s(times: Times, numbers: Times) -> float:
+    """The slope of the times over the numbers, but for those far off their line: a misread cell may change a number by thousands."""
+    line, use = np.zeros(2), np.ones(len(times), dtype=np.bool_)
+    for _ in range(_FITS):
+        line = np.polyfit(numbers[use], times[use], 1)
+        off_s = np.abs(times - np.polyval(line, numbers))
+        use = off_s <= _FAR_OFF * max(float(np.median(off_s)), abs(float(line[0])))
+    return float(line[0])
 
 
 def _spread_ms(left: Times, right: Times, offset_s: float) -> float:

@@ -14,16 +14,30 @@ EXAMPLES = """  phone-host calibrate left/ right/ --board 9x6 --square 25mm --ou
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
-    parser.add_argument("left", metavar="LEFT", help="images of the left camera: a folder or a quoted glob")
-    parser.add_argument("right", metavar="RIGHT", help="images of the right camera, paired by the number in the name")
+    parser.add_argument("left", metavar="LEFT", help="pictures of the left camera: a folder or a quoted glob")
+    parser.add_argument(
+        "right",
+        metavar="RIGHT",
+        help="pictures of the right camera; each is paired with the left picture that has the same number in its name",
+    )
     parser.add_argument("--board", required=True, metavar="9x6", help="inner corners of the chessboard: columns x rows")
     parser.add_argument(
-        "--square", required=True, metavar="25mm", help="side of a square: 25mm, 2.5cm, 0.025m (bare number: mm)"
+        "--square",
+        required=True,
+        metavar="25mm",
+        help="side of one square: 25mm, 2.5cm or 0.025m; a number alone means mm",
     )
     parser.add_argument(
-        "--board-side", choices=("left", "right"), default="left", help="which camera hangs on the board (default left)"
+        "--board-side",
+        choices=("left", "right"),
+        default="left",
+        help="which of the two is the board's camera (default left)",
     )
     parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="rig.yaml", help="the calibration; report.json goes beside it"
+        "--out",
+        type=Path,
+        required=True,
+        metavar="rig.yaml",
+        help="file for the calibration; report.json is written beside it",
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from phone_host.camera.examples import EXAMPLE
 
-SUMMARY = "measure what lies between the two cameras' stamps, with a screen, a lamp or a moving scene"
+SUMMARY = "measure the time offset between the two cameras with a screen, a lamp or a moving scene"
 
 EXAMPLES = """  phone-host calibrate-time --pattern pattern.html     (open it full screen in a browser, in view of both cameras)
   phone-host calibrate-time --by screen --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
@@ -16,20 +16,34 @@ EXAMPLES = """  phone-host calibrate-time --pattern pattern.html     (open it fu
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
-    parser.add_argument("--pattern", type=Path, metavar="FILE.html", help="write the screen's page, and nothing else")
+    parser.add_argument(
+        "--pattern", type=Path, metavar="FILE.html", help="write the page to show on a screen, then end"
+    )
     parser.add_argument(
         "--by",
         choices=("screen", "lamp", "scene"),
         default="screen",
-        help="what both cameras film: the page of --pattern, a lamp or LED switched at irregular moments, or, with a calibrated rig,"
-        " anything with texture that moves up and down (default screen)",
+        help="what both cameras film: the page of --pattern on a screen; a lamp that you switch at irregular moments; or, with"
+        " --calibration, any textured thing that moves up and down (default screen)",
     )
-    parser.add_argument("--link", metavar="URI", help="the board (default: the one that is found, as for run)")
+    parser.add_argument("--link", metavar="URI", help="address of the board (default: look for one, as `run` does)")
     parser.add_argument("--keys", default="", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
-    parser.add_argument("--camera", metavar="URI", help=f"the own camera: {EXAMPLE}")
-    parser.add_argument("--frames", type=Path, metavar="DIR", help="instead of both: frames kept by an earlier run")
-    parser.add_argument("--seconds", type=float, default=20.0, metavar="S", help="how long to film (default 20)")
-    parser.add_argument("--wait", type=float, metavar="S", help="wait this long for an absent board, then exit 3")
-    parser.add_argument("--calibration", type=Path, metavar="rig.yaml", help="gets the result; needed for --by scene")
+    parser.add_argument("--camera", metavar="URI", help=f"camera of this machine: {EXAMPLE}")
+    parser.add_argument(
+        "--frames",
+        type=Path,
+        metavar="DIR",
+        help="use the frames that an earlier run kept with --keep, instead of --link and --camera",
+    )
+    parser.add_argument("--seconds", type=float, default=20.0, metavar="S", help="seconds to film (default 20)")
+    parser.add_argument(
+        "--wait",
+        type=float,
+        metavar="S",
+        help="seconds to wait for a board, then exit with code 3 (default: wait for ever)",
+    )
+    parser.add_argument(
+        "--calibration", type=Path, metavar="rig.yaml", help="calibration to write the result into; --by scene needs it"
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for report.json and time-offset.svg")
-    parser.add_argument("--keep", action="store_true", help="keep the frames in --out, for --frames")
+    parser.add_argument("--keep", action="store_true", help="keep the frames in --out, for a later --frames")

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-SUMMARY = "both programs on this machine, a rendered scene with known truth, a full report"
+SUMMARY = "run both programs on this machine with a rendered scene, and report the depth error and every delay"
 
 EXAMPLES = """  phone-host demo
   phone-host demo --seconds 30 --out scan-demo
@@ -12,7 +12,7 @@ EXAMPLES = """  phone-host demo
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
-    parser.add_argument("--seconds", type=float, default=12.0, metavar="S", help="how long to stream (default 12)")
+    parser.add_argument("--seconds", type=float, default=12.0, metavar="S", help="seconds to stream (default 12)")
     parser.add_argument(
-        "--out", type=Path, default=Path("out/demo"), metavar="DIR", help="folder for results (default out/demo)"
+        "--out", type=Path, default=Path("out/demo"), metavar="DIR", help="folder for the results (default out/demo)"
     )

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-SUMMARY = "check Python, camera, link, rig and disk"
+SUMMARY = "check this machine, its camera, the board, the calibration and the disk"
 
 EXAMPLES = """  phone-host doctor
   phone-host doctor --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out scan
@@ -14,8 +14,23 @@ EXAMPLES = """  phone-host doctor
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
-    parser.add_argument("--link", action="append", metavar="URI", help="ask the board at this link; may be given again")
-    parser.add_argument("--camera", metavar="URI", help="stream from this own camera for a second")
+    parser.add_argument(
+        "--link",
+        action="append",
+        metavar="URI",
+        help="address of the board to check; repeat the option for several links",
+    )
+    parser.add_argument(
+        "--camera", metavar="URI", help="camera of this machine; the check streams from it for a second"
+    )
     parser.add_argument("--calibration", metavar="FILE", help="rig.yaml to check")
-    parser.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder of results (default: this one)")
-    parser.add_argument("--wait", type=float, default=5.0, metavar="S", help="wait this long for the board (default 5)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path(),
+        metavar="DIR",
+        help="folder for results; the check looks for free space there (default: the current folder)",
+    )
+    parser.add_argument(
+        "--wait", type=float, default=5.0, metavar="S", help="seconds to wait for the board (default 5)"
+    )

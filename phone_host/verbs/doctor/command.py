@@ -16,7 +16,12 @@ def run(options: argparse.Namespace) -> int:
         raise SettingsError(f"--wait {options.wait}", "give seconds, 0 or more")
     settings = resolve_settings(options).values
     question = Question(
-        settings.camera, settings.link, settings.calibration, options.out, options.wait, key_folder(settings.keys)
+        camera=settings.camera,
+        links=settings.link,
+        calibration=settings.calibration,
+        out=options.out,
+        wait_s=options.wait,
+        keys=key_folder(settings.keys),
     )
     findings = examine(question)
     print(json.dumps(values(findings)) if options.json else table(findings))

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-SUMMARY = "show or change this host's key and the boards that it knows"
+SUMMARY = "list the boards that this host trusts, or change the list or this host's key"
 
 EXAMPLES = """  phone-host keys
   phone-host keys --forget beaglebone
@@ -15,8 +15,10 @@ EXAMPLES = """  phone-host keys
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--forget", metavar="NAME", help="trust this board no longer")
-    what.add_argument("--new", action="store_true", help="make a new key in place of the old one")
+    what.add_argument("--forget", metavar="NAME", help="stop trusting this board")
+    what.add_argument(
+        "--new", action="store_true", help="replace this host's key; every board must then be paired again"
+    )
     what.add_argument("--add", nargs=3, metavar=("NAME", "LINK", "KEY"), help="trust a board without pairing")
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
     parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")

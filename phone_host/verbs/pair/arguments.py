@@ -5,7 +5,7 @@ from pathlib import Path
 
 from phone_host.boards.udev_rule import RULES
 
-SUMMARY = "get to know a board by the code that it shows"
+SUMMARY = "make this host and a board known to each other, with the code that the board shows"
 
 EXAMPLES = """  phone-host pair
   phone-host pair --link tcp://192.168.7.2:5555
@@ -21,17 +21,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--link",
         metavar="URI",
-        help="the board: tcp://HOST:PORT, or serial:DEVICE for --udev (default: it is looked for)",
+        help="address of the board: tcp://HOST:PORT, or serial:DEVICE with --udev (default: look for one)",
     )
-    parser.add_argument("--code", metavar="DIGITS", help="the code, if the board shows it already")
     parser.add_argument(
-        "--pairing-port", type=int, metavar="PORT", help="the board's door (default: the port behind the link's)"
+        "--code", metavar="DIGITS", help="the code, if the board already shows it (default: ask for it)"
+    )
+    parser.add_argument(
+        "--pairing-port",
+        type=int,
+        metavar="PORT",
+        help="port on which the board takes in new hosts (default: the link's port + 1)",
     )
     parser.add_argument(
         "--udev",
         action="store_true",
-        help=f"write {RULES} for the board on the USB cable: by its vendor, product and serial number it gets the names"
-        " /dev/tandemscan-board and tandemscan0; this names the device and authenticates nobody; needs root",
+        help=f"write {RULES}, which gives the board on the USB cable the names /dev/tandemscan-board and tandemscan0; the rule goes"
+        " by vendor, product and serial number and so authenticates nobody; needs root",
     )
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
     parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")

@@ -7,7 +7,7 @@ from phone_host.camera.examples import EXAMPLE
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 from phone_host.verbs.stereo_arguments import add_stereo_arguments
 
-SUMMARY = "pair a board's frames with the own camera's, compute depth, measure every delay"
+SUMMARY = "pair the board's frames with those of this machine's camera, compute depth, measure every delay"
 
 EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --calibration rig.yaml --out scan
   phone-host run --link ipc://$XDG_RUNTIME_DIR/board --camera 'replay:right?pace=demand' --rectified --disparities 64 --pairs 20 --out scan
@@ -25,41 +25,52 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--link",
         action="append",
         metavar="URI",
-        help="the board: tcp://HOST:PORT, ipc://PATH[?owner=USER], serial:DEVICE or rfcomm://DEVICE (default: the board is looked for); may be given again:"
-        " frames come over the best link that is up",
+        help="address of the board: tcp://HOST:PORT, ipc://PATH[?owner=USER], serial:DEVICE or rfcomm://DEVICE (default: look for a board); repeat the option:"
+        " the frames come over the best link that is up",
     )
-    parser.add_argument("--camera", metavar="URI", help=f"the own camera: {EXAMPLE}")
+    parser.add_argument("--camera", metavar="URI", help=f"camera of this machine: {EXAMPLE}")
     add_stereo_arguments(parser)
     parser.add_argument(
-        "--board-side", choices=("left", "right"), help="which view the board's camera is (default left, or the rig's)"
+        "--board-side",
+        choices=("left", "right"),
+        help="which view the board's camera gives (default: as in the calibration, else left)",
     )
     parser.add_argument(
         "--tolerance",
         type=float,
         metavar="MS",
-        help="greatest time skew of a pair (default: half of the longer frame period)",
+        help="greatest difference of the two exposure times in a pair (default: half of the longer frame period)",
     )
     parser.add_argument(
-        "--fifo", metavar="DEPTH:POLICY", help="drop-oldest, drop-newest or block (default 1:drop-oldest)"
+        "--fifo",
+        metavar="DEPTH:POLICY",
+        help="length of the queue before the matcher, and what happens when it is full: drop-oldest, drop-newest or block (default 1:drop-oldest)",
     )
     parser.add_argument(
         "--align-phase",
         nargs="?",
         const="either",
         choices=("either", "board", "host"),
-        help="steer a camera until both expose together; which one may be steered (default either)",
+        help="shift the exposure of one camera until both expose together; say which one may be shifted (default either)",
     )
     parser.add_argument(
         "--interpolate",
         action="store_true",
         default=None,
-        help="move the board's image to the host's moment along the optical flow, where no camera can be steered",
+        help="move the board's image along the optical flow to the moment of the other camera's exposure",
     )
     parser.add_argument(
-        "--pairs", type=int, default=0, metavar="N", help="end after N pairs; fewer when the stream ends: exit 4"
+        "--pairs",
+        type=int,
+        default=0,
+        metavar="N",
+        help="end after N pairs; exit with code 4 if the stream ends before that",
     )
     parser.add_argument(
-        "--wait", type=float, metavar="S", help="wait this long for an absent board, then exit 3 (default: for ever)"
+        "--wait",
+        type=float,
+        metavar="S",
+        help="seconds to wait for a board, then exit with code 3 (default: wait for ever)",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder for delays.jsonl, report.json, index.html and saved pairs"
@@ -69,8 +80,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=30,
         metavar="N",
-        help="save every Nth pair from the first on; 0: none (default 30)",
+        help="save every Nth pair, beginning with the first; 0 saves none (default 30)",
     )
     parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
     parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
-    parser.add_argument("--log-level", choices=("debug", "info", "warning", "error"), help="how much to log to stderr")
+    parser.add_argument(
+        "--log-level",
+        choices=("debug", "info", "warning", "error"),
+        help="least important messages that are logged to stderr",
+    )

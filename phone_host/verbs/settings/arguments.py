@@ -6,7 +6,7 @@ from pathlib import Path
 
 from phone_host.declared_settings import PhoneHostSettings
 
-SUMMARY = "print each setting with its origin"
+SUMMARY = "print each setting, its value and where the value comes from"
 
 EXAMPLES = """  phone-host settings
   phone-host settings --config host.toml --tolerance 5

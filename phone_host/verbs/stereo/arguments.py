@@ -6,7 +6,7 @@ from pathlib import Path
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 from phone_host.verbs.stereo_arguments import add_stereo_arguments
 
-SUMMARY = "disparity and point cloud of one pair of images"
+SUMMARY = "compute the disparity and the point cloud of one pair of images"
 
 EXAMPLES = """  phone-host stereo left.png right.png --calibration rig.yaml --out scan
   phone-host stereo im0.png im1.png --rectified --disparities 64 --out scan          (no focal length: no cloud.ply)
@@ -17,10 +17,14 @@ EXAMPLES = """  phone-host stereo left.png right.png --calibration rig.yaml --ou
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
-    parser.add_argument("left", type=Path, metavar="LEFT", help="image of the left camera, any format, 8 or 16 bit")
+    parser.add_argument("left", type=Path, metavar="LEFT", help="image of the left camera (8 or 16 bit)")
     parser.add_argument("right", type=Path, metavar="RIGHT", help="image of the right camera")
     add_stereo_arguments(parser)
     parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for the results, made if missing"
+        "--out",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="folder for the results; it is created if it does not exist",
     )

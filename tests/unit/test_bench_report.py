@@ -1,4 +1,4 @@
-"""The delay benchmark's pure parts: what is asked for, what is left out, what is said."""
+"""What the delay benchmark leaves out, and what it says: report, tables, page, figure."""
 
 import dataclasses
 import html
@@ -13,29 +13,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.errors import SettingsError
 from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts
 from phone_host.bench.analysis import Analysis, WhatIf, analyse
 from phone_host.bench.cases import (
-    LOCAL_LINKS,
-    SHAPED_LINKS,
     Case,
     Interface,
     Size,
-    cases,
-    interfaces,
-    parse_links,
-    parse_qualities,
-    parse_rates,
-    parse_sizes,
 )
 from phone_host.bench.changes import parse_changes
-from phone_host.bench.emulate import PROFILES
 from phone_host.bench.page import figure, page
 from phone_host.bench.prediction import Figures, Unknown
 from phone_host.bench.report import Conditions, as_json, losses
-from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up, rig_of
+from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up
 from phone_host.bench.tables import (
     checked_rows,
     fit_lines,
@@ -96,7 +86,7 @@ def result(pairs: int = 100, link: str = "tcp") -> CaseResult:
     host = PairCounts(received=102, paired=101, dropped=1, taken=100, board_orphans=(("no_partner", 1),))
     kept, measured_s = after_warm_up([ledger(number) for number in range(pairs)])
     board = BoardAccount(108, 105, (("no_host", 3),))
-    case = Case(Interface(link), Size(640, 480), 80, 30)
+    case = Case(interface=Interface(link), size=Size(640, 480), quality_percent=80, rate_hz=30)
     return CaseResult(
         case=case,
         ledgers=kept,
@@ -126,93 +116,6 @@ def keys_of_numbers(value: Any, key: str = "") -> list[str]:
     if isinstance(value, list):
         return [found for inner in value for found in keys_of_numbers(inner, key)]
     return [key] if isinstance(value, int | float) else []
-
-
-@given(st.lists(st.sampled_from(LOCAL_LINKS), min_size=1))
-def test_links_are_each_measured_once(names: list[str]) -> None:
-    """Links come out in the order in which they were first named, none twice."""
-    assert parse_links(" , ".join(names)) == tuple(dict.fromkeys(names))
-
-
-@pytest.mark.parametrize("text", ["usb", "tcp,foo", "", ",", "TCP"])
-def test_a_link_that_is_not_there_is_refused_with_those_that_are(text: str) -> None:
-    """The message of the refusal lists every link that can be measured."""
-    with pytest.raises(SettingsError) as caught:
-        parse_links(text)
-    assert all(name in caught.value.remedy for name in LOCAL_LINKS)
-
-
-@given(st.text())
-def test_any_text_is_read_or_refused(text: str) -> None:
-    """Whatever is typed for sizes, rates or links gives values or one SettingsError, nothing else."""
-    for parse in (parse_sizes, parse_rates, parse_qualities, parse_links):
-        try:
-            assert parse(text)
-        except SettingsError as error:
-            assert "\n" not in error.remedy  # noqa: PT017 - any text is allowed to be refused
-
-
-@pytest.mark.parametrize(
-    "text", ["640", "640x", "x480", "0x0", "640x480x3", "-640x480", "63x480", "99999x9", "\u0666\u0664\u0660x480"]
-)
-def test_a_size_of_no_use_is_refused(text: str) -> None:
-    """Sizes are WIDTHxHEIGHT in plain digits within the limits."""
-    with pytest.raises(SettingsError):
-        parse_sizes(text)
-
-
-@pytest.mark.parametrize("text", ["0", "-1", "29.97", "241", "a", ""])
-def test_a_rate_of_no_use_is_refused(text: str) -> None:
-    """Rates are whole numbers from 1 to 240."""
-    with pytest.raises(SettingsError):
-        parse_rates(text)
-
-
-@pytest.mark.parametrize("text", ["0", "101", "80.5", "-1", "best", "", ","])
-def test_a_quality_of_no_use_is_refused(text: str) -> None:
-    """JPEG qualities are whole numbers from 1 to 100."""
-    with pytest.raises(SettingsError):
-        parse_qualities(text)
-
-
-@pytest.mark.parametrize("text", ["tcp://", "tcp://192.168.7.2", "pigeon:5555", "serial:"])
-def test_a_uri_of_no_link_is_refused(text: str) -> None:
-    """What has a colon is a board's address and is checked as one."""
-    with pytest.raises(SettingsError):
-        parse_links(text)
-
-
-def test_every_profile_is_carried_by_its_own_link_or_the_named_ones() -> None:
-    """Without names each profile has its own carrier; with names every link stands in for every profile; without profiles links are themselves."""
-    assert interfaces((), PROFILES) == tuple(Interface(one.carrier, one) for one in PROFILES)
-    assert len(interfaces(SHAPED_LINKS, PROFILES)) == len(SHAPED_LINKS) * len(PROFILES)
-    assert interfaces((), ()) == tuple(Interface(link) for link in LOCAL_LINKS)
-    assert [one.is_remote for one in interfaces(("tcp", "tcp://192.168.7.2:5555"), ())] == [False, True]
-
-
-@pytest.mark.parametrize("link", ["rfcomm", "tcp://192.168.7.2:5555"])
-def test_what_is_not_local_cannot_be_shaped(link: str) -> None:
-    """A real radio or a real board stands for itself only."""
-    with pytest.raises(SettingsError) as caught:
-        interfaces((link,), PROFILES)
-    assert link in caught.value.problem
-
-
-def test_cases_are_all_combinations_with_links_next_to_each_other() -> None:
-    """Every link is measured with every size and rate, and the links of one size and rate follow each other."""
-    measured = (Interface("tcp"), Interface("ipc"))
-    planned = cases(measured, (Size(320, 240), Size(640, 480)), (50, 80), (15, 30))
-    assert len(set(planned)) == len(planned) == 16
-    assert [case.interface.link for case in planned] == ["tcp", "ipc"] * 8
-    assert all(first.images == second.images for first, second in zip(planned[::2], planned[1::2], strict=True))
-
-
-@given(st.integers(64, 4096), st.integers(64, 4096))
-def test_a_rig_of_any_size_has_the_same_field_of_view(width_px: int, height_px: int) -> None:
-    """Half the width over the focal length is the same for every size (tan of half the angle), and the centre is the middle."""
-    camera = rig_of(Size(width_px, height_px)).left
-    assert width_px / 2 / camera.matrix[0, 0] == pytest.approx(320 / 525, rel=1e-12)
-    assert (camera.matrix[0, 2], camera.matrix[1, 2]) == ((width_px - 1) / 2, (height_px - 1) / 2)
 
 
 @given(st.integers(0, 200))
@@ -380,7 +283,9 @@ def test_page_is_whole_html_and_refers_to_nothing_outside() -> None:
 
     checker = Checker()
     checker.open_tags = []
-    small = dataclasses.replace(result(), case=Case(Interface("tcp"), Size(320, 240), 80, 15))
+    small = dataclasses.replace(
+        result(), case=Case(interface=Interface("tcp"), size=Size(320, 240), quality_percent=80, rate_hz=15)
+    )
     results = [result(), result(link="ipc"), small]
     text = page(results, UNDER, analysed(*results))
     checker.feed(text)
@@ -415,7 +320,15 @@ def test_figure_is_an_svg_file_of_its_own() -> None:
 
 def test_predictions_stand_in_terminal_and_tables_with_reasons_where_there_are_none() -> None:
     """Each run beside its prediction, and what was asked for; a prediction that could not be made says why in its place."""
-    said = Figures(12.5, 0.25, 3e6, 4e6, 5e6, 21e6, 30e6)
+    said = Figures(
+        pairs_per_s=12.5,
+        lost_share=0.25,
+        propagation_p50_ns=3e6,
+        queuing_p95_ns=4e6,
+        starvation_p50_ns=5e6,
+        end_to_end_p50_ns=21e6,
+        end_to_end_p95_ns=30e6,
+    )
     why = Unknown("nothing else was measured")
     checked = analysed(result()).checked[0]
     assert checked.measured.end_to_end_p50_ns == 30e6

@@ -1,0 +1,93 @@
+"""Runs the documentation's command lines that need no hardware: `python -m tests.docs.run` (all of them; the tests run the quick ones).
+
+Each page's commands run in its order in one folder, which holds what the pages speak of: pictures of a chessboard from both cameras, one pair, a calibration.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Final
+
+import cv2
+
+from phone_host.output.rig_yaml import write_rig
+from phone_host.stereo.rectify import rectify_rig
+from tests.docs.commands import Command, documented
+from tests.support.boards import poses, render_pair
+from tests.support.rigs import unlike_rig
+
+_HARDWARE: Final = (
+    "v4l2:",
+    "192.168.",
+    "http:",
+    "serial:",
+    "rfcomm:",
+    "tcp://",
+    "--udev",
+    "BOARD",
+    "host.toml",
+    "wall",
+    "opencv-bm",
+)
+"""What stands for a device, an address or a name of the reader's own. `wall` has a test of its own (test_contributing.py)."""
+
+_LONG: Final = ("demo", "delay-bench", "calibrate")
+_MODULES: Final = {
+    "phone-host": "phone_host.cli",
+    "board-agent": "board_agent.cli",
+    "delay-bench": "phone_host.bench.cli",
+}
+_PATIENCE_S: Final = 300
+
+
+def needs_hardware(command: Command) -> bool:
+    """Whether it asks for a device, another machine or a file that only the reader has."""
+    return command.is_mention or any(word in command.line for word in _HARDWARE)
+
+
+def is_long(command: Command) -> bool:
+    """Whether it takes more than 5 s."""
+    return not {*command.words[:2]}.isdisjoint(_LONG)
+
+
+def prepare(folder: Path) -> None:
+    """Put there what the pages take for given."""
+    rig = unlike_rig()
+    for side in ("left", "right"):
+        (folder / side).mkdir()
+    for number, pose in enumerate(poses(12, seed=5)):
+        for side, image in zip(("left", "right"), render_pair(rig, pose), strict=True):
+            cv2.imwrite(str(folder / side / f"{number:02d}.png"), image)
+            cv2.imwrite(str(folder / f"{side}.png"), image)
+    write_rig(folder / "rig.yaml", rig, rectify_rig(rig))
+
+
+def run(command: Command, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run it as it is printed, in that folder."""
+    arguments = [sys.executable, "-P", "-m", _MODULES[command.words[0]], *command.words[1:]]
+    environment = {**os.environ, "XDG_CONFIG_HOME": str(folder / "config")}
+    return subprocess.run(
+        arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=_PATIENCE_S
+    )
+
+
+def main() -> None:
+    """Run all of them; exit 4 when one fails."""
+    failed = 0
+    with tempfile.TemporaryDirectory() as name:
+        prepare(Path(name))
+        for command in documented():
+            if needs_hardware(command):
+                continue
+            done = run(command, Path(name))
+            failed += done.returncode != 0
+            print(f"{'ok  ' if done.returncode == 0 else 'FAIL'} {command.page}: {command.line}")
+            if done.returncode:
+                print(done.stderr, file=sys.stderr)
+    sys.exit(4 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()

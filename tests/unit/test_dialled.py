@@ -1,0 +1,63 @@
+"""A connection that is dialled: its news wakes who waits for them, whenever they came."""
+
+import socket
+from pathlib import Path
+
+import zmq
+
+from common.errors import UnavailableError
+from common.link.base import Broken
+from common.link.dialled import Dialled
+from common.link.waiter import Waiter, is_readable
+from common.link.zeromq import ZeroMqDialer
+from tests.support.keys import acquainted
+from tests.support.programs import until
+
+NEVER = 2**63 - 1
+
+
+def test_news_from_before_the_first_wait_wakes_who_waits() -> None:
+    """A peer that hung up before anybody waited is told of by the descriptor of the monitor alone."""
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        sock = context.socket(zmq.DEALER)
+        dialled = Dialled(sock, f"tcp://127.0.0.1:{server.getsockname()[1]}", "", "frames")
+        for _ in range(3):  # who dials again has written down that the one before was no good
+            accepted, _ = server.accept()
+            with accepted:
+                accepted.recv(64)
+        descriptor = int(dialled.monitor.fileno())
+        told = Waiter([descriptor]).wait(10_000)
+        sock.disable_monitor()
+        context.destroy(linger=0)
+    assert told == [descriptor]
+
+
+def test_both_lanes_of_a_link_that_is_refused_are_dialled_again(tmp_path: Path) -> None:
+    """When both lanes have been turned away by the time anybody looks, who waits on descriptors alone learns of both, so both are dialled again."""
+    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+    open_door = context.socket(zmq.ROUTER)
+    address = f"tcp://127.0.0.1:{open_door.bind_to_random_port('tcp://127.0.0.1')}"
+    keys = acquainted(tmp_path, address)[1]
+    dialler = ZeroMqDialer(address, keys, keys.peers()[0])
+    try:
+        lanes = dialler._connections.values()
+        until(lambda: all(is_readable(lane.monitor) for lane in lanes), "both lanes have news")
+        waiter = Waiter(lane.monitor.fileno() for lane in lanes)
+        refusals = receive(dialler)
+        while any(lane.due_ns == NEVER for lane in lanes):
+            assert waiter.wait(10_000), "news wakes"
+            refusals += receive(dialler)
+        assert refusals
+    finally:
+        dialler.close()
+        context.destroy(linger=0)
+
+
+def receive(dialler: ZeroMqDialer) -> int:
+    """Look once; how many refusals that told, one or none."""
+    try:
+        assert not [incoming for incoming in dialler.receive() if not isinstance(incoming, Broken)]
+    except UnavailableError:
+        return 1
+    return 0

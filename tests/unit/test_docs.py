@@ -1,0 +1,72 @@
+"""What the documentation says is what the programs do."""
+
+import argparse
+import re
+
+import pytest
+
+import board_agent.cli
+import phone_host.bench.cli
+import phone_host.cli
+from tests.docs import troubleshooting
+from tests.docs.commands import ROOT, Command, documented, pages
+
+_PARSERS = {
+    "phone-host": phone_host.cli.parser,
+    "board-agent": board_agent.cli.parser,
+    "delay-bench": phone_host.bench.cli.parser,
+}
+_CODE = troubleshooting.Code(troubleshooting.packages())
+_COMMANDS = documented()
+
+
+@pytest.mark.parametrize("command", _COMMANDS, ids=lambda command: f"{command.page} {command.line}"[:90])
+def test_every_command_line_is_one_that_the_program_takes(command: Command) -> None:
+    """The real parser takes it; what only names a verb names one that there is."""
+    parser = _PARSERS[command.words[0]]()
+    if command.is_mention:
+        assert set(command.named[1:]) <= _verbs(parser)
+    else:
+        parser.parse_args(command.words[1:])
+
+
+def test_the_pages_are_read() -> None:
+    """Each page of the first steps has command lines, so that a change of their layout does not empty the test above."""
+    counts = {
+        page.name: sum(command.page.startswith(str(page.relative_to(ROOT))) for command in _COMMANDS)
+        for page in pages()
+    }
+    for name in ("README.md", "first-scan.md", "board.md", "host.md", "calibration.md", "delays.md", "links.md"):
+        assert counts[name] >= 2, name
+
+
+def test_every_error_stands_in_troubleshooting_with_its_remedy() -> None:
+    """No message is unreadable for the page's maker, and the page is the one that the code makes today (`make docs` writes it)."""
+    assert troubleshooting.unresolved(_CODE) == []
+    assert troubleshooting.PAGE.read_text(encoding="utf-8") == troubleshooting.page(_CODE)
+
+
+def test_troubleshooting_misses_no_error() -> None:
+    """As many messages as there are calls that make errors: counted in the source text, not in the tree that the page is made of."""
+    raised = re.compile(rf"\b({'|'.join(_CODE.errors)})\(\n?\s*[^)\s]")
+    in_text = sum(len(raised.findall(path.read_text(encoding="utf-8"))) for path in troubleshooting.packages())
+    rows = [
+        line
+        for line in troubleshooting.PAGE.read_text(encoding="utf-8").splitlines()
+        if line.endswith(("| 2 |", "| 3 |", "| 4 |"))
+    ]
+    assert in_text >= 250
+    assert len(rows) >= 0.9 * in_text  # some places say the same
+
+
+def test_readme_is_one_screen() -> None:
+    """At most 120 lines of 120 characters and 900 words; every figure in it comes from the page of figures."""
+    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    assert len(lines) <= 120
+    assert max(map(len, lines)) <= 120
+    assert sum(len(line.split()) for line in lines) <= 900
+
+
+def _verbs(parser: argparse.ArgumentParser) -> set[str]:
+    actions = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    return {name for action in actions for name in action.choices}

@@ -1,0 +1,217 @@
+"""Plots: numbers stand where the data say, nothing is made up."""
+
+import math
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phone_host.svg.plot_scale import Linear, Log, duration_text, log_scale, span, ticks
+from phone_host.svg.plots import (
+    Budget,
+    Part,
+    Quantity,
+    Strips,
+    budgets,
+    distributions,
+    over_time,
+    stacked_over_time,
+)
+
+
+def svg(text: str) -> ET.Element:
+    return ET.fromstring(text)
+
+
+def titles(root: ET.Element) -> list[str]:
+    return [element.text or "" for element in root.iter("title")]
+
+
+@settings(deadline=None, max_examples=50)
+@given(parts=st.lists(st.floats(1.0, 1e9), min_size=1, max_size=6), width=st.integers(300, 1200))
+def test_budget_bars_have_the_lengths_of_their_parts(parts: list[float], width: int) -> None:
+    """The parts of the longest bar fill the width, side by side, each as long as its share."""
+    row = Budget("all", tuple(Part(f"p{index}", value, index) for index, value in enumerate(parts)))
+    bars = svg(budgets([row], width)).findall("rect")
+    edge = 0.0
+    for bar, value in zip(bars, parts, strict=True):
+        assert float(bar.get("x", "nan")) == pytest.approx(edge, abs=0.11)
+        assert float(bar.get("width", "nan")) == pytest.approx(width * value / math.fsum(parts), abs=0.11)
+        edge += width * value / math.fsum(parts)
+
+
+def test_several_budgets_share_one_axis() -> None:
+    """A bar of half the sum is half as long."""
+    bars = svg(budgets([Budget("a", (Part("x", 10.0, 0),)), Budget("b", (Part("x", 5.0, 0),))], 400)).findall("rect")
+    assert [float(bar.get("width", "nan")) for bar in bars] == [400.0, 200.0]
+
+
+def test_stacked_columns_reach_their_sums() -> None:
+    """Each layer starts where the one below ends, and heights are proportional to values."""
+    layers = [
+        Quantity(label="a", values_ns=np.array([10e6, 20e6]), colour=0),
+        Quantity(label="b", values_ns=np.array([30e6, 20e6]), colour=1),
+    ]
+    root = svg(stacked_over_time(np.array([0.0, 1.0]), layers, 500, 260))
+    lower, upper = (
+        [float(v) for v in re.findall(r"V([\d.]+)", path.get("d", ""))] for path in root.findall("path[@style]")
+    )
+    # (top, bottom) of both columns: totals of 40 ms reach the top of the frame at y = 24, zero is at y = 260 - 34 = 226.
+    height = 226.0 - 24.0
+    assert lower == pytest.approx([226 - height / 4, 226.0, 226 - height / 2, 226.0], abs=0.06)
+    assert upper == pytest.approx([24.0, 226 - height / 4, 24.0, 226 - height / 2], abs=0.06)
+    assert titles(root)[0].replace("\u202f", " ") == "pair 1: 40.0 ms\na 10.0 ms\nb 30.0 ms"
+
+
+def test_many_pairs_become_means_that_still_add_up() -> None:
+    """Beyond one pair for three pixels, columns are means over slices of time, weighted they give the mean of all."""
+    count = 5000
+    values = np.random.default_rng(1).uniform(1e6, 9e6, count)
+    root = svg(stacked_over_time(np.arange(count) / 30.0, [Quantity(label="a", values_ns=values, colour=0)], 500))
+    names = titles(root)
+    assert 100 <= len(names) <= 146
+    total, pairs = 0.0, 0
+    for name in names:
+        found = re.match(r"mean of pairs (\d+) to (\d+): ([\d.]+)", name)
+        assert found is not None
+        size = int(found[2]) - int(found[1]) + 1
+        total, pairs = total + size * float(found[3]), pairs + size
+    assert pairs == count
+    assert total / pairs == pytest.approx(values.mean() / 1e6, rel=0.002)
+
+
+def test_a_gap_in_time_stays_a_gap() -> None:
+    """A pause in the stream shows as empty room, not as a column stretched over it."""
+    time_s = np.concatenate([np.arange(10.0), 100.0 + np.arange(10.0)])
+    root = svg(stacked_over_time(time_s, [Quantity(label="a", values_ns=np.ones(20), colour=0)], 500))
+    widths = [float(hit.get("width", "nan")) for hit in root.findall("rect")]
+    # 438 px for 110 s: every column is one second wide.
+    assert max(widths) == pytest.approx(438.0 / 110.0, abs=0.1)
+
+
+def test_an_outlier_is_cut_off_and_marked() -> None:
+    """One pair a hundred times slower than the rest does not flatten them: it is marked with its own value."""
+    values = np.full(100, 10e6)
+    values[50] = 1000e6
+    root = svg(stacked_over_time(np.arange(100.0), [Quantity(label="a", values_ns=values, colour=0)], 500))
+    late = root.findall("path[@class='late']")
+    assert [title.text for mark in late for title in mark.iter("title")] == ["1.00\u202fs"]
+    tops = [float(v) for v in re.findall(r"V([\d.]+)H", root.findall("path[@style]")[0].get("d", ""))]
+    # The usual columns still fill 1 / 1.25 of the frame of 202 px.
+    assert tops[0] == pytest.approx(226.0 - 202.0 / 1.25, abs=0.1)
+
+
+def test_strips_show_the_percentiles() -> None:
+    """Bar, median line and numbers stand at the percentiles of the data on the logarithmic axis."""
+    values = np.arange(0.0, 1001.0) * 1000.0  # 0 to 1 ms in steps of 1 µs: percentile p is p * 10 µs
+    root = svg(
+        distributions([Strips("tcp", (Quantity(label="queuing", values_ns=values, colour=4, meaning="waiting"),))], 520)
+    )
+    words = " ".join(text.text or "" for text in root.iter("text"))
+    assert "tcp" in words
+    assert "p50 500 µs · p95 950 µs · p99 990 µs" in words.replace("\u202f", " ")
+    # Decades 1 µs to 1 ms from x = 8 to x = 508.
+    bar = root.find(".//rect[@class='bar']")
+    assert bar is not None
+    left, right = (8.0 + 500.0 * (math.log10(p) - 3.0) / 3.0 for p in (50e3, 950e3))
+    assert float(bar.get("x", "nan")) == pytest.approx(left, abs=0.06)
+    assert float(bar.get("width", "nan")) == pytest.approx(right - left, abs=0.06)
+    median = root.find(".//path[@class='mark p50']")
+    assert median is not None
+    assert float(median.get("d", "")[1:].split()[0]) == pytest.approx(
+        8.0 + 500.0 * (math.log10(500e3) - 3.0) / 3.0, abs=0.06
+    )
+
+
+def test_what_was_not_measured_is_not_drawn() -> None:
+    """Only NaN gives `not measured` or an empty plot; NaN among numbers is left out."""
+    nothing = Quantity(label="offset", values_ns=np.full(5, np.nan), colour=0)
+    assert "not measured" in distributions([Strips("", (nothing,))], 400)
+    assert "no pairs" in over_time(np.arange(5.0), nothing, 400)
+    assert "no pairs" in stacked_over_time(np.zeros(0), [Quantity(label="a", values_ns=np.zeros(0), colour=0)], 400)
+    assert "nothing measured" in budgets([], 400)
+    some = Quantity(label="offset", values_ns=np.array([1.0, np.nan, 3.0]), colour=0)
+    assert len(svg(over_time(np.arange(3.0), some, 400)).findall("circle")) == 2
+
+
+def test_signed_values_stand_on_both_sides_of_zero() -> None:
+    """Equal skews of either sign stand equally far from the zero line, and later pairs further right."""
+    skew = Quantity(label="time skew", values_ns=np.array([-2e5, 2e5, 0.0]), colour=5)
+    root = svg(over_time(np.array([0.0, 1.0, 2.0]), skew, 400, band_ns=np.full(3, 5e4)))
+    x, y = zip(
+        *((float(dot.get("cx", "nan")), float(dot.get("cy", "nan"))) for dot in root.findall("circle")), strict=True
+    )
+    assert list(x) == sorted(x)
+    assert y[0] - y[2] == pytest.approx(y[2] - y[1], abs=0.15)
+    assert root.find("path[@class='band']") is not None
+
+
+def test_extremes_survive_thinning() -> None:
+    """With more pairs than can be told apart, the least and the greatest value are still drawn."""
+    values = np.zeros(10_000)
+    values[1234], values[4321] = 5e6, -7e6
+    drawn = " ".join(titles(svg(over_time(np.arange(10_000.0), Quantity(label="a", values_ns=values, colour=0), 340))))
+    assert "5.00\u202fms" in drawn
+    assert "-7.00\u202fms" in drawn
+
+
+@pytest.mark.parametrize(
+    ("ns", "text"),
+    [
+        (0.0, "0"),
+        (7.0, "7.00 ns"),
+        (999.0, "999 ns"),
+        (999.6, "1.00 µs"),
+        (12_345.0, "12.3 µs"),
+        (-2.5e6, "-2.50 ms"),
+        (99.96e6, "100 ms"),
+        (61.5e9, "61.5 s"),
+        (1234e9, "1234 s"),
+        (math.nan, "\u2013"),
+    ],
+)
+def test_durations_have_three_digits(ns: float, text: str) -> None:
+    """A duration reads with three significant digits in the fitting unit."""
+    assert duration_text(ns).replace("\u202f", " ") == text
+
+
+@settings(deadline=None, max_examples=200)
+@given(low=st.floats(-1e9, 1e9), width=st.floats(1e-3, 1e9), count=st.integers(2, 12))
+def test_ticks_are_round_and_inside(low: float, width: float, count: int) -> None:
+    """Ticks lie in the interval, are evenly spaced by 1, 2 or 5 times a power of ten, and are neither many nor missing."""
+    high = low + width
+    found = ticks(low, high, count)
+    assert len(found) <= count + 2
+    slack = 1e-6 * max(abs(low), abs(high), width)
+    assert all(low - slack <= tick <= high + slack for tick in found)
+    if len(found) > 1:
+        step = found[1] - found[0]
+        mantissa = step / 10.0 ** math.floor(math.log10(step * 1.0001))
+        assert min(abs(mantissa - good) for good in (1.0, 2.0, 5.0)) < 1e-3 * max(1.0, abs(low) / width)
+
+
+@settings(deadline=None)
+@given(value=st.floats(1e3, 1e9))
+def test_scales_keep_order_and_ends(value: float) -> None:
+    """Scales map their ends to their ends, keep values in between, and clamp what lies outside."""
+    for scale in (
+        Linear(low=1e3, high=1e9, start_px=10.0, end_px=110.0),
+        Log(low=1e3, high=1e9, start_px=10.0, end_px=110.0),
+    ):
+        assert scale.px(1e3) == pytest.approx(10.0)
+        assert scale.px(1e9) == pytest.approx(110.0)
+        assert 10.0 <= scale.px(value) <= 110.0
+        assert scale.px(-5.0) == 10.0
+        assert scale.px(1e12) == 110.0
+
+
+def test_axes_of_nothing_and_of_one_value_exist() -> None:
+    """No data or a single value still give an axis of positive length."""
+    assert span(np.zeros(0)) == (0.0, 1.0)
+    assert span(np.array([5.0, np.nan])) == (5.0, 6.0)
+    for values in (np.zeros(3), np.array([1e6])):
+        scale = log_scale(values, 0.0, 100.0)
+        assert scale.high > scale.low > 0.0

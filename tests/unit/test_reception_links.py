@@ -1,0 +1,93 @@
+"""What the host makes of two links to one board: which carries, what becomes of one whose frames are stuck; and what it does before there is any board."""
+
+from dataclasses import replace
+
+from common.protocol.board_session import BoardSession
+from common.protocol.message import BoardCounts, Lane, Ping
+from common.protocol.session import MS, Outgoing, connection_name
+from phone_host.stream.reception import LinkFacts, Reception
+from tests.support.session_world import CAMERA
+from tests.support.unkept import Unkept
+
+LANES = [{lane: connection_name(link, lane.name.encode()) for lane in Lane} for link in range(2)]
+
+
+class TwoLines:
+    """A reception and a board that answers at once, but for the time that an echo takes on each line; they share a clock.
+
+    Attributes:
+        round_trips_ns: of the lines.
+        mute: connections over which nothing comes back.
+    """
+
+    def __init__(self, *round_trips_ns: int) -> None:
+        self.round_trips_ns = round_trips_ns
+        self.mute: set[bytes] = set()
+        self.now_ns = 10**12
+        self.said: list[Outgoing] = []
+        facts = [LinkFacts(kind, lanes, self_paced=False) for kind, lanes in zip(("tcp", "ipc"), LANES, strict=True)]
+        self.reception = Reception(facts, "host", Unkept(), self.said.append)
+        self.board = BoardSession("life", "boot", CAMERA)
+
+    def run(self, duration_ns: int) -> list[str]:
+        """Let both talk; gives the names of the links that carried, in order."""
+        carriers = [self.reception.carrier]
+        for _ in range(duration_ns // (20 * MS)):
+            self.now_ns += 20 * MS
+            self.reception.tick(self.now_ns)
+            while self.said:
+                self._reach_board(self.said.pop(0))
+            if self.reception.carrier != carriers[-1]:
+                carriers.append(self.reception.carrier)
+        return carriers
+
+    def _reach_board(self, outgoing: Outgoing) -> None:
+        name, message = outgoing.connection, outgoing.message
+        if isinstance(message, Ping):
+            message = replace(message, t0_ns=self.now_ns - self.round_trips_ns[name[0]])
+        for reply in self.board.receive(name, message, self.now_ns, BoardCounts()):
+            if reply.connection not in self.mute:
+                self.reception.receive(reply.connection, reply.message, self.now_ns)
+
+
+def test_the_swifter_line_comes_to_carry() -> None:
+    """Of two lines the first one carries at once; where its echoes take 400 ms and the other one's 1 ms, the frames move over, in the same session."""
+    lines = TwoLines(400 * MS, MS)
+    assert lines.run(10_000 * MS) == ["", "tcp", "ipc"]
+    assert lines.board.carrier == 1
+    assert (lines.reception.account.switches, len(lines.reception.account.sessions)) == (1, 1)
+
+
+def test_a_line_whose_frames_are_stuck_stays_in_the_choice() -> None:
+    """Where no answer comes over the preferred line's lane for frames the other one carries, and the first one is up still: mended, it carries again."""
+    lines = TwoLines(MS, MS)
+    lines.mute = {LANES[0][Lane.FRAMES]}
+    assert lines.run(2_000 * MS)[-1] == "ipc"
+    tally = lines.reception.account.links[0]
+    assert tally.is_up
+    assert tally.lost == 1
+    lines.mute = set()
+    assert lines.run(10_000 * MS)[-1] == "tcp"
+
+
+def test_without_a_board_nobody_is_steered() -> None:
+    """A correction for a camera that nobody has met yet goes nowhere; once its board is there, one does."""
+    lines = TwoLines(MS, MS)
+    lines.reception.steer(5 * MS, lines.now_ns)
+    assert lines.said == []
+    lines.run(1_000 * MS)
+    lines.reception.steer(5 * MS, lines.now_ns)
+    [asked] = lines.said
+    lines._reach_board(asked)
+    assert lines.board.take_steering() == 5 * MS
+
+
+def test_a_leave_that_was_taken_before_any_frame_has_an_open_end() -> None:
+    """A board that greeted, but over whose lanes for frames nothing ever came: the account holds one session without a name, with nothing counted."""
+    lines = TwoLines(MS, MS)
+    lines.mute = {lanes[Lane.FRAMES] for lanes in LANES}
+    assert set(lines.run(500 * MS)) == {""}
+    assert lines.reception.leave(lines.now_ns)
+    lines.reception.lose_tail()
+    [account] = lines.reception.account.sessions
+    assert (account.session, account.vanished, account.received, account.latest) == ("", True, 0, BoardCounts())

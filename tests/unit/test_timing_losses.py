@@ -1,0 +1,186 @@
+"""Measuring the time offset where something goes wrong on the way: frames lost, numbers misread, stamps that jump, a lens covered for a moment."""
+
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from common.errors import DataError
+from common.frame import PixelFormat
+from phone_host.calibration.timing.lamp import CELLS, Brightness, measure_lamp
+from phone_host.calibration.timing.screen import COUNT, Counted, PatternReader, Reading, counted, draw, measure_screen
+from phone_host.calibration.timing.shared_motion import measure_shared_motion
+from phone_host.calibration.timing.shots import Measured, Shot, Times
+from phone_host.model import CameraModel, Image, Rig
+from phone_host.stereo.raw_images import EncodedImage
+from phone_host.stereo.rectify import Rectifier
+
+REFRESH_HZ = 60.0
+
+
+def offset_ms(measured: Measured) -> tuple[float, float]:
+    """Offset and uncertainty, ms."""
+    return measured.offset.offset_ns / 1e6, measured.offset.uncertainty_ns / 1e6
+
+
+# A screen.
+
+
+def read_at(times_s: Times, late_s: NDArray[np.float64] | float = 0.0, *, misread: tuple[int, ...] = ()) -> Counted:
+    """What a camera reads of a count that began at 0: its stamps are late; some numbers are far off."""
+    numbers = [int(t * REFRESH_HZ) + 1000 * (k in misread) for k, t in enumerate(times_s)]
+    return counted(times_s + late_s, [Reading(number % COUNT, 0.5) for number in numbers])
+
+
+BOARD_S, HOST_S = np.arange(240) / 29.7, np.arange(240) / 30.31 + 0.004
+
+
+def test_a_number_misread_now_and_then_changes_nothing() -> None:
+    """Two of 240 numbers that are off by a quarter of the count leave the offset where it is, and its uncertainty small."""
+    found, doubt = offset_ms(measure_screen(read_at(BOARD_S, misread=(50, 180)), read_at(HOST_S, 0.021)))
+    assert abs(found - 21.0) <= doubt < 2.0
+
+
+def test_stamps_that_jump_a_little_are_allowed_for() -> None:
+    """Where stamps are off by up to 1.5 ms at random the offset is still found, with more doubt than without."""
+    off_s = np.random.default_rng(1).uniform(-0.0015, 0.0015, len(HOST_S))
+    sure = offset_ms(measure_screen(read_at(BOARD_S), read_at(HOST_S, 0.021)))
+    found, doubt = offset_ms(measure_screen(read_at(BOARD_S), read_at(HOST_S, 0.021 + off_s)))
+    assert abs(found - 21.0) <= doubt
+    assert sure[1] < doubt < 8.0
+
+
+def test_stamps_that_jump_by_periods_are_refused() -> None:
+    """Stamps that are off by up to 60 ms at random fit no steady count: an error that says what else there is."""
+    off_s = np.random.default_rng(2).uniform(-0.06, 0.06, len(HOST_S))
+    with pytest.raises(DataError, match=r"do not fit the screen's count.*--by lamp"):
+        measure_screen(read_at(BOARD_S), read_at(HOST_S, off_s))
+
+
+def test_a_pattern_half_out_of_view_or_too_faint_is_not_read() -> None:
+    """One marker alone does not tell where the cells are, and grey on grey not which of them are dark: no number rather than a false one."""
+    reader, whole = PatternReader(), cv2.copyMakeBorder(draw(1234, 12), 30, 30, 30, 30, cv2.BORDER_CONSTANT, value=255)
+    reading = reader.read(np.asarray(whole, np.uint8))
+    assert reading is not None
+    assert reading.number == 1234
+    assert reader.read(np.asarray(whole[:150, :150], np.uint8)) is None
+    faint = np.asarray(120 + whole / 255.0 * 16, np.uint8)
+    assert reader.read(faint) is None
+
+
+# A lamp.
+
+Lost = NDArray[np.bool_] | None
+SWITCHES_S = np.cumsum(np.random.default_rng(5).uniform(0.15, 0.6, 30))
+FILM_S = np.arange(0.0, 12.0, 1 / 30)
+
+
+def lamp_seen(times_s: Times, late_s: float = 0.0, *, switches_s: Times | None = None, lost: Lost = None) -> Brightness:
+    """What a camera with an exposure of no length sees of a lamp that fills the image; frames may be lost."""
+    kept = times_s if lost is None else times_s[~lost]
+    light = 60.0 + 90.0 * (np.searchsorted(SWITCHES_S if switches_s is None else switches_s, kept) % 2)
+    return Brightness(kept + late_s, np.repeat(light[:, np.newaxis], CELLS[0] * CELLS[1], axis=1))
+
+
+def test_a_change_that_falls_into_a_gap_counts_for_nothing() -> None:
+    """Where three frames are lost around every fourth change those could be anywhere: they are left out, and the others give the offset."""
+    gaps = np.abs(FILM_S[:, np.newaxis] - SWITCHES_S[::4]).min(axis=1) < 0.05
+    whole = measure_lamp(lamp_seen(FILM_S), lamp_seen(FILM_S + 0.011, 0.025))
+    holed = measure_lamp(lamp_seen(FILM_S, lost=gaps), lamp_seen(FILM_S + 0.011, 0.025))
+    assert holed.samples <= whole.samples - 7
+    for measured in (whole, holed):
+        found, doubt = offset_ms(measured)
+        assert abs(found - 25.0) <= doubt < 15.0
+
+
+def test_a_regular_lamp_is_refused_though_a_change_was_missed() -> None:
+    """Two changes that fall into gaps make two pauses of double length: the lamp blinks regularly all the same, and may keep step."""
+    regular_s = np.arange(0.368, 10.6, 0.347)
+    gaps = np.abs(FILM_S[:, np.newaxis] - regular_s[[8, 17]]).min(axis=1) < 0.05
+    seen_by_host = lamp_seen(FILM_S + 0.011, 0.025, switches_s=regular_s)
+    with pytest.raises(DataError, match="regularly"):
+        measure_lamp(lamp_seen(FILM_S, switches_s=regular_s, lost=gaps), seen_by_host)
+
+
+def test_a_switch_that_bounces_tells_nothing_where_it_does() -> None:
+    """A swift camera sees every third change three times within 40 ms, a slow one once: which of them it saw is left open, and the others give the offset."""
+    bounces_s = np.sort(np.concatenate([SWITCHES_S, SWITCHES_S[::3] + 0.02, SWITCHES_S[::3] + 0.04]))
+    swift_s = np.arange(0.0, 12.0, 1 / 100)
+    once = measure_lamp(lamp_seen(FILM_S), lamp_seen(swift_s, 0.025))
+    bounced = measure_lamp(lamp_seen(FILM_S), lamp_seen(swift_s, 0.025, switches_s=bounces_s))
+    assert (once.samples, bounced.samples) == (30, 20)
+    for measured in (once, bounced):
+        found, doubt = offset_ms(measured)
+        assert abs(found - 25.0) <= doubt < 30.0
+
+
+def test_films_that_overlap_little_are_compared_where_they_do() -> None:
+    """A host that filmed from the middle of the board's film on: offsets that leave less than half to compare are no candidates; the true one is found."""
+    measured = measure_lamp(lamp_seen(FILM_S), lamp_seen(FILM_S[FILM_S > 5.8] + 0.011, -0.030))
+    assert np.isinf(measured.misfits).any()
+    found, doubt = offset_ms(measured)
+    assert abs(found + 30.0) <= doubt < 20.0
+
+
+# A scene.
+
+CAMERA = CameraModel(
+    width_px=160,
+    height_px=120,
+    matrix=np.array([[160.0, 0, 79.5], [0, 160.0, 59.5], [0, 0, 1]]),
+    distortion=np.zeros(5),
+)
+RECTIFIER = Rectifier(Rig(left=CAMERA, right=CAMERA, R_right_left=np.eye(3), t_right_left_m=np.array([-0.1, 0.0, 0.0])))
+FRAMES, LATE_S = 34, 0.009
+
+
+@cache
+def poster() -> Image:
+    """A strip of texture on a grey wall, larger than these cameras see of it."""
+    noise = np.random.default_rng(4).uniform(0, 255, (200, 240))
+    smooth = cv2.GaussianBlur(noise, (0, 0), 4.0)
+    strip = np.asarray(cv2.normalize(smooth, None, 0, 255, cv2.NORM_MINMAX), np.uint8)  # type: ignore[call-overload]  # None: made by the call
+    strip[:, :95] = strip[:, 155:] = 128
+    return strip
+
+
+def seen(moment_s: float, right_px: float = 0.0, down_px: float = 0.0) -> Image:
+    """A poster that swings up and down by 10 px, 1.5 times a second, as a camera sees it that stands aside."""
+    height_px = 10.0 * np.sin(2 * np.pi * 1.5 * moment_s) + down_px
+    moved = np.array([[1.0, 0.0, -40.0 - right_px], [0.0, 1.0, -40.0 + height_px]])
+    return np.asarray(cv2.warpAffine(poster(), moved, (160, 120), flags=cv2.INTER_CUBIC), np.uint8)
+
+
+def film(board: list[Image], host: dict[int, Image], offset_s: float) -> Measured:
+    """Measure with 30 frames a second of both cameras, the host's 9 ms behind the board's and stamped late by `offset_s`."""
+    images: dict[str, Image] = {}
+
+    def shot(name: str, moment_s: float, image: Image) -> Shot:
+        images[name] = image
+        return Shot(
+            10**14 + round(moment_s * 1e9),
+            EncodedImage(payload=b"", pixel_format=PixelFormat.GREY, width_px=160, height_px=120, name=name),
+        )
+
+    ours = [shot(f"board {k}", k / 30, image) for k, image in enumerate(board)]
+    theirs = [shot(f"host {k}", k / 30 + LATE_S + offset_s, image) for k, image in host.items()]
+    return measure_shared_motion(ours, theirs, RECTIFIER, lambda one: images[one.image.name], lambda _: None)
+
+
+def test_lost_frames_and_a_covered_lens_cost_only_themselves() -> None:
+    """Four host's frames in a row that never came, and two board's frames of a covered lens, leave the offset where it is."""
+    board = [seen(k / 30) if k not in {20, 21} else np.zeros((120, 160), np.uint8) for k in range(FRAMES)]
+    host = {k: seen(k / 30 + LATE_S, right_px=12.0) for k in range(FRAMES) if k not in range(8, 12)}
+    found, doubt = offset_ms(film(board, host, 0.013))
+    assert abs(found - 13.0) <= doubt < 8.0
+
+
+def test_a_rig_that_shakes_against_itself_is_no_measurement() -> None:
+    """Where the second camera nods by itself the rows say more of that than of the time: refused, with the doubt that was left."""
+    nods_px = np.random.default_rng(3).uniform(-5, 5, FRAMES)
+    board = [seen(k / 30) for k in range(FRAMES)]
+    host = {k: seen(k / 30 + LATE_S, right_px=12.0, down_px=float(nods_px[k])) for k in range(FRAMES)}
+    with pytest.raises(DataError, match="no better than unmeasured"):
+        film(board, host, 0.013)
