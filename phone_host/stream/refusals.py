@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.protocol.message import RefusalReason
-from common.versions import PROTOCOL_VERSION, other_protocol
+from common.versions import PROTOCOL_VERSION
 
 _REFUSAL_NS: Final = 1_000_000_000
 """A board that refuses does so at every hello, five times a second; one that has not done so for this long is gone."""
@@ -88,8 +88,13 @@ def refusal_text(refusal: BoardRefusal) -> tuple[str, str]:
         case RefusalReason.BUSY:
             return "the board is busy with another host", "stop the other one first"
         case RefusalReason.VERSION:
-            if refusal.protocol is not None:
-                return other_protocol(refusal.protocol, peer="the board", own="this host")
-            # A board that does not tell its version is of 0.1, where the newest was 3: ours is newer, or it would talk to us.
-            problem = f"the board speaks an older protocol than {PROTOCOL_VERSION}, which this host speaks"
-            return problem, "update the board's tandemscan"
+            # The words of `other_protocol`, in full: docs/troubleshooting.md is made from them.
+            theirs, ours = refusal.protocol, PROTOCOL_VERSION
+            if theirs is None:  # told by no board of 0.1, whose newest was 3: ours is newer, or it would talk to us
+                return (
+                    f"the board speaks an older protocol than {ours}, which this host speaks",
+                    "update the board's tandemscan",
+                )
+            if theirs < ours:
+                return f"the board speaks protocol {theirs}, this host protocol {ours}", "update the board's tandemscan"
+            return f"the board speaks protocol {theirs}, this host protocol {ours}", "update this host's tandemscan"
