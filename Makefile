@@ -22,7 +22,7 @@ help: ## this list
 
 venv: $(READY) ## create or update the virtual environment .venv (the targets below do so by themselves)
 
-$(READY): requirements/dev.txt pyproject.toml
+$(READY): requirements/dev.txt pyproject.toml common/versions.py
 	@.ci/venv
 
 demo: $(READY) ## both programs on this machine, a rendered scene, a full report in out/demo

@@ -22,7 +22,6 @@ from common.link.waiter import Waiter
 from common.program.logs import event
 from common.protocol.board_session import BoardSession
 from common.protocol.message import (
-    PROTOCOL_VERSION,
     BoardCounts,
     DropReason,
     Pacing,
@@ -32,7 +31,8 @@ from common.protocol.message import (
     Rung,
 )
 from common.protocol.session import Outgoing
-from common.protocol.wire import VersionError, decode, encode_for_any_version, encode_stamped
+from common.protocol.wire import VersionError, decode, encode, encode_for_any_version, encode_stamped
+from common.versions import other_protocol
 
 _LOG = logging.getLogger(__name__)
 
@@ -260,18 +260,21 @@ class Agent:
                 try:
                     message = decode(header, payload)
                 except VersionError as error:
-                    self._refused += 1
-                    if self._refused.bit_count() == 1:  # as for garbage: an old host asks five times a second
-                        theirs, count = error.theirs, self._refused
-                        _LOG.warning(
-                            event("host_refused", reason="version", theirs=theirs, ours=PROTOCOL_VERSION, count=count)
-                        )
-                    refusal = encode_for_any_version(error.theirs, Refusal(RefusalReason.VERSION))
-                    self._links[index].send(incoming.connection, refusal, b"")
+                    self._refuse_version(index, incoming.connection, error.theirs)
                 except ProtocolError as error:
                     self._refuse_garbage(connection, error.problem)
                 else:
                     self._send_all(self._session.receive(connection, message, arrived_ns, self._outbox.counts))
+
+    def _refuse_version(self, index: int, connection: bytes, theirs: int) -> None:
+        """Tell a host of another version so twice: in an envelope of our version, which says what that is, and in one of its own, which it can read."""
+        self._refused += 1
+        if self._refused.bit_count() == 1:  # as for garbage: an old host asks five times a second
+            problem, remedy = other_protocol(theirs, peer="the host", own="this board")
+            _LOG.warning(event("host_refused", reason="version", problem=problem, remedy=remedy, count=self._refused))
+        refusal = Refusal(RefusalReason.VERSION)
+        for header in (encode(refusal)[0], encode_for_any_version(theirs, refusal)):
+            self._links[index].send(connection, header, b"")
 
     def _refuse_garbage(self, connection: bytes, problem: str) -> None:
         self._garbage += 1

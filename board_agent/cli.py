@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from common.camera.options import EXAMPLE
-from common.program.commandline import ExamplesFirstParser, run_command
+from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
 
 _EXAMPLES = """examples:
   board-agent run --camera 'v4l2:/dev/video0?size=640x480&fps=30' --link 'tcp://*:5555'
@@ -51,6 +51,7 @@ def _run(options: argparse.Namespace) -> int:
 def parser() -> argparse.ArgumentParser:
     """All verbs with their options."""
     made = ExamplesFirstParser("board-agent", description=_EXAMPLES)
+    add_version_option(made)
     verbs = made.add_subparsers(dest="verb", required=True, metavar="VERB")
     run = verbs.add_parser("run", help="stream the camera's frames to a host until stopped", description=_EXAMPLES)
     show = verbs.add_parser(

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from typing import Final, Protocol
 
-from common.program.commandline import ExamplesFirstParser, run_command
+from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
 from phone_host.verbs.calibrate import arguments as calibrate
 from phone_host.verbs.calibrate_time import arguments as calibrate_time
 from phone_host.verbs.demo import arguments as demo
@@ -70,6 +70,7 @@ def _run(options: argparse.Namespace) -> int:
 def parser() -> argparse.ArgumentParser:
     """All verbs with their options."""
     made = ExamplesFirstParser("phone-host", description=_EXAMPLES)
+    add_version_option(made)
     verbs = made.add_subparsers(dest="verb", required=True, metavar="VERB")
     for name, arguments in _VERBS.items():
         verb = verbs.add_parser(name, help=arguments.SUMMARY, description=f"examples:\n{arguments.EXAMPLES}")

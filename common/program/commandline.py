@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final, NoReturn
 
 from common.errors import TandemError
+from common.versions import all_versions
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -43,6 +44,25 @@ class ExamplesFirstParser(argparse.ArgumentParser):
         """Say what is wrong in one line on stderr, without the usage, and leave with exit 2."""
         one_line = " ".join(message.split())
         self.exit(2, f"{self.prog}: error: {one_line}: see {self.prog} --help\n")
+
+
+class _VersionAction(argparse.Action):
+    """Prints the versions and ends; unlike argparse's own action without hiding that they could not be written."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        print(all_versions())
+        parser.exit()
+
+
+def add_version_option(parser: argparse.ArgumentParser) -> None:
+    """Declare `--version`, which needs no verb.
+
+    Args:
+        parser: the command's own, not a verb's.
+    """
+    parser.add_argument(
+        "--version", action=_VersionAction, nargs=0, help="print the versions of package, wire and files"
+    )
 
 
 def run_command(

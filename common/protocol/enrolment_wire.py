@@ -23,20 +23,20 @@ from common.protocol.enrolment_words import (
     Word,
 )
 from common.protocol.zap import KEY_BYTES
+from common.versions import ENROLMENT_VERSION
 
 MAX_WORD_BYTES: Final = 255
 """The longest honest word, a key and a commitment with a name of 64 letters of 2 bytes, has 203."""
 
 MAX_NAME: Final = 64
 
-_VERSION: Final = 2
 _KINDS: Final[tuple[type, ...]] = (Ask, Shown, Commit, Open, Refuse, Begin)
 _LONGEST_S: Final = 86_400
 
 
 def encode_word(word: Word) -> bytes:
     """Give a word's bytes, without their length."""
-    packed: bytes = msgpack.packb([_VERSION, _KINDS.index(type(word)), *_fields(word)])
+    packed: bytes = msgpack.packb([ENROLMENT_VERSION, _KINDS.index(type(word)), *_fields(word)])
     return packed
 
 
@@ -55,7 +55,7 @@ def decode_word(packed: bytes) -> Word:
     if not isinstance(items, list) or len(items) not in {4, 5}:
         raise _bad("no [version, kind, field, field]")
     version, kind, *fields = items
-    if type(version) is not int or version != _VERSION:
+    if type(version) is not int or version != ENROLMENT_VERSION:
         raise _bad(f"version {version!r:.20}")
     if type(kind) is not int or not 0 <= kind < len(_KINDS):
         raise _bad(f"kind {kind!r:.20}")

@@ -11,9 +11,6 @@ from enum import Enum
 from common.frame import Buffer, PixelFormat
 from common.ledger import BoardMarks
 
-PROTOCOL_VERSION = 3
-"""2: a camera says whether it can be steered, and `Steer` asks for it. 3: hello and account tell the rung."""
-
 
 class Lane(Enum):
     """What a connection carries."""

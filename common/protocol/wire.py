@@ -14,7 +14,6 @@ from common.errors import ProtocolError
 from common.frame import Buffer
 from common.ledger import BoardMarks
 from common.protocol.message import (
-    PROTOCOL_VERSION,
     BoardCounts,
     BoardHello,
     Bye,
@@ -44,6 +43,7 @@ from common.protocol.wire_fields import (
     FieldReader,
     bad_field,
 )
+from common.versions import PROTOCOL_VERSION, other_protocol
 
 MAX_HEADER_BYTES: Final = 2048
 """The longest honest header, a board's hello with all its texts at full length, stays below 600 bytes."""
@@ -93,9 +93,7 @@ class VersionError(ProtocolError):
     """
 
     def __init__(self, theirs: int) -> None:
-        super().__init__(
-            f"the peer speaks protocol version {theirs}, this side {PROTOCOL_VERSION}", "update the older of the two"
-        )
+        super().__init__(*other_protocol(theirs, peer="the peer", own="this side"))
         self.theirs = theirs
 
 

@@ -5,7 +5,7 @@ import importlib
 import sys
 from collections.abc import Sequence
 
-from common.program.commandline import ExamplesFirstParser, run_command
+from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
 from phone_host.bench.arguments import EXAMPLES, add_arguments
 
 
@@ -24,6 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def parser() -> argparse.ArgumentParser:
     """All options."""
     made = ExamplesFirstParser("delay-bench", description=EXAMPLES)
+    add_version_option(made)
     add_arguments(made)
     made.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     made.add_argument("--debug", action="store_true", help="show tracebacks")

@@ -86,6 +86,8 @@ class BoardReadings:
         camera: the board's camera.
         round_trip_ns: shortest round trip; 0 where unknown.
         uncertainty_ns: of its clock; 0 where unknown.
+        problem: why a board of another version does not talk to this host.
+        remedy: what to do about that.
     """
 
     uri: str
@@ -94,6 +96,8 @@ class BoardReadings:
     camera: str = ""
     round_trip_ns: int = 0
     uncertainty_ns: int = 0
+    problem: str = "the board speaks another protocol version"
+    remedy: str = "update the older of the two"
 
 
 def check_python(version: tuple[int, int, int], platform: str) -> Finding:
@@ -148,9 +152,7 @@ def check_board(board: BoardReadings) -> Finding:  # noqa: PLR0911 - one for eac
         case Answer.BUSY:
             return warn("board", f"{board.uri}: a board serves another host", "stop that one first: one host at a time")
         case Answer.OTHER_VERSION:
-            return fail(
-                "board", f"{board.uri}: the board speaks another protocol version", "update the older of the two"
-            )
+            return fail("board", f"{board.uri}: {board.problem}", board.remedy)
         case Answer.REFUSED:
             remedy = "start board-agent there; its link must be on that address, not on 127.0.0.1 of the board"
             return fail("board", f"{board.uri}: nobody listens at that port", remedy)

@@ -1,5 +1,6 @@
 """What the doctor can only ask with numpy and OpenCV: a board, as a run does, and a rig. Imported when both were seen to work."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,27 +38,27 @@ def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
     link = open_link(parse_link(uri, listens_by_default=False), keys)
     receiver = Receiver([link], now.random_id(), NoFrames())
     patience = BoardPatience(round(wait_s * 1e9), now.monotonic_ns())
-    answer = Answer.BOARD
+    said = BoardReadings(uri=uri, answer=Answer.BOARD, waited_s=wait_s)
     receiver.start()
     try:
         await_board(receiver, patience, lambda: receiver.hello is not None and receiver.estimate is not None)
     except AbsentBoardError:
-        answer = Answer.SILENT
+        said = replace(said, answer=Answer.SILENT)
     except BusyBoardError:
-        answer = Answer.BUSY
-    except OtherVersionError:
-        answer = Answer.OTHER_VERSION
+        said = replace(said, answer=Answer.BUSY)
+    except OtherVersionError as error:
+        said = replace(said, answer=Answer.OTHER_VERSION, problem=error.problem, remedy=error.remedy)
     finally:
         hello, estimate = receiver.hello, receiver.estimate
         receiver.stop()
     if receiver.failure is not None:
         raise receiver.failure
     if hello is None or estimate is None:
-        return BoardReadings(uri=uri, answer=answer, waited_s=wait_s)
+        return said
     camera = f"{hello.camera.name} {hello.camera.width_px}x{hello.camera.height_px}"
     return BoardReadings(
         uri=uri,
-        answer=answer,
+        answer=Answer.BOARD,
         waited_s=0.0,
         camera=camera,
         round_trip_ns=estimate.round_trip_ns,

@@ -1,6 +1,6 @@
 """rig.yaml: a calibrated rig as OpenCV FileStorage YAML, readable by `cv2.FileStorage` anywhere.
 
-Keys: left_image_width, left_image_height, right_image_width, right_image_height (px); M1 D1 M2 D2 (camera matrices and
+Keys: format_version (absent: 1); left_image_width, left_image_height, right_image_width, right_image_height (px); M1 D1 M2 D2 (camera matrices and
 distortion, left and right); R T (right from left, T in metres); R1 R2 P1 P2 Q (rectification); rectified_image_width,
 rectified_image_height (the size P1 and P2 belong to); board_side; rms_left rms_right rms_stereo (px, .Nan = unknown);
 time_offset_ns, time_offset_uncertainty_ns (host's stamp minus board's; absent: not measured).
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from common.files import read_whole
+from common.versions import RIG_FORMAT
 from phone_host.model import CameraModel, Rectification, Rig, Side, TimeOffset
 from phone_host.output.atomic import write_text
 
@@ -39,6 +40,7 @@ def write_rig(path: Path, rig: Rig, rectification: Rectification) -> None:
         OSError: the file cannot be written.
     """
     storage = cv2.FileStorage(".yaml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
+    storage.write("format_version", RIG_FORMAT)
     storage.write("left_image_width", rig.left.width_px)
     storage.write("left_image_height", rig.left.height_px)
     storage.write("right_image_width", rig.right.width_px)
@@ -101,6 +103,7 @@ def read_rig(path: Path) -> Rig:
         DataError: the file is missing or no FileStorage YAML, or a key is missing or makes no sense; names file and key.
     """
     reader = _Reader(path)
+    reader.require_known_format()
     left = reader.camera_model("left_image_width", "left_image_height", "M1", "D1")
     right = reader.camera_model("right_image_width", "right_image_height", "M2", "D2")
     side = reader.text("board_side", Side.LEFT.value)
@@ -157,6 +160,18 @@ class _Reader:
         if node.empty() or node.isNone():
             raise self.problem(key, "is missing", "calibrate again, or add the key")
         return node
+
+    def require_known_format(self) -> None:
+        """Check that this program knows the file's format; a newer one may mean something else by the same keys."""
+        node = self._storage.getNode("format_version")
+        if node.empty():
+            return
+        value = node.real() if node.isInt() or node.isReal() else math.nan
+        if not (math.isfinite(value) and value >= 1 and value == int(value)):
+            raise self.problem("format_version", "is no version", "calibrate again")
+        if value > RIG_FORMAT:
+            known = f"is {value:.0f}, this program reads up to {RIG_FORMAT}"
+            raise self.problem("format_version", known, "update tandemscan, or calibrate again")
 
     def matrix(self, key: str) -> NDArray[np.float64]:
         """Any matrix of finite numbers, as float64."""

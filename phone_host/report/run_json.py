@@ -5,6 +5,7 @@ from dataclasses import asdict
 from typing import Final
 
 from common.camera.base import CameraHealth, health_values
+from common.versions import REPORT_FORMAT
 from phone_host.measure.accounts import LinkTally, rung_values
 from phone_host.measure.delays import DELAYS, STAGES, Spread
 from phone_host.measure.regime import Judgement, judge
@@ -24,6 +25,7 @@ def build(run: RunSnapshot) -> dict[str, object]:
         run: the run.
     """
     return {
+        "format_version": REPORT_FORMAT,
         "ended": run.ended,
         "pairs": run.processed,
         "pairs_per_second": _number(run.pairs_per_second),

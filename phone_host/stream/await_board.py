@@ -12,7 +12,7 @@ from common import now
 from common.errors import AbsentBoardError, BusyBoardError, OtherVersionError, UnavailableError
 from common.protocol.message import RefusalReason
 from phone_host.stream.receiver import Receiver
-from phone_host.stream.refusals import refusal_text
+from phone_host.stream.refusals import BoardRefusal, refusal_text
 
 _STEP_S: Final = 0.05
 
@@ -40,7 +40,7 @@ class BoardPatience:
         self._absent = f"no board at {where}" if where else "no board"
         self._remedy = remedy
 
-    def look(self, now_ns: int, refused: RefusalReason | None, *, present: bool) -> None:
+    def look(self, now_ns: int, refused: BoardRefusal | None, *, present: bool) -> None:
         """See whether there is still reason to wait.
 
         Args:
@@ -57,7 +57,7 @@ class BoardPatience:
             self._seen_ns = now_ns
         patience_ns = self._patience_ns
         if refused is not None:
-            patience_ns = max(patience_ns or 0, _BUSY_NS) if refused is RefusalReason.BUSY else 0
+            patience_ns = max(patience_ns or 0, _BUSY_NS) if refused.reason is RefusalReason.BUSY else 0
         if patience_ns is None or now_ns - self._seen_ns <= patience_ns:
             return
         if refused is not None:
@@ -100,9 +100,9 @@ def await_board(
     return False
 
 
-def _refusal(reason: RefusalReason) -> UnavailableError:
-    match reason:
+def _refusal(refusal: BoardRefusal) -> UnavailableError:
+    match refusal.reason:
         case RefusalReason.BUSY:
-            return BusyBoardError(*refusal_text(reason))
+            return BusyBoardError(*refusal_text(refusal))
         case RefusalReason.VERSION:
-            return OtherVersionError(*refusal_text(reason))
+            return OtherVersionError(*refusal_text(refusal))

@@ -11,13 +11,14 @@ from common.errors import ProtocolError
 from common.link.base import Broken, Garbage, Incoming, Link, Packet
 from common.link.several import SeveralLinks
 from common.link.waiter import Waiter
-from common.protocol.message import BoardHello, Ping, RefusalReason
+from common.protocol.message import BoardHello, Ping
 from common.protocol.session import Outgoing, connection_name
 from common.protocol.wire import VersionError, decode, encode_stamped
 from phone_host.measure.accounts import LinkAccount
 from phone_host.stream.corrections import Corrections
 from phone_host.stream.frame_sink import FrameSink
 from phone_host.stream.reception import BoardListener, LinkFacts, Reception
+from phone_host.stream.refusals import BoardRefusal
 from phone_host.sync.clock import ClockEstimate
 
 _LONGEST_WAIT_MS: Final = 50
@@ -66,7 +67,7 @@ class Receiver:
         return self._reception.account
 
     @property
-    def refused(self) -> RefusalReason | None:
+    def refused(self) -> BoardRefusal | None:
         """Why the board that was last heard does not talk to us; None when it does, or is silent now."""
         return self._reception.refused(now.monotonic_ns())
 
@@ -192,7 +193,7 @@ class Receiver:
                 try:
                     message = decode(header, payload)
                 except VersionError as error:
-                    reception.refuse_version(connection, error.problem, now_ns)
+                    reception.refuse_version(connection, error.theirs, now_ns)
                 except ProtocolError as error:
                     reception.count_garbage(error.problem)
                 else:

@@ -33,7 +33,7 @@ from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount, 
 from phone_host.model import BoardFrame
 from phone_host.stream.border import Arrival, Border
 from phone_host.stream.frame_sink import FrameSink
-from phone_host.stream.refusals import Refusals, refusal_text
+from phone_host.stream.refusals import BoardRefusal, Refusals, refusal_text
 from phone_host.sync.choice import LinkChoice
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.flow import Flow
@@ -100,7 +100,7 @@ class Reception:
         self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
         self._border = Border(self.account, sink.void)
 
-    def refused(self, now_ns: int) -> RefusalReason | None:
+    def refused(self, now_ns: int) -> BoardRefusal | None:
         """Why the board that was last heard does not talk to us; None when it does, or is silent now."""
         return self._refusals.last(now_ns)
 
@@ -145,14 +145,20 @@ class Reception:
         """
         self._handle(self._session.receive(connection, message, now_ns), now_ns)
 
-    def refuse_version(self, connection: bytes, problem: str, now_ns: int) -> None:
+    def refuse_version(self, connection: bytes, theirs: int, now_ns: int) -> None:
         """Take note of a message of another protocol version.
 
-        In a running session it is somebody else's noise; whoever called here, not being called, may be anybody.
+        On a link that is up it is somebody else's noise; whoever called here, not being called, may be anybody.
         """
-        if not self._session.is_open and connection in self._links[connection[0]].dialled.values():
-            self._refusals.note(RefusalReason.VERSION, now_ns)
-        self.count_garbage(problem)
+        refusal, link = BoardRefusal(RefusalReason.VERSION, theirs), connection[0]
+        if self.account.links[link].is_up:
+            self.count_garbage(refusal_text(refusal)[0])
+            return
+        self.account.garbage += 1
+        if not self._session.is_open and connection in self._links[link].dialled.values():
+            self._refusals.note(refusal, now_ns)  # whoever waits for the board tells it
+        else:
+            self._tell_refusal(link, refusal)
 
     def interrupted(self, connection: bytes, now_ns: int) -> None:
         """Take note that a connection broke."""
@@ -264,12 +270,15 @@ class Reception:
         if isinstance(refused, Unbelievable):
             self.count_garbage(refused.problem)
             return
-        self._refusals.note(refused.reason, now_ns)
-        if self._session.is_open and self._refusals.is_news(refused.link):
-            problem, remedy = refusal_text(refused.reason)
-            _LOG.warning(
-                event("link_refused", link=self.account.links[refused.link].name, problem=problem, remedy=remedy)
-            )
+        refusal = BoardRefusal(refused.reason)
+        self._refusals.note(refusal, now_ns)
+        if self._session.is_open:
+            self._tell_refusal(refused.link, refusal)
+
+    def _tell_refusal(self, link: int, refusal: BoardRefusal) -> None:
+        if self._refusals.is_news(link):
+            problem, remedy = refusal_text(refusal)
+            _LOG.warning(event("link_refused", link=self.account.links[link].name, problem=problem, remedy=remedy))
 
     def _note_gone(self, *, orderly: bool, now_ns: int) -> None:
         """The board is not there any more, on no link."""

@@ -13,7 +13,7 @@ import msgpack
 import pytest
 import zmq
 
-from common.protocol.message import PROTOCOL_VERSION
+from common.versions import PROTOCOL_VERSION
 from tests.support.numbered import draw, saved_numbers, write_film
 from tests.support.programs import Program, board, free_port, host, ledgers, lines, until
 
@@ -87,35 +87,68 @@ def test_images_spoiled_on_the_host_cost_only_their_own_pairs(tmp_path: Path) ->
     assert report["frames"]["orphaned"]["no_partner"] >= 9
 
 
-def test_a_host_of_another_version_is_refused_in_its_own_words(tmp_path: Path) -> None:
-    """A hello of protocol version 99 is answered in an envelope of version 99 that says so, and the board serves on."""
+VERSIONS = pytest.mark.parametrize(
+    ("theirs", "board_is_older"), [(PROTOCOL_VERSION - 1, True), (PROTOCOL_VERSION + 1, False), (99, False)]
+)
+"""Protocol versions of a peer, and whether a board of that version is the side to update."""
+
+
+@VERSIONS
+def test_a_host_of_another_version_is_refused_in_its_own_words(
+    theirs: int, *, board_is_older: bool, tmp_path: Path
+) -> None:
+    """Its hello is answered in an envelope of its version, the board's log says in one line which side to update, and the board serves on."""
     film, link = write_film(tmp_path / "film", 5), f"ipc://{tmp_path}/link"
     with board(["run", "--camera", f"replay:{film}?loop=1", "--link", link], tmp_path) as sender:
         context = zmq.Context()
         stranger = context.socket(zmq.DEALER)
         stranger.connect(link)
-        stranger.send(msgpack.packb([99, 0, "future", 0]))
+        stranger.send(msgpack.packb([theirs, 0, "another", 0]))
         assert stranger.poll(60_000)
-        version, kind, reason = msgpack.unpackb(stranger.recv())
+        told = [msgpack.unpackb(stranger.recv()) for _ in range(2)]
         context.destroy(linger=0)
-        assert (version, kind, reason) == (99, 3, 1)  # a Refusal because of the version
+        # A Refusal because of the version: in the board's own, which says what that is, and in the stranger's, which it can read.
+        assert told == [[PROTOCOL_VERSION, 3, 1], [theirs, 3, 1]]
         with host(["run", "--camera", f"replay:{film}?loop=1", "--link", link, "--pairs", "2"], tmp_path) as receiver:
             assert receiver.wait() == 0
-        assert "host_refused" in sender.stderr
-        assert f"ours={PROTOCOL_VERSION}" in sender.stderr
+        (line,) = [line for line in sender.stderr.splitlines() if "protocol" in line]
+        assert f"the host speaks protocol {theirs}, this board protocol {PROTOCOL_VERSION}" in line
+        assert f"update {'the host' if board_is_older else 'this board'}'s tandemscan" in line
 
 
-def test_a_board_of_another_version_ends_the_host_with_one_line(tmp_path: Path) -> None:
-    """A host that finds a board of version 99 ends with exit 3 and says which side must be updated."""
+@VERSIONS
+def test_a_board_of_another_version_ends_the_host_with_one_line(
+    theirs: int, *, board_is_older: bool, tmp_path: Path
+) -> None:
+    """The host ends with exit 3 and says in its only line which side must be updated."""
     film, link = write_film(tmp_path / "film", 5), f"ipc://{tmp_path}/link"
     context = zmq.Context()
-    future = context.socket(zmq.ROUTER)
-    future.bind(link)
+    other = context.socket(zmq.ROUTER)
+    other.bind(link)
     with host(["run", "--camera", f"replay:{film}?loop=1", "--link", link], tmp_path) as receiver:
-        assert future.poll(60_000)
-        future.send_multipart([future.recv_multipart()[0], msgpack.packb([99, 1, "anything"])])
+        assert other.poll(60_000)
+        caller, hello = other.recv_multipart()
+        assert msgpack.unpackb(hello)[0] == PROTOCOL_VERSION
+        for header in ([theirs, 3, 1], [PROTOCOL_VERSION, 3, 1]):  # as board-agent refuses
+            other.send_multipart([caller, msgpack.packb(header)])
         assert receiver.wait() == 3
-        assert "version" in complaint(receiver)
+        (line,) = [line for line in receiver.stderr.splitlines() if "protocol" in line]
+        assert f"the board speaks protocol {theirs}, this host protocol {PROTOCOL_VERSION}" in line
+        assert f"update {'the board' if board_is_older else 'this host'}'s tandemscan" in line
+    context.destroy(linger=0)
+
+
+def test_a_board_that_does_not_tell_its_version_is_the_older_one(tmp_path: Path) -> None:
+    """Boards of 0.1 refuse in the host's version only: the host says that the board is to be updated."""
+    film, link = write_film(tmp_path / "film", 5), f"ipc://{tmp_path}/link"
+    context = zmq.Context()
+    other = context.socket(zmq.ROUTER)
+    other.bind(link)
+    with host(["run", "--camera", f"replay:{film}?loop=1", "--link", link], tmp_path) as receiver:
+        assert other.poll(60_000)
+        other.send_multipart([other.recv_multipart()[0], msgpack.packb([PROTOCOL_VERSION, 3, 1])])
+        assert receiver.wait() == 3
+        assert "update the board's tandemscan" in complaint(receiver)
     context.destroy(linger=0)
 
 

@@ -17,7 +17,7 @@ from common.link.curve import secure_dialler
 from common.peers import Peer
 from common.protocol.enrolment_wire import frame_word
 from common.protocol.enrolment_words import Ask, Identity
-from common.protocol.message import PROTOCOL_VERSION
+from common.versions import PROTOCOL_VERSION
 from tests.support.enrolment_rig import ports
 from tests.support.numbered import write_film
 from tests.support.programs import Program, board, host, lines, until

@@ -15,6 +15,7 @@ from common.protocol.message import Lane, RefusalReason
 from phone_host.stream.await_board import BoardPatience, await_board
 from phone_host.stream.frame_sink import NoFrames
 from phone_host.stream.receiver import Receiver
+from phone_host.stream.refusals import BoardRefusal
 
 S = 1_000_000_000
 LOOKS = 200_000
@@ -25,7 +26,7 @@ def ends_after(patience_ns: int | None, refused: RefusalReason | None) -> tuple[
     patience = BoardPatience(patience_ns, 0)
     for second in range(61):
         try:
-            patience.look(second * S, refused, present=False)
+            patience.look(second * S, None if refused is None else BoardRefusal(refused), present=False)
         except UnavailableError as error:
             return second, error
     return None
@@ -115,8 +116,10 @@ def test_a_refusal_that_ends_while_it_is_told_is_a_refusal(tmp_path: Path) -> No
 
     def flicker() -> None:
         while not done.is_set():
-            reception.refuse_version(dialled, "another version", now.monotonic_ns())
+            reception.refuse_version(dialled, 4, now.monotonic_ns())
+            sum(range(200))  # neither state may be so short that the threads never meet in it
             reception._refusals.accepted()  # as when a board accepts
+            sum(range(200))
 
     usual_s = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)

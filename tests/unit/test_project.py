@@ -15,6 +15,8 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from common.versions import PACKAGE_VERSION
+
 ROOT = Path(__file__).resolve().parents[2]
 TOP_PACKAGES = ("board_agent", "common", "phone_host")
 COMMANDS = ("board-agent", "phone-host", "delay-bench")
@@ -127,11 +129,17 @@ def test_licence_is_apache_2() -> None:
 
 
 def test_version_has_one_source() -> None:
-    """The version stands in pyproject.toml only; the installed metadata repeat it and no module states its own."""
-    version = pyproject()["project"]["version"]
-    assert importlib.metadata.version("tandemscan") == version
-    own = re.compile(r"^\s*(__version__|VERSION)\b[^=]*=\s*[\"'f]", re.MULTILINE)
-    files = [path for top in TOP_PACKAGES for path in (ROOT / top).rglob("*.py")]
+    """The version stands in common/versions.py only: pyproject.toml takes it from there, the installed metadata repeat it, no other module states its own.
+
+    Where the metadata are older, the environment is: `make venv`, or `pip install -e . --no-deps`.
+    """
+    project = pyproject()
+    assert project["project"]["dynamic"] == ["version"]
+    assert "version" not in project["project"]
+    assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "common.versions.PACKAGE_VERSION"}
+    assert importlib.metadata.version("tandemscan") == PACKAGE_VERSION
+    own = re.compile(r"^\s*(__version__|(PACKAGE_)?VERSION)\b[^=]*=\s*[\"'f]", re.MULTILINE)
+    files = [path for top in TOP_PACKAGES for path in (ROOT / top).rglob("*.py") if path.name != "versions.py"]
     assert [str(path) for path in files if own.search(path.read_text(encoding="utf-8"))] == []
 
 

@@ -34,7 +34,7 @@ from common.protocol.session import (
 from phone_host.model import BoardFrame
 from phone_host.stream.frame_sink import FrameSink, NoFrames
 from phone_host.stream.reception import LinkFacts, Reception
-from phone_host.stream.refusals import refusal_text
+from phone_host.stream.refusals import BoardRefusal, refusal_text
 from phone_host.sync.quarantine import Disbelief
 from tests.support.session_world import CAMERA
 from tests.support.talk import NAMES, Talk
@@ -87,11 +87,11 @@ def test_a_leaving_host_greets_nobody() -> None:
 def test_a_strangers_refusal_ends_no_waiting(*, dialled: bool) -> None:
     """Three bytes of another version, or a refusal, count from the board that was called, and from no caller."""
     talk = Talk(dialled=dialled)
-    talk.reception.refuse_version(NAMES[Lane.CONTROL], "another version", talk.now_ns)
-    assert talk.reception.refused(talk.now_ns) is (RefusalReason.VERSION if dialled else None)
+    talk.reception.refuse_version(NAMES[Lane.CONTROL], 4, talk.now_ns)
+    assert talk.reception.refused(talk.now_ns) == (BoardRefusal(RefusalReason.VERSION, 4) if dialled else None)
     talk = Talk(dialled=dialled)
     talk.reception.receive(NAMES[Lane.CONTROL], Refusal(RefusalReason.BUSY), talk.now_ns)
-    assert talk.reception.refused(talk.now_ns) is (RefusalReason.BUSY if dialled else None)
+    assert talk.reception.refused(talk.now_ns) == (BoardRefusal(RefusalReason.BUSY) if dialled else None)
 
 
 @pytest.mark.parametrize(
@@ -284,14 +284,14 @@ def test_a_link_that_is_turned_away_is_told_once(caplog: pytest.LogCaptureFixtur
         talk.reception._handle([Refused(RefusalReason.BUSY, 1)], talk.now_ns)
     assert len([record for record in caplog.records if "link_refused" in record.getMessage()]) == 1
     assert talk.reception.connected
-    assert talk.reception.refused(talk.now_ns) is RefusalReason.BUSY
+    assert talk.reception.refused(talk.now_ns) == BoardRefusal(RefusalReason.BUSY)
     assert talk.reception.refused(talk.now_ns + 2000 * MS) is None
 
 
 @pytest.mark.parametrize("reason", RefusalReason)
 def test_every_refusal_has_a_remedy(reason: RefusalReason) -> None:
     """Whatever a board refuses for, the user is told what to do."""
-    problem, remedy = refusal_text(reason)
+    problem, remedy = refusal_text(BoardRefusal(reason))
     assert "board" in problem
     assert remedy
 

@@ -10,6 +10,7 @@ from typing import Final
 
 from common.camera.base import CameraHealth
 from common.protocol.message import RefusalReason
+from common.versions import PROTOCOL_VERSION
 from phone_host.measure.regime import RunFigures, judge
 from phone_host.measure.trust import (
     Concern,
@@ -20,7 +21,7 @@ from phone_host.measure.trust import (
     unbelieved_concerns,
 )
 from phone_host.model import TimeOffset
-from phone_host.stream.refusals import refusal_text
+from phone_host.stream.refusals import BoardRefusal, refusal_text
 from phone_host.sync.fifo import Overflow
 
 MS: Final = 1_000_000
@@ -92,9 +93,12 @@ def sentences() -> Iterator[str]:
                 )
             ),
         )
-    for refusal in RefusalReason:
-        problem, remedy = refusal_text(refusal)
-        yield f"refused, {refusal.name.lower()}: {problem}\n    {remedy}"
+    for refused in RefusalReason:
+        problem, remedy = refusal_text(BoardRefusal(refused))
+        yield f"refused, {refused.name.lower()}: {problem}\n    {remedy}"
+    for protocol in (PROTOCOL_VERSION - 1, PROTOCOL_VERSION + 1):
+        problem, remedy = refusal_text(BoardRefusal(RefusalReason.VERSION, protocol))
+        yield f"refused, version {protocol}: {problem}\n    {remedy}"
 
 
 def told(concern: Concern) -> str:

@@ -33,11 +33,13 @@ def loaded_by(module: str, *arguments: str) -> set[str]:
     ("module", "arguments"),
     [
         ("phone_host.cli", ["--help"]),
+        ("phone_host.cli", ["--version"]),
         ("phone_host.cli", ["run", "--help"]),
         ("phone_host.cli", ["stereo", "--help"]),
         ("phone_host.cli", ["settings"]),
         ("phone_host.bench.cli", ["--help"]),
         ("phone_host.bench.cli", ["--emulate", "list"]),
+        ("board_agent.cli", ["--version"]),
         ("board_agent.cli", ["run", "--help"]),
         ("board_agent.cli", ["settings"]),
     ],

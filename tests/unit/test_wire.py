@@ -13,7 +13,6 @@ from common.errors import ProtocolError
 from common.frame import PixelFormat
 from common.ledger import BoardMarks
 from common.protocol.message import (
-    PROTOCOL_VERSION,
     BoardCounts,
     BoardHello,
     CameraDescription,
@@ -37,6 +36,7 @@ from common.protocol.wire import (
     encode,
     encode_for_any_version,
 )
+from common.versions import PROTOCOL_VERSION
 from tests.support.messages import MESSAGES, mutated
 
 MUTATIONS = 80

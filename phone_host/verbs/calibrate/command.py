@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from common.errors import DataError
+from common.versions import REPORT_FORMAT
 from phone_host.calibration.board_pairs import Calibration, Rejected
 from phone_host.calibration.board_views import BoardViews, look_for_boards
 from phone_host.calibration.calibrate import calibrate
@@ -47,6 +48,7 @@ def run(options: argparse.Namespace) -> int:
     rejected = (*views.rejected, *calibration.rejected)
     judgement = judge(calibration, rejected)
     report = {
+        "format_version": REPORT_FORMAT,
         "pairs": _pairs(files, rejected, len(calibration.used)),
         **_figures(calibration),
         "verdict": judgement.verdict.value,
@@ -78,6 +80,7 @@ def _pairs(files: ViewFiles, rejected: tuple[Rejected, ...], used: int) -> dict[
 def _failed(files: ViewFiles, views: BoardViews, error: DataError) -> dict[str, Any]:
     """The report when there is no rig at all."""
     return {
+        "format_version": REPORT_FORMAT,
         "pairs": _pairs(files, views.rejected, 0),
         "verdict": "reject",
         "problem": error.problem,

@@ -20,6 +20,7 @@ from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level
 from common.program.signals import StopSignals
 from common.stamp import HOST_CLOCK
+from common.versions import REPORT_FORMAT
 from phone_host.boards.discovery import find_board_and_say
 from phone_host.calibration.misfit_plot import misfit_svg
 from phone_host.calibration.timing.lamp import Brightness, brightness, measure_lamp
@@ -167,6 +168,7 @@ def _seen(
 
 def _report(options: argparse.Namespace, measured: Measured, footage: Footage) -> dict[str, Any]:
     return {
+        "format_version": REPORT_FORMAT,
         "method": measured.method.value,
         "time_offset_ns": measured.offset.offset_ns,
         "uncertainty_ns": measured.offset.uncertainty_ns,

@@ -10,6 +10,7 @@ import numpy as np
 from common import now
 from common.errors import SettingsError
 from common.ledger import StageTimes
+from common.versions import REPORT_FORMAT
 from phone_host.model import CloudImage, Disparity, RectifiedPair
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
@@ -61,6 +62,7 @@ def run(options: argparse.Namespace) -> int:
     points = _write(options.out, pair, disparity, cloud)
     watch.lap("write")
     report: dict[str, Any] = {
+        "format_version": REPORT_FORMAT,
         "left": {"file": str(options.left), "size": size_text(left)},
         "right": {"file": str(options.right), "size": size_text(right)},
         "size": size_text(pair.left),

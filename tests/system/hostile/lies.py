@@ -12,7 +12,6 @@ import msgpack
 
 from common.frame import PixelFormat
 from common.protocol.message import (
-    PROTOCOL_VERSION,
     BoardCounts,
     FrameMessage,
     Lane,
@@ -24,6 +23,7 @@ from common.protocol.message import (
     Status,
 )
 from common.protocol.wire_fields import MAX_SIZE_PX
+from common.versions import PROTOCOL_VERSION
 from tests.support.bombs import LARGE_PX, jpeg_bomb, png_bomb, torn_jpeg
 from tests.support.programs import free_port
 from tests.system.hostile.attack import Attack, Outcome, Rounds

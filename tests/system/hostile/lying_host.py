@@ -15,7 +15,6 @@ from common import now
 from common.link.base import SendResult
 from common.link.zeromq import ZeroMqDialer
 from common.protocol.message import (
-    PROTOCOL_VERSION,
     BoardCounts,
     Bye,
     Credit,
@@ -28,6 +27,7 @@ from common.protocol.message import (
     Steer,
 )
 from common.protocol.wire import encode
+from common.versions import PROTOCOL_VERSION
 from tests.support.programs import Program, board, free_port, until
 from tests.system.hostile.attack import Attack, Outcome, Rounds
 from tests.system.hostile.scene import Watched, board_and_host, board_arguments, scene
