@@ -125,7 +125,10 @@ def main() -> int:
         print(f"error: {error}", file=sys.stderr)
         return 3
     if options.json:
-        print(json.dumps({"machine": str(machine()), "seconds": options.seconds, **asdict(figures)}))
+        verdicts = [asdict(verdict) for verdict in _judge(figures)]
+        print(
+            json.dumps({"machine": str(machine()), "seconds": options.seconds, **asdict(figures), "verdicts": verdicts})
+        )
     else:
         scheduling = "SCHED_FIFO" if figures.quiet else "ordinary scheduling (SCHED_FIFO needs root)"
         runs = f"{options.runs} runs of {options.seconds:g} s of each program, in turns"
@@ -287,9 +290,7 @@ def _judge(figures: Figures) -> list[Verdict]:
         (f"dialling to first frame, camera at rest, ms, most of {len(firsts)}", max(firsts), _FIRST_FRAME_MS),
         (f"start to READY, ms, most of {len(starts)}", max(starts), _READY_MS),
     ]
-    return [
-        Verdict(f"{what}: {value:.2f} (to reach: at most {limit:g})", value <= limit) for what, value, limit in found
-    ]
+    return [Verdict(what, value <= limit, f"{value:.2f}", f"at most {limit:g}") for what, value, limit in found]
 
 
 if __name__ == "__main__":
