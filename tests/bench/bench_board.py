@@ -39,6 +39,7 @@ from tests.bench.board_guest import (
     Puller,
     booted_board,
     install_rivals,
+    need_compiler,
 )
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
@@ -147,6 +148,7 @@ def _options() -> argparse.Namespace:
 
 
 def _measure(seconds: float, runs: int, programs: list[str], progress: Progress) -> Figures:
+    need_compiler()
     figures = Figures()
     others = ("boot", "without camera", "starts", "idle", "first frames", "copies")
     task = progress.add_task("boot", total=runs * len(programs) + len(others))

@@ -122,7 +122,12 @@ def judge(rows: Sequence[Row]) -> list[Verdict]:
     ours, anchor = mean(rows, MatcherName.SGBM.value), mean(rows, ANCHOR)
     both = {"bad2": (ours.bad2, anchor.bad2), "fill2": (ours.fill2, anchor.fill2)}
     return [
-        Verdict(f"{name} of sgbm, mean", mine < theirs, f"{mine:.2f} %", f"below {theirs:.2f} % of {ANCHOR}")
+        Verdict(
+            f"{name} of sgbm, mean of {len(rows) // len(METHODS)} cases",
+            mine < theirs,
+            f"{mine:.2f} %",
+            f"below {theirs:.2f} % of {ANCHOR}",
+        )
         for name, (mine, theirs) in both.items()
     ]
 

@@ -36,7 +36,7 @@ def _lower(image: Image) -> Image:
 
 def _darker(image: Image) -> Image:
     gain, offset = _DIM
-    return np.clip(gain * image.astype(np.float32) + offset, 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(gain * image.astype(np.float32) + offset, 0, 255), np.uint8)
 
 
 CASES: Final[dict[str, Callable[[Image, Image], tuple[Image, Image]]]] = {
