@@ -33,14 +33,16 @@ class Figure:
     Attributes:
         what: is measured.
         figure: with its unit.
-        beside: what is to be reached, or the anchor; empty: neither.
-        reached: whether it was; None: nothing is to be reached.
+        anchor: what stands beside it; empty: nothing.
+        limit: what is to be reached; empty: nothing.
+        reached: whether it was.
     """
 
     what: str
     figure: str
-    beside: str = ""
-    reached: bool | None = None
+    anchor: str = ""
+    limit: str = ""
+    reached: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +75,7 @@ def _number(value: float | None) -> str:
 
 def _verdicts(data: Data) -> Iterator[Figure]:
     for verdict in data["verdicts"]:
-        yield Figure(verdict["what"], verdict["found"], verdict["limit"], verdict["reached"])
+        yield Figure(verdict["what"], verdict["found"], "", verdict["limit"], verdict["reached"])
 
 
 def _depth(data: Data) -> Iterator[Figure]:
@@ -188,22 +190,19 @@ def _clock(data: Data) -> Iterator[Figure]:
         what = f"two processes, loopback TCP, {row['load']}, {row['scheduling']}: error p99"
         for when, moment, limit_us in (("early", "after 1 s", early_us), ("late", "after 10 s", late_us)):
             found = f"{_number(row[f'{when}_p99_us'])} us"
-            yield Figure(f"{what} {moment}", found, f"at most {limit_us:g} us", moment not in row["missed"])
+            yield Figure(f"{what} {moment}", found, "", f"at most {limit_us:g} us", moment not in row["missed"])
     for row in data["simulated"]:
-        target = row["target_us"]
-        beside = f"min-RTT: {_number(row['least_p99_us'])} us, mean: {_number(row['mean_p99_us'])} us"
-        limit = "" if target is None else f"at most {target:g} us; "
-        missed = [what for what in row["missed"] if "holdover" not in what]
-        beside += "".join(f"; {what}" for what in missed if "error p99" not in what)
-        what = f"simulated, {row['name']}: error p99 after 10 s"
-        asked = target is not None or bool(missed)
-        yield Figure(what, f"{_number(row['p99_us'])} us", limit + beside, not missed if asked else None)
-        if row["held_p99_us"] is not None and not math.isnan(row["held_p99_us"]):
-            held, reached = f"{_number(row['held_p99_us'])} us", not any("holdover" in what for what in row["missed"])
-            what = f"simulated, {row['name']}: error p99 after 60 s without echoes"
-            yield Figure(what, held, f"at most {data['held_limit_us']:g} us", reached)
+        what, target = f"simulated, {row['name']}: error p99 after", row["target_us"]
+        missed = [said for said in row["missed"] if "holdover" not in said]
+        anchor = f"min-RTT: {_number(row['least_p99_us'])} us, mean: {_number(row['mean_p99_us'])} us"
+        wanted = [] if target is None else [f"at most {target:g} us"]
+        limit = ", ".join([*wanted, *(f"not {said}" for said in missed if "error p99" not in said)])
+        yield Figure(f"{what} 10 s", f"{_number(row['p99_us'])} us", anchor, limit, not missed)
+        if not math.isnan(row["held_p99_us"]):
+            held, reached = f"{_number(row['held_p99_us'])} us", len(missed) == len(row["missed"])
+            yield Figure(f"{what} 60 s without echoes", held, "", f"at most {data['held_limit_us']:g} us", reached)
     violations = sum(row["violations"] for row in data["simulated"])
-    yield Figure("simulated: estimates beyond the bound that they state", str(violations), "none", violations == 0)
+    yield Figure("simulated: estimates beyond the bound that they state", str(violations), "", "0", violations == 0)
 
 
 def _pairing(data: Data) -> Iterator[Figure]:
@@ -211,27 +210,30 @@ def _pairing(data: Data) -> Iterator[Figure]:
     for regime in dict.fromkeys(row["regime"] for row in data["rows"]):
         rows = [row for row in data["rows"] if row["regime"] == regime]
         ours = [row for row in rows if row["method"] == "tandemscan"]
+        pairs, wait_ms = min(row["pairs"] for row in ours), max(row["wait_p99_ms"] for row in ours)
+        figure = f"{_percent(pairs)}; {sum(row['beyond'] for row in ours)}; {_number(wait_ms)} ms"
         least = {name: min(row["pairs"] for row in rows if row["method"] == name) for name in rivals}
-        figure = f"{min(row['pairs'] for row in ours):.2%}, beyond the tolerance: {sum(row['beyond'] for row in ours)}, wait p99 {_number(max(row['wait_p99_ms'] for row in ours))} ms"
-        missed = sorted({what for row in ours for what in row["missed"]})
-        wanted = "all, no wait" if "further apart than twice" in regime else "99 %, none beyond, wait one period"
-        beside = "; ".join([wanted, *missed, *(f"{name}: {share:.2%}" for name, share in least.items())])
-        yield Figure(
-            f"{regime}: pairs of the best possible",
-            figure.replace("%", " %"),
-            beside.replace("%", " %").replace("  %", " %"),
-            not missed,
-        )
+        anchor = ", ".join(f"{name}: {_percent(share)}" for name, share in least.items())
+        wanted = "100 %; 0; 1 ms" if "further apart than twice" in regime else "99 %; 0; one period"
+        missed = sorted({f"not {what}" for row in ours for what in row["missed"]})
+        what = f"{regime}: pairs of the best possible; beyond the tolerance; wait p99"
+        yield Figure(what, figure, anchor, ", ".join([wanted, *missed]), not missed)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2f} %"
 
 
 def _age(data: Data) -> Iterator[Figure]:
     yield from _verdicts(data)
     for row in data["rows"]:
-        link, pipeline = row["link"][1], row["pipeline"][1]
-        yield Figure(
-            f"{row['name']}: age p95 at the link / at the pipeline, last 5 s; camera's frames a second",
-            f"{_number(link['p95_ms'])} / {_number(pipeline['p95_ms'])} ms; {row['camera_hz']:.1f}",
-        )
+        link, pipeline = (_time(row[place][1]["p95_ms"]) for place in ("link", "pipeline"))
+        what = f"{row['name']}: age p95 at the link / at the pipeline, last 5 s; camera's frames a second"
+        yield Figure(what, f"{link} / {pipeline}; {row['camera_hz']:.1f}")
+
+
+def _time(ms: float) -> str:
+    return f"{_number(ms)} ms" if ms < 1000 else f"{_number(ms / 1000)} s"
 
 
 def _board(data: Data) -> Iterator[Figure]:
@@ -259,7 +261,7 @@ SOURCES: Final = (
     Source("link", Topic.LINKS, "640x480 JPEGs at 30 per second between two processes, all transports in turns.", f"{_BENCH}bench_link --runs 2 --seconds 4 --payloads jpeg --transports {' '.join(_TRANSPORTS)} --json", _link, 130),
     Source("serial", Topic.LINKS, "Serial lines: a pseudo terminal, and emulated slow cables.", f"{_BENCH}bench_serial --runs 2 --seconds 10 --json", _serial, 80),
     Source("switches", Topic.LINKS, "The better of two links is lost and comes back.", f"{_BENCH}bench_links --losses 2 --json", _switches, 70),
-    Source("clock", Topic.CLOCK, "How well the host knows the board's clock.", f"{_BENCH}bench_clock --runs 60 --long-runs 10 --real-runs 1 --json", _clock, 90),
+    Source("clock", Topic.CLOCK, "How well the host knows the board's clock. Why radio misses its figure without echoes: [decision 0009](decisions/0009-clock-estimate.md).", f"{_BENCH}bench_clock --runs 400 --long-runs 40 --real-runs 1 --json", _clock, 230),
     Source("pairing", Topic.PAIRING, "Random streams of two cameras, 0 to 10 % of the frames lost, beside the best possible pairs. The worst of the losses is told.", f"{_BENCH}bench_pairing --streams 200 --json", _pairing, 50),
     Source("age", Topic.AGE, "A host ten times slower than the camera: how old are the frames that it gets?", f"{_BENCH}bench_age --seconds 15 --json", _age, 75),
     Source("board", Topic.BOARD, "A booted virtual board (armhf, emulated) with a 640x480 MJPEG webcam at 30 per second.", f"{_BENCH}bench_board --runs 1 --seconds 8 --json", _board, 180),

@@ -97,7 +97,7 @@ def main() -> int:
             print(f"{'error: ' if name in failed else ''}{name} was not measured: {outcome.reason}", file=sys.stderr)
     missed = [figure for _, figure in _judged(outcomes) if not figure.reached]
     for figure in missed:
-        print(f"missed: {figure.what}: {figure.figure} (to reach: {figure.beside})")
+        print(f"missed: {figure.what}: {figure.figure} (to reach: {figure.limit})")
     return 1 if failed else _MISSED if missed else 0
 
 
@@ -198,7 +198,7 @@ def _judged(outcomes: Mapping[str, Outcome]) -> Iterator[tuple[Source, Figure]]:
     for source in SOURCES:
         outcome = outcomes.get(source.name)
         if outcome is not None and outcome.measured:
-            yield from ((source, figure) for figure in figures(source, outcome) if figure.reached is not None)
+            yield from ((source, figure) for figure in figures(source, outcome) if figure.limit)
 
 
 def page(outcomes: Mapping[str, Outcome]) -> str:
@@ -208,9 +208,13 @@ def page(outcomes: Mapping[str, Outcome]) -> str:
         outcomes: by name of the source; what has none, nobody has run.
     """
     judged = list(_judged(outcomes))
-    missed = [f"{figure.what}: {figure.figure}" for _, figure in judged if not figure.reached]
-    summary = f"Of {len(judged)} figures that are to be reached, {len(judged) - len(missed)} were."
-    parts = [_INTRO, "\n", summary, *(f"\n\n- **Missed**: {_cell(text)}" for text in missed), "\n"]
+    missed = [
+        f"- {source.topic.value}: {_cell(f'{figure.what}: {figure.figure} (to reach: {figure.limit})')}\n"
+        for source, figure in judged
+        if not figure.reached
+    ]
+    summary = f"\nOf {len(judged)} figures that are to be reached, {len(judged) - len(missed)} were."
+    parts = [_INTRO, summary, *([" **Missed:**\n\n", *missed] if missed else ["\n"])]
     for topic in Topic:
         parts.append(f"\n## {topic.value}\n")
         parts += [_section(source, outcomes.get(source.name)) for source in SOURCES if source.topic is topic]
@@ -223,7 +227,7 @@ def _section(source: Source, outcome: Outcome | None) -> str:
         return f"\n{source.title}\n\nNot measured on this machine: {why}.\n\n{_origin(source.command)}\n"
     table = ["| what is measured | figure | to reach, or beside it |", "|---|---|---|"]
     table += [
-        f"| {_cell(row.what)} | {_cell(row.figure)} | {_cell(row.beside)}{_verdict(row)} |"
+        f"| {_cell(row.what)} | {_cell(row.figure)} | {'; '.join(filter(None, (_verdict(row), _cell(row.anchor))))} |"
         for row in figures(source, outcome)
     ]
     origin = _origin(outcome.command, outcome.machine, outcome.date.partition("T")[0])
@@ -231,13 +235,9 @@ def _section(source: Source, outcome: Outcome | None) -> str:
 
 
 def _verdict(figure: Figure) -> str:
-    match figure.reached:
-        case None:
-            return ""
-        case True:
-            return ": reached"
-        case _:
-            return ": **missed**"
+    if not figure.limit:
+        return ""
+    return f"{_cell(figure.limit)}: {'reached' if figure.reached else '**missed**'}"
 
 
 def _origin(*parts: str) -> str:

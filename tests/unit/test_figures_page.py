@@ -42,7 +42,7 @@ def test_a_result_is_told_in_rows_with_command_machine_and_date(tmp_path: Path) 
     (tmp_path / "age.json").write_text(json.dumps(asdict(_outcome(_age(12.5)))), encoding="utf-8")
     section = _section(page(load(tmp_path)), Topic.AGE)
     assert "| age at the link | 12.5 ms | 35.0 ms: reached |" in section
-    assert re.search(r"\| FIFO 1:drop-oldest: .* \| 12\.5 / 12\.5 ms; 30\.0 \|  \|", section)
+    assert re.search(r"\| FIFO 1:drop-oldest: .* \| 12\.5 ms / 12\.5 ms; 30\.0 \|  \|", section)
     assert "`python -m tests.bench.x --json`, A CPU, 2 cores, 2026-01-02\n" in section
 
 
@@ -51,7 +51,9 @@ def test_a_missed_figure_is_told() -> None:
     text = page({"age": _outcome(_age(77.5), code=4)})
     assert "| age at the link | 77.5 ms | 35.0 ms: **missed** |" in text
     assert "Of 1 figures that are to be reached, 0 were." in text
-    assert "- **Missed**: age at the link: 77.5 ms" in text.partition("\n## ")[0]
+    assert (
+        "**Missed:**\n\n- Age and queues: age at the link: 77.5 ms (to reach: 35.0 ms)\n" in text.partition("\n## ")[0]
+    )
 
 
 def test_the_board_is_told_where_it_can_be_measured() -> None:
