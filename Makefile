@@ -15,7 +15,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo docs docs-run test test-slow coverage soak attack $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
+.PHONY: help venv demo docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -65,6 +65,9 @@ soak: $(READY) ## ten minutes of a booted board, thirty of both programs (MINUTE
 
 attack: $(READY) ## every attack on the running programs for ten minutes in all (MINUTES=N, ONLY=word); exit 4 when a limit is missed
 	@$(BIN)/python -m tests.system.hostile $(if $(MINUTES),--minutes $(MINUTES)) $(if $(ONLY),--only "$(ONLY)")
+
+figures: .venv/.ready-bench ## short benchmarks of everything, told in docs/figures.md (12 minutes; ONLY=name, AGAIN=1); exit 4 when one is missed
+	@$(BIN)/python -m tests.docs.figures $(if $(ONLY),--only "$(ONLY)") $(if $(AGAIN),--again)
 
 .venv/.ready-bench: $(READY) requirements/bench.txt
 	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: --no-binary cobs --no-build-isolation -r requirements/bench.txt

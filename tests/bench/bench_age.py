@@ -221,9 +221,8 @@ def main() -> int:
         ]
     verdicts = _judge(rows[0])
     if options.json:
-        print(
-            json.dumps({"machine": str(machine()), "seconds": options.seconds, "rows": [asdict(row) for row in rows]})
-        )
+        shown = {"rows": [asdict(row) for row in rows], "verdicts": [asdict(verdict) for verdict in verdicts]}
+        print(json.dumps({"machine": str(machine()), "seconds": options.seconds, **shown}))
         return exit_code(verdicts)
     print(
         f"{machine()}\ncamera {_FPS}/s, {size / 1000:.0f} KB, host {_SLOWNESS} times slower, {options.seconds:g} s each"
@@ -266,7 +265,7 @@ def _judge(row: Row) -> list[Verdict]:
     link_ms = max(window.p95_ms for window in row.link)
     pipeline_ms, bound_ms = max(window.p95_ms for window in row.pipeline), _PERIODS * _PERIOD_MS + link_ms
     return [
-        Verdict(f"age at the {what}, p95 of the worse window: {value:.1f} ms (to reach: {limit:.1f})", value <= limit)
+        Verdict(f"age at the {what}, p95 of the worse window", value <= limit, f"{value:.1f} ms", f"{limit:.1f} ms")
         for what, value, limit in (("link", link_ms, _LINK_MS), ("pipeline", pipeline_ms, bound_ms))
     ]
 

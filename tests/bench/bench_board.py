@@ -39,6 +39,7 @@ from tests.bench.board_guest import (
     Puller,
     booted_board,
     install_rivals,
+    need_compiler,
 )
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
@@ -125,7 +126,10 @@ def main() -> int:
         print(f"error: {error}", file=sys.stderr)
         return 3
     if options.json:
-        print(json.dumps({"machine": str(machine()), "seconds": options.seconds, **asdict(figures)}))
+        verdicts = [asdict(verdict) for verdict in _judge(figures)]
+        print(
+            json.dumps({"machine": str(machine()), "seconds": options.seconds, **asdict(figures), "verdicts": verdicts})
+        )
     else:
         scheduling = "SCHED_FIFO" if figures.quiet else "ordinary scheduling (SCHED_FIFO needs root)"
         runs = f"{options.runs} runs of {options.seconds:g} s of each program, in turns"
@@ -144,6 +148,7 @@ def _options() -> argparse.Namespace:
 
 
 def _measure(seconds: float, runs: int, programs: list[str], progress: Progress) -> Figures:
+    need_compiler()
     figures = Figures()
     others = ("boot", "without camera", "starts", "idle", "first frames", "copies")
     task = progress.add_task("boot", total=runs * len(programs) + len(others))
@@ -287,9 +292,7 @@ def _judge(figures: Figures) -> list[Verdict]:
         (f"dialling to first frame, camera at rest, ms, most of {len(firsts)}", max(firsts), _FIRST_FRAME_MS),
         (f"start to READY, ms, most of {len(starts)}", max(starts), _READY_MS),
     ]
-    return [
-        Verdict(f"{what}: {value:.2f} (to reach: at most {limit:g})", value <= limit) for what, value, limit in found
-    ]
+    return [Verdict(what, value <= limit, f"{value:.2f}", f"at most {limit:g}") for what, value, limit in found]
 
 
 if __name__ == "__main__":

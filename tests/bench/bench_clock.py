@@ -236,7 +236,9 @@ def main() -> int:
     real = measure(options.real_runs) if options.real_runs else []
     if options.json:
         shown = [asdict(row) | {"missed": row.failures} for row in rows]
-        print(json.dumps({"machine": str(machine()), "simulated": shown, "real": [asdict(row) for row in real]}))
+        shown_real = [asdict(row) | {"missed": _real_failures(row)} for row in real]
+        limits = {"held_limit_us": _HOLDOVER_US, "real_limits_us": _REAL_US}
+        print(json.dumps({"machine": str(machine()), "simulated": shown, "real": shown_real, **limits}))
     else:
         print(f"{machine()}\n{options.runs} simulated runs, {options.long_runs} long ones for each link")
         _print(rows)

@@ -4,17 +4,25 @@ Both programs over a serial cable (a pseudo terminal, 3 MB/s) and tcp or ipc, JP
 The cable is pulled so many times, or falls silent without a word. A pause is the time between the last frame over one link and the first over the
 other, as they came to the host (delays.jsonl); 33 ms of it are the camera's period. The way back is a choice, made after the cable has proved
 itself for a second, and for twice as long after each loss; its pause is what the change costs. Figures to reach for a pulled cable (DESIGN, section
-7): median 1 s, p95 2 s; a silent one is known as lost after 1.5 s.
+7): median 1 s, p95 2 s; a silent one is known as lost after 1.5 s. Exit 4 when one is missed.
 """
 
 import argparse
+import json
 import statistics
+import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+
+from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.support.numbered import write_film
 from tests.support.programs import board, free_port, host, ledgers, lines, until
@@ -23,21 +31,61 @@ from tests.support.pty_line import PtyLine
 _FPS = 30
 
 
-def main() -> None:
-    """Measure and print a table."""
+@dataclass(frozen=True, slots=True)
+class Row:
+    """The cable lost in one way, with one other link.
+
+    Attributes:
+        way: `pulled` or `silent`.
+        other: kind of the other link.
+        there_ms: pause of each change to it.
+        back_ms: pause of each return.
+        lost: frames lost a switch.
+    """
+
+    way: str
+    other: str
+    there_ms: list[float]
+    back_ms: list[float]
+    lost: float
+
+
+def main() -> int:
+    """Measure and print a table; 4 when a figure is missed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--losses", type=int, default=3, help="how often the cable is lost in each way (default 3)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
+    console, rows = Console(stderr=True), []
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        for way, other in progress.track([(way, other) for way in ("pulled", "silent") for other in ("tcp", "ipc")]):
+            with tempfile.TemporaryDirectory() as folder:
+                rows.append(Row(way, other, *measure(Path(folder), way, other, options.losses)))
+    verdicts = _judge(rows)
+    if options.json:
+        shown = {"rows": [asdict(row) for row in rows], "verdicts": [asdict(verdict) for verdict in verdicts]}
+        print(json.dumps({"machine": str(machine()), "losses": options.losses, **shown}))
+        return exit_code(verdicts)
     print(machine())
     print(
         f"{'cable':>8} {'other':>6} {'to the other, ms: p50':>22} {'max':>8} {'back, ms: p50':>14} {'max':>8} {'lost a switch':>14}"
     )
-    for way in ("pulled", "silent"):
-        for other in ("tcp", "ipc"):
-            with tempfile.TemporaryDirectory() as folder:
-                there_ms, back_ms, lost = measure(Path(folder), way, other, options.losses)
-            row = [statistics.median(there_ms), max(there_ms), statistics.median(back_ms), max(back_ms)]
-            print(f"{way:>8} {other:>6} {row[0]:22.0f} {row[1]:8.0f} {row[2]:14.0f} {row[3]:8.0f} {lost:14.1f}")
+    for row in rows:
+        there, back = ((statistics.median(pauses), max(pauses)) for pauses in (row.there_ms, row.back_ms))
+        print(
+            f"{row.way:>8} {row.other:>6} {there[0]:22.0f} {there[1]:8.0f} {back[0]:14.0f} {back[1]:8.0f} {row.lost:14.1f}"
+        )
+    print(*verdicts, sep="\n")
+    return exit_code(verdicts)
+
+
+def _judge(rows: list[Row]) -> list[Verdict]:
+    pauses_ms = [pause for row in rows if row.way == "pulled" for pause in row.there_ms]
+    found = (("median", statistics.median(pauses_ms), 1000), ("p95", float(np.percentile(pauses_ms, 95)), 2000))
+    return [
+        Verdict(f"pause when the cable is pulled, {name}", value <= limit, f"{value:.0f} ms", f"{limit} ms")
+        for name, value, limit in found
+    ]
 
 
 def measure(folder: Path, way: str, other: str, losses: int) -> tuple[list[float], list[float], float]:
@@ -110,4 +158,4 @@ def _wait(out: Path, link: str, pairs: int) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -18,7 +18,7 @@ import sys
 import tempfile
 import tty
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import cv2
@@ -87,7 +87,8 @@ def main() -> int:
             slow[line.name] = _over_slow_line(line, options.seconds)
             progress.advance(task)
     if options.json:
-        print(json.dumps({"machine": str(machine()), "pty": fast, "slow": slow}, indent=1))
+        verdicts = [asdict(verdict) for verdict in _judge(fast, slow)]
+        print(json.dumps({"machine": str(machine()), "pty": fast, "slow": slow, "verdicts": verdicts}, indent=1))
     else:
         _print(fast, slow, options)
     return exit_code(_judge(fast, slow))
@@ -198,15 +199,16 @@ def _judge(fast: dict[str, list[tuple[float, float, float]]], slow: dict[str, di
     if "cobs" in fast:
         ours, theirs = (statistics.median(run[0] for run in fast[name]) for name in ("ours", "cobs"))
         verdicts.append(
-            Verdict(f"{ours / theirs:.2f} x {_NAMES['cobs']} (to reach: {_RATIO})", ours / theirs >= _RATIO)
+            Verdict(f"throughput / {_NAMES['cobs']}", ours / theirs >= _RATIO, f"{ours / theirs:.2f}", f"{_RATIO}")
         )
     for line in _SLOW:
         goodput, echo_ms = slow[line.name]["goodput"], slow[line.name]["echo_p99_ms"]
-        said = f"{line.name}: goodput {goodput:.1%} (to reach: {line.goodput:.0%})"
-        verdicts.append(Verdict(said, goodput >= line.goodput))
+        verdicts.append(
+            Verdict(f"{line.name}: goodput", goodput >= line.goodput, f"{goodput:.1%}", f"{line.goodput:.0%}")
+        )
         if line.echo_ms == line.echo_ms:
-            said = f"{line.name}: echo p99 {echo_ms:.1f} ms (to reach: {line.echo_ms:.0f})"
-            verdicts.append(Verdict(said, echo_ms <= line.echo_ms))
+            reached = echo_ms <= line.echo_ms
+            verdicts.append(Verdict(f"{line.name}: echo p99", reached, f"{echo_ms:.1f} ms", f"{line.echo_ms:.0f} ms"))
     return verdicts
 
 

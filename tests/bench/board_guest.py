@@ -317,14 +317,18 @@ def booted_board(architecture: Architecture = Architecture.ARMHF) -> Iterator[Bo
             guest.stop()
 
 
-def install_rivals(board: Board) -> None:
-    """Compile what stands beside our board and what counts its copies for an armhf guest, linked to its own libzmq, and put it there.
+def need_compiler() -> None:
+    """Look for what `install_rivals` needs, before minutes go into a boot.
 
     Raises:
         UnavailableError: the cross compiler is missing.
     """
     if not shutil.which(COMPILER):
         raise UnavailableError(f"{COMPILER} is missing", "apt install gcc-arm-linux-gnueabihf")
+
+
+def install_rivals(board: Board) -> None:
+    """Compile what stands beside our board and what counts its copies for an armhf guest, linked to its own libzmq, and put it there."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         libzmq, forward, copies = folder / "libzmq.so.5", folder / "forward", folder / "copies.so"

@@ -12,16 +12,20 @@ class Verdict:
     """One figure beside what was found.
 
     Attributes:
-        said: what was found, and what was to be reached.
-        reached: whether it was.
+        what: was measured.
+        reached: whether the figure was reached.
+        found: with its unit.
+        limit: what was to be reached.
     """
 
-    said: str
+    what: str
     reached: bool
+    found: str = ""
+    limit: str = ""
 
     def __str__(self) -> str:
         """One line."""
-        return f"{self.said} {'reached' if self.reached else 'NOT reached'}"
+        return f"{self.what}: {self.found} (to reach: {self.limit}) {'reached' if self.reached else 'NOT reached'}"
 
 
 def exit_code(verdicts: Sequence[Verdict]) -> int:

@@ -1,0 +1,269 @@
+"""Where the figures of docs/figures.md come from: a command line for each, and how its JSON is told in rows.
+
+The arguments keep `make figures` within about twelve minutes on two cores. An anchor stands in the same run where there is one; otherwise its origin is said.
+"""
+
+import math
+import statistics
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+Data = Mapping[str, Any]
+
+
+class Topic(Enum):
+    """The page's sections, in their order, by their headings."""
+
+    DEPTH = "Depth"
+    CALIBRATION = "Calibration"
+    LINKS = "Links"
+    CLOCK = "Clock"
+    PAIRING = "Pairing"
+    AGE = "Age and queues"
+    BOARD = "Board"
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One row.
+
+    Attributes:
+        what: is measured.
+        figure: with its unit.
+        anchor: what stands beside it; empty: nothing.
+        limit: what is to be reached; empty: nothing.
+        reached: whether it was.
+    """
+
+    what: str
+    figure: str
+    anchor: str = ""
+    limit: str = ""
+    reached: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A command whose JSON gives figures.
+
+    Attributes:
+        name: of its file in out/figures.
+        topic: section of the page.
+        title: what it measures, one sentence.
+        command: as a reader types it in the project's folder, the environment activated.
+        rows: tells its JSON.
+        about_s: how long it takes.
+    """
+
+    name: str
+    topic: Topic
+    title: str
+    command: str
+    rows: Callable[[Data], Iterator[Figure]]
+    about_s: int
+
+
+def _number(value: float | None) -> str:
+    """Three digits or all before the point."""
+    if value is None or math.isnan(value):
+        return "-"
+    return f"{value:.{0 if abs(value) >= 100 else 1 if abs(value) >= 10 else 2}f}"
+
+
+def _verdicts(data: Data) -> Iterator[Figure]:
+    for verdict in data["verdicts"]:
+        yield Figure(verdict["what"], verdict["found"], "", verdict["limit"], verdict["reached"])
+
+
+def _depth(data: Data) -> Iterator[Figure]:
+    yield from _verdicts(data)
+    means = {(row["method"], row["case"]): row for row in data["means"]}
+    scenes = Counter(row["case"] for row in data["rows"] if row["method"] == "sgbm")
+    anchor = "tuned OpenCV"
+
+    def quality(method: str, case: str) -> str:
+        row = means[method, case]
+        return f"{row['bad2']:.2f} / {row['fill2']:.2f} / {row['density']:.1f} %"
+
+    for case, count in scenes.items():
+        what = f"`sgbm`, {case}, {count} scenes: bad2 / fill2 / density"
+        yield Figure(what, quality("sgbm", case), f"{anchor}: {quality(anchor, case)}")
+    what = f"`block`, the paper's matcher, all {scenes.total()} cases: bad2 / fill2 / density"
+    yield Figure(what, quality("block", ""), f"{anchor}: {quality(anchor, '')}")
+    for method in ("sgbm", "block"):
+        took, beside = (
+            f"{_number(row['ms_per_mp'])} ms, CPU {_number(row['cpu_ms_per_mp'])} ms"
+            for row in (means[method, ""], means[anchor, ""])
+        )
+        yield Figure(f"`{method}`, time for a megapixel, mean of the cases", took, f"{anchor}: {beside}")
+
+
+def _demo(data: Data) -> Iterator[Figure]:
+    truth, delays = data["truth"], data["delays_ms"]
+    yield Figure("median depth error", f"{truth['depth_mm']:.1f} mm ({truth['depth_percent']:.2f} %)")
+    for metres in (1, 2):
+        yield Figure(f"median depth error at {metres} m", f"{truth[f'at_{metres}_m_mm']:.1f} mm")
+    yield Figure("median disparity error", f"{truth['disparity_px']:.3f} px")
+    yield Figure("pixels with a value, of those that both cameras see", f"{100 * truth['density']:.1f} %")
+    for name in ("propagation", "queuing", "processing", "end_to_end"):
+        both = f"{_number(delays[name]['p50'])} / {_number(delays[name]['p95'])} ms"
+        yield Figure(f"{name.replace('_', '-')} delay of a pair, p50 / p95", both)
+
+
+_PUBLISHED_RIG: Final = "published with the images"
+_PUBLISHED_RMS_PX: Final = 0.189
+_PUBLISHED_BASELINE_MM: Final = 80.17
+"""rig.json of simplestereo_rig1: its RMS over all 30 pairs, and the length of T."""
+
+_OPENCV_RMS_PX: Final = 0.215
+"""README of $SCAN_DATA: cv2.stereoCalibrate on the same pairs."""
+
+
+def _calibration(data: Data, rms: str, baseline: str) -> Iterator[Figure]:
+    pairs, rows = data["pairs"], data["vertical_error_px"]
+    yield Figure("pairs used, of those with a board", f"{pairs['used']} of {pairs['found']}")
+    yield Figure("RMS stereo", f"{data['rms_px']['stereo']:.3f} px", rms)
+    if baseline:
+        found = f"{data['baseline_mm']:.2f} mm, sigma {data['baseline_sigma_mm']:.2f} mm"
+        yield Figure("baseline", found, baseline)
+    yield Figure("vertical error after rectification, mean / 95 %", f"{rows['mean']:.2f} / {rows['p95']:.2f} px")
+    yield Figure("verdict of the command", data["verdict"])
+
+
+def _published(data: Data) -> Iterator[Figure]:
+    rms = f"{_PUBLISHED_RIG}, over 30 pairs: {_PUBLISHED_RMS_PX} px"
+    return _calibration(data, rms, f"{_PUBLISHED_RIG}: {_PUBLISHED_BASELINE_MM} mm")
+
+
+def _opencv_images(data: Data) -> Iterator[Figure]:
+    """The side of its squares is unknown, so its millimetres mean nothing."""
+    return _calibration(data, f"OpenCV's stereoCalibrate, in a run of its own: {_OPENCV_RMS_PX} px", "")
+
+
+_TRANSPORTS: Final = {
+    "tandemscan": "tandemscan over tcp",
+    "tandemscan-curve": "tandemscan over tcp with keys",
+    "tandemscan-ipc": "tandemscan over ipc",
+    "pyzmq": "bare pyzmq PUSH/PULL",
+    "tcp": "bare TCP socket",
+    "imagezmq": "imagezmq REQ/REP",
+}
+
+
+def _link(data: Data) -> Iterator[Figure]:
+    yield from _verdicts(data)
+    for payload, found in data["payloads"].items():
+        for name, row in found["transports"].items():
+            what = f"{_TRANSPORTS[name]}, {payload} of {found['bytes'] / 1000:.0f} KB: one-way p50 / p99; sender's CPU a frame; lost"
+            times = f"{_number(row['p50_us'])} / {_number(row['p99_us'])} us; {_number(row['sender_us'])} us; {row['lost_frames']}"
+            yield Figure(what, times)
+
+
+def _serial(data: Data) -> Iterator[Figure]:
+    yield from _verdicts(data)
+    speeds = {name: statistics.median(run[0] for run in runs) for name, runs in data["pty"].items()}
+    rivals = {"cobs": "COBS + CRC-32", "length": "length + CRC-32"}
+    beside = ", ".join(f"bare loop with {rivals[name]}: {_number(speeds[name])}" for name in speeds if name in rivals)
+    yield Figure("throughput over a pseudo terminal, frames of 50 KB", f"{_number(speeds['ours'])} MB/s", beside)
+    for name, row in data["slow"].items():
+        yield Figure(f"{name}, frames of 25 KB; lost", f"{row['frames_per_s']:.2f} a second; {row['lost']}")
+
+
+def _switches(data: Data) -> Iterator[Figure]:
+    yield from _verdicts(data)
+    for way, beside in (("pulled", ""), ("silent", "known as lost after 1500 ms")):
+        rows = [row for row in data["rows"] if row["way"] == way]
+        there, back = ([pause for row in rows for pause in row[side]] for side in ("there_ms", "back_ms"))
+        what = (
+            f"cable {way}, {len(there)} times: longest pause to the other link / longest on the way back; lost a switch"
+        )
+        lost = max(row["lost"] for row in rows)
+        yield Figure(what, f"{max(there):.0f} / {max(back):.0f} ms; {_number(lost)}", beside)
+
+
+def _clock(data: Data) -> Iterator[Figure]:
+    early_us, late_us = data["real_limits_us"]
+    for row in data["real"]:
+        what = f"two processes, loopback TCP, {row['load']}, {row['scheduling']}: error p99"
+        for when, moment, limit_us in (("early", "after 1 s", early_us), ("late", "after 10 s", late_us)):
+            found = f"{_number(row[f'{when}_p99_us'])} us"
+            yield Figure(f"{what} {moment}", found, "", f"at most {limit_us:g} us", moment not in row["missed"])
+    for row in data["simulated"]:
+        what, target = f"simulated, {row['name']}: error p99 after", row["target_us"]
+        missed = [said for said in row["missed"] if "holdover" not in said]
+        anchor = f"min-RTT: {_number(row['least_p99_us'])} us, mean: {_number(row['mean_p99_us'])} us"
+        wanted = [] if target is None else [f"at most {target:g} us"]
+        limit = ", ".join([*wanted, *(f"not {said}" for said in missed if "error p99" not in said)])
+        yield Figure(f"{what} 10 s", f"{_number(row['p99_us'])} us", anchor, limit, not missed)
+        if not math.isnan(row["held_p99_us"]):
+            held, reached = f"{_number(row['held_p99_us'])} us", len(missed) == len(row["missed"])
+            yield Figure(f"{what} 60 s without echoes", held, "", f"at most {data['held_limit_us']:g} us", reached)
+    violations = sum(row["violations"] for row in data["simulated"])
+    yield Figure("simulated: estimates beyond the bound that they state", str(violations), "", "0", violations == 0)
+
+
+def _pairing(data: Data) -> Iterator[Figure]:
+    rivals = ("ApproximateTime", "naive nearest")
+    for regime in dict.fromkeys(row["regime"] for row in data["rows"]):
+        rows = [row for row in data["rows"] if row["regime"] == regime]
+        ours = [row for row in rows if row["method"] == "tandemscan"]
+        pairs, wait_ms = min(row["pairs"] for row in ours), max(row["wait_p99_ms"] for row in ours)
+        figure = f"{_percent(pairs)}; {sum(row['beyond'] for row in ours)}; {_number(wait_ms)} ms"
+        least = {name: min(row["pairs"] for row in rows if row["method"] == name) for name in rivals}
+        anchor = ", ".join(f"{name}: {_percent(share)}" for name, share in least.items())
+        wanted = "100 %; 0; 1 ms" if "further apart than twice" in regime else "99 %; 0; one period"
+        missed = sorted({f"not {what}" for row in ours for what in row["missed"]})
+        what = f"{regime}: pairs of the best possible; beyond the tolerance; wait p99"
+        yield Figure(what, figure, anchor, ", ".join([wanted, *missed]), not missed)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2f} %"
+
+
+def _age(data: Data) -> Iterator[Figure]:
+    yield from _verdicts(data)
+    for row in data["rows"]:
+        link, pipeline = (_time(row[place][1]["p95_ms"]) for place in ("link", "pipeline"))
+        what = f"{row['name']}: age p95 at the link / at the pipeline, last 5 s; camera's frames a second"
+        yield Figure(what, f"{link} / {pipeline}; {row['camera_hz']:.1f}")
+
+
+def _time(ms: float) -> str:
+    return f"{_number(ms)} ms" if ms < 1000 else f"{_number(ms / 1000)} s"
+
+
+def _board(data: Data) -> Iterator[Figure]:
+    yield from _verdicts(data)
+    for name, costs in data["costs"].items():
+        frames = sum(cost["frames"] for cost in costs)
+        cpu_ms = sum(cost["cpu_ns"] for cost in costs) / max(1, frames) / 1e6
+        resident_mb = max(cost["resident_bytes"] for cost in costs) / 1e6
+        yield Figure(f"{name}: CPU time a frame; resident memory", f"{cpu_ms:.2f} ms; {resident_mb:.1f} MB")
+    scheduling = "SCHED_FIFO" if data["quiet"] else "ordinary scheduling"
+    yield Figure(
+        f"for orientation: 10^6 rounds of `x += i` in the emulated board, {scheduling}",
+        f"{1000 * data['interpreter_s']:.0f} ms",
+    )
+
+
+_CALIBRATE: Final = 'phone-host calibrate "$SCAN_DATA/{left}" "$SCAN_DATA/{right}" --board {board} --square {square} --out out/figures/{name}/rig.yaml --json'
+_BENCH: Final = "python -m tests.bench."
+
+SOURCES: Final = (
+    Source("depth", Topic.DEPTH, "Real pairs with ground truth, clean and as cheap cameras give them. bad2: values that are off by more than 2 px. fill2: the same, each gap filled from its row. density: pixels with a value.", f"{_BENCH}bench_depth --json", _depth, 20),
+    Source("demo", Topic.DEPTH, "The demo: a rendered scene of known depth, both programs live.", "phone-host demo --out out/figures/demo --json", _demo, 40),
+    Source("rig1", Topic.CALIBRATION, "A published rig, 1280x720.", _CALIBRATE.format(left="simplestereo_rig1/calib/*_L.png", right="simplestereo_rig1/calib/*_R.png", board="7x6", square="60.5mm", name="rig1"), _published, 20),
+    Source("opencv", Topic.CALIBRATION, "OpenCV's example images, 640x480. The side of the squares is unknown.", _CALIBRATE.format(left="opencv_stereo_calib/left*.jpg", right="opencv_stereo_calib/right*.jpg", board="9x6", square="25mm", name="opencv"), _opencv_images, 10),
+    Source("link", Topic.LINKS, "640x480 JPEGs at 30 per second between two processes, all transports in turns.", f"{_BENCH}bench_link --runs 2 --seconds 4 --payloads jpeg --transports {' '.join(_TRANSPORTS)} --json", _link, 130),
+    Source("serial", Topic.LINKS, "Serial lines: a pseudo terminal, and emulated slow cables.", f"{_BENCH}bench_serial --runs 2 --seconds 10 --json", _serial, 80),
+    Source("switches", Topic.LINKS, "The better of two links is lost and comes back.", f"{_BENCH}bench_links --losses 2 --json", _switches, 70),
+    Source("clock", Topic.CLOCK, "How well the host knows the board's clock. Why radio misses its figure without echoes: [decision 0009](decisions/0009-clock-estimate.md).", f"{_BENCH}bench_clock --runs 400 --long-runs 40 --real-runs 1 --json", _clock, 230),
+    Source("pairing", Topic.PAIRING, "Random streams of two cameras, 0 to 10 % of the frames lost, beside the best possible pairs. The worst of the losses is told.", f"{_BENCH}bench_pairing --streams 200 --json", _pairing, 50),
+    Source("age", Topic.AGE, "A host ten times slower than the camera: how old are the frames that it gets?", f"{_BENCH}bench_age --seconds 15 --json", _age, 75),
+    Source("board", Topic.BOARD, "A booted virtual board (armhf, emulated) with a 640x480 MJPEG webcam at 30 per second.", f"{_BENCH}bench_board --runs 1 --seconds 8 --json", _board, 180),
+)  # fmt: skip
+"""Everything on the page."""
