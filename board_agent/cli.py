@@ -38,6 +38,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     """Import the verb, and run it. The only place that imports by a verb's name."""
+    if options.verb is None:
+        parser().print_help()
+        return 0
     gc.disable()  # what is imported stays: to look for garbage in it, now and later, only costs a board time
     try:
         verb = importlib.import_module(f"board_agent.verbs.{options.verb}")
@@ -52,7 +55,7 @@ def parser() -> argparse.ArgumentParser:
     """All verbs with their options."""
     made = ExamplesFirstParser("board-agent", description=_EXAMPLES)
     add_version_option(made)
-    verbs = made.add_subparsers(dest="verb", required=True, metavar="VERB")
+    verbs = made.add_subparsers(dest="verb", metavar="VERB")
     run = verbs.add_parser("run", help="stream the camera's frames to a host until stopped", description=_EXAMPLES)
     show = verbs.add_parser(
         "settings", help="print each setting, its value and where the value comes from", description=_EXAMPLES

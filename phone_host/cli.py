@@ -62,6 +62,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     """Import the command half of the verb, and run it. The only place that imports by a verb's name."""
+    if options.verb is None:
+        parser().print_help()
+        return 0
     command = importlib.import_module(f"phone_host.verbs.{options.verb.replace('-', '_')}.command")
     code: int = command.run(options)
     return code
@@ -71,7 +74,7 @@ def parser() -> argparse.ArgumentParser:
     """All verbs with their options."""
     made = ExamplesFirstParser("phone-host", description=_EXAMPLES)
     add_version_option(made)
-    verbs = made.add_subparsers(dest="verb", required=True, metavar="VERB")
+    verbs = made.add_subparsers(dest="verb", metavar="VERB")
     for name, arguments in _VERBS.items():
         verb = verbs.add_parser(name, help=arguments.SUMMARY, description=f"examples:\n{arguments.EXAMPLES}")
         arguments.add_arguments(verb)

@@ -34,3 +34,12 @@ def test_help_opens_with_examples(module: str, verb: list[str], tmp_path: Path) 
     # Where verbs are still to be chosen there are none of their options.
     runs_as_it_is = bool(verb) or module == "phone_host.bench.cli"
     assert ("--debug" in running.out.read_text()) is runs_as_it_is
+
+
+@pytest.mark.parametrize("module", ["board_agent.cli", "phone_host.cli"])
+def test_a_bare_name_says_what_can_be_done(module: str, tmp_path: Path) -> None:
+    """Without a verb a program prints its examples and verbs, and that is no mistake."""
+    with program(module, [], tmp_path, "bare") as running:
+        assert running.wait() == 0
+    assert running.out.read_text().startswith("examples:")
+    assert running.stderr == ""
