@@ -6,6 +6,7 @@ import json
 import math
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from html.parser import HTMLParser
 from typing import Any
 
@@ -42,6 +43,7 @@ from phone_host.measure.accounts import LinkAccount, SessionAccount
 from phone_host.measure.delays import DELAYS, STAGES
 from phone_host.model import PairCounts
 from phone_host.sync.fifo import FifoSettings
+from tests.support.samples import LEDGER
 
 UNDER = Conditions(
     machine="a machine",
@@ -58,12 +60,11 @@ def ledger(number: int, period_ns: int = 33_000_000) -> PairLedger:
     """A pair whose delays are 1, 2, 3, 4, 5 and 15 ms."""
     exposed_ns = number * period_ns
     marks = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=exposed_ns + 1_000_000, sent_ns=exposed_ns + 3_000_000)
-    return PairLedger(
-        session="s",
+    return replace(
+        LEDGER,
         sequence=number,
         host_sequence=number,
         bytes=50_000,
-        link="tcp",
         board=marks,
         received_ns=exposed_ns + 6_000_000,
         paired_ns=exposed_ns + 10_000_000,
@@ -73,7 +74,6 @@ def ledger(number: int, period_ns: int = 33_000_000) -> PairLedger:
         previous_done_ns=exposed_ns + 9_000_000,
         stages=StageTimes(decode=1_000_000, match=14_000_000),
         time_skew_ns=-5_000,
-        offset_ns=0,
         uncertainty_ns=40_000,
         host=HostMarks(exposed_ns=exposed_ns + 5_000, grabbed_ns=exposed_ns + 1_000_000),
     )

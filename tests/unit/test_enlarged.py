@@ -13,7 +13,6 @@ from common import now
 from common.errors import DataError
 from common.frame import Frame, PixelFormat
 from common.ledger import BoardMarks
-from common.protocol.message import FrameMessage
 from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, Image, Side
 from phone_host.run.pipeline import Pipeline
@@ -23,6 +22,7 @@ from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
 from tests.support.pictures import encoded
 from tests.support.planes import Plane, plane
+from tests.support.samples import FRAME
 
 _SCENE: Final = plane(shortest_px=14.0)
 """Textures that half of the pixels still show: Shannon's limit there is 4 px."""
@@ -38,14 +38,12 @@ def pair_of(left: Image, right: Image, board_side: Side, asked_px: tuple[int, in
     """Two frames as they come to the worker."""
     board, host = (left, right) if board_side is Side.LEFT else (right, left)
     marks, stamp = BoardMarks(exposed_ns=1, grabbed_ns=1, sent_ns=1), Stamp(1, HOST_CLOCK)
-    message = FrameMessage(
-        session="s",
-        sent_index=0,
+    message = replace(
+        FRAME,
         sequence=7,
         width_px=board.shape[1],
         height_px=board.shape[0],
         pixel_format=PixelFormat.PNG,
-        exposure_ns=None,
         marks=marks,
         payload=encoded(".png", board),
     )

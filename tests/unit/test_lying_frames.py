@@ -1,5 +1,7 @@
 """Frames whose bytes, header and camera do not agree are refused before anything is decoded, each with its reason."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -9,7 +11,6 @@ from common.errors import DataError
 from common.frame import Frame, FrameFault, ImageSizeError, PixelFormat, SpoiledImageError
 from common.imagesize.head import MEGAPIXEL
 from common.ledger import BoardMarks
-from common.protocol.message import FrameMessage
 from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, Side
 from phone_host.run.pipeline import Pipeline
@@ -19,6 +20,7 @@ from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
 from tests.support import bombs
 from tests.support.pictures import encoded, jpeg, picture
+from tests.support.samples import FRAME
 
 JPEG, PNG = PixelFormat.MJPEG, PixelFormat.PNG
 
@@ -32,14 +34,12 @@ def pair_of(
 ) -> FramePair:
     """A board's frame as it came, beside a sound one of the own camera."""
     marks, stamp = BoardMarks(exposed_ns=1, grabbed_ns=1, sent_ns=1), Stamp(1, HOST_CLOCK)
-    message = FrameMessage(
-        session="s",
-        sent_index=0,
+    message = replace(
+        FRAME,
         sequence=7,
         width_px=size_px[0],
         height_px=size_px[1],
         pixel_format=pixel_format,
-        exposure_ns=None,
         marks=marks,
         payload=board,
     )

@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from common import now
 from common.frame import Frame, PixelFormat
 from common.ledger import BoardMarks
-from common.protocol.message import CameraDescription, FrameMessage, Pacing
+from common.protocol.message import CameraDescription, Pacing
 from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, PairCounts
 from phone_host.stream.demand_clock import DemandClock
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.sync.fifo import FifoSettings, Overflow
+from tests.support.samples import FRAME
 
 MS = 1_000_000
 PERIOD_NS = 33 * MS
@@ -25,16 +26,11 @@ PERIOD_NS = 33 * MS
 def board_frame(sequence: int, exposed_ns: int, received_ns: int | None = None) -> BoardFrame:
     """A frame that the board exposed at this time of the host's clock."""
     marks = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=exposed_ns, sent_ns=exposed_ns)
-    message = FrameMessage(
-        session="s",
+    message = replace(
+        FRAME,
         sent_index=sequence,
         sequence=sequence,
-        width_px=1,
-        height_px=1,
-        pixel_format=PixelFormat.MJPEG,
-        exposure_ns=None,
         marks=marks,
-        payload=b"",
     )
     return BoardFrame(
         message=message,

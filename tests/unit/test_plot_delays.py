@@ -3,14 +3,16 @@
 import math
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
+from common.ledger import BoardMarks, StageTimes
 from phone_host.measure.delay_fit import fit_delay
 from phone_host.svg.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
 from phone_host.svg.plot_parts import point_legend
+from tests.support.samples import LEDGER
 
 MS = 1_000_000
 
@@ -76,24 +78,15 @@ def test_frames_of_one_size_have_no_line() -> None:
 def test_a_pairs_bars_are_as_long_as_its_delays() -> None:
     """Delays of 10, 20, 40, 10, 20 and 100 ms are bars of these lengths on one scale, each beginning where the one before ends."""
     board = BoardMarks(exposed_ns=0, grabbed_ns=10 * MS, sent_ns=30 * MS)
-    ledger = PairLedger(
-        session="s",
-        sequence=0,
-        host_sequence=0,
-        bytes=9,
-        link="tcp",
+    ledger = replace(
+        LEDGER,
         board=board,
         received_ns=70 * MS,
         paired_ns=80 * MS,
         queued_ns=80 * MS,
         dequeued_ns=100 * MS,
         done_ns=200 * MS,
-        previous_done_ns=0,
         stages=StageTimes(match=90 * MS, write=10 * MS),
-        time_skew_ns=0,
-        offset_ns=0,
-        uncertainty_ns=0,
-        host=HostMarks(exposed_ns=0, grabbed_ns=0),
     )
     root = svg(lives([Life("tcp, typical", ledger)], 500))
     bars = {

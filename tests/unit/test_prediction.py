@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
+from common.ledger import BoardMarks
 from phone_host.bench.emulate import PROFILES
 from phone_host.bench.prediction import (
     Cell,
@@ -21,6 +21,7 @@ from phone_host.bench.prediction import (
     with_own_delays,
 )
 from phone_host.sync.fifo import FifoSettings, Overflow
+from tests.support.samples import LEDGER
 
 MS = 1_000_000
 LATENCY_NS, NS_PER_BYTE = 2 * MS, 1000
@@ -43,12 +44,11 @@ def cell(interface: str = "tcp", size_bytes: int = 10_000, period_ms: int = 40, 
         board = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=exposed_ns + 1 * MS, sent_ns=exposed_ns + 1 * MS)
         done_ns = received_ns + processing_ns
         ledgers.append(
-            PairLedger(
-                session="s",
+            replace(
+                LEDGER,
                 sequence=number,
                 host_sequence=number,
                 bytes=size_bytes,
-                link="tcp",
                 board=board,
                 received_ns=received_ns,
                 paired_ns=received_ns,
@@ -56,11 +56,6 @@ def cell(interface: str = "tcp", size_bytes: int = 10_000, period_ms: int = 40, 
                 dequeued_ns=received_ns,
                 done_ns=done_ns,
                 previous_done_ns=done_ns - period_ms * MS,
-                stages=StageTimes(),
-                time_skew_ns=0,
-                offset_ns=0,
-                uncertainty_ns=0,
-                host=HostMarks(exposed_ns=0, grabbed_ns=0),
             )
         )
     return Cell(

@@ -3,6 +3,7 @@
 import base64
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import cv2
@@ -33,6 +34,7 @@ from phone_host.svg.plots import (
     over_time,
     stacked_over_time,
 )
+from tests.support.samples import LEDGER
 
 VOID = {"meta", "img", "br", "path", "rect", "circle", "hr"}
 PNG = cv2.imencode(".png", np.zeros((4, 4, 3), dtype=np.uint8))[1].tobytes()
@@ -79,12 +81,10 @@ def ledger(number: int, delays_ms: tuple[int, ...] = (1, 2, 3, 4, 5, 20), start_
         decode=1_000_000, interpolate=0, rectify=2_000_000, match=10_000_000, reproject=3_000_000, write=4_000_000
     )
     board = BoardMarks(exposed_ns=exposed, grabbed_ns=grabbed, sent_ns=sent)
-    return PairLedger(
-        session="s",
+    return replace(
+        LEDGER,
         sequence=number,
         host_sequence=number,
-        bytes=1,
-        link="tcp",
         board=board,
         received_ns=received,
         paired_ns=received,
@@ -94,7 +94,6 @@ def ledger(number: int, delays_ms: tuple[int, ...] = (1, 2, 3, 4, 5, 20), start_
         previous_done_ns=queued,
         stages=stages,
         time_skew_ns=-7000,
-        offset_ns=0,
         uncertainty_ns=9000,
         host=HostMarks(exposed_ns=exposed + 7000, grabbed_ns=grabbed),
     )

@@ -7,7 +7,7 @@ import pytest
 
 from common.camera.base import CameraHealth, CameraState
 from common.frame import FrameFault
-from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
+from common.ledger import BoardMarks, HostMarks
 from common.protocol.message import BoardCounts, DropReason
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.measure.delays import DelayStatistics, Series
@@ -22,6 +22,7 @@ from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Aligning, Alignment, Phase
 from phone_host.sync.quarantine import Disbelief, Suspects
+from tests.support.samples import LEDGER
 
 NAN = float("nan")
 MS = 1_000_000
@@ -34,12 +35,10 @@ def run(pairs: int) -> RunSnapshot:
         at = number * 50 * MS
         board = BoardMarks(exposed_ns=at, grabbed_ns=at + MS, sent_ns=at + 2 * MS)
         delays.add(
-            PairLedger(
-                session="s",
+            replace(
+                LEDGER,
                 sequence=number,
                 host_sequence=number,
-                bytes=9,
-                link="ipc",
                 board=board,
                 received_ns=at + 3 * MS,
                 paired_ns=at + 4 * MS,
@@ -47,9 +46,6 @@ def run(pairs: int) -> RunSnapshot:
                 dequeued_ns=at + 5 * MS,
                 done_ns=at + 15 * MS,
                 previous_done_ns=at,
-                stages=StageTimes(),
-                time_skew_ns=0,
-                offset_ns=0,
                 uncertainty_ns=50,
                 host=HostMarks(exposed_ns=at, grabbed_ns=at + MS),
             )

@@ -1,14 +1,12 @@
 """One session over two links: cut, mended, chosen in any order, on simulated time. The world itself checks that frames come once and in order."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.frame import PixelFormat
-from common.ledger import BoardMarks
 from common.protocol.board_session import BoardSession
 from common.protocol.host_carriage import STUCK_NS
 from common.protocol.message import (
@@ -39,6 +37,7 @@ from common.protocol.session import (
     StaleReason,
     connection_name,
 )
+from tests.support.samples import FRAME
 from tests.support.session_world import CAMERA, HostNode, World
 
 LINKS = 2
@@ -288,16 +287,11 @@ def test_another_board_on_the_second_link_is_told_and_left_alone() -> None:
         world._host_does(host, host.session.receive(control, other, world.now_ns))
         world.settle(200 * MS)
         assert world.now_ns - begin_ns < TAKEOVER_NS + 500 * MS
-    foreign = FrameMessage(
+    foreign = replace(
+        FRAME,
         session="other",
         sent_index=3,
         sequence=3,
-        width_px=1,
-        height_px=1,
-        pixel_format=PixelFormat.MJPEG,
-        exposure_ns=None,
-        marks=BoardMarks(exposed_ns=0, grabbed_ns=0, sent_ns=0),
-        payload=b"",
     )
     world._host_does(host, host.session.receive(host.names[1, Lane.FRAMES], foreign, world.now_ns))
     assert host.stale[-1].reason is StaleReason.OLD_SESSION

@@ -15,13 +15,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.frame import Frame, PixelFormat
-from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
-from common.protocol.message import FrameMessage
+from common.ledger import BoardMarks, HostMarks, StageTimes
 from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, Processed, RectifiedPair, Result
 from phone_host.output.listed import LIST
 from phone_host.run.file_sink import FileSink
 from phone_host.run.sinks import FunctionSink, SinkQueue
+from tests.support.samples import FRAME, LEDGER
 
 PATIENCE_S = 60.0
 
@@ -29,14 +29,13 @@ PATIENCE_S = 60.0
 def result(number: int) -> Result:
     """A result of two grey images."""
     marks = BoardMarks(exposed_ns=number, grabbed_ns=number + 1, sent_ns=number + 2)
-    size = {"width_px": 4, "height_px": 3}
-    message = FrameMessage(
-        session="s",
+    message = replace(
+        FRAME,
         sent_index=number,
         sequence=number,
-        **size,
+        width_px=4,
+        height_px=3,
         pixel_format=PixelFormat.GREY,
-        exposure_ns=None,
         marks=marks,
         payload=b"\0" * 12,
     )
@@ -46,29 +45,23 @@ def result(number: int) -> Result:
         sequence=number,
         exposed=exposed,
         grabbed=grabbed,
-        **size,
+        width_px=4,
+        height_px=3,
         pixel_format=PixelFormat.GREY,
         exposure_ns=None,
         payload=b"",
     )
     image = np.full((3, 4), number % 256, np.uint8)
-    ledger = PairLedger(
-        session="s",
+    ledger = replace(
+        LEDGER,
         sequence=number,
         host_sequence=number,
-        bytes=12,
-        link="ipc",
         board=marks,
         received_ns=number + 3,
         paired_ns=number + 4,
         queued_ns=number + 5,
         dequeued_ns=number + 6,
         done_ns=number + 7,
-        previous_done_ns=0,
-        stages=StageTimes(),
-        time_skew_ns=0,
-        offset_ns=0,
-        uncertainty_ns=0,
         host=HostMarks(exposed_ns=number, grabbed_ns=number + 1),
     )
     pair = FramePair(board=board, host=host, time_skew_ns=0, paired_ns=number + 4, queued_ns=number + 5)

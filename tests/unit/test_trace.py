@@ -1,12 +1,14 @@
 """Traces of pairs' lives for Perfetto."""
 
+from dataclasses import replace
 from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
+from common.ledger import BoardMarks, PairLedger, StageTimes
 from phone_host.bench.trace import TracedRun, trace_json
+from tests.support.samples import LEDGER
 from tests.support.trace_format import checked
 
 PARTS = ("capture", "outbox", "propagation", "pairing", "queuing", "processing")
@@ -28,24 +30,19 @@ def runs(draw: st.DrawFn) -> tuple[PairLedger, ...]:
         done_ns = dequeued_ns + rest_ns + sum(getattr(stages, name) for name in StageTimes.__slots__)
         board = BoardMarks(exposed_ns=grabbed_ns - draw(st.integers(0, 10**9)), grabbed_ns=grabbed_ns, sent_ns=sent_ns)
         ledgers.append(
-            PairLedger(
-                session="s",
+            replace(
+                LEDGER,
                 sequence=number,
                 host_sequence=number,
-                bytes=1000,
-                link="tcp",
                 board=board,
                 received_ns=received_ns,
                 paired_ns=queued_ns,
                 queued_ns=queued_ns,
                 dequeued_ns=dequeued_ns,
                 done_ns=done_ns,
-                previous_done_ns=0,
                 stages=stages,
                 time_skew_ns=5,
-                offset_ns=0,
                 uncertainty_ns=9,
-                host=HostMarks(exposed_ns=0, grabbed_ns=0),
             )
         )
     return tuple(ledgers)
@@ -84,24 +81,15 @@ def test_a_pairs_slices_are_its_delays_one_behind_the_other(ledgers: tuple[PairL
 def test_a_clock_that_errs_gives_no_negative_slice() -> None:
     """A frame that seems to come before it was sent, within the clock's uncertainty, is shown as a slice without length."""
     board = BoardMarks(exposed_ns=0, grabbed_ns=1000, sent_ns=2000)
-    ledger = PairLedger(
-        session="s",
-        sequence=0,
-        host_sequence=0,
-        bytes=9,
-        link="ipc",
+    ledger = replace(
+        LEDGER,
         board=board,
         received_ns=1990,
         paired_ns=3000,
         queued_ns=3000,
         dequeued_ns=4000,
         done_ns=5000,
-        previous_done_ns=0,
-        stages=StageTimes(),
-        time_skew_ns=0,
-        offset_ns=0,
         uncertainty_ns=50,
-        host=HostMarks(exposed_ns=0, grabbed_ns=0),
     )
     events = checked(trace_json([TracedRun("run", (ledger,))]))
     assert [event["dur"] for event in events if event["name"] == "propagation"] == [0.0]
