@@ -30,7 +30,7 @@ _LOG = logging.getLogger(__name__)
 _NOT_PAIRED: Final = {errno.EACCES, errno.EPERM, errno.ECONNABORTED, errno.EINVAL}
 
 
-class _Stage(Enum):
+class _Progress(Enum):
     IDLE = 0
     ASKING = 1
     ASKED = 2
@@ -51,7 +51,7 @@ class _Dialling:
         self._uri, self._address, self._channel = uri, address, channel
         self._unpaired = unpaired
         self._socket: socket.socket | None = None
-        self._stage = _Stage.IDLE
+        self._progress = _Progress.IDLE
         self._published = False
         self._problem = ""
 
@@ -73,19 +73,19 @@ class _Dialling:
         """Let go of what is half open."""
         if self._socket is not None:
             self._socket.close()
-        self._socket, self._stage = None, _Stage.IDLE
+        self._socket, self._progress = None, _Progress.IDLE
 
     def _step(self) -> RfcommLine | Opening:
         if self._socket is None:
             return self._dial(self._channel) if self._channel else self._ask()
-        wanted = select.POLLIN if self._stage is _Stage.ASKED else select.POLLOUT
+        wanted = select.POLLIN if self._progress is _Progress.ASKED else select.POLLOUT
         poll = select.poll()
         poll.register(self._socket, wanted)
         ready = poll.poll(0)
         if not ready:
             return Opening(self._socket.fileno(), wanted)
         number = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
-        if number == errno.ECONNREFUSED and self._stage is _Stage.ASKING:  # it publishes nothing at all
+        if number == errno.ECONNREFUSED and self._progress is _Progress.ASKING:  # it publishes nothing at all
             self.close()
             self._published = False
             return self._dial(DEFAULT_CHANNEL)
@@ -96,28 +96,28 @@ class _Dialling:
         return self._go_on(self._socket)
 
     def _go_on(self, opened: socket.socket) -> RfcommLine | Opening:
-        if self._stage is _Stage.ASKING:
+        if self._progress is _Progress.ASKING:
             opened.send(query())
-            self._stage = _Stage.ASKED
+            self._progress = _Progress.ASKED
             return Opening(opened.fileno(), select.POLLIN)
-        if self._stage is _Stage.ASKED:
+        if self._progress is _Progress.ASKED:
             channel = channel_in(opened.recv(65536))
             self.close()
             self._published = channel > 0
             return self._dial(channel or DEFAULT_CHANNEL)
-        self._socket, self._stage, self._problem = None, _Stage.IDLE, ""
+        self._socket, self._progress, self._problem = None, _Progress.IDLE, ""
         return RfcommLine(opened)
 
     def _ask(self) -> Opening:
-        return self._connect(new_socket(SocketKind.L2CAP), PSM, _Stage.ASKING)
+        return self._connect(new_socket(SocketKind.L2CAP), PSM, _Progress.ASKING)
 
     def _dial(self, channel: int) -> Opening:
         dialling = new_socket(SocketKind.RFCOMM)
         secure(dialling, unpaired=self._unpaired)
-        return self._connect(dialling, channel, _Stage.DIALLING)
+        return self._connect(dialling, channel, _Progress.DIALLING)
 
-    def _connect(self, dialling: socket.socket, where: int, stage: _Stage) -> Opening:
-        self._socket, self._stage = dialling, stage
+    def _connect(self, dialling: socket.socket, where: int, progress: _Progress) -> Opening:
+        self._socket, self._progress = dialling, progress
         number = dialling.connect_ex((self._address, where))
         if number not in {0, errno.EINPROGRESS}:
             raise OSError(number, os.strerror(number))

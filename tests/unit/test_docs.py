@@ -1,15 +1,21 @@
 """What the documentation says is what the programs do."""
 
 import argparse
+import json
 import re
+from pathlib import Path
 
 import pytest
 
 import board_agent.cli
 import phone_host.bench.cli
 import phone_host.cli
+from phone_host.output.rig_yaml import write_rig
+from phone_host.stereo.rectify import rectify_rig
 from tests.docs import troubleshooting
 from tests.docs.commands import ROOT, Command, documented, pages
+from tests.support.rigs import unlike_rig
+from tests.support.samples import LEDGER
 
 _PARSERS = {
     "phone-host": phone_host.cli.parser,
@@ -57,6 +63,17 @@ def test_troubleshooting_misses_no_error() -> None:
     ]
     assert in_text >= 250
     assert len(rows) >= 0.9 * in_text  # some places say the same
+
+
+def test_every_key_of_our_files_is_described(tmp_path: Path) -> None:
+    """Each key of a rig.yaml and of a line of delays.jsonl stands in the page of file formats."""
+    described = set(re.findall(r"`(\w+)`", (ROOT / "docs" / "files.md").read_text(encoding="utf-8")))
+    rig = unlike_rig()
+    write_rig(tmp_path / "rig.yaml", rig, rectify_rig(rig))
+    keys = set(re.findall(r"^(\w+):", (tmp_path / "rig.yaml").read_text(encoding="utf-8"), re.MULTILINE))
+    line = json.loads(LEDGER.to_json())
+    assert len(keys) + len(line) >= 40
+    assert keys | set(line) <= described
 
 
 def test_readme_is_one_screen() -> None:
