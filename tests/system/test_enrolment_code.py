@@ -153,13 +153,13 @@ def test_the_owner_may_come_before_the_agent(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("module", "options", "named"),
     [
-        ("board_agent.cli", ["pair", "--seconds", "nan"], "--seconds nan"),
+        ("board_agent.cli", ["pair", "--seconds", "nan"], "--seconds is nan"),
         ("board_agent.cli", ["keys", "--forget", "nobody"], "nobody"),
         ("board_agent.cli", ["keys", "--add", "phone", "short"], "short"),
         ("phone_host.cli", ["keys", "--add", "bone", "serial:/dev/ttyACM0", "a" * 40], "serial:/dev/ttyACM0"),
         ("phone_host.cli", ["pair", "--link", "ipc:///tmp/board"], "ipc:///tmp/board"),
         ("phone_host.cli", ["pair", "--link", "tcp://127.0.0.1:65535"], "65535"),
-        ("phone_host.cli", ["pair", "--link", "tcp://127.0.0.1:5555", "--pairing-port", "0"], "--pairing-port 0"),
+        ("phone_host.cli", ["pair", "--link", "tcp://127.0.0.1:5555", "--pairing-port", "0"], "--pairing-port is 0"),
     ],
 )
 def test_what_makes_no_sense_is_one_line(module: str, options: list[str], named: str, tmp_path: Path) -> None:

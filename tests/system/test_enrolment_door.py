@@ -117,7 +117,7 @@ def test_a_door_that_drips_is_given_up(tmp_path: Path) -> None:
         port = server.getsockname()[1] - 1
         for said, code, line in (
             (b"\xff", 3, "does not answer any more"),
-            (b"HTTP/1.1 400 Bad Request\r\n" * 9, 4, "no board's door"),
+            (b"HTTP/1.1 400 Bad Request\r\n" * 9, 4, "does not answer like a board"),
         ):
             pairing = start_pairing(f"tcp://127.0.0.1:{port}", str(tmp_path / "h"))
             line_to_host, _ = server.accept()

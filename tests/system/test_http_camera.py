@@ -172,8 +172,8 @@ REFUSALS = {
     "page": ("a web page", "IP Webcam has /video"),
     "snapshot": ("single images", "IP Webcam has /video"),
     "missing": ("404", "check the path"),
-    "moved": ("http://elsewhere/video", "give that address"),
-    "moved_here": ("has moved to /other", "give that address"),
+    "moved": ("http://elsewhere/video", "give the new address"),
+    "moved_here": ("has moved to /other", "give the new address"),
     "busy": ("503", "busy"),
     "digest": ("by Digest authentication", "Basic"),
     "password": ("asks for a password", "USER:PASSWORD"),
@@ -229,7 +229,7 @@ def test_nobody_there_is_told(film: Path) -> None:
     """A port that nobody listens on, and a name that nobody has, are unavailable at once."""
     del film
     for uri in (f"http://127.0.0.1:{free_port()}/video", "http://phone.invalid/video"):
-        with pytest.raises(UnavailableError, match=r"refuses|not a valid address|does not answer"):
+        with pytest.raises(UnavailableError, match=r"refuses|has no address|does not answer"):
             open_camera(uri, "host", 0)
 
 
@@ -324,9 +324,9 @@ def test_a_phone_whose_latency_nobody_measured_makes_a_warning(tmp_path: Path) -
         assert receiver.stop() == 0
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     told = {warning["doubt"]: warning for warning in report["warnings"]}
-    assert "nor the own camera's latency" in told["stamps"]["sentence"]
+    assert "nor was the latency of this machine's camera" in told["stamps"]["sentence"]
     assert "calibrate-time" in told["stamps"]["remedy"]
-    assert "warning: nobody has measured" in receiver.stderr + receiver.out.read_text()
+    assert "warning: the time offset between the two cameras was never measured" in receiver.stderr + receiver.out.read_text()
 
 
 def test_the_doctor_looks_at_a_phone(film: Path, tmp_path: Path) -> None:

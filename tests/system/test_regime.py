@@ -80,7 +80,7 @@ def test_the_terminal_shows_regime_and_warning(tmp_path: Path) -> None:
             assert running.wait(60) == 0
     os.close(ours)
     text = shown.decode(errors="replace")
-    assert "the processor has nothing to do" in text
+    assert "the processor is idle for" in text
     assert "px of error, depth is wrong" in text
     assert "processing, p50 in ms: decode" in text
     assert "us (hard +-" in text
