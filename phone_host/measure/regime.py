@@ -148,7 +148,7 @@ def _backlog(figures: RunFigures) -> Judgement:
                 f"use a faster matcher: it may take {_ms(arrival_ns - rest_ns)} ms, this one takes {_ms(figures.match_ns)} ms"
             )
         remedies.append(
-            f"lower the camera's rate: the processor manages fps={_rate(figures.processing_ns)}, and the link carries less"
+            f"lower the camera's rate: fps={_rate(figures.processing_ns)} is what the processor manages; it also spares the link"
         )
     return Judgement(Regime.BACKLOG, text, tuple(remedies))
 

@@ -49,8 +49,9 @@ _ROOMS: Final = (
 
 _INTRO: Final = """# Troubleshooting
 
-Every error is one line: what is wrong, then what to do. This page lists all of them, with the same remedy in the same words. Words in CAPITALS stand for
-names and numbers of your case. The page is made from the code.
+Every error is one line: what is wrong, then what to do. This page lists them with their remedies, in the words of the programs. Words in CAPITALS stand
+for names and numbers of your case. The page is made from the code. Mistyped verbs and options are not listed: the message names them, and `--help` lists
+the right ones.
 
 ## First things to try
 
@@ -59,7 +60,7 @@ names and numbers of your case. The page is made from the code.
 | anything about the board | `sudo board-agent doctor` on the board: one line per check, with the remedy |
 | anything about the host | `phone-host doctor --link … --camera … --calibration rig.yaml` |
 | a setting has no effect | `phone-host settings` or `board-agent settings`: each value with its origin |
-| an error that you do not understand | the same command with `--debug --log-level debug` |
+| an error that you do not understand | the same command with `--debug`; `run` also takes `--log-level debug` |
 
 ## Exit codes
 

@@ -326,7 +326,10 @@ def test_a_phone_whose_latency_nobody_measured_makes_a_warning(tmp_path: Path) -
     told = {warning["doubt"]: warning for warning in report["warnings"]}
     assert "nor was the latency of this machine's camera" in told["stamps"]["sentence"]
     assert "calibrate-time" in told["stamps"]["remedy"]
-    assert "warning: the time offset between the two cameras was never measured" in receiver.stderr + receiver.out.read_text()
+    assert (
+        "warning: the time offset between the two cameras was never measured"
+        in receiver.stderr + receiver.out.read_text()
+    )
 
 
 def test_the_doctor_looks_at_a_phone(film: Path, tmp_path: Path) -> None:
