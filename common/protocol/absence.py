@@ -21,11 +21,11 @@ class Presence:
         """Look at the clock; return how long this process did not run before.
 
         Args:
-                due_ns: gives when it wanted to be called, as of its last look, ns. Called only after a long gap, because this runs for each message.
+            due_ns: gives when it wanted to be called, as of its last look, ns. Called only after a long gap, because this runs for each message.
             now_ns: the clock now, ns.
 
         Returns:
-                Nanoseconds, each reported once; 0 if it was called in time or nearly so.
+            Nanoseconds, each reported once; 0 if it was called in time or nearly so.
         """
         looked_ns, self._looked_ns = self._looked_ns, now_ns
         if looked_ns is None or now_ns - looked_ns <= LATE_NS:

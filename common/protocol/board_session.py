@@ -45,13 +45,13 @@ class _Host:
 
     Attributes:
         host_id: its random id.
-            heard_ns: when it was last heard, over any link.
-            status_due_ns: when it is next sent the account.
-            silence_due_ns: earliest time at which any of its links can have been silent for too long.
-            heard_by: when it was last heard, by link.
-            frames: the connection that frames go to; None if it was lost.
-            controls: the control connections, by link.
-            below_index: frames below this index may be sent.
+        heard_ns: when it was last heard, over any link.
+        status_due_ns: when it is next sent the account.
+        silence_due_ns: earliest time at which any of its links can have been silent for too long.
+        heard_by: when it was last heard, by link.
+        frames: the connection that frames go to; None if it was lost.
+        controls: the control connections, by link.
+        below_index: frames below this index may be sent.
     """
 
     host_id: str
@@ -104,10 +104,10 @@ class BoardSession:
     """One life of a board process.
 
     Args:
-            session: random id of this process's life.
-            boot_id: identifies this life of the machine's clock.
-            camera: what the host must know about the camera.
-            dialled: the connections that this side opened itself (`?connect=1`), on all links; empty when the host dials.
+        session: random id of this process's life.
+        boot_id: identifies this life of the machine's clock.
+        camera: what the host must know about the camera.
+        dialled: the connections that this side opened itself (`?connect=1`), on all links; empty when the host dials.
     """
 
     def __init__(
@@ -174,8 +174,8 @@ class BoardSession:
         Args:
             connection: where it came from.
             message: what came.
-                now_ns: its arrival on the board's clock, ns.
-                counts: the current account of this session's frames.
+            now_ns: its arrival on the board's clock, ns.
+            counts: the current account of this session's frames.
 
         Returns:
             What to send.

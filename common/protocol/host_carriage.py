@@ -27,9 +27,9 @@ class Carriage:
         paths: all links.
 
     Attributes:
-            carrier: the link that carries frames now; None if there is none.
-            wanted: the link that shall carry them; None if there is none.
-            pending: whether the board has yet to agree to `wanted`.
+        carrier: the link that carries frames now; None if there is none.
+        wanted: the link that shall carry them; None if there is none.
+        pending: whether the board has yet to agree to `wanted`.
     """
 
     def __init__(self, host_id: str, paths: Sequence[HostPath]) -> None:

@@ -15,7 +15,7 @@ class HostPath:
 
     Args:
         link: its number.
-            dialled: the connections that this side opened; empty when the board dials, whose knocks then reveal them.
+        dialled: the connections that this side opened; empty when the board dials, whose knocks then reveal them.
     """
 
     def __init__(self, link: int, dialled: dict[Lane, bytes]) -> None:
@@ -58,7 +58,7 @@ class HostPath:
             now_ns: host's clock, ns.
 
         Returns:
-                The lane; None if a second board knocks while the first is alive.
+            The lane; None if a second board knocks while the first is alive.
         """
         lane = next((lane for lane, known in self.lanes.items() if known == connection), None)
         if lane is None:  # a board that dials

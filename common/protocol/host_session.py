@@ -122,7 +122,7 @@ class HostSession:
                 if connection not in path.dialled.values():
                     return []  # on a lane that others dial, the caller may be anybody
                 if not path.is_open and any(other.is_open for other in self._paths):
-                    path.shut(now_ns + _FOREIGN_RETRY_NS)  # our board talks to us on another link, so this is a different board
+                    path.shut(now_ns + _FOREIGN_RETRY_NS)  # our board is on another link: this is a different one
                 return [Refused(reason, path.link)]
             case BoardHello():
                 if connection == path.lanes.get(Lane.CONTROL):

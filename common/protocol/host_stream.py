@@ -16,12 +16,12 @@ class Stream:
     """The frames of one life of the board. Nothing here outlives that life.
 
     Attributes:
-            hello: what the board said about itself when its frames were last accepted.
-            changes: how often its camera had been reconfigured, as far as the board has told.
-            next_index: index of the next expected frame.
-            below_index: credit granted since frames were last accepted, as the index below which the board may send.
-            granted_index: the same over the whole life. No honest frame has this index or a higher one.
-            missing: frames recently given up as lost.
+        hello: what the board said about itself when its frames were last accepted.
+        changes: how often its camera had been reconfigured, as far as the board has told.
+        next_index: index of the next expected frame.
+        below_index: credit granted since frames were last accepted, as the index below which the board may send.
+        granted_index: the same over the whole life. No honest frame has this index or a higher one.
+        missing: frames recently given up as lost.
     """
 
     hello: BoardHello
@@ -42,10 +42,10 @@ class Stream:
         """Take a frame of this life.
 
         Args:
-                index: its index among the frames sent.
+            index: its index among the frames sent.
 
         Returns:
-                How many frames before it are given up as lost, or why this frame was not expected.
+            How many frames before it are given up as lost, or why this frame was not expected.
         """
         if index >= self.granted_index:
             return StaleReason.BEYOND_CREDIT

@@ -66,11 +66,11 @@ class CameraDescription:
 
     Attributes:
         name: for people.
-            width_px: image width as requested, px. Frames of a lower rung may be smaller.
-            height_px: image height as requested, px.
+        width_px: image width as requested, px. Frames of a lower rung may be smaller.
+        height_px: image height as requested, px.
         pixel_format: encoding of the frames.
         period_ns: nominal time between frames, ns.
-            pacing: whether its own clock or the host's demand sets the pace.
+        pacing: whether its own clock or the host's demand sets the pace.
         steering: how its phase can be moved.
     """
 
@@ -93,13 +93,13 @@ class Rung:
     """How far the board has lowered the camera's output so that the link can carry it.
 
     Attributes:
-            index: index of the current rung; 0 is what was asked for.
-            last: index of the lowest rung; 0 means that nothing can or may be lowered.
-            changes: how often the rung went down or up in this session.
-            period_ns: current nominal time between frames, ns; 0 before it is known.
-            quality: current JPEG quality, in the camera's own unit; 0 where it cannot be set.
-            width_px: current image width, px; 0 where it cannot be set.
-            height_px: current image height, px; 0 where it cannot be set.
+        index: index of the current rung; 0 is what was asked for.
+        last: index of the lowest rung; 0 means that nothing can or may be lowered.
+        changes: how often the rung went down or up in this session.
+        period_ns: current nominal time between frames, ns; 0 before it is known.
+        quality: current JPEG quality, in the camera's own unit; 0 where it cannot be set.
+        width_px: current image width, px; 0 where it cannot be set.
+        height_px: current image height, px; 0 where it cannot be set.
     """
 
     index: int = 0
