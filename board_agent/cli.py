@@ -1,4 +1,4 @@
-"""board-agent: the board's command. It knows all options; what a verb does is imported when it runs."""
+"""board-agent: the board's command. It knows all options; a verb's implementation is imported when it runs."""
 
 import argparse
 import gc
@@ -28,17 +28,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Args:
-        arguments: without the program's name; None for those of the process.
+        arguments: without the program's name; None: those of the process.
 
     Returns:
-        The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout not to be had, 4 bad data or a failed check, 130 interrupted.
+        The exit code: 0 done, 2 wrong usage, 3 a device, link or stdout cannot be had, 4 bad data or a failed check, 130 interrupted.
     """
     return run_command(parser(), arguments, _run)
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Import the verb, and run it. The only place that imports by a verb's name."""
-    gc.disable()  # what is imported stays: to look for garbage in it, now and later, only costs a board time
+    """Import the verb and run it. Only here are modules imported by a verb's name."""
+    gc.disable()  # imported objects stay: looking for garbage among them only costs a board time
     try:
         verb = importlib.import_module(f"board_agent.verbs.{options.verb}")
     finally:
