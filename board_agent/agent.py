@@ -43,7 +43,7 @@ _FAREWELL_NS: Final = 300_000_000
 """A host answers a goodbye within a round trip. If it hangs, the wait is too short for a person to notice."""
 
 _FULL_RETRY_NS: Final = 2_000_000
-"""A full link is offered a frame that must not be dropped again after this time. ZeroMQ does not say when it has room."""
+"""If a link is full, a frame that must not be dropped is offered again after this time. ZeroMQ does not say when it has room."""
 
 _LONGEST_WAIT_MS: Final = 1000
 

@@ -1,7 +1,8 @@
 """What BlueZ's daemon does for an RFCOMM link: it publishes the service's record and knows devices by name.
 
-The link listens and dials with its own sockets. So if the daemon is missing, or dbus-fast, which is needed to talk to it, only the names are
-lost (decision 0012). dbus-fast needs asyncio; nothing else imports it, and its loop runs in its own thread, or for a single question.
+The link listens and dials with its own sockets. So if the daemon is missing, or dbus-fast, which is needed to talk to it, only the device names and
+the published channel are lost (decision 0012). dbus-fast needs asyncio; nothing else imports it, and its loop runs in its own thread, or for a
+single question.
 """
 
 import asyncio

@@ -220,7 +220,7 @@ class Door:
                     assert_never(output)
 
     def _show(self, code: int, name: str, address: str, now_ns: int) -> None:
-        """Report the code and who asks: at once if the code is new, and rarely for others who ask."""
+        """Show the code to the owner's command and log who asks: at once if the code is new, rarely for further askers."""
         if self._askers.now(now_ns) or code != self._told_code:
             self._told_code = code
             self._state = replace(self._state, code=code_text(code), asking=name)

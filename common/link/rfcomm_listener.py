@@ -42,7 +42,7 @@ class RfcommListener:
         adapter: address of one of this machine's adapters, or ANYONE.
         channel: channel to listen on; 0: the default.
         unpaired: whether devices that were never paired may dial.
-        waits: whether to wait for a missing adapter. Who listens on all adapters hears a new one when it comes.
+        waits: whether to wait for a missing adapter. A listener on all adapters hears one as soon as it comes.
 
     Raises:
         UnavailableError: this machine has no Bluetooth (MissingDeviceError if it lacks only the adapter), or the channel is taken.

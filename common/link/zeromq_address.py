@@ -63,7 +63,7 @@ def free_path(path: str) -> None:
             f"use one of at most {_UNIX_PATH_MAX} bytes, for example ipc://$XDG_RUNTIME_DIR/board",
         )
     with socket.socket(socket.AF_UNIX) as probe:
-        probe.setblocking(False)  # noqa: FBT003 - who listens may never accept; then it is full, and taken
+        probe.setblocking(False)  # noqa: FBT003 - a listener may never accept; then its queue is full, and the path is taken
         try:
             probe.connect(path)
         except BlockingIOError:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 
-def named(reference: str) -> Any:  # noqa: ANN401 - whatever bears the name
+def named(reference: str) -> Any:  # noqa: ANN401 - whatever has that name
     """Import one of our own implementations.
 
     Args:
@@ -88,7 +88,7 @@ def _only(group: str, name: str) -> "EntryPoint":
 
 
 def _entry_points(group: str) -> "tuple[EntryPoint, ...]":
-    from importlib.metadata import entry_points  # noqa: PLC0415 - 30 ms of a host's start, more on a board; seldom needed
+    from importlib.metadata import entry_points  # noqa: PLC0415 - 30 ms of a host's start, more on a board; rarely needed
 
     return tuple(entry_points(group=group))
 

@@ -61,11 +61,11 @@ class Waves:
 
     @property
     def due_ns(self) -> int:
-        """When `begin_wave` wants to be called next, host's clock, ns."""
+        """When `begin_wave` must be called next, host's clock, ns."""
         return self._due_ns
 
     def open(self, now_ns: int) -> None:
-        """The link came up: echoes under way are of an earlier connection, perhaps of another clock."""
+        """Record that the link came up. Echoes under way belong to an earlier connection, perhaps to another clock."""
         self._wave += 1
         self._first_wave = self._wave
         self._echoes_left = 0
