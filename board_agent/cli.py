@@ -37,8 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Import the verb and run it. Only here are modules imported by a verb's name."""
-    gc.disable()  # imported objects stay: looking for garbage among them only costs a board time
+    """Import the verb, and run it. The only place that imports by a verb's name."""
+    gc.disable()  # what is imported stays: to look for garbage in it, now and later, only costs a board time
     try:
         verb = importlib.import_module(f"board_agent.verbs.{options.verb}")
     finally:
