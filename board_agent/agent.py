@@ -37,18 +37,18 @@ from common.versions import other_protocol
 _LOG = logging.getLogger(__name__)
 
 _DRAIN_NS: Final = 5_000_000_000
-"""After the last frame the host gets this long to say goodbye: longer than any pipeline keeps a pair."""
+"""After the last frame the host gets this long to say goodbye. No pipeline keeps a pair longer."""
 
 _FAREWELL_NS: Final = 300_000_000
-"""A host answers a goodbye within a round trip; one that hangs is not waited for longer than a person would notice."""
+"""A host answers a goodbye within a round trip. If it hangs, the wait is too short for a person to notice."""
 
 _FULL_RETRY_NS: Final = 2_000_000
-"""A frame that may not be dropped is offered again after this time to a link that was full; ZeroMQ does not say when it has room."""
+"""If a link is full, a frame that must not be dropped is offered again after this time. ZeroMQ does not say when it has room."""
 
 _LONGEST_WAIT_MS: Final = 1000
 
 _CAMERA_RETRY_MS: Final = 500
-"""A camera that was missing at the start is found within this time, half of what recovery may take; a look at /dev costs a board 7 ms."""
+"""A camera that was missing at the start is found within this time, half of the time allowed for recovery. A look at /dev costs a board 7 ms."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,9 +58,9 @@ class Summary:
     Attributes:
         session: its id.
         counts: what became of its frames.
-        garbage: packets that were none of ours.
-        ended: whether the camera came to its end (a replay without loop).
-        camera: how the camera has fared.
+        garbage: packets that were not ours.
+        ended: whether the camera reached its end (a replay without loop).
+        camera: the camera's health.
     """
 
     session: str
@@ -71,13 +71,13 @@ class Summary:
 
 
 def wait_for_camera(uri: str, clock: str, wake: socket.socket, notifier: Notifier) -> Camera | None:
-    """Open a camera, however long it takes until there is one.
+    """Open a camera; wait for it as long as necessary.
 
     Args:
         uri: the camera.
         clock: name of this machine's clock, for the stamps.
-        wake: readable end of a socket that is written to by signals.
-        notifier: told what is missing.
+        wake: readable end of a socket that signals write to.
+        notifier: is told what is missing.
 
     Returns:
         The open camera; None if a signal came first.
@@ -104,18 +104,18 @@ def wait_for_camera(uri: str, clock: str, wake: socket.socket, notifier: Notifie
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """Tells the service manager that the loop goes round, and how the board is doing.
+    """Tells the service manager that the loop is running, and how the board is doing.
 
     Attributes:
-        notifier: the way there.
-        status: makes up what is told.
+        notifier: sends it.
+        status: makes the status line.
     """
 
     notifier: Notifier
     status: StatusLine
 
     def alive(self, now_ns: int, counts: BoardCounts, session: BoardSession, rung: Rung | None) -> None:
-        """Tell it, when the notifier is due."""
+        """Report that the loop is running, if a report is due."""
         text = self.status.text(now_ns, counts, has_host=session.has_host, carrier=session.carrier, rung=rung)
         self.notifier.alive(now_ns, text)
 
@@ -128,10 +128,10 @@ class Agent:
         links: open links; one host at a time over all of them.
         session: random id of this process's life.
         boot_id: id of the machine's boot.
-        wake: readable end of a socket that is written to by signals.
-        service: told that the loop goes round; None outside a service.
-        idle_ns: after this time without a host the camera rests; None: never.
-        control: chooses among the camera's modes by what the link carries; None: the camera stays as it is.
+        wake: readable end of a socket that signals write to.
+        service: is told that the loop is running; None outside a service.
+        idle_ns: the camera rests after this time without a host; None: never.
+        control: chooses a camera mode that the link can carry; None: the camera stays as it is.
     """
 
     def __init__(
@@ -218,7 +218,7 @@ class Agent:
         return min(self._session.due_ns, self._camera.due_ns(now_ns))
 
     def _poll(self, due_ns: int, now_ns: int) -> bool:
-        """Wait for whatever comes first and take all packets; rounded up, because waking early would only spin.
+        """Wait for whatever comes first and receive all packets. The wait is rounded up, because waking early would only spin.
 
         Returns:
             Whether the camera's descriptor is readable.
@@ -234,7 +234,7 @@ class Agent:
         return self._camera_fd in ready
 
     def _receive(self) -> None:
-        """Take all packets."""
+        """Receive all packets."""
         for index, incoming in self._several.receive():
             self._take(index, incoming)
 
@@ -267,7 +267,7 @@ class Agent:
                     self._send_all(self._session.receive(connection, message, arrived_ns, self._outbox.counts))
 
     def _refuse_version(self, index: int, connection: bytes, theirs: int) -> None:
-        """Tell a host of another version so twice: in an envelope of our version, which says what that is, and in one of its own, which it can read."""
+        """Refuse a host of another version, in two envelopes: ours, which tells it our version, and its own, which it can read."""
         self._refused += 1
         if self._refused.bit_count() == 1:  # as for garbage: an old host asks five times a second
             problem, remedy = other_protocol(theirs, peer="the host", own="this board")
@@ -297,7 +297,7 @@ class Agent:
                     self._camera_ended = True
 
     def _watch_clock(self) -> None:
-        """Notice that the machine has slept. A frame from before is dropped: between its exposure and its sending the clock stood still."""
+        """Notice that the machine has slept. Drop a frame from before: the clock stood still between its exposure and its sending."""
         slept_ns = self._sleep.slept_ns()
         if not slept_ns:
             return
@@ -306,14 +306,14 @@ class Agent:
         _LOG.info(event("slept", session=self._session.session, seconds=round(slept_ns / 1e9, 1)))
 
     def _flush(self) -> None:
-        """Send the waiting frame if there is credit for it; one that reaches nobody waits for the host to come back, or for a newer one."""
+        """Send the waiting frame if there is credit for it. If it reaches nobody, it waits until the host returns or a newer frame replaces it."""
         frame = self._outbox.waiting
         self._held_back = False
         if frame is None or not self._session.has_credit:
             return
         outgoing = self._session.send(frame)
         if not self._links[outgoing.connection[0]].ready(outgoing.connection[1:]):
-            self._held_back = True  # the frame before is still leaving; this one waits, or a newer one
+            self._held_back = True  # the previous frame is still leaving; this one waits, or a newer one
             return
         match self._send(outgoing):
             case SendResult.SENT:
@@ -325,7 +325,7 @@ class Agent:
                 self._retry_ns = now.monotonic_ns() + _FULL_RETRY_NS
 
     def _adapt(self, control: RateControl, now_ns: int) -> None:
-        """Let the camera give what the link carries."""
+        """Set the camera to what the link carries."""
         if not control.update(self._outbox.counts, self._session.carrier, now_ns):
             return
         self._camera.adapt(control.mode, now_ns)
@@ -350,7 +350,7 @@ class Agent:
         return result
 
     def _watch_host(self, now_ns: int) -> None:
-        """Note a host's coming and going; the camera rests when none has been there for a while."""
+        """Watch the host come and go. The camera rests when none has been there for a while."""
         if self._session.has_host != self._had_host:
             self._had_host = self._session.has_host
             self._alone_since_ns = now_ns
@@ -361,7 +361,7 @@ class Agent:
             self._camera.pause()
 
     def _drain(self) -> None:
-        """Tell the host that this was all, and give it the time to take it in."""
+        """Tell the host that there are no more frames, and give it time to process them."""
         _LOG.info(event("camera_ended", session=self._session.session))
         deadline_ns = now.monotonic_ns() + _DRAIN_NS
         unsaid = self._session.end(self._outbox.counts)
@@ -371,7 +371,7 @@ class Agent:
             self._poll(min(self._session.due_ns, deadline_ns), now_ns)
 
     def _part(self) -> None:
-        """Say goodbye, and stay until the host has answered: ZeroMQ throws away what was not read when a connection closes."""
+        """Say goodbye and stay until the host has answered: ZeroMQ discards unread data when a connection closes."""
         farewell = self._session.leave(self._outbox.counts)
         self._send_all(farewell)
         waiter = Waiter([item for link in self._links for item in link.pollables])
@@ -382,5 +382,5 @@ class Agent:
 
 
 def _address(link_index: int, connection: bytes) -> bytes:
-    """Make a connection's name unique over all links."""
+    """Make a connection's name unique across all links."""
     return bytes((link_index,)) + connection

@@ -1,4 +1,4 @@
-"""What cameras this machine has: formats, sizes, rates and controls, as a table for people or as plain values for JSON."""
+"""The cameras of this machine: formats, sizes, rates and controls, as a table for people or as plain values for JSON."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,11 +17,11 @@ class Listed:
     """One camera.
 
     Attributes:
-        path: its lasting name.
-        node: the node behind it.
-        identity: what it says of itself.
-        formats: each encoding with the rates of each of its sizes.
-        controls: each control with its value; None where it cannot be read.
+        path: its persistent name.
+        node: the node behind that name.
+        identity: what the node says about itself.
+        formats: each encoding, with the rates of each of its sizes.
+        controls: each control with its value; None if it cannot be read.
     """
 
     path: Path
@@ -32,7 +32,7 @@ class Listed:
 
 
 def list_cameras() -> list[Listed]:
-    """Ask every capture node of this machine; metadata nodes are left out, and cameras that vanish meanwhile."""
+    """Query every capture node of this machine. Metadata nodes are left out, as are cameras that vanish meanwhile."""
     found = []
     for path in capture_nodes():
         try:
@@ -71,7 +71,7 @@ def _ask(device: Device) -> Listed:
 
 
 def _ends(offer: FormatOffer) -> tuple[tuple[int, int], ...]:
-    """Smallest and largest size of a camera that scales."""
+    """Smallest and largest size of a scaling camera."""
     if offer.size_range is None:
         return ()
     (w0, w1, _), (h0, h1, _) = offer.size_range.width_px, offer.size_range.height_px

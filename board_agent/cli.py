@@ -1,4 +1,4 @@
-"""board-agent: the board's command. It knows all options; what a verb does is imported when it runs."""
+"""board-agent: the board's command. It knows all options; a verb's implementation is imported when it runs."""
 
 import argparse
 import gc
@@ -28,10 +28,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Args:
-        arguments: without the program's name; None for those of the process.
+        arguments: without the program's name; None: those of the process.
 
     Returns:
-        The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout not to be had, 4 bad data or a failed check, 130 interrupted.
+        The exit code: 0 done, 2 wrong usage, 3 a device, link or stdout cannot be had, 4 bad data or a failed check, 130 interrupted.
     """
     return run_command(parser(), arguments, _run)
 

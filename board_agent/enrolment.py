@@ -1,7 +1,7 @@
-"""What `board-agent pair` does: asks the running agent to take in a new host, and follows what becomes of it.
+"""What `board-agent pair` does: asks the running agent to let in a new host, and follows the outcome.
 
-Rule: root gives up its rights for those of the folder's owner before it touches what lies there, for good: ZeroMQ connects in a thread of its
-own, whenever it likes. What answers is that owner's process, and no more is believed of it than what can be printed.
+Rule: before it touches the folder's content, root takes on the rights of the folder's owner, for good: ZeroMQ connects in its own thread,
+whenever it likes. The answer comes from that owner's process, so only its printable content is believed.
 """
 
 import os
@@ -19,32 +19,32 @@ from common.keys import KeyFolder
 from common.link.enrolment_door import CONTROL_PREFIX, DoorState
 
 _LONGEST_FOLDER_BYTES: Final = 107 - len("/pairing-12345678")
-"""What unix(7) leaves for the folder of a socket."""
+"""What unix(7) leaves for a socket's folder."""
 
 _ASK_NS: Final = 500_000_000
 _SILENCE_NS: Final = 5_000_000_000
-"""An agent on the smallest board answers within one round of its loop, a second at most."""
+"""An agent on the smallest board answers within one round of its loop, at most a second."""
 
 _MOST_AGENTS: Final = 16
 _MOST_BYTES: Final = 4096
-"""More is no state of a door: addresses of 16 links and names of 64 letters."""
+"""Anything longer is not a door's state: it has addresses of 16 links and names of 64 letters."""
 
 NOBODY: Final = DoorState(address="", code="", asking="", paired="", failed=0)
-"""No agent answers: none is running, or it waits for its camera and has opened no link yet."""
+"""No agent answers: none is running, or it waits for its camera and has not opened a link yet."""
 
 
 def follow(keys: KeyFolder, seconds: float) -> Iterator[DoorState]:
-    """Keep the door open and give its state whenever that has changed, until a host was taken in. An agent that is not there yet is waited for.
+    """Keep the door open and yield its state whenever it changes, until a host is let in. Wait for an agent that is not there yet.
 
     Args:
         keys: the running agent's folder.
-        seconds: for so long; then it ends without a host.
+        seconds: how long to wait for a host.
 
     Returns:
         States; NOBODY whenever no agent answers any more.
 
     Raises:
-        UnavailableError: no agent with a secured link uses this folder, or nobody came.
+        UnavailableError: no agent with a secured link uses this folder, or no host came.
     """
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     state = NOBODY
@@ -64,7 +64,7 @@ def follow(keys: KeyFolder, seconds: float) -> Iterator[DoorState]:
 
 
 def absence(keys: KeyFolder) -> UnavailableError:
-    """What is wrong while nobody answers."""
+    """The error to report while nobody answers."""
     if len(os.fsencode(keys.path)) > _LONGEST_FOLDER_BYTES:
         return UnavailableError(
             f"the path {keys.path} is too long for a socket in it",
@@ -83,10 +83,10 @@ def _is_socket(path: Path) -> bool:
 
 
 class _Agents:
-    """The running agents that use a folder of keys: one, as a rule.
+    """The running agents that use a key folder: usually one.
 
     Args:
-        context: of the sockets.
+        context: context of the sockets.
         keys: the folder.
     """
 
@@ -97,11 +97,11 @@ class _Agents:
 
     @property
     def are_none(self) -> bool:
-        """Whether none has left a sign of itself."""
+        """Whether no agent's socket has been found."""
         return not self._sockets
 
     def ask(self) -> None:
-        """Ask all that there are now to keep their doors open."""
+        """Ask all agents that are there now to keep their doors open."""
         if not self._keys.become_owner():
             return
         for path in self._keys.path.glob(f"{CONTROL_PREFIX}*"):
@@ -109,7 +109,7 @@ class _Agents:
                 sock = self._sockets[path] = self._context.socket(zmq.DEALER)
                 sock.setsockopt(zmq.LINGER, 0)
                 sock.setsockopt(zmq.MAXMSGSIZE, _MOST_BYTES)
-                sock.setsockopt(zmq.IMMEDIATE, 1)  # nothing is kept for an agent that has gone
+                sock.setsockopt(zmq.IMMEDIATE, 1)  # queue nothing for an agent that has gone
                 sock.connect(f"ipc://{path}")
                 self._poller.register(sock, zmq.POLLIN)
         for sock in self._sockets.values():
@@ -117,7 +117,7 @@ class _Agents:
                 sock.send(b"", zmq.DONTWAIT)
 
     def answers(self, until_ns: int) -> Iterator[DoorState]:
-        """Give what they say until then."""
+        """Yield their answers until then."""
         while (left_ns := until_ns - now.monotonic_ns()) > 0:
             ready = dict(self._poller.poll(left_ns // 1_000_000 + 1))
             for sock in ready:
@@ -136,7 +136,7 @@ def _follow(agents: _Agents, deadline_ns: int) -> Iterator[DoorState]:
         agents.ask()
         for state in agents.answers(now_ns + _ASK_NS):
             silent_since_ns, is_told = now.monotonic_ns(), False
-            if len(shown) > _MOST_AGENTS:  # they make addresses up
+            if len(shown) > _MOST_AGENTS:  # they are making addresses up
                 shown.clear()
             if shown.get(state.address) != state:
                 shown[state.address] = state

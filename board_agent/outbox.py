@@ -1,4 +1,4 @@
-"""The one frame that waits for the link, and the account of every frame: grabbed = sent + dropped + waiting."""
+"""The one frame that waits for the link, and the account of all frames: grabbed = sent + dropped + waiting."""
 
 from common.frame import Frame
 from common.protocol.message import BoardCounts, DropReason
@@ -24,7 +24,7 @@ class Outbox:
         return BoardCounts(self._grabbed, self._sent, tuple(self._dropped.items()))
 
     def put(self, frame: Frame, *, has_host: bool) -> None:
-        """Take a fresh frame; the one that still waits was not wanted in time."""
+        """Put in a fresh frame. If one was still waiting, it was not wanted in time and is dropped."""
         self._grabbed += 1
         if self._waiting is not None:
             self._drop(DropReason.REPLACED)
@@ -33,17 +33,17 @@ class Outbox:
             self.discard(DropReason.NO_HOST)
 
     def spoiled(self) -> None:
-        """Count a grab whose bytes are no whole image."""
+        """Count a grab whose bytes are not a whole image."""
         self._grabbed += 1
         self._drop(DropReason.SPOILED)
 
     def skipped(self, frames: int = 1) -> None:
-        """Count grabs that newer ones had replaced before they were looked at."""
+        """Count grabs that were replaced by newer ones before anyone looked at them."""
         self._grabbed += frames
         self._drop(DropReason.REPLACED, frames)
 
     def sent(self) -> None:
-        """Take note that the link took the waiting frame."""
+        """Record that the link took the waiting frame."""
         assert self._waiting is not None
         self._waiting = None
         self._sent += 1

@@ -1,9 +1,9 @@
-"""How much the board asks of its camera, so that the link carries it: down a ladder of modes, and up again when more is tried and holds. A core, `now_ns` passed in.
+"""How much the board asks of its camera, so that the link can carry it: a ladder of modes, down when needed and up on trial. A core.
 
-A frame that the camera gave and the link did not carry in time was replaced by a newer one. Where that befalls more than a tenth of them the camera
-goes down by one rung; where none has been replaced for a while the rung above is tried. A trial that fails is repeated after twice the time, for each
-rung by itself: a link of constant rate is tried less and less, and one that has got better is climbed rung by rung. A new link is a new beginning for
-these times, not for the rung: what it carries is found out from where the camera is.
+`now_ns` is passed in. A frame that the link did not carry in time is replaced by a newer one. If that happens to more than a tenth of the frames,
+the camera goes down one rung; if none has been replaced for a while, the rung above is tried. A trial that fails is repeated after twice the
+time, for each rung separately. So a link of constant rate is tried less and less, and a link that has improved is climbed rung by rung.
+A new link resets these times but not the rung: what it carries is found out starting from the current rung.
 """
 
 from collections.abc import Collection, Iterable
@@ -17,31 +17,33 @@ from common.protocol.message import BoardCounts, DropReason, Rung
 
 _WINDOW_NS: Final = 1_000_000_000
 _FEWEST: Final = 10
-"""Frames are judged by the second, or by ten of them: one that is late is a tenth then."""
+"""Frames are judged in windows of a second and of at least this many, so that one late frame is a tenth."""
 
 _KEPT: Final = 0.9
-"""Below this share of carried frames the link is too slow for the mode: eight of ten are not the rate that was asked for."""
+"""If a smaller share of the frames is carried, the link is too slow for the mode: eight of ten are not the requested rate."""
 
 _AT_EASE: Final = 0.97
-"""From this share on the link may have room for more; between the two all stays as it is."""
+"""From this share on, the link may have room for more. Between the two, nothing changes."""
 
 _SLOW_NS: Final = 2_500_000_000
-"""What goes on for this long is no hiccup: one that is shorter than a window spoils two."""
+"""What lasts this long is not a hiccup. One that is shorter than a window spoils at most two windows."""
 
 _UNDER_WAY: Final = 2
 _SETTLE_NS: Final = 500_000_000
-"""After a step two frames must have been sent, the one that waited and the one under way, and automatic parts of a camera have settled."""
+"""After a step this much time must pass, so that a camera's automatic controls have settled, and two frames must have been sent: the one that
+waited and the one under way."""
 
 _PROOF_NS: Final = 5_000_000_000
 _MOST_PROOF_NS: Final = 300_000_000_000
-"""How long the link must be at ease before the next rung up is tried: at first, and at most, as long as other trials of a link (phone_host/sync/flow.py)."""
+"""How long the link must be at ease before the next rung up is tried: initially and at most. The same limit as for other trials of a link
+(phone_host/sync/flow.py)."""
 
 _LOOK_NS: Final = 100_000_000
 _NEVER: Final = 2**63 - 1
 
 
 class Way(Enum):
-    """What of a camera may be lowered."""
+    """What may be lowered in a camera's output."""
 
     QUALITY = "quality"
     RATE = "rate"
@@ -49,13 +51,13 @@ class Way(Enum):
 
 
 def ways(names: Iterable[str]) -> frozenset[Way]:
-    """Read what may be lowered.
+    """Parse the list of what may be lowered.
 
     Args:
-        names: as they stand in the settings.
+        names: as they appear in the settings.
 
     Raises:
-        SettingsError: one is unknown.
+        SettingsError: a name is unknown.
     """
     known = {way.value: way for way in Way}
     wrong = sorted(set(names) - set(known))
@@ -65,15 +67,15 @@ def ways(names: Iterable[str]) -> frozenset[Way]:
 
 
 def ladder(offers: Offers, lowered: Collection[Way], least_fps: float) -> tuple[Mode, ...]:
-    """Put a camera's modes in the order in which they are tried: quality goes first, because every image is kept, then the rate, then the size.
+    """Put a camera's modes in the order in which they are tried. Quality goes first, because every image is kept; then the rate, then the size.
 
     Args:
         offers: what the camera can be set to.
-        lowered: what of it may be lowered.
-        least_fps: the rate is not lowered below this, frames per second; 0: not at all.
+        lowered: what may be lowered.
+        least_fps: the rate is not lowered below this, frames per second; 0: the rate is never lowered.
 
     Returns:
-        Modes, each of which asks less of the link than the one before; the first is the present one. Empty for a camera with nothing to set.
+        Modes, each asking less of the link than the one before; the first is the current one. Empty for a camera with nothing to set.
     """
     if not offers.periods_ns:
         return ()
@@ -84,7 +86,7 @@ def ladder(offers: Offers, lowered: Collection[Way], least_fps: float) -> tuple[
     if Way.QUALITY in lowered:
         modes += [replace(modes[0], quality=value) for value in lower]
     if Way.RATE in lowered and least_fps > 0:
-        # A driver's period is rounded to 100 ns; a hundredth is no other rate (v4l2_formats).
+        # A driver's period is rounded to 100 ns; a difference of one hundredth is not another rate (v4l2_formats).
         modes += [replace(modes[-1], period_ns=longer) for longer in longer_ns if longer * least_fps <= 1.01e9]
     if Way.SIZE in lowered:
         modes += [replace(modes[-1], size_px=smaller) for smaller in smaller_px]
@@ -111,12 +113,12 @@ class RateControl:
 
     @property
     def mode(self) -> Mode:
-        """What the camera shall give now."""
+        """The mode that the camera shall use now."""
         return self._modes[self._index]
 
     @property
     def rung(self) -> Rung:
-        """Where that is on the ladder."""
+        """The position of that mode on the ladder."""
         mode, last = self.mode, len(self._modes) - 1
         return Rung(
             index=self._index,
@@ -129,7 +131,7 @@ class RateControl:
         )
 
     def is_due(self, now_ns: int) -> bool:
-        """Whether `update` wants to be called: ten times a second is enough.
+        """Whether `update` should be called now; ten times a second is enough.
 
         Args:
             now_ns: CLOCK_MONOTONIC now, ns.
@@ -137,11 +139,11 @@ class RateControl:
         return now_ns >= self._due_ns
 
     def update(self, counts: BoardCounts, link: int | None, now_ns: int) -> bool:
-        """Look at what has become of the frames.
+        """Check what became of the frames, and step if necessary.
 
         Args:
-            counts: of all frames so far.
-            link: number of the link that frames go to; None: to none.
+            counts: account of all frames so far.
+            link: number of the link that carries frames; None: there is none.
             now_ns: CLOCK_MONOTONIC now, ns.
 
         Returns:
@@ -155,7 +157,7 @@ class RateControl:
             return False
         carried = counts.sent - self._before.sent
         offered = carried + _not_carried(counts) - _not_carried(self._before)
-        # Of a link that carries nothing at all nothing can be learned: it is about to be given up.
+        # A link that carries nothing at all teaches nothing: it is about to be given up.
         if now_ns - self._window_ns < _WINDOW_NS or offered < _FEWEST or carried < _UNDER_WAY:
             return False
         begin_ns, self._before, self._window_ns = self._window_ns, counts, now_ns
@@ -173,7 +175,7 @@ class RateControl:
         return False
 
     def _go_down(self, counts: BoardCounts, now_ns: int) -> bool:
-        """Take the next rung down, if there is one; the one that is left is tried again after twice the time if it held for less than that."""
+        """Take the next rung down, if any. If the rung just left did not hold for its trial time, it is tried again only after twice that time."""
         if self._index == len(self._modes) - 1:
             return False
         proof_ns = self._proofs_ns[self._index]
@@ -188,12 +190,12 @@ class RateControl:
         self._enter(counts, now_ns)
 
     def _enter(self, counts: BoardCounts, now_ns: int) -> None:
-        """Begin to measure anew."""
+        """Restart the measurement."""
         self._before, self._has_settled, self._slow_since_ns = counts, False, _NEVER
         self._entered_ns = self._window_ns = self._good_ns = self._at_ease_since_ns = now_ns
 
     def _is_settled(self, counts: BoardCounts, now_ns: int) -> bool:
-        """Whether what is measured is this mode's doing; the first window begins then."""
+        """Whether the measurement reflects the current mode. If it just begins to, the first window starts now."""
         if self._has_settled:
             return True
         if counts.sent - self._before.sent >= _UNDER_WAY and now_ns - self._entered_ns >= _SETTLE_NS:

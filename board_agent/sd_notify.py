@@ -1,7 +1,7 @@
-"""What the service manager is told: ready, alive, in which state, stopping. See sd_notify(3) for words and socket.
+"""What the service manager is told: ready, alive, status, stopping. See sd_notify(3) for words and socket.
 
-A core that composes the datagrams with `now_ns` passed in, and a shell that sends them. The watchdog is fed from the capture and link
-loop itself and nowhere else: a loop that hangs is a service that hangs.
+A core composes the datagrams, with `now_ns` passed in; a shell sends them. Only the capture and link loop itself feeds the watchdog, so a
+loop that hangs is a service that hangs.
 """
 
 import os
@@ -15,10 +15,10 @@ _TELL_NS: Final = 2_000_000_000
 
 
 class ServiceState:
-    """Decides what to tell, and when. Each datagram says everything, so that none may be missed and a lost one does no harm.
+    """Decides what to tell the service manager, and when. Each datagram says everything, so a lost one does no harm.
 
     Args:
-        watchdog_ns: the service is restarted when it is silent for this long, ns; None without watchdog.
+        watchdog_ns: the service is restarted after this much silence, ns; None without a watchdog.
     """
 
     def __init__(self, watchdog_ns: int | None) -> None:
@@ -27,7 +27,7 @@ class ServiceState:
         self._due_ns = 0
 
     def due(self, now_ns: int) -> bool:
-        """Whether something is to be told now.
+        """Whether a datagram is due.
 
         Args:
             now_ns: CLOCK_MONOTONIC now, ns.
@@ -35,7 +35,7 @@ class ServiceState:
         return now_ns >= self._due_ns
 
     def alive(self, now_ns: int, status: str) -> bytes:
-        """Give the datagram of a loop that has just gone round.
+        """Return the datagram of a loop that is running.
 
         Args:
             now_ns: CLOCK_MONOTONIC now, ns.
@@ -45,7 +45,7 @@ class ServiceState:
         return _datagram("READY=1", *self._alive, _status(status))
 
     def stopping(self, status: str) -> bytes:
-        """Give the datagram that says goodbye.
+        """Return the datagram that says goodbye.
 
         Args:
             status: one line for people.
@@ -54,10 +54,10 @@ class ServiceState:
 
 
 def watchdog_ns(environment: Mapping[str, str], process_id: int) -> int | None:
-    """Read how long the service manager bears silence, ns; None if it does not watch this process.
+    """Return how much silence the service manager tolerates, ns; None if it does not watch this process.
 
     Args:
-        environment: of the process: WATCHDOG_USEC, and WATCHDOG_PID where it is meant for one process only.
+        environment: environment of the process: WATCHDOG_USEC, and WATCHDOG_PID if it is meant for one process only.
         process_id: own process id.
     """
     if environment.get("WATCHDOG_PID", str(process_id)) != str(process_id):
@@ -70,13 +70,13 @@ def watchdog_ns(environment: Mapping[str, str], process_id: int) -> int | None:
 
 
 def socket_address(environment: Mapping[str, str]) -> str | None:
-    r"""Read where the service manager listens: a path, or a name in the abstract namespace (`@` stands for its leading \0).
+    r"""Return where the service manager listens: a path, or a name in the abstract namespace (`@` stands for its leading \0).
 
     Args:
-        environment: of the process: NOTIFY_SOCKET.
+        environment: environment of the process: NOTIFY_SOCKET.
 
     Returns:
-        The address for `connect`; None outside a service, or where it is no Unix socket.
+        The address for `connect`; None outside a service, or if it is not a Unix socket.
     """
     address = environment.get("NOTIFY_SOCKET", "")
     if address.startswith("@"):
@@ -85,10 +85,10 @@ def socket_address(environment: Mapping[str, str]) -> str | None:
 
 
 class Notifier:
-    """Tells the service manager; without one every call does nothing.
+    """Talks to the service manager; without one, every call does nothing.
 
     Args:
-        environment: of the process.
+        environment: environment of the process.
     """
 
     def __init__(self, environment: Mapping[str, str]) -> None:
@@ -103,7 +103,7 @@ class Notifier:
         return self._socket is not None and self._state.due(now_ns)
 
     def alive(self, now_ns: int, status: str) -> None:
-        """Tell that the service is ready and the loop went round.
+        """Report that the service is ready and its loop is running.
 
         Args:
             now_ns: CLOCK_MONOTONIC now, ns.
@@ -112,17 +112,17 @@ class Notifier:
         self._send(self._state.alive(now_ns, status))
 
     def stopping(self, status: str) -> None:
-        """Tell that the service ends by itself."""
+        """Report that the service is stopping by itself."""
         self._send(self._state.stopping(status))
 
     def close(self) -> None:
-        """Let go of the socket."""
+        """Release the socket."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
     def _send(self, datagram: bytes) -> None:
-        """Send without waiting: a service manager that restarts or is busy must not stop the stream; the next datagram says it all again."""
+        """Send without waiting. A service manager that restarts or is busy must not stop the stream; the next datagram repeats everything."""
         if datagram and self._socket is not None and self._address is not None:
             with suppress(OSError):
                 self._socket.sendto(datagram, self._address)

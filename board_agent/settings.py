@@ -1,4 +1,4 @@
-"""What the board's owner may set, and which of it `run` could not use."""
+"""The settings that the board's owner may make, and the check for values that `run` could not use."""
 
 import argparse
 import os
@@ -17,13 +17,13 @@ from common.program.settings import Resolved, log_level, resolve
 ENVIRONMENT_PREFIX = "BOARD_AGENT"
 
 LONGEST_S: Final = 1e9
-"""Of any time that is waited."""
+"""Limit of every waiting time."""
 
 _HIGHEST_FPS: Final = 1000
-"""Of any camera URI."""
+"""Limit of every camera URI's frame rate."""
 
 SERVICE_SETTINGS: Final = Path("/etc/tandemscan/board-agent.toml")
-"""What the package's service is run with."""
+"""The settings file of the package's service."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,23 +51,23 @@ class BoardSettings:
 
 
 def key_folder(keys: str) -> KeyFolder:
-    """Give the folder of keys that a setting means.
+    """Return the key folder that a setting names.
 
     Args:
-        keys: the setting; empty for the usual place.
+        keys: the setting; empty for the default.
     """
     return KeyFolder(Path(keys).expanduser() if keys else default_folder(os.environ, service=True))
 
 
 def chosen_keys(options: argparse.Namespace) -> KeyFolder:
-    """Give the folder of keys of whoever is meant; without any choice that of the service, where it is installed."""
+    """Return the key folder that the options name. If they name none, it is the service's where that is installed."""
     if not (options.config or options.keys) and SERVICE_SETTINGS.is_file():
         options.config = SERVICE_SETTINGS
     return key_folder(resolve_settings(options).values.keys)
 
 
 def resolve_settings(options: argparse.Namespace) -> Resolved[BoardSettings]:
-    """Work out the settings from file, environment and a verb's options."""
+    """Resolve the settings from file, environment and a verb's options."""
     link = tuple(options.link) if options.link else None
     adapt = None if options.adapt is None else tuple(way for way in options.adapt.split(",") if way)
     given = {"camera": options.camera, "link": link, "keys": options.keys, "log_level": options.log_level}
@@ -76,10 +76,10 @@ def resolve_settings(options: argparse.Namespace) -> Resolved[BoardSettings]:
 
 
 def check(settings: BoardSettings) -> None:
-    """Refuse values that `run` could not use, as far as that can be said without opening anything.
+    """Refuse values that `run` could not use, as far as that is known without opening anything.
 
     Raises:
-        SettingsError: one makes no sense.
+        SettingsError: a value makes no sense.
     """
     log_level(settings.log_level)
     if settings.camera:

@@ -1,19 +1,19 @@
-"""One line for people on how the board is doing: its rate, its host, or what is missing. A core, `now_ns` passed in."""
+"""One line for people about how the board is doing: its rate, its host, or what is missing. A core, `now_ns` passed in."""
 
 from typing import Final
 
 from common.protocol.message import BoardCounts, Pacing, Rung
 
 _SILENT_NS: Final = 3_000_000_000
-"""Without a frame for this long a camera that goes by the clock counts as silent: above the slowest useful rate of 1 fps."""
+"""A clock-paced camera counts as silent after this long without a frame. This is above the period of the slowest useful rate, 1 fps."""
 
 
 class StatusLine:
-    """Makes up the line from the account of the frames.
+    """Makes the status line from the account of the frames.
 
     Args:
         camera: the camera's URI.
-        pacing: whether it gives frames by itself.
+        pacing: whether it delivers frames by itself.
         links: URIs of the links.
         now_ns: CLOCK_MONOTONIC now, ns.
     """
@@ -34,14 +34,14 @@ class StatusLine:
         carrier: int | None = None,
         rung: Rung | None = None,
     ) -> str:
-        """Give the line; the rate is the mean since it was asked for last.
+        """Return the line. Its rate is the mean since the last call.
 
         Args:
             now_ns: CLOCK_MONOTONIC now, ns.
-            counts: what became of all frames so far.
+            counts: account of all frames so far.
             has_host: whether a host is served.
-            carrier: index of the link that its frames go to; None while there is none.
-            rung: how far the camera is lowered; None where it cannot be.
+            carrier: index of the link that carries frames; None if there is none.
+            rung: how far the camera is lowered; None if it cannot be.
         """
         fresh = counts.grabbed - self._grabbed
         rate_hz = fresh * 1e9 / max(1, now_ns - self._measured_ns)
@@ -60,7 +60,7 @@ class StatusLine:
 
 
 def _lowered(rung: Rung | None) -> str:
-    """What the camera gives where that is less than was asked for."""
+    """Describe the camera's output where it is less than was asked for."""
     if rung is None or not rung.index:
         return ""
     quality = f" at quality {rung.quality}" if rung.quality else ""

@@ -1,7 +1,7 @@
 """The one error tree. Each class says when it is raised, whose fault it is and which exit code it means.
 
 Every message is one line that names the culprit (option, key, file, device, peer) and the remedy.
-Exit codes are the commands' contract: 0 done, 2 wrong usage or settings, 3 a device or link cannot be had, 4 the data are bad
+Exit codes are part of the commands' contract: 0 done, 2 wrong usage or settings, 3 a device or link cannot be had, 4 the data are bad
 or a check failed, 130 interrupted.
 """
 
@@ -25,7 +25,7 @@ class TandemError(Exception):
 
     def __str__(self) -> str:
         text = f"{self.problem}: {self.remedy}"
-        # One line, whatever the name or value that it quotes; and a foreign text shall not command the terminal.
+        # One line, whatever name or value it quotes; and foreign text must not control the terminal.
         return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
 
 
@@ -68,7 +68,7 @@ class DataError(TandemError):
 
 
 class ProtocolError(TandemError):
-    """Raised by the codec for bytes that are no message of ours. The peer's fault; the packet is dropped and counted."""
+    """Raised by the codec for bytes that are not one of our messages. The peer's fault; the packet is dropped and counted."""
 
     exit_code = 4
 

@@ -1,13 +1,13 @@
-"""Files in folders into which others may write, too: links, pipes and folders may lie under the names that we use.
+"""Files in folders that others may write to as well: links, pipes and folders may lie under the names that we use.
 
-Rules: a folder is opened once; what lies in it is reached by its plain name there (`dir_fd`), never by a path. A name that is a link is not
-followed, nothing waits for the other end of a pipe, nothing is read beyond a limit. A new file begins under a random name that nobody else
-has (O_EXCL) and takes its place when it is whole. Root acts in another user's folder with that user's rights, so that the kernel refuses
-whatever this user could not do himself; that holds however links and folders are exchanged meanwhile.
+Rules: a folder is opened once. What lies in it is reached by its plain name there (`dir_fd`), never by a path. A name that is a link is not
+followed, nothing waits for the other end of a pipe, and nothing is read beyond a limit. A new file begins under a random name that nobody
+else has (O_EXCL) and takes its place once it is whole. Root acts in another user's folder with that user's rights, so the kernel refuses
+whatever that user could not do himself. This holds however links and folders are replaced meanwhile.
 
-The effective user is one for the whole process: glibc changes it in all threads. So one block at a time has other rights (`_TURN`), for
-milliseconds. Other threads of a root's process must not open files of root's meanwhile; ours (ZeroMQ's, D-Bus's) open none. A thread's own
-rights (setfsuid) would need ctypes, and would keep root's groups.
+The effective user applies to the whole process: glibc changes it in all threads. So only one block at a time has other rights (`_TURN`), for
+milliseconds. Meanwhile other threads of a root process must not open root's files; ours (ZeroMQ's, D-Bus's) open none. Rights per thread
+(setfsuid) would need ctypes, and would keep root's groups.
 """
 
 import errno
@@ -32,26 +32,26 @@ _READ: Final = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_
 _NEW: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 
 _MOST_LINKS: Final = 40
-"""As in the kernel (path_resolution(7))."""
+"""The kernel's own limit (path_resolution(7))."""
 
 
 @contextmanager
 def opened_folder(path: Path, *, make: bool = False) -> Iterator[int]:
-    """Open a folder for the length of a block.
+    """Open a folder for the duration of a block.
 
-    Root goes along the path step by step. From the first folder or link on that belongs to another user it goes on with that user's rights,
-    to the block's end: he could have put there whatever comes behind it.
+    Root follows the path step by step. From the first folder or link that belongs to another user, it continues with that user's rights until
+    the block ends, because that user could have put anything behind it.
 
     Args:
         path: the folder.
-        make: whether to make it (mode 0700) and those above it where they are missing.
+        make: whether to create it (mode 0700) and its missing parents.
 
     Yields:
         Its descriptor.
 
     Raises:
-        OSError: as the operating system gives it.
-        UnavailableError: root's way leads through a folder in which anybody may exchange what others have put there.
+        OSError: as the operating system raises it.
+        UnavailableError: root's path leads through a folder in which anybody may replace what others have put there.
     """
     with ExitStack() as stack:
         stack.enter_context(_TURN)
@@ -66,11 +66,11 @@ def opened_folder(path: Path, *, make: bool = False) -> Iterator[int]:
 
 
 def become_owner(path: Path) -> None:
-    """Take on, for good, the rights that `opened_folder` gives root in a folder. Nothing happens in root's own, or for who is not root.
+    """Take on, for good, the rights that `opened_folder` gives root in a folder. Does nothing in root's own folder, or if we are not root.
 
     Raises:
-        OSError: as the operating system gives it.
-        UnavailableError: as `opened_folder`.
+        OSError: as the operating system raises it.
+        UnavailableError: as in `opened_folder`.
     """
     with opened_folder(path):
         uid, gid = os.geteuid(), os.getegid()
@@ -81,24 +81,24 @@ def become_owner(path: Path) -> None:
 
 
 def read_file(folder: int, path: Path, most_bytes: int) -> tuple[bytes, os.stat_result]:
-    """Read a file that is small.
+    """Read a small file.
 
     Args:
-        folder: descriptor of the folder in which it lies.
-        path: the file, for its name and for messages.
-        most_bytes: of a longer one nothing is read.
+        folder: descriptor of the folder that contains it.
+        path: the file; gives its name, and is used in messages.
+        most_bytes: nothing is read from a longer file.
 
     Returns:
         Its content and its status.
 
     Raises:
-        DataError: it is a link, a pipe or something else that is no plain file, or too long.
-        OSError: as the operating system gives it; FileNotFoundError where there is none.
+        DataError: it is not a plain file (but a link or a pipe, say), or it is too long.
+        OSError: as the operating system raises it; FileNotFoundError if it does not exist.
     """
     try:
         descriptor = os.open(path.name, _READ, dir_fd=folder)
     except OSError as error:
-        if error.errno in {errno.ELOOP, errno.ENXIO, errno.EMLINK}:  # a link (EMLINK: on BSD); a socket
+        if error.errno in {errno.ELOOP, errno.ENXIO, errno.EMLINK}:  # a link (EMLINK on BSD); a socket
             raise _no_file(path) from None
         raise
     status = os.fstat(descriptor)
@@ -113,18 +113,18 @@ def read_file(folder: int, path: Path, most_bytes: int) -> tuple[bytes, os.stat_
 
 
 def read_whole(path: Path, most_bytes: int) -> bytes:
-    """Read a file that somebody names, whatever that name leads to.
+    """Read a file that somebody names, wherever that name leads.
 
     Args:
         path: the file; links are followed.
-        most_bytes: of a longer one nothing is read.
+        most_bytes: nothing is read from a longer file.
 
     Returns:
         Its content.
 
     Raises:
-        DataError: it is no plain file (a pipe or a device might never end), or too long.
-        OSError: as the operating system gives it.
+        DataError: it is not a plain file (a pipe or a device might never end), or it is too long.
+        OSError: as the operating system raises it.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with os.fdopen(descriptor, "rb") as file:
@@ -140,19 +140,19 @@ def read_whole(path: Path, most_bytes: int) -> bytes:
 
 @contextmanager
 def replacing_in(folder: int, name: str, *, mode: int = 0o666, durable: bool = True) -> Iterator[BinaryIO]:
-    """Open a new file that takes its place in a folder when the block ends well; a link of that name is replaced, not followed.
+    """Open a new file that takes its place in a folder if the block succeeds. A link of that name is replaced, not followed.
 
     Args:
         folder: descriptor of the folder.
-        name: of the file in it.
+        name: the file's name in it.
         mode: permissions, which the process's umask narrows.
-        durable: whether a power cut afterwards must not take it away again; costs a disk some ms.
+        durable: whether the file must survive a later power cut; costs some ms on a disk.
 
     Yields:
         The file, open for binary writing.
 
     Raises:
-        OSError: as the operating system gives it; nothing of the partial file is left.
+        OSError: as the operating system raises it; nothing remains of the partial file.
     """
     temporary = f".{name}.{os.urandom(8).hex()}.part"
     descriptor = os.open(temporary, _NEW, mode, dir_fd=folder)
@@ -173,7 +173,7 @@ def replacing_in(folder: int, name: str, *, mode: int = 0o666, durable: bool = T
 
 
 def sync_folder(folder: int) -> None:
-    """Have the names in a folder survive a power cut, where the file system can do that.
+    """Make the names in a folder survive a power cut, if the file system can.
 
     Raises:
         OSError: the disk fails.
@@ -181,7 +181,7 @@ def sync_folder(folder: int) -> None:
     try:
         os.fsync(folder)
     except OSError as error:
-        if error.errno not in {errno.EINVAL, errno.ENOTSUP}:  # some of FUSE know no such thing
+        if error.errno not in {errno.EINVAL, errno.ENOTSUP}:  # some FUSE file systems do not support it
             raise
 
 
@@ -192,7 +192,7 @@ def _no_file(path: Path) -> DataError:
 
 
 def _walk(path: Path, stack: ExitStack, *, make: bool) -> int:
-    """Go to a folder from the root, as `opened_folder` says."""
+    """Go to a folder from the root, as `opened_folder` describes."""
     parts = deque(path.absolute().parts[1:])
     here = root = _kept(os.open("/", _PASSED), stack)
     links = 0
@@ -226,7 +226,7 @@ def _kept(descriptor: int, stack: ExitStack) -> int:
 
 
 def _go_on_as(status: os.stat_result, path: Path, stack: ExitStack) -> None:
-    """Root takes on the rights of whoever owns this step of the way."""
+    """As root, take on the rights of the owner of this step of the path."""
     if os.geteuid() != 0:
         return
     if status.st_uid != 0:
@@ -238,9 +238,9 @@ def _go_on_as(status: os.stat_result, path: Path, stack: ExitStack) -> None:
 
 
 def is_open_to_others(status: os.stat_result) -> bool:
-    """Whether others than a folder's owner may exchange what lies in it: they may write to it and it is not sticky.
+    """Whether anyone but a folder's owner may replace what lies in it: they may write to it and it is not sticky.
 
-    Root's group counts as root, a group that is its owner's alone (by its name, as Debian makes one for each user) as the owner.
+    Root's group counts as root. A group that is the owner's alone (by its name, as Debian makes one for each user) counts as the owner.
     """
     if status.st_mode & stat.S_ISVTX:
         return False
@@ -259,7 +259,7 @@ def _is_own_group(status: os.stat_result) -> bool:
 
 @contextmanager
 def _rights_of(status: os.stat_result) -> Iterator[None]:
-    """Be another user for the length of a block; root alone can."""
+    """Act as another user for the duration of a block; only root can."""
     gid, groups = os.getegid(), os.getgroups()
     try:
         own_gid = pwd.getpwuid(status.st_uid).pw_gid

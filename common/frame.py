@@ -7,7 +7,7 @@ from common.errors import DataError
 from common.stamp import Stamp
 
 Buffer = bytes | bytearray | memoryview
-"""Bytes that are handed on without a copy."""
+"""Bytes that are passed on without a copy."""
 
 
 class PixelFormat(Enum):
@@ -23,8 +23,8 @@ class PixelFormat(Enum):
 class FrameFault(Enum):
     """Why a frame's bytes are not the whole image that they claim to be.
 
-    flagged: its driver says so; stale: older than the stream; other_size: their size is not the one that was told; too_large: nobody asked for
-    an image of that size; too_short: no image of that size has so few bytes; too_many_scans: more than any camera makes; corrupt: the decoder says so.
+    flagged: its driver says so. stale: older than the stream. other_size: the size differs from the announced one. too_large: nobody asked for an
+    image of that size. too_short: too few bytes for any image of that size. too_many_scans: more than any camera makes. corrupt: the decoder says so.
     """
 
     EMPTY = "empty"
@@ -41,10 +41,10 @@ class FrameFault(Enum):
 
 
 class SpoiledImageError(DataError):
-    """Raised for bytes that are not the whole image that they claim to be. The fault of who made or carried them; a stream goes on without it.
+    """Raised for bytes that are not the whole image that they claim to be. The fault of whoever made or carried them; a stream goes on without it.
 
     Args:
-        fault: what is wrong with them, for counters.
+        fault: the fault, for counters.
         problem: what is wrong, naming the image.
         remedy: what to do about it.
     """
@@ -55,27 +55,27 @@ class SpoiledImageError(DataError):
 
 
 class ImageSizeError(SpoiledImageError):
-    """Raised for an image whose size is not believed or beyond the limit, before it is decoded. The fault of who made it, or the limit is too low."""
+    """Raised before decoding for an image whose size is implausible or too large. Its maker's fault, or the limit is too low."""
 
 
 NOT_AS_SAID = frozenset(
     {FrameFault.OTHER_SIZE, FrameFault.TOO_LARGE, FrameFault.TOO_SHORT, FrameFault.TOO_MANY_SCANS, FrameFault.CORRUPT}
 )
-"""Faults of images that are not what their headers say: no camera or cable makes them by losing an end."""
+"""Faults of images that are not what their headers say. A camera or cable that cuts off an end never causes them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """One image and what the camera says of it.
+    """One image and what the camera says about it.
 
     Attributes:
-        sequence: number of this grab since the camera was opened, from 0; every grab counts, also a spoiled one.
+        sequence: number of this grab since the camera was opened, from 0. Every grab counts, even a spoiled one.
         exposed: exposure mid-point.
         grabbed: when it was dequeued from the driver, same clock as `exposed`.
         width_px: image width, px.
         height_px: image height, px.
         pixel_format: encoding of `payload`.
-        exposure_ns: exposure time, ns; None where the camera does not tell.
+        exposure_ns: exposure time, ns; None if the camera does not report it.
         payload: the encoded image.
     """
 
@@ -90,7 +90,7 @@ class Frame:
 
 
 _PADDING_BYTES = 256
-"""Some webcams pad a JPEG with zeros after its end marker; more than this was not seen."""
+"""Some webcams pad a JPEG with zeros after its end marker; more than this was never seen."""
 
 _BRACKETS = {
     PixelFormat.MJPEG: (b"\xff\xd8", b"\xff\xd9"),
@@ -104,7 +104,7 @@ _RAW_BITS = {PixelFormat.YUYV: 16, PixelFormat.GREY: 8, PixelFormat.NV12: 12}
 
 
 def raw_bytes(pixel_format: PixelFormat, width_px: int, height_px: int) -> int | None:
-    """How long a raw image is.
+    """Return the length of a raw image.
 
     Args:
         pixel_format: its encoding.
@@ -119,12 +119,12 @@ def raw_bytes(pixel_format: PixelFormat, width_px: int, height_px: int) -> int |
 
 
 def find_fault(pixel_format: PixelFormat, payload: Buffer, expected_bytes: int | None = None) -> FrameFault | None:
-    """Check that encoded bytes begin and end as their format demands; the driver's error flag is not enough (DESIGN 5.5).
+    """Check that encoded bytes begin and end as their format requires. The driver's error flag alone is not enough (DESIGN 5.5).
 
     Args:
         pixel_format: what the bytes claim to be.
         payload: the encoded image.
-        expected_bytes: length of a raw image (`raw_bytes`, or longer with padded rows); None: not checked.
+        expected_bytes: length of a raw image (`raw_bytes`, or more with padded rows); None: do not check.
 
     Returns:
         The fault, or None for a sound frame.

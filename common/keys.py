@@ -1,8 +1,8 @@
-"""This machine's key and those of the machines that it trusts, as files in one folder.
+"""This machine's key and those of the machines it trusts, as files in one folder.
 
-Rules: files are for their owner only (0600 in a folder of 0700) and appear whole or not at all. Root acts here for the service with the
-service's rights (`common.files`): what it writes is the folder's owner's, and what that one may have planted leads nowhere. A file that
-others may read, or that is no key file, is refused with one line: nothing is repaired in silence.
+Rules: files are for their owner only (0600 in a folder of 0700) and appear whole or not at all. Root acts here with the service's rights
+(`common.files`): what it writes belongs to the folder's owner, and links planted by that owner lead nowhere. A file that others may read,
+or that is not a key file, is refused with one line: nothing is repaired silently.
 """
 
 import fcntl
@@ -28,29 +28,29 @@ _KEY_FILE: Final = "key"
 _PEERS_FILE: Final = "peers.json"
 _CODES_FILE: Final = "spent-codes"
 _CODES_KEPT: Final = 64
-"""Codes that were typed last; a board shows one for minutes."""
+"""How many typed codes are remembered. A board shows one for minutes."""
 _MAX_FILE_BYTES: Final = 1 << 20
-"""Thousands of peers; more is no file of ours."""
+"""Room for thousands of peers. A larger file is not ours."""
 
 _LOCK_WAIT_NS: Final = 10_000_000_000
 _LOCK_STEP_S: Final = 0.05
-"""Who changes the folder holds it for some ms. A service that was taken over may hold it for ever."""
+"""Processes that change the folder hold its lock for some ms. A service that was taken over may hold it for ever."""
 
 
 @dataclass(frozen=True, slots=True)
 class OwnKey:
-    """This machine's pair of keys, Z85."""
+    """This machine's key pair, Z85."""
 
     public: str
     secret: str
 
 
 class KeyFolder:
-    """Key and peers in a folder. Nothing is made before it is asked for.
+    """The key and the peers in a folder. Nothing is created before it is asked for.
 
     Args:
-        path: the folder; made with the first file.
-        lock_wait_ns: how long another process that changes it is waited for.
+        path: the folder; created with the first file.
+        lock_wait_ns: how long to wait for another process that is changing it.
     """
 
     def __init__(self, path: Path, *, lock_wait_ns: int = _LOCK_WAIT_NS) -> None:
@@ -59,7 +59,7 @@ class KeyFolder:
 
     @property
     def has_key(self) -> bool:
-        """Whether a key was made already."""
+        """Whether a key already exists."""
         try:
             with self._opened(make=False) as folder:
                 return _has(folder, _KEY_FILE)
@@ -67,17 +67,17 @@ class KeyFolder:
             return False
 
     def own(self) -> OwnKey:
-        """Give this machine's keys; makes them when there are none.
+        """Return this machine's keys; create them if there are none.
 
         Raises:
-            DataError: the file is no key, or others may read it.
+            DataError: the file is not a key, or others may read it.
             UnavailableError: it cannot be read or written.
         """
         try:
             secret = self._read(_KEY_FILE).strip()
         except FileNotFoundError:
             secret = self._make().strip()
-        with suppress(ValueError):  # of a text that is no Z85
+        with suppress(ValueError):  # the text is not Z85
             if is_key(secret):
                 return OwnKey(_curve().curve_public(secret.encode()).decode(), secret)
         path = self.path / _KEY_FILE
@@ -86,7 +86,7 @@ class KeyFolder:
         )
 
     def renew(self) -> OwnKey:
-        """Make new keys in place of the old ones; whoever trusted those must be paired again.
+        """Replace the keys by new ones. Machines that trusted the old ones must be paired again.
 
         Raises:
             UnavailableError: they cannot be written.
@@ -97,10 +97,10 @@ class KeyFolder:
         return OwnKey(public.decode(), secret.decode())
 
     def peers(self) -> tuple[Peer, ...]:
-        """Give all peers, in the order in which they were added.
+        """Return all peers, in the order in which they were added.
 
         Raises:
-            DataError: the file is none of ours, or others may read it.
+            DataError: the file is not one of ours, or others may read it.
             UnavailableError: it cannot be read.
         """
         try:
@@ -128,7 +128,7 @@ class KeyFolder:
 
     @property
     def peers_state(self) -> tuple[int, int, int] | None:
-        """Something that changes when the file of peers does; None while there is none. As cheap as one system call."""
+        """A value that changes when the peers file does; None while there is none. Costs only one system call."""
         try:
             status = os.lstat(self.path / _PEERS_FILE)  # once for each connection
         except OSError:
@@ -136,14 +136,14 @@ class KeyFolder:
         return status.st_mtime_ns, status.st_ino, status.st_size
 
     def add(self, peer: Peer) -> Peer:
-        """Trust a machine. One whose key is known already is renewed; a name that another has gets a number.
+        """Trust a machine. If its key is already known, its entry is renewed. A name that another machine has gets a number appended.
 
         Returns:
             The peer under the name that it has now.
 
         Raises:
-            SettingsError: the key is none.
-            DataError: the file of peers is bad.
+            SettingsError: the key is invalid.
+            DataError: the peers file is bad.
             UnavailableError: it cannot be written.
         """
         if not is_key(peer.key):
@@ -160,11 +160,11 @@ class KeyFolder:
         return named
 
     def forget(self, name: str) -> Peer:
-        """Trust a machine no longer; gives what was known of it.
+        """Stop trusting a machine; return its entry.
 
         Raises:
-            SettingsError: there is none of that name.
-            DataError: the file of peers is bad.
+            SettingsError: there is no machine of that name.
+            DataError: the peers file is bad.
             UnavailableError: it cannot be written.
         """
         with self._locked() as folder:
@@ -178,7 +178,7 @@ class KeyFolder:
         )
 
     def spent_codes(self) -> tuple[str, ...]:
-        """Give the codes that were typed here last. None is to be proved twice: each time tells somebody in the middle some of its bits.
+        """Return the codes last typed here. No code may be proved twice: each proof reveals some of its bits to a man in the middle.
 
         Raises:
             DataError: others may read the file.
@@ -190,7 +190,7 @@ class KeyFolder:
             return ()
 
     def spend(self, code: str) -> None:
-        """Take note that a code is being proved.
+        """Record that a code is being proved.
 
         Raises:
             DataError: others may read the file.
@@ -203,7 +203,7 @@ class KeyFolder:
 
     @contextmanager
     def with_owners_rights(self) -> Iterator[None]:
-        """Do something in the folder, which is made if it is missing, with its owner's rights: root would leave there what is root's.
+        """Act in the folder with its owner's rights; create it if missing. Otherwise files that root leaves there would be root's.
 
         Raises:
             UnavailableError: the folder cannot be used.
@@ -212,7 +212,7 @@ class KeyFolder:
             yield
 
     def become_owner(self) -> bool:
-        """Give up root's rights for those of the folder's owner, for good; whether the folder is there.
+        """Replace root's rights by those of the folder's owner, for good. Return whether the folder exists.
 
         Raises:
             UnavailableError: it cannot be used.
@@ -226,14 +226,14 @@ class KeyFolder:
         return True
 
     def _make(self) -> str:
-        secret = _curve().curve_keypair()[1]  # not below: whose rights we have there may not be able to load it
+        secret = _curve().curve_keypair()[1]  # here: the owner, whose rights we take below, may be unable to load it
         with self._locked() as folder:
             if not _has(folder, _KEY_FILE):  # another process may have been faster
                 _write(folder, _KEY_FILE, secret + b"\n")
             return self._read_in(folder, _KEY_FILE)
 
     def _read(self, name: str) -> str:
-        """Read a small file that must be its owner's alone; FileNotFoundError where there is none."""
+        """Read a small file that must be readable by its owner alone; raise FileNotFoundError if there is none."""
         with self._opened(make=False) as folder:
             return self._read_in(folder, name)
 
@@ -247,7 +247,7 @@ class KeyFolder:
 
     @contextmanager
     def _opened(self, *, make: bool) -> Iterator[int]:
-        """Open the folder; whatever fails in the block is told, save FileNotFoundError where nothing is to be made."""
+        """Open the folder. Any failure in the block becomes an error for the user, except FileNotFoundError if nothing is to be created."""
         try:
             with opened_folder(self.path, make=make) as folder:
                 yield folder
@@ -258,7 +258,7 @@ class KeyFolder:
 
     @contextmanager
     def _locked(self) -> Iterator[int]:
-        """Keep other processes from changing the folder meanwhile."""
+        """Keep other processes from changing the folder for the duration of the block."""
         with self._opened(make=True) as folder:
             until_ns = now.monotonic_ns() + self._lock_wait_ns
             while True:
@@ -275,11 +275,11 @@ class KeyFolder:
 
 
 def default_folder(environment: Mapping[str, str], *, service: bool) -> Path:
-    """Where keys lie when no setting says so.
+    """Where keys lie if no setting says so.
 
     Args:
-        environment: of the process: STATE_DIRECTORY of a service, XDG_CONFIG_HOME, HOME.
-        service: whether the machine's service counts: for whoever may write its folder (root), its keys are meant.
+        environment: environment of the process: STATE_DIRECTORY of a service, XDG_CONFIG_HOME, HOME.
+        service: whether to consider the machine's service: for a user who may write its folder (root), its keys are meant.
 
     Returns:
         The folder; it need not exist.
@@ -290,18 +290,18 @@ def default_folder(environment: Mapping[str, str], *, service: bool) -> Path:
         if os.access(SERVICE_FOLDER, os.W_OK | os.X_OK):
             return SERVICE_FOLDER
     home = environment.get("XDG_CONFIG_HOME", "")
-    # The specification: a relative path is invalid and to be ignored.
+    # The XDG specification says that a relative path is invalid and must be ignored.
     base = Path(home) if home.startswith("/") else Path(environment.get("HOME", "/")) / ".config"
     return base / "tandemscan"
 
 
 def usual_keys() -> KeyFolder:
-    """The host's folder where no setting names another."""
+    """The host's folder if no setting names another."""
     return KeyFolder(default_folder(os.environ, service=False))
 
 
 def _curve() -> Any:  # noqa: ANN401 - a module
-    """ZeroMQ, loaded only when a key is made or read: --help and settings need none of it."""
+    """ZeroMQ, loaded only when a key is created or read: --help and settings do not need it."""
     import zmq  # noqa: PLC0415
 
     if not zmq.has("curve"):
@@ -314,7 +314,7 @@ def _curve() -> Any:  # noqa: ANN401 - a module
 def _peer(item: Any) -> Peer:  # noqa: ANN401 - whatever JSON holds
     peer = Peer(**item)
     texts = asdict(peer).values()
-    # Printable: whoever writes this file must not command the terminal of who lists it.
+    # Printable, so that whoever writes this file cannot control the terminal of whoever lists it.
     if not all(isinstance(text, str) and text.isprintable() for text in texts) or not is_key(peer.key):
         raise ValueError(item)
     return peer
@@ -334,7 +334,7 @@ def _write_peers(folder: int, peers: tuple[Peer, ...]) -> None:
 
 
 def _write(folder: int, name: str, content: bytes) -> None:
-    """Put a file in place, whole, for its owner only; a power cut leaves the old one or the new one."""
+    """Put a file in place, whole and for its owner only. A power cut leaves either the old one or the new one."""
     with replacing_in(folder, name, mode=0o600) as file:
         file.write(content)
 
@@ -343,6 +343,6 @@ def _unavailable(path: Path, error: OSError) -> UnavailableError:
     remedy = "check the disk"
     if error.errno in {1, 13, 30}:
         remedy = "run it with sudo, or name another folder with --keys"
-        if os.geteuid() == 0:  # which has acted for whoever owns the way to it
+        if os.geteuid() == 0:  # root acted with the rights of the path's owner
             remedy = f"give all of it to one user (ls -ld {path} and above), or name another folder with --keys"
     return UnavailableError(f"{path} cannot be used ({error.strerror})", remedy)

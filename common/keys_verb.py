@@ -15,7 +15,7 @@ def change(
 
     Args:
         folder: the folder.
-        forget: name of a peer to trust no longer; None: nobody.
+        forget: name of a peer that is no longer to be trusted; None: nobody.
         new: whether to make a new key.
         add: name and public key of a peer to trust; None: nobody.
         address: link on which that peer listens; empty if it does not.
@@ -35,10 +35,10 @@ def change(
 
 
 def listing(folder: KeyFolder, *, as_json: bool) -> str:
-    """What a `keys` verb prints: the own public key and who is trusted, never the secret key.
+    """What a `keys` verb prints: this machine's public key and its trusted peers, never the secret key.
 
     Args:
-        folder: the folder; its key is made if there is none.
+        folder: the folder; its key is created if there is none.
         as_json: whether as one JSON object; else as lines for people.
 
     Raises:

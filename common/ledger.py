@@ -1,7 +1,7 @@
-"""The marks on a pair's life line and the delays between them: integer nanoseconds that add up exactly.
+"""The marks of a pair and the delays between them: integer nanoseconds that add up exactly.
 
-Board marks are taken on the board's clock. Only `sent` is mapped to the host's clock, once, on receipt; the other board marks follow by
-their differences on the board's own clock. So end-to-end is the sum of the delays to the nanosecond, whatever the clock estimate was worth.
+Board marks are taken on the board's clock. Only `sent` is mapped to the host's clock, once, on receipt. The other board marks follow by their
+differences on the board's own clock. So the delays add up to end-to-end to the nanosecond, however good the clock estimate was.
 """
 
 import json
@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StageTimes:
-    """How long each stage of processing took, ns, in the order in which they run; together at most the processing delay."""
+    """How long each stage of processing took, ns, in the order in which they run. Their sum is at most the processing delay."""
 
     decode: int = 0
     interpolate: int = 0
@@ -22,14 +22,14 @@ class StageTimes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardMarks:
-    """A frame's marks on one clock: its exposure mid-point, its dequeue from the driver, the moment before its first byte was written (ns)."""
+    """A frame's marks on one clock (ns): exposure mid-point, dequeue from the driver, and the moment before its first byte was written."""
 
     exposed_ns: int
     grabbed_ns: int
     sent_ns: int
 
     def moved_to(self, sent_ns: int) -> "BoardMarks":
-        """Express the marks on another clock on which `sent` is known; differences stay as they are."""
+        """Move the marks to another clock on which `sent` is known; their differences stay the same."""
         shift = sent_ns - self.sent_ns
         return BoardMarks(exposed_ns=self.exposed_ns + shift, grabbed_ns=self.grabbed_ns + shift, sent_ns=sent_ns)
 
@@ -47,7 +47,7 @@ class PairLedger:
     """Everything measured about one pair. All marks in ns on the host's clock; the delays are defined in DESIGN, section 4.
 
     Attributes:
-        session: the board process's life that sent the frame.
+        session: the session of the board process that sent the frame.
         sequence: the board frame's number.
         host_sequence: the host frame's number.
         bytes: size of the board frame's payload.
@@ -62,7 +62,7 @@ class PairLedger:
         stages: shares of the processing delay.
         time_skew_ns: exposure of the board's frame minus that of the host's.
         offset_ns: host clock minus board clock as estimated for this frame.
-        uncertainty_ns: of that offset.
+        uncertainty_ns: uncertainty of that offset.
         host: the marks of the host's own frame.
     """
 
@@ -91,22 +91,22 @@ class PairLedger:
 
     @property
     def outbox_ns(self) -> int:
-        """Waiting for the link."""
+        """Time spent waiting for the link."""
         return self.board.sent_ns - self.board.grabbed_ns
 
     @property
     def propagation_ns(self) -> int:
-        """From the first byte written to the last received; carries the clock estimate's error."""
+        """From the first byte written to the last byte received. Includes the error of the clock estimate."""
         return self.received_ns - self.board.sent_ns
 
     @property
     def pairing_ns(self) -> int:
-        """Waiting for the partner."""
+        """Time spent waiting for the partner."""
         return self.queued_ns - self.received_ns
 
     @property
     def queuing_ns(self) -> int:
-        """The FIFO's backlog."""
+        """Time spent in the FIFO's backlog."""
         return self.dequeued_ns - self.queued_ns
 
     @property
@@ -125,7 +125,7 @@ class PairLedger:
         return max(0, self.queued_ns - self.previous_done_ns)
 
     def to_json(self) -> str:
-        """One line of delays.jsonl: the keys of DESIGN, section 4, and the marks of the host's own frame behind them."""
+        """One line of delays.jsonl: the keys of DESIGN, section 4, followed by the marks of the host's own frame."""
         record = {
             "session": self.session,
             "sequence": self.sequence,

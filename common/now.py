@@ -6,34 +6,35 @@ from pathlib import Path
 from typing import Final
 
 _LEAST_SLEEP_NS: Final = 5_000_000
-"""A shorter sleep would spoil no pair; a process that is held up between two readings of clocks makes less than nothing of it."""
+"""A shorter sleep would spoil no pair. A process that is delayed between two clock readings sees a sleep as shorter, never as longer."""
 
 
 def monotonic_ns() -> int:
-    """Nanoseconds of CLOCK_MONOTONIC: never steps, the clock that V4L2 stamps with (a board without RTC has no other honest one)."""
+    """Nanoseconds of CLOCK_MONOTONIC, which never steps. V4L2 stamps with this clock; a board without an RTC has no other honest one."""
     return time.monotonic_ns()
 
 
 _RUNS_ON: Final = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
-"""The clock that goes on in a suspend; where the kernel has none, no sleep is seen."""
+"""The clock that keeps running during a suspend. Where the kernel has none, no sleep is seen."""
 
 
 def asleep_ns() -> int:
-    """How long this machine has slept since it booted, ns: CLOCK_MONOTONIC stands still in a suspend, CLOCK_BOOTTIME goes on.
+    """How long this machine has slept since it booted, ns: CLOCK_MONOTONIC stands still in a suspend, CLOCK_BOOTTIME keeps running.
 
-    At most that: what passes between the two readings makes it less, never more. 0 where the kernel has no clock that runs on.
+    The result never exceeds the true value: time that passes between the two readings makes it smaller. 0 where the kernel has no clock that
+    keeps running.
     """
     return time.clock_gettime_ns(_RUNS_ON) - time.monotonic_ns()
 
 
 class SleepWatch:
-    """Tells when this machine has slept since it was last asked; its CLOCK_MONOTONIC stood still meanwhile."""
+    """Tells whether this machine has slept, with CLOCK_MONOTONIC standing still, since the last call."""
 
     def __init__(self) -> None:
-        self._asleep_ns = max(asleep_ns() for _ in range(3))  # held up between its readings, one says less
+        self._asleep_ns = max(asleep_ns() for _ in range(3))  # a delay between readings makes one too small
 
     def slept_ns(self) -> int:
-        """Nanoseconds of sleep that were not told yet; 0: none."""
+        """Nanoseconds of sleep not yet reported; 0: none."""
         slept_ns = asleep_ns() - self._asleep_ns
         if slept_ns < _LEAST_SLEEP_NS:
             return 0
@@ -42,10 +43,10 @@ class SleepWatch:
 
 
 class StandstillWatch:
-    """Tells when this machine's CLOCK_MONOTONIC has, or may have, stood still since it was last asked.
+    """Tells whether this machine's CLOCK_MONOTONIC has, or may have, stood still since the last call.
 
-    A suspend shows on CLOCK_BOOTTIME. A machine that an emulator stops shows none; where it is given the time again afterwards, the time of day has jumped:
-    only that it did is used, never its value. Asked before each message, so it reads each clock once.
+    A suspend shows on CLOCK_BOOTTIME. A machine stopped by an emulator shows none. If it is then given the time again, the time of day has jumped;
+    only the fact of the jump is used, never its value. This is called before each message, so it reads each clock once.
     """
 
     def __init__(self) -> None:
@@ -53,25 +54,25 @@ class StandstillWatch:
         self._apart_ns = time.time_ns() - time.monotonic_ns()
 
     def look(self) -> tuple[int, bool]:
-        """Nanoseconds of sleep that were not told yet, and whether the time of day was set; not where the process was held up between two readings."""
+        """Return the ns of sleep not yet reported, and whether the time of day has jumped. A pause between the readings does not count as a jump."""
         slept_ns, now_ns, wall_ns = self._sleep.slept_ns(), time.monotonic_ns(), time.time_ns()
         moved_ns = wall_ns - now_ns - self._apart_ns
         jumped = not -_LEAST_SLEEP_NS < moved_ns < _LEAST_SLEEP_NS
         if jumped and time.monotonic_ns() - now_ns >= _LEAST_SLEEP_NS // 5:
-            return slept_ns, False  # looked at again the next time
+            return slept_ns, False  # check again at the next call
         self._apart_ns += moved_ns
         return slept_ns, jumped
 
 
 def wall_time() -> str:
-    """Local wall time as ISO 8601 to the second, for reports only; nothing is ever computed from it."""
+    """Local wall time as ISO 8601 to the second. For reports only; nothing is ever computed from it."""
     return time.strftime("%Y-%m-%dT%H:%M:%S%z")
 
 
 def boot_id() -> str:
-    """Id of this boot of the machine: the life of its CLOCK_MONOTONIC.
+    """Id of this boot of the machine, which is one life of its CLOCK_MONOTONIC.
 
-    Where the kernel does not show one (Android hides /proc/sys), a random id is given: then a restart looks like a reboot, which is safe.
+    Where the kernel does not show one (Android hides /proc/sys), the id is random. Then a restart looks like a reboot, which is safe.
     """
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip().replace("-", "")
@@ -80,5 +81,5 @@ def boot_id() -> str:
 
 
 def random_id() -> str:
-    """A fresh id, 16 hexadecimal digits (64 random bits): names one life of a process."""
+    """A fresh id of 16 hexadecimal digits (64 random bits); identifies one life of a process."""
     return os.urandom(8).hex()

@@ -1,6 +1,6 @@
 """Who is trusted on a link: names, public keys and addresses as values. Pure.
 
-Keys are Curve25519 in Z85, as CurveZMQ has them (RFC 26, RFC 32).
+Keys are Curve25519 in Z85, as in CurveZMQ (RFC 26, RFC 32).
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ MAX_NAME: Final = 64
 
 _Z85_CHARACTERS: Final = 40
 _Z85_ALPHABET: Final = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.-:+=^!/*?&<>()[]{}@%$#"
-"""RFC 32. A text of 40 of them may still be no 256 bits (each five stand for less than 2^32): see is_key."""
+"""RFC 32. A text of 40 such letters may still not be 256 bits (each five must stand for less than 2^32): see is_key."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +21,7 @@ class Peer:
     """A machine that this one trusts.
 
     Attributes:
-        name: by which people know it; unique in a folder.
+        name: the name that people know it by; unique in a folder.
         key: its public key, Z85.
         added: local wall time, ISO 8601.
         address: link on which a host reaches it; empty for a host.
@@ -34,10 +34,10 @@ class Peer:
 
 
 def peer_at(peers: Sequence[Peer], address: str) -> Peer | None:
-    """Find who is at an address: whoever was paired there last, else who is named like it, else the only one that there is.
+    """Find the peer at an address: the one last paired there, else the one with that name, else the only one there is.
 
     Args:
-        peers: all that are known.
+        peers: all known peers.
         address: `tcp://HOST:PORT`.
 
     Returns:
@@ -58,6 +58,6 @@ def is_key(text: str) -> bool:
 
 
 def clean_name(name: str) -> str:
-    """Make a name of what a peer says of itself: letters, digits, dots, hyphens, at most 64; anything else becomes a hyphen."""
+    """Turn a peer's own name into one of letters, digits, dots and hyphens, at most 64 in all; anything else becomes a hyphen."""
     kept = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in name[:MAX_NAME])
     return kept.strip(".-") or "unnamed"

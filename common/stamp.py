@@ -1,15 +1,15 @@
-"""Points in time that know their clock, so that times of two machines can't be mixed by accident."""
+"""Points in time that know their clock, so that the times of two machines cannot be mixed by accident."""
 
 from dataclasses import dataclass
 
 from common.errors import ClockMismatchError
 
 HOST_CLOCK = "host"
-"""Name of the clock on which pairs are formed and delays are added up: CLOCK_MONOTONIC of the host."""
+"""Name of the clock on which pairs are formed and delays are summed: CLOCK_MONOTONIC of the host."""
 
 
 def board_clock(boot_id: str) -> str:
-    """Name the CLOCK_MONOTONIC of a board: a reboot starts a new clock, a restart of the service does not.
+    """Name the CLOCK_MONOTONIC of a board. A reboot starts a new clock; a restart of the service does not.
 
     Args:
         boot_id: the board's boot id.
@@ -47,7 +47,7 @@ class Stamp:
         return self.ns <= other.ns
 
     def plus(self, duration_ns: int) -> "Stamp":
-        """Give the moment `duration_ns` later on the same clock."""
+        """Return the moment `duration_ns` later on the same clock."""
         return Stamp(self.ns + duration_ns, self.clock)
 
     def _check(self, other: "Stamp") -> None:

@@ -23,10 +23,10 @@ def examine(settings: BoardSettings, file: Path | None) -> list[Finding]:
 
     Args:
         settings: what would be run.
-        file: where they were read from; None: no file.
+        file: the settings file they came from; None: no file.
 
     Returns:
-        The findings, in the order in which things go wrong.
+        The findings, in the order in which problems would appear.
 
     Raises:
         SettingsError: the camera's or a link's URI makes no sense.

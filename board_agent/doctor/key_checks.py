@@ -1,4 +1,4 @@
-"""The folder of keys of links that other machines reach: may its user read it, and does it know anybody. Nothing is made or changed."""
+"""Checks the key folder of links that other machines reach: can its user read it, and does it hold any peer? Creates and changes nothing."""
 
 import stat
 
@@ -9,17 +9,17 @@ from common.keys import KeyFolder
 
 
 def check_keys(folder: KeyFolder, account: Account) -> Finding:  # noqa: PLR0911 - one for each state of the folder
-    """Judge a board's folder of keys.
+    """Judge a board's key folder.
 
     Args:
-        folder: of this machine's key and of those that may connect.
-        account: who is to read it.
+        folder: holds this machine's key and those of machines that may connect.
+        account: the user who must read it.
     """
     path = folder.path
     try:
         if not path.exists():
             return warn("keys", f"{path} is not there yet, so nobody is known", "start the agent, then pair a host")
-        # Files of keys are for their owner only, so whoever is to read them must own them; root may read all.
+        # Key files are for their owner only, so whoever must read them must own them; root may read everything.
         states = {item.name: item.lstat() for item in path.iterdir()}
         owners = {name: state.st_uid for name, state in states.items() if stat.S_ISREG(state.st_mode)}
         if folder.has_key:

@@ -1,4 +1,4 @@
-"""A configured link judged from readings: can this side have it, or who has it. Pure."""
+"""Judges a configured link from readings: can this side have it, or who has it? Pure."""
 
 from dataclasses import dataclass
 
@@ -13,12 +13,12 @@ class LinkReadings:
     Attributes:
         uri: as configured.
         holders: processes that have it open.
-        all_seen: whether every process could be looked at.
+        all_seen: whether every process could be inspected.
         console: whether the kernel's console writes to it.
-        terminals: processes whose terminal it is, a getty among them.
-        problem: why it could not be opened; empty when it could, or was not tried.
+        terminals: processes whose controlling terminal it is, such as a getty.
+        problem: why it could not be opened; empty if it could, or was not tried.
         remedy: what to do about that.
-        taken: whether the reason is that somebody has it.
+        taken: whether the reason is that another process has it.
     """
 
     uri: str

@@ -1,4 +1,4 @@
-"""Tries to have each configured link for a moment, or finds out who has it, and lets the checks judge."""
+"""Tries to open each configured link for a moment, or finds out who has it, and lets the checks judge."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,8 +19,8 @@ def examine_link(uri: str, account: Account, unit: Unit, *, listens_by_default: 
 
     Args:
         uri: the link.
-        account: who is to open it.
-        unit: our own service, which may have it.
+        account: the user who must open it.
+        unit: our own service, which may have it open.
         listens_by_default: true on the board.
 
     Raises:
@@ -43,7 +43,7 @@ def examine_link(uri: str, account: Account, unit: Unit, *, listens_by_default: 
 
 
 def _readings(uri: str, address: str, account: Account, *, listens: bool) -> LinkReadings:
-    """What can be told without opening anything."""
+    """What can be read without opening anything."""
     if address.startswith("serial:"):
         device = Path(address.removeprefix("serial:")).resolve()
         holders, all_seen = machine.holders_of(str(device))
@@ -65,7 +65,7 @@ def _readings(uri: str, address: str, account: Account, *, listens: bool) -> Lin
         holders, all_seen = machine.holders_of(target)
         seen_all &= all_seen
         found.update(dict.fromkeys(holders))
-    # The same port of another address is none of ours, so a holder counts only where opening fails, too.
+    # The same port on another address does not concern us, so a holder counts only if opening fails too.
     return (
         LinkReadings(uri=uri, all_seen=seen_all)
         if not found
@@ -79,7 +79,7 @@ def _blamed(uri: str, holders: tuple[Holder, ...], account: Account, *, all_seen
 
 
 def _tried(readings: LinkReadings, account: Account, *, listens_by_default: bool) -> LinkReadings:
-    """Open the link and close it again; without keys, of which none is to be made here."""
+    """Open the link and close it again. No keys are used, because none may be created here."""
     try:
         parsed = parse_link(readings.uri, listens_by_default=listens_by_default)
         owner = parsed.owner or (str(account.uid) if parsed.address.startswith("ipc:") else "")

@@ -1,1 +1,1 @@
-"""One module for each verb of board-agent: what it does, what it prints, its exit code. Its options stand in `cli`."""
+"""One module per verb of board-agent: what it does, what it prints, its exit code. Its options are in `cli`."""

@@ -7,7 +7,7 @@ from board_agent.cameras import list_cameras, table, values
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what the cameras of this machine offer."""
+    """Print what this machine's cameras offer."""
     found = list_cameras()
     print(json.dumps(values(found)) if options.json else table(found))
     return 0

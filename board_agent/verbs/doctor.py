@@ -11,7 +11,7 @@ from common.program import logs
 
 
 def run(options: argparse.Namespace) -> int:
-    """Check what `run` would use; without any choice that is what the service uses, where it is installed."""
+    """Check what `run` would use. If nothing is chosen, that is what the service uses, where it is installed."""
     if not (options.config or options.camera or options.link) and SERVICE_SETTINGS.is_file():
         options.config = SERVICE_SETTINGS
     settings = resolve_settings(options).values

@@ -9,7 +9,7 @@ from common.keys_verb import change, listing
 
 
 def run(options: argparse.Namespace) -> int:
-    """Change what is asked for and print what there is."""
+    """Make the requested changes and print the result."""
     folder = chosen_keys(options)
     change(folder, forget=options.forget, new=options.new, add=options.add, address="", when=now.wall_time())
     print(listing(folder, as_json=options.json))

@@ -30,7 +30,7 @@ _LOG: Final = logging.getLogger("board_agent")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Serve until stopped, then say what became of the frames."""
+    """Serve until stopped, then print what became of the frames."""
     settings = resolve_settings(options).values
     check(settings)
     logs.set_up(log_level(settings.log_level))
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _serve(settings: BoardSettings, signals: StopSignals) -> Summary:
-    """Open everything in the order in which it may fail at once, serve, and close it again."""
+    """Open the camera, then the links; serve; close everything again."""
     boot_id, session = now.boot_id(), now.random_id()
     clock, uris = board_clock(boot_id), [parse_link(uri, listens_by_default=True) for uri in settings.link]
     with ExitStack() as opened:

@@ -1,6 +1,6 @@
-"""A camera is a source of still-encoded frames with stamps. Board and host use the same ones.
+"""A camera is a source of still-encoded frames with stamps. Board and host use the same implementations.
 
-A camera never blocks: it says what to wait for (`pollable`, `due_ns`) and then gives what has come since.
+A camera never blocks: it says what to wait for (`pollable`, `due_ns`) and then returns what has come since.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from common.protocol.message import CameraDescription
 
 @dataclass(frozen=True, slots=True)
 class Spoiled:
-    """A grab whose bytes are no whole image; it has a sequence number like any other.
+    """A grab whose bytes are not a whole image. It has a sequence number like any other.
 
     Attributes:
         sequence: number of the grab.
@@ -26,11 +26,11 @@ class Spoiled:
 
 @dataclass(frozen=True, slots=True)
 class Skipped:
-    """A grab that was passed over unread, because a newer one was there already; it has a sequence number like any other.
+    """A grab that was skipped unread because a newer one was already there. It has a sequence number like any other.
 
     Attributes:
-        sequence: number of the grab; of the first one where several are told of at once.
-        frames: how many.
+        sequence: number of the grab; of the first one if several are reported at once.
+        frames: how many were skipped.
     """
 
     sequence: int
@@ -47,12 +47,12 @@ Grab = Frame | Spoiled | Skipped | Ended
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """What a camera can be told to give while it runs.
+    """What a camera can be told to deliver while it runs.
 
     Attributes:
         period_ns: nominal time between frames, ns.
-        quality: of its JPEG images in the camera's own unit, more is better; 0 where it cannot be set.
-        size_px: (width, height) of its images, px; zeros where it cannot be set.
+        quality: JPEG quality in the camera's own unit, more is better; 0 where it cannot be set.
+        size_px: image size (width, height), px; zeros where it cannot be set.
     """
 
     period_ns: int
@@ -62,12 +62,12 @@ class Mode:
 
 @dataclass(frozen=True, slots=True)
 class Offers:
-    """What a camera's mode can be made of, the present values first; both empty where nothing can be changed while it runs.
+    """The values that a camera's mode can take, the current ones first. Empty tuples where nothing can be changed while it runs.
 
     Attributes:
-        periods_ns: nominal times between frames, ns, the shortest first; none is shorter than the present one.
-        qualities: of its JPEG images, the best first; none is better than the present one.
-        sizes_px: (width, height) of its images, px, the largest first; all have exactly one shape and all of these periods.
+        periods_ns: nominal times between frames, ns, the shortest first; none is shorter than the current one.
+        qualities: JPEG qualities, the best first; none is better than the current one.
+        sizes_px: image sizes (width, height), px, the largest first; all have exactly the same shape and support all of these periods.
     """
 
     periods_ns: tuple[int, ...] = ()
@@ -85,23 +85,23 @@ class CameraState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class CameraHealth:
-    """How a camera has fared since it was opened.
+    """How a camera has performed since it was opened.
 
     Attributes:
         state: whether frames come.
-        missed: frames that the camera took and the driver had no buffer for or lost on the bus (gaps in its numbers).
-        faults: number of spoiled grabs by what was wrong with them.
-        stalls: how often frames stayed away and the device was opened anew for it.
-        failures: how often the driver failed (EIO and the like) and the device was opened anew.
+        missed: frames that the camera took but the driver had no buffer for or lost on the bus (gaps in its numbers).
+        faults: number of spoiled grabs, by fault.
+        stalls: how often frames stopped coming and the device was reopened.
+        failures: how often the driver failed (EIO and the like) and the device was reopened.
         unplugged: how often the device vanished.
-        returned: how often the device was back after any of these.
-        distrusted_stamps: frames whose stamp could not be true, so that the moment of dequeuing stands for it.
+        returned: how often the device came back after any of these.
+        distrusted_stamps: frames whose stamp could not be true, so that the time of dequeuing replaces it.
         refused_controls: controls that the driver would not set.
-        held: exposure, gain, white balance and focus as they are held now, by name, in the control's own unit.
-        period_ns: time between frames as measured, ns; None where unknown.
-        latency_ns: calibrated time from exposure to arrival that was subtracted from every stamp, ns; None where there is none, or the driver knows.
-        latency_uncertainty_ns: of that, as it was stated; None: not stated.
-        jitter_ns: how much later than the swiftest frame 95 % of them arrived; None where stamps are no arrivals.
+        held: exposure, gain, white balance and focus as now held, by name, in the control's own unit.
+        period_ns: measured time between frames, ns; None where unknown.
+        latency_ns: calibrated time from exposure to arrival, subtracted from every stamp, ns; None if there is none, or the driver knows it.
+        latency_uncertainty_ns: stated uncertainty of that; None if not stated.
+        jitter_ns: how much later than the fastest frame 95 % of the frames arrived; None where stamps are not arrival times.
     """
 
     state: CameraState = CameraState.RUNNING
@@ -142,42 +142,42 @@ class Camera(Protocol):
 
     @property
     def description(self) -> CameraDescription:
-        """Size as it was asked for, encoding, period and pacing. The period follows the mode; another size is told by the frames themselves."""
+        """Requested size, encoding, period and pacing. The period follows the mode; the frames themselves tell a different size."""
 
     @property
     def offers(self) -> Offers:
-        """What it can be told to give instead of what it was asked for at first; that stays the first of each."""
+        """What it can deliver instead of what was first requested. The first request stays the first of each."""
 
     def adapt(self, mode: Mode, now_ns: int) -> None:
-        """Give frames of another mode from now on; a device may need a new start for it. A camera that offers none takes no notice.
+        """Deliver frames of another mode from now on. A device may need a restart for this. A camera that offers none ignores the call.
 
         Args:
-            mode: made of what it offers.
+            mode: composed of offered values.
             now_ns: CLOCK_MONOTONIC now, ns.
         """
 
     @property
     def pollable(self) -> int | None:
-        """A file descriptor that becomes readable, urgent or in error when there is something to read; None for a camera that goes by `due_ns` alone.
+        """A file descriptor that becomes readable, urgent or in error when there is something to read; None if only `due_ns` counts.
 
-        It may change with every `read`, `pause` and `resume`: a device that was lost comes back as another one.
+        It may change with every `read`, `pause` and `resume`: a lost device comes back as a different one.
         """
 
     def due_ns(self, now_ns: int) -> int:
-        """When `read` will have something, ns on the machine's CLOCK_MONOTONIC; the far future if that is up to `pollable` or demand."""
+        """When `read` will have something, ns on the machine's CLOCK_MONOTONIC; the far future if that depends on `pollable` or demand."""
 
     def read(self, now_ns: int) -> list[Grab]:
-        """Give what has come since the last call, oldest first, without waiting.
+        """Return what has come since the last call, oldest first, without waiting.
 
         Args:
-            now_ns: CLOCK_MONOTONIC now, ns. A demand-paced camera gives one image for each call.
+            now_ns: CLOCK_MONOTONIC now, ns. A demand-paced camera returns one image per call.
         """
 
     def anchor(self, exposed_ns: int, index: int) -> None:
-        """Let a demand-paced camera's next image be number `index`, exposed at `exposed_ns`; other cameras take no notice."""
+        """Make a demand-paced camera's next image number `index`, exposed at `exposed_ns`. Other cameras ignore the call."""
 
     def steer(self, later_ns: int, now_ns: int) -> None:
-        """Expose later from now on, as `description.steering` says; a camera that cannot takes no notice.
+        """Expose later from now on, as `description.steering` allows. A camera that cannot ignores the call.
 
         Args:
             later_ns: by how much, less than a period, ns.
@@ -186,17 +186,17 @@ class Camera(Protocol):
 
     @property
     def health(self) -> CameraHealth:
-        """How it has fared; values, for summaries and for those who watch."""
+        """The camera's health as values, for summaries and for monitoring."""
 
     def pause(self) -> None:
-        """Take note that nobody listens: a device may rest. Again is harmless."""
+        """Tell the camera that nobody listens, so a device may rest. Repeating the call is harmless."""
 
     def resume(self, now_ns: int) -> None:
-        """Take note that somebody listens again: frames come as soon as can be. Again is harmless.
+        """Tell the camera that somebody listens again: frames come as soon as possible. Repeating the call is harmless.
 
         Args:
             now_ns: CLOCK_MONOTONIC now, ns.
         """
 
     def close(self) -> None:
-        """Let go of the device."""
+        """Release the device."""

@@ -1,8 +1,8 @@
-"""Camera URI to camera. The registry of cameras: each kind is imported when it is asked for.
+"""Opens the camera that a URI names. The registry of cameras: each kind is imported only when needed.
 
-Other packages' cameras are registered as entry points of the group `tandemscan.cameras`; the name is the URI's scheme, lower case. The entry
-point is a callable that takes one CameraRequest, opens the camera and gives a `common.camera.base.Camera`; for an option of no use it raises
-a SettingsError, for a device that cannot be had an UnavailableError.
+Other packages register cameras as entry points of the group `tandemscan.cameras`; the name is the URI's scheme in lower case. The entry point is
+a callable that takes one CameraRequest, opens the camera and returns a `common.camera.base.Camera`. It raises a SettingsError for an unusable
+option, and an UnavailableError for a device that cannot be had.
 """
 
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ _CAMERAS: Final = "tandemscan.cameras"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraRequest:
-    """A camera of another package that is to be opened.
+    """A request to open another package's camera.
 
     Attributes:
-        uri: the whole of it, for errors.
-        path: what stands between the scheme and the options.
-        options: those behind the question mark, in their order.
+        uri: the whole URI, for errors.
+        path: the part between the scheme and the options.
+        options: the options after the question mark, in their order.
         clock: name of this machine's clock, for the stamps.
         now_ns: CLOCK_MONOTONIC now, ns.
     """
@@ -38,11 +38,11 @@ class CameraRequest:
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """Where a kind of camera is found.
+    """Where a kind of camera is implemented.
 
     Attributes:
-        read: takes URI, path, options and clock, gives the settings.
-        open: takes the settings and CLOCK_MONOTONIC, ns, gives the camera.
+        read: takes URI, path, options and clock; returns the settings.
+        open: takes the settings and CLOCK_MONOTONIC, ns; returns the camera.
     """
 
     read: str
@@ -82,14 +82,14 @@ def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
 
 
 def parse_camera(uri: str, clock: str) -> object:
-    """Read a camera URI without opening anything.
+    """Parse a camera URI without opening anything.
 
     Args:
         uri: see EXAMPLE.
         clock: name of this machine's clock, for the stamps.
 
     Returns:
-        The settings of the camera that is meant: ReplaySettings or V4l2Settings; None for another package's, which reads them when it opens.
+        The camera's settings: ReplaySettings or V4l2Settings; None for another package's camera, which parses them when it opens.
 
     Raises:
         SettingsError: the URI makes no sense.
@@ -104,7 +104,7 @@ def _read(scheme: str, uri: str, path: str, options: dict[str, str], clock: str)
 
 
 def _parts(uri: str) -> tuple[str, str, dict[str, str]]:
-    """Split scheme, path and options; the scheme is one that is known."""
+    """Split scheme, path and options; check that the scheme is known."""
     scheme, found, rest = uri.partition(":")
     known = found and (scheme in _KINDS or scheme in registered_names(_CAMERAS))
     if not known or (scheme == "replay" and not rest):
@@ -113,7 +113,7 @@ def _parts(uri: str) -> tuple[str, str, dict[str, str]]:
 
 
 def _split(uri: str, rest: str) -> tuple[str, dict[str, str]]:
-    """Split path and options; a `?` without `=` behind it belongs to a glob."""
+    """Split path and options. A `?` without a following `=` belongs to a glob."""
     path, mark, query = rest.rpartition("?")
     if not mark or "=" not in query:
         return rest, {}

@@ -18,7 +18,7 @@ from common.protocol.wire_fields import MAX_SIZE_PX
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImageFile:
-    """An image file's bytes as they are sent, and what their header says.
+    """An image file's bytes as they are sent, and the content of its header.
 
     Attributes:
         pixel_format: encoding of `payload`.
@@ -36,18 +36,18 @@ class ImageFile:
 _REMEDY = "use JPEG, PNG or binary PGM/PPM files, or remove it from the folder"
 
 SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".pgm", ".ppm", ".pnm"})
-"""File names that a replay folder is searched for."""
+"""File suffixes that a replay folder is searched for."""
 
 _MAXIMUM = re.compile(rb"(?:\s|#[^\n]*\n)+(\d{1,9})\s")
-"""Behind a binary map's size: its maximum value and one white space (pgm(5), ppm(5))."""
+"""What follows a binary map's size: its maximum value and one white space (pgm(5), ppm(5))."""
 
 
 _MOST_BYTES: Final = 4 * MAX_PAYLOAD_BYTES
-"""Of a file that is packed before it is sent; a link takes a quarter of that."""
+"""Size limit of a file that is packed before it is sent. A link takes a quarter of that."""
 
 
 def load(path: Path) -> ImageFile:
-    """Read an image file as it is sent over a link.
+    """Load an image file in the form in which it is sent over a link.
 
     Args:
         path: a JPEG, PNG, binary PGM or PPM file.
@@ -56,7 +56,7 @@ def load(path: Path) -> ImageFile:
         Its bytes and header.
 
     Raises:
-        DataError: the file cannot be read, its header is none of these, or no link takes an image of that size.
+        DataError: the file cannot be read, its header is of none of these kinds, or no link takes an image of that size.
     """
     try:
         data = read_whole(path, _MOST_BYTES)
@@ -66,14 +66,14 @@ def load(path: Path) -> ImageFile:
 
 
 def read_image(path: Path, data: bytes) -> ImageFile:
-    """Read the content of an image file.
+    """Parse the content of an image file.
 
     Args:
         path: its name, for errors.
-        data: its bytes, from anybody.
+        data: its bytes; they may come from anybody.
 
     Returns:
-        The bytes as they are sent, and what the header says.
+        The bytes as they are sent, and the content of the header.
 
     Raises:
         DataError: the header is of none of these kinds, or no link takes an image of that size.

@@ -1,10 +1,10 @@
 """When a camera is opened, switched on and off, found silent, closed and tried again: one automaton for every camera that can be lost.
 
-No device, no thread, no clock: times are CLOCK_MONOTONIC, ns, and passed in. Its shell asks `due` what time brings, tells it what happened and what is
-ordered, carries out every `Step` that it is given, and reports the outcome of those that have one. It holds, whatever happens:
+It has no device, thread or clock; times are CLOCK_MONOTONIC, ns, and are passed in. Its shell asks `due` what is to be done now, reports events and
+orders, carries out every `Step` that it is given, and reports the outcome of steps that have one. These invariants always hold:
 
 - what was opened is closed before it is opened again;
-- between an opening that gave no frame and the next lies a rest, unless the owner's order (`resume`, `renew`) comes between;
+- an opening that gave no frame is followed by a rest before the next one, unless the owner's order (`resume`, `renew`) comes in between;
 - a camera that is wanted and silent is closed and tried again, for ever;
 - openings = refused + opened; opened = lost + released + open now.
 """
@@ -18,7 +18,7 @@ from common.camera.base import CameraState
 NEVER_NS: Final = 2**63 - 1
 
 _MOST_DOUBLINGS: Final = 16
-"""A camera may be away for months; the rest has long reached its limit."""
+"""A camera may be away for months; the rest has long reached its limit by then."""
 
 
 class Unwanted(Enum):
@@ -29,7 +29,7 @@ class Unwanted(Enum):
 
 
 class Standing(Enum):
-    """Where the camera stands: closed, being opened, on, off for a moment to be steered, off because nobody listens, being closed."""
+    """The camera's current state: closed, being opened, on, briefly off to be steered, off because nobody listens, being closed."""
 
     CLOSED = "closed"
     OPENING = "opening"
@@ -40,7 +40,7 @@ class Standing(Enum):
 
 
 class Step(Enum):
-    """What the shell does now."""
+    """What the shell must do now."""
 
     NONE = "none"
     OPEN = "open"
@@ -50,13 +50,13 @@ class Step(Enum):
     STOP = "stop"
     """Switch it off; report `lost` if that fails."""
     LOOK = "look"
-    """See whether it is still there; report `lost` if it is not."""
+    """Check that it is still there; report `lost` if it is not."""
     CLOSE = "close"
-    """Let go of it; then report `closed`."""
+    """Release it; then report `closed`."""
 
 
 class Loss(Enum):
-    """Why an open camera is given up."""
+    """Why an open camera was given up."""
 
     STALLED = "stalled"
     FAILED = "failed"
@@ -65,18 +65,18 @@ class Loss(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LifeSettings:
-    """How patient a kind of camera is.
+    """How patient to be with a kind of camera.
 
     Attributes:
-        start_ns: so long its first frame of all may take, ns.
-        first_frame_ns: so long the first frame after any later switching on, ns.
-        silence_ns: so long any further frame, ns.
-        silence_periods: or so many periods, whichever is longer.
-        lost_rest_ns: from the loss of one that gave frames to the next attempt, ns; one that fell silent gets `rest_ns`.
-        rest_ns: from any other loss to the next attempt, ns; doubled with each attempt that brings no frame.
-        longest_rest_ns: limit of that, ns.
+        start_ns: time allowed for its very first frame, ns.
+        first_frame_ns: time allowed for the first frame whenever it is switched on later, ns.
+        silence_ns: time allowed for every further frame, ns.
+        silence_periods: the same in frame periods; the longer of the two counts.
+        lost_rest_ns: time from the loss of a camera that gave frames to the next attempt, ns; one that fell silent gets `rest_ns`.
+        rest_ns: time from any other loss to the next attempt, ns; doubled with each attempt that brings no frame.
+        longest_rest_ns: upper limit of that, ns.
         unwanted: what becomes of it while nobody listens.
-        look_ns: how often one that stays open is looked for then, ns.
+        look_ns: how often to check then that an open camera is still there, ns.
     """
 
     start_ns: int
@@ -96,10 +96,10 @@ class LifeCounts:
 
     Attributes:
         refused: openings that failed.
-        opened: openings that did not.
-        lost: how often an open one was given up, by reason.
+        opened: openings that succeeded.
+        lost: how often an open camera was given up, by reason.
         released: how often it was closed by order.
-        returned: how often it was back after it had been lost.
+        returned: how often it came back after a loss.
     """
 
     refused: int = 0
@@ -133,7 +133,7 @@ class Life:
 
     @property
     def phase(self) -> Standing:
-        """Where it stands."""
+        """The camera's current state."""
         return self._phase
 
     @property
@@ -143,12 +143,12 @@ class Life:
 
     @property
     def is_ended(self) -> bool:
-        """Whether it is over."""
+        """Whether its life is over."""
         return self._is_ended
 
     @property
     def is_lost(self) -> bool:
-        """Whether it was there and is not: from a loss or a refusal to the next frame, or to its opening where no frame is wanted."""
+        """Whether it was there and is gone: from a loss or refusal until the next frame, or until it is open if no frame is wanted."""
         return self._is_accepted and self._is_gone
 
     @property
@@ -161,14 +161,14 @@ class Life:
 
     @property
     def due_ns(self) -> int:
-        """When `due` will have a step, ns; the far future if that is up to a report or an order."""
+        """When `due` will return a step, ns; the far future if that depends on a report or an order."""
         if self._phase is not Standing.CLOSED:
             return self._next_ns
         has_rest = not self._is_wanted and self._settings.unwanted is Unwanted.IS_CLOSED
         return NEVER_NS if self._is_ended or has_rest else self._retry_ns
 
     def due(self, now_ns: int) -> Step:
-        """What time brings."""
+        """Return the step that is due now."""
         if now_ns < self.due_ns:
             return Step.NONE
         match self._phase:
@@ -187,24 +187,24 @@ class Life:
                 return Step.NONE
 
     def gives_up(self, now_ns: int) -> bool:
-        """Whether a camera that is not accepted yet is not to be waited for any longer: it was refused, or its time is over."""
+        """Whether to stop waiting for a camera that has not been accepted: it was refused, or its time is over."""
         return not self._is_accepted and (self.counts.refused > 0 or now_ns >= self._begun_ns + self._settings.start_ns)
 
     # Reports.
 
     def accept(self) -> None:
-        """It is what was asked for: from now on it is never given up, and its loss is news."""
+        """Report that it is what was asked for. From now on it is never given up, and its loss counts as one."""
         self._is_accepted, self._is_gone = True, False
 
     def opened(self, now_ns: int, period_ns: int = 0) -> Step:
-        """It is open, and on if it was wanted.
+        """Report that it is open, and on if it was wanted.
 
         Args:
             now_ns: the time.
-            period_ns: between its frames; 0: not known yet.
+            period_ns: time between its frames; 0 if not yet known.
 
         Returns:
-            CLOSE if nobody wants it any more, else NONE.
+            CLOSE if nobody wants it any more, otherwise NONE.
         """
         assert self._phase is Standing.OPENING, self._phase
         self.counts.opened += 1
@@ -219,18 +219,18 @@ class Life:
         return Step.NONE
 
     def refused(self, now_ns: int) -> None:
-        """It could not be opened."""
+        """Report that it could not be opened."""
         assert self._phase is Standing.OPENING, self._phase
         self.counts.refused += 1
         self._phase, self._is_gone = Standing.CLOSED, True
         self._rest(now_ns)
 
     def heard(self, now_ns: int, period_ns: int = 0) -> None:
-        """A frame came; when it is not on, that is a late one and no news.
+        """Report a frame. If the camera is not on, the frame is a late one and is ignored.
 
         Args:
             now_ns: the time.
-            period_ns: between its frames; 0: not known yet.
+            period_ns: time between its frames; 0 if not yet known.
         """
         if self._phase is not Standing.STREAMING:
             return
@@ -239,7 +239,7 @@ class Life:
         self._come_back()
 
     def stirred(self, now_ns: int) -> None:
-        """Something came that is no frame of use: it is not silent, and not back either.
+        """Report that something other than a usable frame came: it is not silent, but not back either.
 
         Args:
             now_ns: the time.
@@ -248,10 +248,10 @@ class Life:
             self._listen_until(now_ns, self._settings.silence_ns)
 
     def lost(self, loss: Loss, now_ns: int) -> Step:
-        """It failed or is gone; again, or while it is being closed, is no news.
+        """Report that it failed or is gone. Repeated reports, and reports while it is being closed, are ignored.
 
         Returns:
-            CLOSE, or NONE if it was no news.
+            CLOSE, or NONE if the report was ignored.
         """
         if self._phase not in {Standing.STREAMING, Standing.STEERED, Standing.RESTING}:
             return Step.NONE
@@ -266,14 +266,14 @@ class Life:
         return Step.CLOSE
 
     def closed(self) -> None:
-        """It is closed, as was told."""
+        """Report that it is closed, as ordered."""
         assert self._phase is Standing.CLOSING, self._phase
         self._phase = Standing.CLOSED
 
     # Orders.
 
     def pause(self) -> Step:
-        """Nobody listens any more; again is harmless. One that stays open is looked for at once.
+        """Nobody listens any more. A camera that stays open is checked at once. Repeating the order is harmless.
 
         Returns:
             STOP or CLOSE, if it was on.
@@ -289,7 +289,7 @@ class Life:
         return Step.STOP
 
     def resume(self, now_ns: int) -> Step:
-        """Somebody listens: no rest is kept any longer; again is harmless.
+        """Somebody listens again: a pending rest is cut short. Repeating the order is harmless.
 
         Returns:
             START if it stayed open.
@@ -303,7 +303,7 @@ class Life:
         return Step.START
 
     def steer(self, start_ns: int) -> Step:
-        """Switch it off until then.
+        """Switch it off until `start_ns`.
 
         Returns:
             STOP if it is on.
@@ -314,10 +314,10 @@ class Life:
         return Step.STOP
 
     def renew(self, now_ns: int) -> Step:
-        """Open it anew, because it is to be another; without a rest.
+        """Reopen it without a rest, because it is to become another one.
 
         Returns:
-            CLOSE if it is open; then an opening is due.
+            CLOSE if it is open; after that, an opening is due.
         """
         if self._phase not in {Standing.STREAMING, Standing.STEERED, Standing.RESTING}:
             return Step.NONE
@@ -325,7 +325,7 @@ class Life:
         return self._release()
 
     def end(self) -> Step:
-        """It is over; again is harmless.
+        """End its life. Repeating the order is harmless.
 
         Returns:
             CLOSE if it is open.

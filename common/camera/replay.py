@@ -1,7 +1,8 @@
-"""A camera that shows a folder of images, in name order, on a clock or on demand.
+"""A camera that shows a folder of images, in name order, by the clock or on demand.
 
-pace=clock: at any moment the image is number floor(t * fps) of CLOCK_MONOTONIC, exposed exactly at k / fps; so two replays on one machine
-agree whenever they were started; `phase_ms` makes all its exposures so much later than that. A slower mode shows every n-th of these images at its own time. pace=demand: one image for each read, nothing dropped, stamps first + k / fps.
+pace=clock: at any moment the image is number floor(t * fps) of CLOCK_MONOTONIC, exposed exactly at k / fps. So two replays on one machine agree
+whenever they were started; `phase_ms` delays all its exposures by that much. A slower mode shows every n-th of these images at its own time.
+pace=demand: one image per read, nothing dropped; the stamps are first + k / fps.
 """
 
 import re
@@ -19,7 +20,7 @@ from common.stamp import Stamp
 
 _FAR_FUTURE: Final = 2**63 - 1
 _CACHE_BYTES: Final = 64 * 1024 * 1024
-"""Files are kept in memory up to here: a tenth of a BeagleBone's RAM, and no disk delay in the measured path for short clips."""
+"""Files are cached in memory up to this size: a tenth of a BeagleBone's RAM, and no disk delay in measurements with short clips."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +33,7 @@ class ReplaySettings:
         loop: begin again after the last.
         pacing: by the clock or on demand.
         clock: name of the clock of the stamps.
-        phase_ns: on the clock, every exposure is so much later than k / fps: a camera that is out of step with others.
+        phase_ns: with the clock, delay of every exposure after k / fps: a camera that is out of step with others.
     """
 
     path: str
@@ -44,7 +45,7 @@ class ReplaySettings:
 
 
 def name_order(path: Path) -> tuple[list[tuple[int, int | str]], str]:
-    """Sort key that takes numbers in names as numbers: frame2 before frame10."""
+    """Sort key that treats numbers in names as numbers: frame2 before frame10."""
     parts = [(0, int(part)) if part.isdecimal() else (1, part) for part in re.split(r"(\d+)", path.name) if part]
     return parts, path.name
 
@@ -59,8 +60,8 @@ def find_images(pattern: str) -> list[Path]:
         At least one path.
 
     Raises:
-        SettingsError: it is empty or no glob.
-        UnavailableError: there is no such folder, or it can't be read.
+        SettingsError: the pattern is empty or not a glob.
+        UnavailableError: there is no such folder, or it cannot be read.
         DataError: it holds no image.
     """
     folder = Path(pattern)
@@ -86,7 +87,7 @@ def find_images(pattern: str) -> list[Path]:
         raise UnavailableError(
             f"replay {pattern!r} cannot be read ({error.strerror})", "check its permissions"
         ) from None
-    except ValueError as error:  # pathlib's word on a pattern such as a**b
+    except ValueError as error:  # pathlib's error for a pattern such as a**b
         raise SettingsError(
             f"replay {pattern!r} is not a valid pattern ({error})", "give a folder or another pattern"
         ) from None
@@ -107,7 +108,7 @@ class ReplayCamera:
 
     Raises:
         UnavailableError: there is no such folder.
-        DataError: no image, an unreadable one, or images of different size or encoding.
+        DataError: there is no image, one is unreadable, or images differ in size or encoding.
     """
 
     def __init__(self, settings: ReplaySettings, now_ns: int) -> None:
@@ -115,7 +116,7 @@ class ReplayCamera:
         self._paths = find_images(settings.path)
         self._cache: list[tuple[ImageFile, FrameFault | None] | None] = [None] * len(self._paths)
         self._cached_bytes = 0
-        # Image k is exposed k * _step / _rate ns after the start. Integers: a Fraction costs 0.1 ms a frame where caches are cold.
+        # Image k is exposed k * _step / _rate ns after the start. Integers, because a Fraction costs 0.1 ms a frame where caches are cold.
         self._step, self._rate = settings.fps.denominator * 1_000_000_000, settings.fps.numerator
         first = self._check_alike()
         self._period_ns = self._step // self._rate
@@ -143,26 +144,26 @@ class ReplayCamera:
         self._sequence = 0
 
     def due_ns(self, now_ns: int) -> int:
-        """When the next image is exposed; on demand never by itself."""
+        """When the next image is exposed; never by itself on demand."""
         del now_ns
         return self._due_ns
 
     def anchor(self, exposed_ns: int, index: int) -> None:
-        """Let a demand-paced camera's next image be number `index`, exposed at `exposed_ns`; without it the first read sets the time."""
+        """Make a demand-paced camera's next image number `index`, exposed at `exposed_ns`. Without this, the first read sets the time."""
         if self._settings.pacing is Pacing.DEMAND:
             self._first_ns = 0
             self._first_ns = exposed_ns - self._time_of(index)
             self._next = index
 
     def steer(self, later_ns: int, now_ns: int) -> None:
-        """Show all images that are still to come later by so much; what they show stays as it is, only a real camera sees a later moment."""
+        """Delay all coming images by this much. Their content stays the same; only a real camera would see a later moment."""
         del now_ns
         if self._settings.pacing is Pacing.CLOCK:
             self._phase_ns += later_ns
             self._due_ns = self._time_of(self._next)
 
     def adapt(self, mode: Mode, now_ns: int) -> None:
-        """Show every n-th image only: those whose number n divides, so that two replays still show the same one at a time."""
+        """Show only every n-th image: those whose number is divisible by n, so that two replays still show the same one at a time."""
         del now_ns
         if mode.period_ns not in self.offers.periods_ns:
             return
@@ -172,7 +173,7 @@ class ReplayCamera:
         self.description = replace(self.description, period_ns=mode.period_ns)
 
     def read(self, now_ns: int) -> list[Grab]:
-        """Give the images that have become due; of several missed ones all, so that each is accounted for.
+        """Return the images that have become due. If several were missed, return all of them, so that each is accounted for.
 
         Raises:
             DataError: a file has become unreadable.
@@ -184,7 +185,7 @@ class ReplayCamera:
         if now_ns < self._due_ns:
             return []
         newest = self._index_at(now_ns) // self._stride * self._stride
-        # After a long stall (a stopped process) only the newest images are read; the others are told of by their number.
+        # After a long stall (a stopped process) only the newest images are read; the others are reported by number.
         passed = max(0, (newest - self._next) // self._stride + 1 - _BACKLOG) if self._settings.loop else 0
         grabs: list[Grab] = [Skipped(self._sequence, passed)] if passed else []
         self._sequence += passed
@@ -195,10 +196,10 @@ class ReplayCamera:
         return grabs
 
     def pause(self) -> None:
-        """Nothing to rest: a film on the clock goes on, seen or unseen."""
+        """Do nothing: a film on the clock goes on, seen or unseen."""
 
     def resume(self, now_ns: int) -> None:
-        """Nothing to wake."""
+        """Do nothing: there is nothing to wake."""
 
     def close(self) -> None:
         """Forget the files."""
@@ -212,7 +213,7 @@ class ReplayCamera:
         self._next += self._stride
         sequence = self._sequence
         self._sequence += 1
-        # On the clock the image follows from the time alone, so that two replays agree; without loop it is the first one first.
+        # On the clock the time alone determines the image, so that two replays agree; without loop, the first image comes first.
         position = index if self._settings.loop else shown
         image, fault = self._load(position % len(self._paths))
         if fault is not None:
@@ -235,7 +236,7 @@ class ReplayCamera:
         return start + (2 * index * self._step + self._rate) // (2 * self._rate)  # rounded to the nearest ns
 
     def _index_at(self, now_ns: int) -> int:
-        # Rounding to ns may put an exposure just before or just after its exact time: half a ns on decides as `_time_of` does.
+        # Rounding to ns may put an exposure just before or just after its exact time; adding half a ns decides as `_time_of` does.
         index = (2 * (now_ns - self._phase_ns) + 1) * self._rate // (2 * self._step)
         return index if self._time_of(index) <= now_ns else index - 1
 
@@ -268,7 +269,7 @@ class ReplayCamera:
 
 
 _STRIDES: Final = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
-"""Every how many-th image a slower mode shows: each rate is a quarter to a half below the one before."""
+"""Every how many-th image a slower mode shows. Each rate is a quarter to a half below the previous one."""
 
 _BACKLOG: Final = 64
-"""Most images read at once: two seconds of video, as much as a driver's ring could ever hold and more."""
+"""Most images read at once: two seconds of video, at least as much as any driver's ring could hold."""

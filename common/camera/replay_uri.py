@@ -10,12 +10,12 @@ from common.protocol.message import Pacing
 
 
 def replay_settings(uri: str, path: str, options: Mapping[str, str], clock: str) -> ReplaySettings:
-    """Read the options of a camera URI.
+    """Parse the options of a camera URI.
 
     Args:
-        uri: the whole of it, for errors.
+        uri: the whole URI, for errors.
         path: folder, glob or file.
-        options: those behind the question mark.
+        options: the options after the question mark.
         clock: name of the clock of the stamps.
 
     Returns:

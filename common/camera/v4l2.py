@@ -1,9 +1,9 @@
 """A V4L2 camera for months of use: opened once, kept through unplugging, driver failures and stalls, resting while nobody listens.
 
-When it is opened, given up and tried again, `life.py` says; here it is done.
+`life.py` decides when it is opened, given up and tried again; this module does it.
 
-`pollable` is the device's own descriptor and so changes with it. An epoll set that stays the same was tried: v4l2loopback, and vb2 before Linux
-5.11, tell an epoll set nothing of a frame if one was waiting already when the device joined it.
+`pollable` is the device's own descriptor, so it changes with the device. An epoll set that stays the same was tried, but v4l2loopback, and vb2
+before Linux 5.11, do not report a frame to an epoll set if one was already waiting when the device joined it.
 """
 
 import contextlib
@@ -28,32 +28,32 @@ from common.protocol.message import CameraDescription, Pacing, Steering
 _LOG = logging.getLogger(__name__)
 
 _FIRST_FRAME_NS: Final = 3_000_000_000
-"""Webcams take up to 2 s to begin: exposure search, power-up."""
+"""Webcams take up to 2 s to start: exposure search, power-up."""
 
 _LIFE: Final = LifeSettings(
     start_ns=_FIRST_FRAME_NS,
     first_frame_ns=_FIRST_FRAME_NS,
-    # After that a second without any frame, or ten periods, is a stall.
+    # After that, a second without any frame, or ten periods, is a stall.
     silence_ns=1_000_000_000,
     silence_periods=10,
-    # A device that failed is often whole again at once.
+    # A device that failed is often usable again at once.
     lost_rest_ns=0,
-    # A camera that is gone is looked for five times a second: a stat() of its name, 10 us; a fifth of the second that recovery may take.
+    # A missing camera is looked for five times a second: a stat() of its name takes 10 us. This is a fifth of the second allowed for recovery.
     rest_ns=200_000_000,
     longest_rest_ns=200_000_000,
-    # The device stays open, so that its controls are kept and the first frame is near; without a stream no driver tells of an unplugged one.
+    # The device stays open, so it keeps its controls and the first frame comes soon. Without a stream no driver reports that it was unplugged.
     unwanted=Unwanted.STAYS_OPEN,
     look_ns=1_000_000_000,
 )
 
 _SETTLE_NS: Final = 2_000_000_000
-"""Automatic exposure and white balance of webcams settle within one to two seconds from the first frame."""
+"""A webcam's automatic exposure and white balance settle within one to two seconds of the first frame."""
 
 _REST_NS: Final = 20_000_000
-"""Between the end of a stream and its new start at the soonest: what switching off takes."""
+"""Least time between a stream's end and its restart: switching off takes this long."""
 
 _AUTO_EXPOSURE_NS: Final = 1_000_000_000
-"""An exposure time that the camera changes by itself, or whose changes the driver does not tell, is read once a second."""
+"""The exposure time is read once a second if the camera changes it by itself, or if the driver does not report its changes."""
 
 
 class V4l2Camera:
@@ -65,7 +65,7 @@ class V4l2Camera:
 
     Raises:
         UnavailableError: there is no such camera, it may not be opened, or another program has it.
-        SettingsError: it has not what is asked for.
+        SettingsError: it lacks what is asked for.
     """
 
     def __init__(self, settings: V4l2Settings, now_ns: int) -> None:
@@ -85,7 +85,7 @@ class V4l2Camera:
         try:
             self._life.due(now_ns)
             stream = self._stream = self._open()
-            # From now on exactly this is asked for, whatever a camera that is plugged in later may prefer.
+            # From now on exactly this is requested, whatever a camera plugged in later may prefer.
             width_px, height_px = stream.choice.size_px
             wanted = Wanted(stream.choice.size_px, settings.wanted.fps, stream.choice.pixel_format)
             self._settings = replace(settings, wanted=wanted)
@@ -129,7 +129,7 @@ class V4l2Camera:
 
     @property
     def pollable(self) -> int | None:
-        """The device while it streams: readable with a frame, urgent with a changed control, in error when it is lost."""
+        """The device while it streams: readable for a frame, urgent for a changed control, in error when it is lost."""
         return self._stream.fd if self._stream is not None and self._life.phase is Standing.STREAMING else None
 
     @property
@@ -151,20 +151,20 @@ class V4l2Camera:
         )
 
     def due_ns(self, now_ns: int) -> int:
-        """When something is to be done that no descriptor tells of: a stall, a retry, controls to be held."""
+        """When something is to be done that no descriptor reports: a stall, a retry, controls to be held."""
         del now_ns
         if self._life.phase is not Standing.STREAMING:
             return self._life.due_ns
         return min(self._life.due_ns, self._settle_ns or NEVER_NS, self._exposure_due_ns)
 
     def anchor(self, exposed_ns: int, index: int) -> None:
-        """A camera with a clock of its own takes no notice."""
+        """Ignore the call: this camera has a clock of its own."""
 
     def steer(self, later_ns: int, now_ns: int) -> None:
-        """Switch the stream off, and on again when its exposures will be `later_ns` later within their period.
+        """Switch the stream off, and on again such that its exposures come `later_ns` later within their period.
 
-        A camera whose sensor runs only while it streams exposes first a fixed time after the start; that time is taken from the stream that
-        ends here. A sensor that runs on by itself takes no notice.
+        A camera whose sensor runs only while it streams takes its first exposure a fixed time after the start. That time is taken from the stream
+        that ends here. A sensor that runs all the time is unaffected.
         """
         if self._stream is None or self._latency_ns is None:
             return
@@ -181,7 +181,7 @@ class V4l2Camera:
         _LOG.info(event("camera_steered", camera=self._path, later_ms=round(later_ns / 1e6, 1)))
 
     def adapt(self, mode: Mode, now_ns: int) -> None:
-        """Set the quality while frames come; for another rate or size the device is opened anew: few drivers change it while they have buffers."""
+        """Set the quality while streaming. For another rate or size, reopen the device: few drivers change those while they have buffers."""
         if mode.quality != self._wishes.quality:
             self._wishes = replace(self._wishes, quality=mode.quality)
             try:
@@ -203,7 +203,7 @@ class V4l2Camera:
             self._carry_out(self._life.due(now_ns), now_ns)
 
     def read(self, now_ns: int) -> list[Grab]:
-        """Give what has come; a device that fails is closed here and opened anew, now or later."""
+        """Return what has come. A device that fails is closed here and reopened, now or later."""
         grabs: list[Grab] = []
         if self._stream is not None and self._life.phase is Standing.STREAMING:
             try:
@@ -217,7 +217,7 @@ class V4l2Camera:
     def pause(self) -> None:
         """Switch the stream off; the device stays open."""
         if self._life.pause() is Step.STOP and self._stream is not None:
-            with contextlib.suppress(OSError):  # a camera that has just vanished is noticed by the next look
+            with contextlib.suppress(OSError):  # the next check will notice a camera that has just vanished
                 self._stream.stop()
             _LOG.info(event("camera_paused", camera=self._path))
 
@@ -231,12 +231,12 @@ class V4l2Camera:
             self._carry_out(self._life.due(now_ns), now_ns)
 
     def close(self) -> None:
-        """Let go of the device."""
+        """Release the device."""
         self._life.end()
         self._let_go()
 
     def _carry_out(self, step: Step, now_ns: int) -> None:
-        """Do what time brings."""
+        """Carry out what is due."""
         match step:
             case Step.OPEN:
                 self._try_again(now_ns)
@@ -254,7 +254,7 @@ class V4l2Camera:
         return Stream(self._path, self._settings, self._wishes, self._tally)
 
     def _start(self, now_ns: int) -> bool:
-        """Switch the open stream on; gives whether that went well."""
+        """Switch the open stream on; return whether that succeeded."""
         assert self._stream is not None
         try:
             self._switch_on(self._stream, now_ns)
@@ -278,7 +278,7 @@ class V4l2Camera:
             self._exposure_due_ns = now_ns + _AUTO_EXPOSURE_NS if still_changes else NEVER_NS
         elif (
             not grabs and stream.controls.has_events()
-        ):  # woken for something else: asking for events with each frame costs an ioctl
+        ):  # woken for something else: fetching events with each frame costs an ioctl
             stream.controls.read_exposure()
         for grab in grabs:
             if isinstance(grab, Frame):
@@ -293,13 +293,13 @@ class V4l2Camera:
         return grabs
 
     def _note_back(self) -> None:
-        """Say once that a camera that was lost is back: with its first frame, or by being there when no frame is wanted."""
+        """Report once that a lost camera is back: with its first frame or, if no frame is wanted, when it is there."""
         if self._is_told_lost and not self._life.is_lost:
             self._is_told_lost = False
             _LOG.info(event("camera_back", camera=self._path))
 
     def _settle(self, stream: Stream, now_ns: int) -> None:
-        """Hold the controls as found, some time after the first frame."""
+        """Hold the controls at their current values, some time after the first frame."""
         if self._locked:
             return
         if self._settle_ns is None:
@@ -309,7 +309,7 @@ class V4l2Camera:
             self._locked, self._settle_ns = True, None
 
     def _watch_rate(self) -> None:
-        """Say once when the camera's rate is not the nominal one (dim light, a full bus), and once when it is again."""
+        """Report once when the camera's rate differs from the nominal one (dim light, a full bus), and once when it no longer does."""
         nominal_ns = self.description.period_ns
         if self._tally.grabs % 32 or self._tally.rate.differs_from(nominal_ns) is self._rate_is_off:
             return
@@ -330,7 +330,7 @@ class V4l2Camera:
 
     def _drop(self, reason: str) -> None:
         """Close a device that is lost."""
-        # A camera that is opened again and again without a frame stays lost: that is no news.
+        # A camera that is reopened again and again without a frame stays lost: that is not news.
         level = logging.DEBUG if self._is_told_lost else logging.WARNING
         _LOG.log(level, event("camera_lost", camera=self._path, reason=reason))
         self._let_go()
@@ -338,7 +338,7 @@ class V4l2Camera:
         self._locked = not self._wishes.lock
 
     def _let_go(self) -> None:
-        """Close the device, if it is open, and say so."""
+        """Close the device if it is open, and log that."""
         if self._stream is not None:
             self._stream.close()
             self._stream = None
@@ -346,7 +346,7 @@ class V4l2Camera:
             self._life.closed()
 
     def _try_again(self, now_ns: int) -> None:
-        """Look whether the camera is back, and open it; as it was, or not at all."""
+        """Check whether the camera is back. Open it exactly as it was, or not at all."""
         if not self._path.exists():
             self._life.refused(now_ns)
             return
@@ -367,7 +367,7 @@ class V4l2Camera:
 
 
 def _find(path: str) -> Path:
-    """The camera that is meant, by a name that outlives unplugging."""
+    """The requested camera, by a name that survives unplugging."""
     if path:
         return lasting_name(Path(path))
     nodes = capture_nodes()

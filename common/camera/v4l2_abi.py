@@ -1,8 +1,8 @@
 """The kernel's Video4Linux2 interface as ctypes structures, ioctl numbers and constants; nothing else may live here.
 
-Source: include/uapi/linux/videodev2.h, v4l2-controls.h and asm-generic/ioctl.h of Linux 6.1. Sizes that depend on the machine (pointers,
-`struct timeval`) are made by `layout`, so that every machine's layout can be checked on any other. The kernel of a 32-bit machine takes
-both sizes of time; the 32-bit one is what Debian 12 speaks, and a kernel without it answers ENOTTY.
+Source: include/uapi/linux/videodev2.h, v4l2-controls.h and asm-generic/ioctl.h of Linux 6.1. `layout` makes the sizes that depend on the machine
+(pointers, `struct timeval`), so every machine's layout can be checked on any other. The kernel of a 32-bit machine accepts both sizes of time.
+Debian 12 uses the 32-bit one; a kernel without it answers ENOTTY.
 """
 
 import ctypes
@@ -25,7 +25,7 @@ def fourcc(name: str) -> int:
 
 
 def fourcc_name(code: int) -> str:
-    """The four letters of a pixel format; what is no letter is shown as a dot."""
+    """The four letters of a pixel format; blanks and unprintable bytes are shown as dots."""
     return "".join(chr(byte) if 32 < byte < 127 else "." for byte in (code & 0x7FFFFFFF).to_bytes(4, "little"))
 
 
@@ -164,7 +164,7 @@ class MenuItem(ctypes.Structure):
     """struct v4l2_querymenu, packed, 44 bytes; for integer menus `name` holds the value's eight bytes."""
 
     _pack_ = 1
-    _layout_ = "ms"  # what _pack_ has always meant; Python 3.14 wants it said
+    _layout_ = "ms"  # what _pack_ has always meant; Python 3.14 requires it to be stated
     _fields_ = [("id", c_uint32), ("index", c_uint32), ("name", c_uint8 * 32), ("reserved", c_uint32)]
 
 
@@ -176,7 +176,7 @@ class EventSubscription(ctypes.Structure):
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The structures whose size depends on the machine, with the ioctl numbers that carry their size.
+    """The structures whose size depends on the machine, with the ioctl numbers that contain their size.
 
     Attributes:
         format: struct v4l2_format: `type`, `pix`.
@@ -221,7 +221,7 @@ def _event(time: type[c_int32] | type[c_int64]) -> type[ctypes.Structure]:
 
 
 def layout(pointer_bits: int, time_bits: int) -> Layout:
-    """Make the structures of a machine.
+    """Make a machine's structures.
 
     Args:
         pointer_bits: 32 or 64.
@@ -276,7 +276,7 @@ def layout(pointer_bits: int, time_bits: int) -> Layout:
 
 _LONG_BITS: Final = 8 * ctypes.sizeof(ctypes.c_long)
 LAYOUTS: Final = (layout(64, 64),) if _LONG_BITS == 64 else (layout(32, 32), layout(32, 64))
-"""This machine's layouts in the order in which to try them: the second where a kernel answers ENOTTY to the first."""
+"""This machine's layouts in the order in which to try them: the second if a kernel answers ENOTTY to the first."""
 
 QUERYCAP: Final = _request(_READ, 0, ctypes.sizeof(Capability))
 ENUM_FMT: Final = _request(_READ | _WRITE, 2, ctypes.sizeof(FormatDescription))

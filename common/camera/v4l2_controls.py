@@ -1,7 +1,7 @@
-"""Which controls of a camera are set to what, in the order that drivers demand. Values only: no device is touched here.
+"""Which controls of a camera are set to what, in the order that drivers require. Values only: no device is touched here.
 
-A control that follows an automatism is refused (EACCES) while that runs, so the automatism goes off first. What the user does not set is left
-to the automatism until it has settled, then read, and held at what was read: the two cameras of a rig must not change their minds mid-scan.
+A control governed by an automatic mode is refused (EACCES) while that mode runs, so the automatic mode is switched off first. What the user does
+not set is left automatic until it has settled, then read and held at that value: the two cameras of a rig must not readjust mid-scan.
 """
 
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from common.camera import v4l2_abi as abi
 
 
 class PowerLine(Enum):
-    """The mains whose lamps flicker: values of V4L2_CID_POWER_LINE_FREQUENCY."""
+    """The mains frequency at which lamps flicker: values of V4L2_CID_POWER_LINE_FREQUENCY."""
 
     OFF = 0
     HZ_50 = 1
@@ -56,16 +56,16 @@ class Control:
 
     @property
     def can_be_set(self) -> bool:
-        """Whether the driver would ever take a value; an inactive control becomes active with its automatism off."""
+        """Whether the driver would ever accept a value. An inactive control becomes active when its automatic mode is off."""
         return not self.flags & (abi.CTRL_FLAG_DISABLED | abi.CTRL_FLAG_GRABBED | abi.CTRL_FLAG_READ_ONLY)
 
     @property
     def can_be_read(self) -> bool:
-        """Whether the driver gives its value."""
+        """Whether the driver reports its value."""
         return not self.flags & (abi.CTRL_FLAG_DISABLED | abi.CTRL_FLAG_WRITE_ONLY)
 
     def fitted(self, value: int) -> int:
-        """The nearest value that the control takes."""
+        """The nearest value that the control accepts."""
         if self.kind not in {abi.CTRL_TYPE_INTEGER, abi.CTRL_TYPE_BOOLEAN}:
             return value
         step = max(1, self.step)
@@ -80,13 +80,13 @@ class Control:
 
 @dataclass(frozen=True, slots=True)
 class ControlWishes:
-    """What the user asks of the controls.
+    """The user's wishes for the controls.
 
     Attributes:
-        held: value of each axis in the control's own unit (exposure: 100 us; white balance: K); an axis that is missing is left to its automatism.
-        power_line: None: as it is.
-        lock: whether axes that are not held are held as found, once the automatism has settled.
-        quality: of JPEG images, in the camera's own unit; 0: as it is.
+        held: value of each axis in the control's own unit (exposure: 100 us; white balance: K); a missing axis stays automatic.
+        power_line: None: leave it as it is.
+        lock: whether axes that are not held are held as found, once the automatic modes have settled.
+        quality: JPEG quality, in the camera's own unit; 0: leave it as it is.
     """
 
     held: tuple[tuple[Axis, int], ...] = ()
@@ -95,11 +95,11 @@ class ControlWishes:
     quality: int = 0
 
     def value(self, axis: Axis) -> int | None:
-        """The value to hold an axis at; None: left to the automatism."""
+        """The value to hold an axis at; None: it stays automatic."""
         return dict(self.held).get(axis)
 
     def with_found(self, found: tuple[tuple[Axis, int], ...]) -> "ControlWishes":
-        """These wishes with the axes held that were found: a camera that is plugged in again comes back as it was."""
+        """These wishes with the found axes held as well: a camera that is plugged in again comes back as it was."""
         return replace(self, held=tuple({**dict(found), **dict(self.held)}.items()))
 
 
@@ -118,7 +118,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class _AxisControls:
-    """The controls of an axis: the automatism, the values that switch it off (the best first), and the value itself."""
+    """The controls of an axis: the automatic mode, the values that switch it off (the best first), and the value itself."""
 
     automatic: int
     off: tuple[int, ...]
@@ -136,17 +136,18 @@ _AXES: Final = {
 
 
 _QUALITIES: Final = (0.85, 0.7, 0.5, 0.3)
-"""Shares of the best quality. OpenCV's JPEGs of ten photographs (Middlebury 2014, quarter size) have 55, 37, 28 and 20 % of the bytes at 95: about a third less each."""
+"""Shares of the best quality. OpenCV's JPEGs of ten photographs (Middlebury 2014, quarter size) have 55, 37, 28 and 20 % of the bytes at 95: about
+a third less each."""
 
 
 def lower_qualities(control: Control, present: int) -> tuple[int, ...]:
-    """Give the values by which a camera's JPEG images can be made smaller.
+    """Return the values that make a camera's JPEG images smaller.
 
-    Its range is the driver's own; only positive values have a meaning, and larger ones are better images (ext-ctrls-jpeg).
+    The range is the driver's own. Only positive values have a meaning, and larger ones give better images (ext-ctrls-jpeg).
 
     Args:
-        control: of the quality.
-        present: its value now.
+        control: the quality control.
+        present: its current value.
 
     Returns:
         Values below that, the best first.
@@ -166,11 +167,11 @@ class ControlPlan:
         self._by_id = {control.id: control for control in controls}
 
     def missing(self, wishes: ControlWishes) -> tuple[Axis, ...]:
-        """The axes that the user wants held and the camera does not have."""
+        """The axes that the user wants held but the camera lacks."""
         return tuple(axis for axis, _ in wishes.held if _AXES[axis].value not in self._by_id)
 
     def to_start(self, wishes: ControlWishes) -> list[Step]:
-        """What to set before the stream: frame rate before brightness, lamps, and the axes whose value is known."""
+        """What to set before the stream: frame rate before brightness, lamps, and the axes whose values are known."""
         steps = self._maybe(abi.CID_EXPOSURE_DYNAMIC_FRAMERATE, 0)
         if wishes.power_line is not None:
             steps += self._maybe(abi.CID_POWER_LINE_FREQUENCY, wishes.power_line.value)
@@ -182,16 +183,16 @@ class ControlPlan:
         return steps
 
     def to_set_quality(self, quality: int) -> list[Step]:
-        """How to set the quality of JPEG images, before the stream or while it runs; 0: as it is."""
+        """How to set the JPEG quality, before or during the stream; 0: leave it as it is."""
         return self._maybe(abi.CID_JPEG_COMPRESSION_QUALITY, quality) if quality else []
 
     def quality(self) -> Control | None:
-        """The control of the JPEG images' quality, if there is one that can be read and set."""
+        """The JPEG quality control, if there is one that can be read and set."""
         control = self._by_id.get(abi.CID_JPEG_COMPRESSION_QUALITY)
         return control if control is not None and control.can_be_set and control.can_be_read else None
 
     def to_find(self, wishes: ControlWishes) -> list[tuple[Axis, Control]]:
-        """What to read once the automatisms have settled: the axes that are to be held as found."""
+        """What to read once the automatic modes have settled: the axes to be held as found."""
         if not wishes.lock:
             return []
         open_axes = [axis for axis in Axis if wishes.value(axis) is None]
@@ -199,7 +200,7 @@ class ControlPlan:
         return [(axis, control) for axis, control in found if control is not None and control.can_be_read]
 
     def to_lock(self, found: tuple[tuple[Axis, int], ...], wishes: ControlWishes) -> list[Step]:
-        """How to hold what was found; an axis with an automatism but no value of its own just has it switched off."""
+        """How to hold what was found. An axis with an automatic mode but no value of its own just has that mode switched off."""
         steps = [step for axis, value in found for step in self._hold(axis, value)]
         done = {axis for axis, _ in (*found, *wishes.held)}
         for axis in (Axis.GAIN, Axis.WHITE_BALANCE, Axis.FOCUS):
@@ -208,13 +209,13 @@ class ControlPlan:
         return steps
 
     def exposure(self) -> Control | None:
-        """The control that tells the exposure time, if there is one that can be read."""
+        """The control that reports the exposure time, if there is one that can be read."""
         control = self._by_id.get(abi.CID_EXPOSURE_TIME_ABSOLUTE)
         return control if control is not None and control.can_be_read else None
 
     def _hold(self, axis: Axis, value: int) -> list[Step]:
         if _AXES[axis].value not in self._by_id:
-            return []  # an automatism that is switched off with nothing to set instead would leave the image dark
+            return []  # switching an automatic mode off without setting a value instead would leave the image dark
         return self._switch_off(axis) + self._maybe(_AXES[axis].value, value)
 
     def _switch_off(self, axis: Axis) -> list[Step]:

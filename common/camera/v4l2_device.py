@@ -1,6 +1,6 @@
-"""One open V4L2 node: what it says of itself, its format, rate and controls. A thin shell over ioctls; decisions are made elsewhere.
+"""One open V4L2 node: its identity, format, rate and controls. A thin shell over ioctls; decisions are made elsewhere.
 
-Methods raise the kernel's OSError, except for opening, which says in words what is wrong.
+Methods raise the kernel's OSError, except for opening, which explains in words what is wrong.
 """
 
 import ctypes
@@ -21,18 +21,18 @@ from common.errors import TakenError, UnavailableError
 _BY_ID: Final = Path("/dev/v4l/by-id")
 _BY_PATH: Final = Path("/dev/v4l/by-path")
 _MOST_ITEMS: Final = 256
-"""An enumeration that goes on beyond this is a driver's endless loop."""
+"""An enumeration that continues beyond this is a driver's endless loop."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """What a node says of itself.
+    """What a node says about itself.
 
     Attributes:
         driver: kernel driver, such as uvcvideo.
         card: the camera's name.
-        bus: where it is plugged.
-        capabilities: V4L2_CAP bits of this very node.
+        bus: where it is plugged in.
+        capabilities: V4L2_CAP bits of this particular node.
     """
 
     driver: str
@@ -42,20 +42,20 @@ class Identity:
 
     @property
     def captures(self) -> bool:
-        """Whether the node gives images that can be streamed (a webcam's second node gives metadata)."""
+        """Whether the node delivers images that can be streamed (a webcam's second node delivers metadata)."""
         wanted = abi.CAP_VIDEO_CAPTURE | abi.CAP_STREAMING
         return self.capabilities & wanted == wanted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PixelFormatSet:
-    """What the driver made of a format.
+    """The format that the driver actually set.
 
     Attributes:
-        letters: four letters of the format.
+        letters: the format's four letters.
         size_px: (width, height), px.
-        row_bytes: from one row to the next, bytes; 0 for compressed formats.
-        image_bytes: most bytes of one image.
+        row_bytes: distance from one row to the next, bytes; 0 for compressed formats.
+        image_bytes: maximum size of one image, bytes.
     """
 
     letters: str
@@ -65,7 +65,7 @@ class PixelFormatSet:
 
 
 def ioctl(fd: int, request: int, argument: ctypes.Structure | ctypes.c_int) -> None:
-    """Call an ioctl, again when a signal came in between."""
+    """Call an ioctl; repeat it if a signal interrupts it."""
     while True:
         try:
             fcntl.ioctl(fd, request, argument)
@@ -80,7 +80,7 @@ def taken(path: Path) -> TakenError:
 
 
 def video_nodes() -> list[Path]:
-    """All nodes of the kernel's V4L2 devices by number, whatever they give and whoever may open them."""
+    """All nodes of the kernel's V4L2 devices by number, whatever they deliver and whoever may open them."""
     return sorted(
         (path for path in _listed(Path("/dev"), "video") if path.name[5:].isdigit()),
         key=lambda path: int(path.name[5:]),
@@ -88,7 +88,7 @@ def video_nodes() -> list[Path]:
 
 
 def capture_nodes() -> list[Path]:
-    """All capture nodes, those with a name in /dev/v4l/by-id first, in name order; metadata and output nodes are left out."""
+    """All capture nodes in name order, those with a name in /dev/v4l/by-id first. Metadata and output nodes are left out."""
     nodes: dict[Path, Path] = {}
     for path in (*_listed(_BY_ID), *video_nodes()):
         nodes.setdefault(path.resolve(), path)
@@ -96,7 +96,7 @@ def capture_nodes() -> list[Path]:
 
 
 def lasting_name(path: Path) -> Path:
-    """The name that a camera keeps when it is plugged in again: its link in by-id, else by-path, else the node itself."""
+    """The name that a camera keeps when it is plugged in again: its link in by-id, otherwise in by-path, otherwise the node itself."""
     if path.parent in {_BY_ID, _BY_PATH}:
         return path
     target = path.resolve()
@@ -108,9 +108,9 @@ def lasting_name(path: Path) -> Path:
 
 
 def _listed(folder: Path, prefix: str = "") -> list[Path]:
-    """What is in a folder, in name order; nothing where there is no such folder. A board that waits for its camera asks four times a second."""
+    """The entries of a folder in name order; none if it does not exist. A board that waits for its camera asks four times a second."""
     try:
-        names = os.listdir(folder)  # noqa: PTH208 - makes a path of what is wanted only: a third of the time of `glob`
+        names = os.listdir(folder)  # noqa: PTH208 - makes paths only of matching names: a third of the time of `glob`
     except OSError:
         return []
     return [folder / name for name in sorted(names) if name.startswith(prefix)]
@@ -125,13 +125,13 @@ def _captures(path: Path) -> bool:
 
 
 class Device:
-    """An open V4L2 node, not blocking.
+    """An open, non-blocking V4L2 node.
 
     Args:
         path: the node or a link to it.
 
     Raises:
-        UnavailableError: it is missing, not allowed or no V4L2 node.
+        UnavailableError: it is missing, not permitted, or not a V4L2 node.
     """
 
     def __init__(self, path: Path) -> None:
@@ -163,16 +163,16 @@ class Device:
         self.close()
 
     def close(self) -> None:
-        """Close the node; again is harmless."""
+        """Close the node. Repeating the call is harmless."""
         if self.fd >= 0:
             fd, self.fd = self.fd, -1
             os.close(fd)
 
     def require_capture(self) -> None:
-        """Check that this node gives images.
+        """Check that this node delivers images.
 
         Raises:
-            UnavailableError: it gives something else; the remedy names the node to use, where there is one.
+            UnavailableError: it delivers something else. The remedy names the node to use, if there is one.
         """
         capabilities = self.identity.capabilities
         if self.identity.captures:
@@ -189,7 +189,7 @@ class Device:
         raise UnavailableError(f"camera {self.path} gives no images", "use a camera that `board-agent cameras` lists")
 
     def formats(self) -> tuple[FormatOffer, ...]:
-        """The encodings and sizes that are offered."""
+        """The encodings and sizes on offer."""
         offers = []
         for index in range(_MOST_ITEMS):
             item = abi.FormatDescription(index=index, type=abi.BUF_TYPE_VIDEO_CAPTURE)
@@ -227,7 +227,7 @@ class Device:
         return Rates(tuple(sorted(named, reverse=True)), between)
 
     def set_format(self, letters: str, size_px: tuple[int, int]) -> PixelFormatSet:
-        """Set encoding and size, and give what the driver made of it."""
+        """Set encoding and size; return what the driver actually set."""
         shape = abi.LAYOUTS[0]
         item = shape.format(type=abi.BUF_TYPE_VIDEO_CAPTURE)
         item.pix = abi.PixelLayout(
@@ -244,7 +244,7 @@ class Device:
         )
 
     def set_rate(self, rate_hz: Fraction) -> Fraction | None:
-        """Set the frame rate, Hz, and give what the driver made of it; None where it does not tell."""
+        """Set the frame rate, Hz; return the rate that the driver actually set, or None if it does not say."""
         item = abi.StreamParameters(type=abi.BUF_TYPE_VIDEO_CAPTURE)
         try:
             ioctl(self.fd, abi.G_PARM, item)
@@ -292,7 +292,7 @@ class Device:
         ioctl(self.fd, abi.S_CTRL, abi.ControlValue(id=control_id, value=value))
 
     def watch_control(self, control_id: int) -> bool:
-        """Have changes of a control told as events (EPOLLPRI); False where the driver can't."""
+        """Have the driver report changes of a control as events (EPOLLPRI). Return False if it cannot."""
         item = abi.EventSubscription(type=abi.EVENT_CTRL, id=control_id, flags=abi.EVENT_SUB_FL_ALLOW_FEEDBACK)
         try:
             ioctl(self.fd, abi.SUBSCRIBE_EVENT, item)
@@ -301,7 +301,7 @@ class Device:
         return True
 
     def take_events(self) -> int:
-        """Take all waiting events and give their number; their content is not needed."""
+        """Take all waiting events and return their number. Their content is not needed."""
         for shape in abi.LAYOUTS:
             count = 0
             try:
@@ -341,7 +341,7 @@ class Device:
                 yield index, _text(bytes(item.name))
 
     def _enumerate(self, request: int, item: ctypes.Structure) -> bool:
-        """Ask for one item of a list; False when there is no such item, or no such list."""
+        """Ask for one item of a list. Return False if there is no such item, or no such list."""
         try:
             ioctl(self.fd, request, item)
         except OSError as error:

@@ -15,21 +15,21 @@ PREFERENCE: Final = (
     ("NV12", PixelFormat.NV12),
     ("GREY", PixelFormat.GREY),
 )
-"""Four letters of the formats that are passed on, the best first: JPEG is a tenth of the bytes, on the bus and on the link."""
+"""Four letters of the supported formats, the best first: JPEG takes a tenth of the bytes, on the bus and on the link."""
 
 _USUAL_PX: Final = (640, 480)
 _USUAL_FPS: Final = Fraction(30)
 _SAME_RATE: Final = Fraction(1, 100)
-"""Rates are the same up to this share: drivers count in 100 ns, and people write 30 for 29.97."""
+"""Rates are equal within this share: drivers count in 100 ns, and people write 30 for 29.97."""
 
 
 _PARTS: Final = (2, 3, 4, 6, 8, 12, 16, 24, 32)
-"""Rates of a camera that takes any, as parts of the asked one: frames of the host's camera at that rate stay in step with them."""
+"""Rates of a camera that takes any rate, as fractions of the requested one. The host's camera at that rate stays in step with them."""
 
 
 @dataclass(frozen=True, slots=True)
 class SizeRange:
-    """Sizes that a camera scales to: minimum, maximum and step of width and height, px."""
+    """Sizes that a scaling camera offers: minimum, maximum and step of width and height, px."""
 
     width_px: tuple[int, int, int]
     height_px: tuple[int, int, int]
@@ -42,7 +42,7 @@ class SizeRange:
         )
 
     def within(self, size_px: tuple[int, int]) -> tuple[int, int]:
-        """The largest of these sizes, px, that is neither wider nor higher than one; of a side that has no such length, the shortest."""
+        """The largest of these sizes, px, that is neither wider nor higher than the given one. A side with no such length gets the shortest."""
         width, height = (
             low + max(0, min(value, high) - low) // max(1, step) * max(1, step)
             for value, (low, high, step) in zip(size_px, (self.width_px, self.height_px), strict=True)
@@ -52,7 +52,7 @@ class SizeRange:
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """Frame rates of one size: those named, or everything between two; both empty where the driver does not tell.
+    """Frame rates of one size: named ones, or everything between two. Both are empty if the driver does not say.
 
     Attributes:
         named_hz: discrete rates, Hz, the highest first.
@@ -92,7 +92,7 @@ class FormatOffer:
     size_range: SizeRange | None = None
 
     def has(self, size_px: tuple[int, int]) -> bool:
-        """Whether a size (width, height), px, is offered; a camera that names no size may have any."""
+        """Whether a size (width, height), px, is offered. A camera that names no sizes may have any."""
         if self.size_range is not None:
             return self.size_range.holds(size_px)
         return size_px in self.sizes_px or not self.sizes_px
@@ -108,7 +108,7 @@ class FormatOffer:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What the user asks of the encoding; None: whatever is best.
+    """The user's wishes for the encoding; None: whatever is best.
 
     Attributes:
         size_px: (width, height), px.
@@ -127,7 +127,7 @@ class Choice:
 
     Attributes:
         letters: four letters of the format.
-        pixel_format: our name of it.
+        pixel_format: our name for it.
         size_px: (width, height), px.
     """
 
@@ -145,16 +145,16 @@ def choose(offers: tuple[FormatOffer, ...], wanted: Wanted, camera: str) -> Choi
     """Choose encoding and size.
 
     Args:
-        offers: what the camera has.
+        offers: what the camera offers.
         wanted: what the user asks for.
-        camera: how errors call it.
+        camera: the camera's name in errors.
 
     Returns:
-        The first format by PREFERENCE that fits; without a size 640x480, or the largest below it, or the smallest.
+        The first fitting format in the order of PREFERENCE. Without a requested size: 640x480, otherwise the largest below it, otherwise the smallest.
 
     Raises:
-        UnavailableError: the camera has no format that is passed on (H.264 only, say).
-        SettingsError: it has not what is asked for; the message lists what it has.
+        UnavailableError: the camera has no supported format (only H.264, say).
+        SettingsError: it lacks what is requested; the message lists what it has.
     """
     by_letters = {offer.letters: offer for offer in offers}
     known = [(by_letters[letters], kind) for letters, kind in PREFERENCE if letters in by_letters]
@@ -193,13 +193,13 @@ def choose_rate(rates: Rates, wanted: Wanted, camera: str) -> Fraction:
     Args:
         rates: what the camera offers at the size.
         wanted: what the user asks for.
-        camera: how errors call it.
+        camera: the camera's name in errors.
 
     Returns:
-        The rate, Hz; without a wish the highest up to 30, or the lowest there is.
+        The rate, Hz. Without a wish: the highest up to 30, or the lowest there is.
 
     Raises:
-        SettingsError: a rate is asked for that is not offered; the message lists those that are.
+        SettingsError: the requested rate is not offered; the message lists those that are.
     """
     if wanted.fps is None:
         if rates.named_hz:
@@ -220,14 +220,14 @@ def choose_rate(rates: Rates, wanted: Wanted, camera: str) -> Fraction:
 
 
 def slower_rates(rates: Rates, present_hz: Fraction) -> tuple[Fraction, ...]:
-    """Give the rates to which a camera can be slowed.
+    """Return the rates to which a camera can be slowed down.
 
     Args:
         rates: what it offers at its size.
-        present_hz: the rate now, Hz.
+        present_hz: the current rate, Hz.
 
     Returns:
-        Rates below that, Hz, the highest first; of a camera that takes any rate between two, parts of the present one.
+        Rates below that, Hz, the highest first. For a camera that takes any rate between two: fractions of the current one.
     """
     if rates.named_hz:
         return tuple(rate for rate in rates.named_hz if rate < present_hz * (1 - _SAME_RATE))
@@ -246,14 +246,14 @@ def has_rates(rates: Rates, wanted_hz: Iterable[Fraction]) -> bool:
 
 
 def smaller_sizes(offer: FormatOffer, size_px: tuple[int, int]) -> tuple[tuple[int, int], ...]:
-    """Give the sizes of exactly the same shape below one.
+    """Return the smaller sizes of exactly the same shape.
 
     Args:
-        offer: the encoding that they are wanted in.
-        size_px: (width, height) now, px.
+        offer: the encoding to search.
+        size_px: current (width, height), px.
 
     Returns:
-        (width, height), px, the largest first; of a scaling camera the halves, thirds and quarters that it has.
+        (width, height), px, the largest first. For a scaling camera: the halves, thirds and quarters that it offers.
     """
     width, height = size_px
     if offer.size_range is not None:

@@ -1,4 +1,4 @@
-"""The controls of an open V4L2 device: set in the order of their plan, read, watched. A control that the driver refuses is counted, not fatal."""
+"""The controls of an open V4L2 device: set in planned order, read, watched. A control that the driver refuses is counted, not fatal."""
 
 import errno
 import logging
@@ -13,15 +13,15 @@ _LOG = logging.getLogger(__name__)
 
 
 class OpenControls:
-    """The controls of a device, set as they are to be before its stream begins.
+    """The controls of a device, set before its stream begins.
 
     Attributes:
-        exposure_ns: exposure time as last read, ns; None where the camera does not tell.
-        tells_exposure: whether the driver tells of each change of the exposure time.
+        exposure_ns: exposure time as last read, ns; None if the camera does not report it.
+        tells_exposure: whether the driver reports each change of the exposure time.
 
     Args:
         device: the device; must outlive this.
-        wishes: after a first life with the values that were found then.
+        wishes: wishes for the controls; after a first life, with the values found then.
         tally: where to count.
 
     Raises:
@@ -40,7 +40,7 @@ class OpenControls:
         self.read_exposure()
 
     def has_events(self) -> bool:
-        """Take the events that wait, and tell whether there was one: the exposure time has changed.
+        """Take the waiting events; return whether there were any, which means that the exposure time has changed.
 
         Raises:
             OSError: the camera is gone.
@@ -59,10 +59,10 @@ class OpenControls:
         self.exposure_ns = None if value is None else value * abi.EXPOSURE_UNIT_NS
 
     def lock(self, wishes: ControlWishes) -> tuple[tuple[Axis, int], ...]:
-        """Hold exposure, gain, white balance and focus at what the automatisms have found.
+        """Hold exposure, gain, white balance and focus at the values that the automatic modes have found.
 
         Args:
-            wishes: what is held already.
+            wishes: what is already held.
 
         Returns:
             What was found.
@@ -80,7 +80,7 @@ class OpenControls:
         return found
 
     def qualities(self) -> tuple[int, ...]:
-        """The qualities of JPEG images, the present one first and then those below it; empty where it cannot be set.
+        """The JPEG qualities, the current one first, then the lower ones; empty if it cannot be set.
 
         Raises:
             OSError: the camera is gone.
@@ -90,7 +90,7 @@ class OpenControls:
         return () if control is None or not present else (present, *lower_qualities(control, present))
 
     def set_quality(self, quality: int) -> None:
-        """Set the quality of JPEG images; drivers take it while they stream, or refuse, which is counted.
+        """Set the JPEG quality. Drivers accept it while they stream, or refuse it, which is counted.
 
         Raises:
             OSError: the camera is gone.
@@ -109,7 +109,7 @@ class OpenControls:
                 _LOG.warning(event("control_refused", control=step.control.name, value=step.value, reason=reason))
 
     def _read(self, control_id: int) -> int | None:
-        """A control's value; None where the driver does not give it."""
+        """A control's value; None if the driver does not report it."""
         try:
             return self._device.control(control_id)
         except OSError as error:

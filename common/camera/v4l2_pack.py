@@ -1,4 +1,4 @@
-"""What leaves a buffer, in one copy: compressed images as they are, raw ones without row padding, whole or only their luma."""
+"""What leaves a buffer, in one copy: compressed images unchanged, raw ones without row padding, whole or only their luma."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Packing:
         sent_as: encoding of the payload.
         width_px: image width, px.
         height_px: image height, px.
-        row_bytes: from one row to the next, bytes; 0 for compressed images.
+        row_bytes: distance from one row to the next, bytes; 0 for compressed images.
     """
 
     source: PixelFormat
@@ -35,7 +35,7 @@ class Packing:
 
     @classmethod
     def of(cls, made: PixelFormatSet, source: PixelFormat, part: SendPart) -> "Packing":
-        """Make the packing of a format; JPEG has no luma to take without decoding and is always sent whole."""
+        """Make the packing for a format. JPEG's luma cannot be taken without decoding, so JPEG is always sent whole."""
         if source in {PixelFormat.MJPEG, PixelFormat.PNG}:
             return cls(source, source, *made.size_px, 0)
         sent_as = PixelFormat.GREY if part is SendPart.LUMA else source
@@ -44,7 +44,7 @@ class Packing:
 
     @property
     def least_bytes(self) -> int | None:
-        """Length below which a buffer holds no whole image; None for compressed images."""
+        """A shorter buffer cannot hold a whole image; None for compressed images."""
         if not self.row_bytes:
             return None
         return (self._rows - 1) * self.row_bytes + self._used_row_bytes
@@ -65,13 +65,13 @@ class Packing:
         rows = self.height_px if luma_only else self._rows
         if self.row_bytes == self._used_row_bytes:
             whole = bytes(view[: rows * self.row_bytes])
-            # Luma of YUYV is copied twice: slicing bytes with a step takes 0.08 ms for 640x480, a memoryview with one 1.1 ms (x86).
+            # Luma of YUYV is copied twice: slicing bytes with a step takes 0.08 ms for 640x480, a memoryview 1.1 ms (x86).
             return whole if step == 1 else whole[::step]
         return b"".join(self._padded_rows(view, rows, step))
 
     @property
     def _rows(self) -> int:
-        """Rows in the buffer: NV12 has its colours, at half the height, in rows of the same length below."""
+        """Rows in the buffer. NV12 has its colours below, at half the height, in rows of the same length."""
         return self.height_px * 3 // 2 if self.source is PixelFormat.NV12 else self.height_px
 
     @property

@@ -1,4 +1,4 @@
-"""The ring of buffers that a V4L2 driver fills and this process maps: begin, take, give back, stop."""
+"""The ring of buffers that a V4L2 driver fills and this process maps: start, take, give back, stop."""
 
 import ctypes
 import errno
@@ -10,19 +10,19 @@ from common.camera import v4l2_abi as abi
 from common.camera.v4l2_device import Device, ioctl, taken
 
 RING_BUFFERS: Final = 4
-"""Least that never starves a driver: one is being filled, one is next, one is read here, one spare for a late reader. DESIGN's issue asks for 4."""
+"""Fewest that never starve a driver: one being filled, one next, one being read here, one spare for a late reader. DESIGN asks for 4."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Filled:
-    """A buffer that the driver has filled; it must be given back.
+    """A buffer filled by the driver; it must be given back.
 
     Attributes:
-        index: which one.
+        index: which buffer.
         used_bytes: length of its content.
         flags: V4L2_BUF_FLAG bits.
-        stamp_ns: the kernel's stamp, ns, on the clock that the flags name.
-        sequence: number of the frame since the stream began, 32 bit.
+        stamp_ns: the kernel's stamp, ns, on the clock named by the flags.
+        sequence: number of the frame since the stream began, 32 bits.
     """
 
     index: int
@@ -67,17 +67,17 @@ class Ring:
         return len(self._maps)
 
     def start(self) -> None:
-        """Give the driver all buffers and begin the stream."""
+        """Give all buffers to the driver and start the stream."""
         for index in range(len(self._maps)):
             self.give_back(index)
         ioctl(self._fd, abi.STREAMON, ctypes.c_int(abi.BUF_TYPE_VIDEO_CAPTURE))
 
     def stop(self) -> None:
-        """End the stream and take all buffers back; they stay mapped."""
+        """Stop the stream and take all buffers back; they stay mapped."""
         ioctl(self._fd, abi.STREAMOFF, ctypes.c_int(abi.BUF_TYPE_VIDEO_CAPTURE))
 
     def take(self) -> Filled | None:
-        """Take the oldest filled buffer; None when none is ready.
+        """Take the oldest filled buffer; None if none is ready.
 
         Raises:
             OSError: the camera is gone or the driver failed.
@@ -103,7 +103,7 @@ class Ring:
         ioctl(self._fd, self._shape.qbuf, buffer)
 
     def view(self, filled: Filled) -> memoryview:
-        """The content of a filled buffer, in place: to be released before the buffer is given back."""
+        """The content of a filled buffer, in place. Release the view before giving the buffer back."""
         return self._views[filled.index][: filled.used_bytes]
 
     def close(self) -> None:
@@ -119,7 +119,7 @@ class Ring:
         return self._shape.buffer(type=abi.BUF_TYPE_VIDEO_CAPTURE, memory=abi.MEMORY_MMAP)
 
     def _find_shape(self) -> abi.Layout:
-        """The layout of struct v4l2_buffer that this kernel takes."""
+        """The layout of struct v4l2_buffer that this kernel accepts."""
         for shape in abi.LAYOUTS:
             try:
                 ioctl(self._fd, shape.querybuf, shape.buffer(type=abi.BUF_TYPE_VIDEO_CAPTURE, memory=abi.MEMORY_MMAP))

@@ -1,7 +1,7 @@
-"""From a kernel stamp to the exposure mid-point, and the frame rate as measured. Values only: no device, no clock is read here.
+"""From a kernel stamp to the exposure mid-point, and the measured frame rate. Values only: no device or clock is read here.
 
-The stamp's two flags say which clock it is on and which moment it means (V4L2 specification, "Buffer flags"). uvcvideo sets
-"start of exposure" but stamps the arrival of the frame's first packet, which is after the sensor has been read out: its flag is not believed.
+Two flags of a stamp say which clock it is on and which moment it means (V4L2 specification, "Buffer flags"). uvcvideo sets "start of exposure" but
+stamps the arrival of the frame's first packet, which comes after the sensor has been read out. So its flag is not believed.
 """
 
 from collections import deque
@@ -12,8 +12,8 @@ from typing import Final
 from common.camera import v4l2_abi as abi
 
 _PLAUSIBLE_AGE_NS: Final = 2_000_000_000
-"""A stamp of an unnamed clock is taken for CLOCK_MONOTONIC if its frame was dequeued at most this long after it: a full ring at 5 fps is
-0.8 s old; another clock (wall time, time since the driver was loaded) is off by far more, save in a machine's first seconds."""
+"""A stamp of an unnamed clock is taken for CLOCK_MONOTONIC if its frame was dequeued at most this much later. A full ring at 5 fps is
+0.8 s old. Other clocks (wall time, time since the driver was loaded) differ by far more, except in a machine's first seconds."""
 
 _RATE_WINDOW: Final = 31
 _RATE_MINIMUM: Final = 8
@@ -21,7 +21,7 @@ _RATE_TOLERANCE: Final = 0.1
 
 
 class StampClock(Enum):
-    """What a driver says of its stamps' clock."""
+    """What a driver says about the clock of its stamps."""
 
     MONOTONIC = auto()
     UNKNOWN = auto()
@@ -38,12 +38,12 @@ class StampSource(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """What is known of a camera beside each stamp.
+    """What is known about a camera besides each stamp.
 
     Attributes:
         driver: the kernel driver's name.
-        readout_ns: time in which the sensor's rows are read one after the other, ns.
-        latency_ns: constant of this camera between the end of the readout and the stamp, ns; 0 until measured.
+        readout_ns: time in which the sensor's rows are read one after another, ns.
+        latency_ns: this camera's constant from the end of the readout to the stamp, ns; 0 until measured.
     """
 
     driver: str
@@ -73,11 +73,11 @@ def is_trusted(stamp_ns: int, clock: StampClock, dequeued_ns: int) -> bool:
 
     Args:
         stamp_ns: the kernel's stamp.
-        clock: what the driver says of it.
+        clock: the clock that the driver names.
         dequeued_ns: CLOCK_MONOTONIC after the frame was dequeued.
 
     Returns:
-        False for a stamp after the frame was in our hands, whatever its flags say (vivid does that), and for one of an unnamed clock that is
+        False for a stamp later than the dequeuing, whatever its flags say (vivid does that), and for a stamp of an unnamed clock that is
         too old.
     """
     age_ns = dequeued_ns - stamp_ns
@@ -85,7 +85,7 @@ def is_trusted(stamp_ns: int, clock: StampClock, dequeued_ns: int) -> bool:
 
 
 def exposure_midpoint_ns(stamp_ns: int, source: StampSource, timing: Timing, exposure_ns: int | None) -> int:
-    """When the middle row of the image was half exposed.
+    """Return when the middle row of the image was half exposed.
 
     With a rolling shutter of readout time R and exposure time E, the first row is exposed from 0 to E, the middle row from R/2 to R/2 + E,
     and the readout ends at R + E.
@@ -94,7 +94,7 @@ def exposure_midpoint_ns(stamp_ns: int, source: StampSource, timing: Timing, exp
         stamp_ns: a trusted stamp.
         source: which moment it means.
         timing: what is known of the camera.
-        exposure_ns: exposure time, ns; None counts as 0, for want of better.
+        exposure_ns: exposure time, ns; None counts as 0, for lack of a better value.
 
     Returns:
         CLOCK_MONOTONIC, ns. First packet and end of frame: stamp - E/2 - R/2 - the camera's constant; start of exposure: stamp + E/2 + R/2.
@@ -106,10 +106,10 @@ def exposure_midpoint_ns(stamp_ns: int, source: StampSource, timing: Timing, exp
 
 
 def estimated_readout_ns(shortest_period_ns: int) -> int:
-    """The readout time of a sensor that does not tell: half of the shortest frame period that the camera offers at that size.
+    """Estimate the readout time of a sensor that does not report it: half of the shortest frame period that the camera offers at that size.
 
-    A sensor reads its rows within one frame, at that rate, too, so R lies between 0 (global shutter) and that period; the middle is off by half
-    of it at most, and so the mid-point by a quarter. Webcams of 30 frames a second have 15 to 30 ms.
+    A sensor reads its rows within one frame at that rate too, so R lies between 0 (global shutter) and that period. Half of it is therefore wrong by
+    at most half the period, and the mid-point by at most a quarter. Webcams with 30 frames a second have 15 to 30 ms.
 
     Args:
         shortest_period_ns: the period, ns.
@@ -118,20 +118,20 @@ def estimated_readout_ns(shortest_period_ns: int) -> int:
 
 
 class RateMeter:
-    """The time between frames as their stamps tell it: running median over 31 frames, gaps divided by the frames they left out."""
+    """The time between frames according to their stamps: running median over 31 frames; gaps are divided by the number of missing frames."""
 
     def __init__(self) -> None:
         self._periods_ns: deque[int] = deque(maxlen=_RATE_WINDOW)
         self._last: tuple[int, int] | None = None
 
     def add(self, stamp_ns: int, sequence: int) -> None:
-        """Take note of a frame with its stamp and its number in the stream."""
+        """Record a frame's stamp and its number in the stream."""
         if self._last is not None and (steps := sequence - self._last[1]) > 0:
             self._periods_ns.append((stamp_ns - self._last[0]) // steps)
         self._last = stamp_ns, sequence
 
     def restart(self) -> None:
-        """Take note that the stream begins anew: the next frame has no predecessor."""
+        """Record that the stream restarts: the next frame has no predecessor."""
         self._last = None
 
     @property

@@ -1,4 +1,4 @@
-"""One life of a V4L2 device: opened, its format and controls set, streaming, until it is closed or lost. `v4l2.py` gives it further lives."""
+"""One life of a V4L2 device: opened, format and controls set, streaming, until it is closed or lost. `v4l2.py` gives it further lives."""
 
 import contextlib
 import errno
@@ -49,7 +49,7 @@ _BACKWARDS: Final = 0x80000000
 
 @dataclass(frozen=True, slots=True)
 class V4l2Settings:
-    """What is asked of a V4L2 camera.
+    """What is requested of a V4L2 camera.
 
     Attributes:
         path: node or link; empty: the first camera by its name in /dev/v4l/by-id.
@@ -76,19 +76,19 @@ class Stream:
     Attributes:
         choice: encoding and size.
         period_ns: nominal time between frames, ns.
-        slower_hz: rates to which it can be slowed, Hz, the highest first.
+        slower_hz: rates to which it can be slowed down, Hz, the highest first.
         controls: its controls.
         started_ns: when the stream was last started, CLOCK_MONOTONIC, ns.
 
     Args:
         path: node or link.
-        settings: what is asked for.
-        wishes: controls; after a first life with the values that were found then.
+        settings: what is requested.
+        wishes: wishes for the controls; after a first life, with the values found then.
         tally: where to count.
 
     Raises:
-        UnavailableError: it can't be had.
-        SettingsError: it has not what is asked for.
+        UnavailableError: the device cannot be had.
+        SettingsError: it lacks what is requested.
         OSError: the driver failed.
     """
 
@@ -116,7 +116,7 @@ class Stream:
 
     @property
     def fd(self) -> int:
-        """What to wait on."""
+        """The descriptor to wait on."""
         return self._device.fd
 
     @property
@@ -145,7 +145,7 @@ class Stream:
         return self._timing.readout_ns
 
     def start(self) -> None:
-        """Begin to stream.
+        """Start streaming.
 
         Raises:
             OSError: the driver failed.
@@ -156,7 +156,7 @@ class Stream:
         self._ring.start()
 
     def stop(self) -> None:
-        """End the stream; the device stays open.
+        """Stop streaming; the device stays open.
 
         Raises:
             OSError: the driver failed.
@@ -164,23 +164,23 @@ class Stream:
         self._ring.stop()
 
     def close(self) -> None:
-        """Let go of the device, whatever state it is in."""
+        """Release the device, whatever state it is in."""
         with contextlib.suppress(OSError):  # it may be gone
             self._ring.stop()
         self._ring.close()
         self._device.close()
 
     def take(self) -> list[Grab]:
-        """Take all filled buffers: the newest is copied out, once, older ones are skipped.
+        """Take all filled buffers. The newest is copied out, once; older ones are skipped.
 
         Raises:
-            OSError: the camera is gone or the driver failed; everything taken before has been given.
+            OSError: the camera is gone or the driver failed. Everything taken before has been returned.
         """
         if self._broken is not None:
             raise self._broken
         grabs: list[Grab] = []
         newest: Filled | None = None
-        for _ in range(len(self._ring) + 1):  # a camera faster than this loop must not keep it for ever
+        for _ in range(len(self._ring) + 1):  # a camera faster than this loop must not keep it here for ever
             try:
                 filled = self._ring.take()
             except OSError as error:
@@ -201,7 +201,7 @@ class Stream:
         return grabs
 
     def qualities(self) -> tuple[int, ...]:
-        """The qualities of JPEG images, the present one first and then those below it; empty where it cannot be set.
+        """The JPEG qualities, the current one first, then the lower ones; empty if it cannot be set.
 
         Raises:
             OSError: the camera is gone.
@@ -209,7 +209,7 @@ class Stream:
         return self.controls.qualities() if self.choice.pixel_format is PixelFormat.MJPEG else ()
 
     def sizes_px(self) -> tuple[tuple[int, int], ...]:
-        """The present size, and the smaller ones of the same shape that have the same rates, (width, height), px.
+        """The current size, and the smaller ones of the same shape that support the same rates, (width, height), px.
 
         Raises:
             OSError: the camera is gone.
@@ -236,7 +236,7 @@ class Stream:
         return made
 
     def _set_rate(self) -> tuple[int, Timing]:
-        """Set the rate; give the nominal period and what follows for the stamps."""
+        """Set the rate; return the nominal period and the timing to use for the stamps."""
         path, choice = self._device.path, self.choice
         rates = self._device.rates(choice.letters, choice.size_px)
         rate_hz = choose_rate(rates, self._settings.wanted, str(path))
@@ -258,10 +258,10 @@ class Stream:
         try:
             self._ring.give_back(filled.index)
         except OSError as error:
-            self._broken = error  # told by the next `take`, so that this grab is not lost with it
+            self._broken = error  # raised by the next `take`, so that this grab is not lost with it
 
     def _note_sequence(self, sequence: int) -> None:
-        """Count the frames between this one and the last; a number that goes back is a driver that began anew."""
+        """Count the frames missing between this one and the last. A number that goes back means that the driver has restarted."""
         if self._last_sequence is not None:
             gap = (sequence - self._last_sequence - 1) & _SEQUENCE_MASK
             if gap < _BACKWARDS:
@@ -277,7 +277,7 @@ class Stream:
         if fault is not None:
             self._tally.faults[fault] = self._tally.faults.get(fault, 0) + 1
             if not self._sound:
-                self._last_sequence = None  # v4l2loopback: a first buffer that is none, then numbers from anywhere
+                self._last_sequence = None  # v4l2loopback: a first buffer without a frame, then numbers from anywhere
             return Spoiled(sequence, fault)
         self._sound = True
         clock = self._settings.clock

@@ -1,4 +1,4 @@
-"""What is counted of a V4L2 camera over all lives of its device."""
+"""What is counted for a V4L2 camera over all lives of its device."""
 
 from dataclasses import dataclass, field
 
@@ -8,7 +8,7 @@ from common.frame import FrameFault
 
 @dataclass(slots=True)
 class Tally:
-    """Counts that outlive the device; `stamps` is the clock that the last frame's flags named, None before one."""
+    """Counts that outlive the device. `stamps` is the clock named by the last frame's flags; None before the first frame."""
 
     grabs: int = 0
     missed: int = 0

@@ -35,12 +35,12 @@ _LARGEST: Final = 2**31 - 1
 
 
 def v4l2_settings(uri: str, path: str, options: Mapping[str, str], clock: str) -> V4l2Settings:
-    """Read the options of a camera URI.
+    """Parse the options of a camera URI.
 
     Args:
-        uri: the whole of it, for errors.
+        uri: the whole URI, for errors.
         path: node or link; `auto` or empty for the first camera.
-        options: those behind the question mark.
+        options: the options after the question mark.
         clock: name of the clock of the stamps.
 
     Returns:
@@ -116,7 +116,7 @@ def _format(text: str) -> PixelFormat:
 
 
 def _exposure(text: str) -> int:
-    """Milliseconds to the control's unit of 100 us, at least one."""
+    """Convert milliseconds to the control's unit of 100 us, at least one."""
     units = round(exact(text) * 10)
     if not 1 <= units <= _LARGEST:
         raise ValueError(text)

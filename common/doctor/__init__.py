@@ -1,1 +1,1 @@
-"""What a `doctor` verb finds out about a machine: pure checks that judge readings, and thin shells that read /sys, /proc and /dev."""
+"""What a `doctor` verb examines: pure checks judge readings; thin shells read /sys, /proc and /dev."""

@@ -13,9 +13,9 @@ class Account:
 
     Attributes:
         name: for people.
-        uid: number; 0 may everything.
+        uid: user id; 0 may do everything.
         groups: ids of all groups.
-        is_me: whether it is the user who asks.
+        is_me: whether this is the user who asks.
     """
 
     name: str
@@ -29,12 +29,12 @@ class Node:
     """A device node.
 
     Attributes:
-        path: of the node itself, not of a link to it.
+        path: path of the node itself, not of a link to it.
         uid: owner.
         gid: group.
         group: the group's name.
         mode: permission bits.
-        open_to_me: whether the user who asks may open it, access lists (logind's, for one) included.
+        open_to_me: whether the user who asks may open it, taking access lists (such as logind's) into account.
     """
 
     path: str
@@ -62,7 +62,7 @@ class Holder:
 
 
 def may_open(node: Node, account: Account) -> bool:
-    """Whether a user may read and write a node, as far as owner, group and mode tell."""
+    """Whether a user may read and write a node, as far as owner, group and mode show."""
     if account.uid == 0:
         return True
     if account.is_me:
@@ -82,7 +82,7 @@ def check_access(what: str, node: Node, account: Account) -> Finding:
     Args:
         what: the thing checked.
         node: the device.
-        account: who is to open it.
+        account: the user who must open it.
     """
     state = f"{node.path} (group {node.group}, mode {node.mode:03o})"
     if may_open(node, account):

@@ -1,4 +1,4 @@
-"""A camera judged from readings: is it there, does it offer what is asked, does the bus carry it, are its frames and stamps sound. Pure."""
+"""Judges a camera from readings: does it exist, offer what is requested, fit the bus, and deliver sound frames and stamps? Pure."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -14,12 +14,12 @@ from common.frame import raw_bytes
 _MB: Final = 1e6
 
 _BUS_BYTES: Final = ((12.0, 1_023_000), (480.0, 24_576_000))
-"""Most that one video endpoint gets, bytes a second, by the bus's speed in Mbit/s: 1023 bytes a ms at full speed, three times 1024 bytes a
+"""Maximum for one video endpoint, bytes a second, by the bus's speed in Mbit/s: 1023 bytes a ms at full speed, three times 1024 bytes a
 microframe at high speed (USB 2.0, 5.6.3). Above that speed no webcam fills the bus."""
 
 _SLOW: Final = Fraction(9, 10)
 _FEW: Final = 8
-"""Frames below which no rate is known (RateMeter)."""
+"""With fewer frames, no rate is known (RateMeter)."""
 
 _MANY_MISSED: Final = Fraction(1, 50)
 
@@ -30,7 +30,7 @@ class UsbCamera:
 
     Attributes:
         name: product.
-        has_driver: whether a driver of the kernel has taken the interface.
+        has_driver: whether a kernel driver has claimed the interface.
     """
 
     name: str
@@ -42,9 +42,9 @@ class UsbBus:
     """How a camera is plugged in.
 
     Attributes:
-        port: such as 1-1.2.
+        port: port name such as 1-1.2.
         megabits: speed of the connection, Mbit/s.
-        cameras: cameras on the same bus, this one included.
+        cameras: cameras on the same bus, including this one.
     """
 
     port: str
@@ -54,7 +54,7 @@ class UsbBus:
 
 @dataclass(frozen=True, slots=True)
 class Offered:
-    """What a camera's driver offers for a wish.
+    """What a camera's driver offers for a request.
 
     Attributes:
         formats: encodings and sizes.
@@ -67,18 +67,18 @@ class Offered:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """What came of streaming for a while.
+    """The result of streaming for a while.
 
     Attributes:
         frames: sound frames.
-        spoiled: frames that were none, by what was wrong with them.
+        spoiled: spoiled frames, by fault.
         missed: frames that the driver lost (gaps in its numbers).
         distrusted: frames whose stamp could not be true.
-        nominal_ns: time between frames as set, ns.
-        period_ns: as measured, ns; None with too few frames.
+        nominal_ns: set time between frames, ns.
+        period_ns: measured time between frames, ns; None with too few frames.
         frame_bytes: mean length of a frame; 0 without one.
         first_ns: from the start to the first sound frame, ns; 0 without one.
-        stamps: clock that the stamps' flags name; None without a frame.
+        stamps: clock named by the stamps' flags; None without a frame.
         driver: the kernel driver's name.
         refused: controls that the driver would not set.
     """
@@ -97,11 +97,11 @@ class Sample:
 
 
 def check_absence(nodes: int, cameras: tuple[UsbCamera, ...]) -> Finding:
-    """Say why no camera was found.
+    """Explain why no camera was found.
 
     Args:
-        nodes: number of video nodes, whatever they are.
-        cameras: video devices that the USB bus sees.
+        nodes: number of video nodes of any kind.
+        cameras: video devices seen on the USB bus.
     """
     without = [camera.name for camera in cameras if not camera.has_driver]
     if without:
@@ -114,7 +114,7 @@ def check_absence(nodes: int, cameras: tuple[UsbCamera, ...]) -> Finding:
 
 
 def check_format(camera: str, offered: Offered, wanted: Wanted) -> Finding:
-    """Judge what is asked for against what the driver offers."""
+    """Judge the request against what the driver offers."""
     try:
         choice = choose(offered.formats, wanted, camera)
         rate_hz = choose_rate(offered.rates.get((choice.letters, choice.size_px), Rates()), wanted, camera)
@@ -125,7 +125,7 @@ def check_format(camera: str, offered: Offered, wanted: Wanted) -> Finding:
 
 
 def check_bus(bus: UsbBus, frame_bytes: int, rate_hz: float) -> Finding:
-    """Judge whether the USB bus carries a stream.
+    """Judge whether the USB bus can carry a stream.
 
     Args:
         bus: how the camera is plugged in.
@@ -150,7 +150,7 @@ def check_bus(bus: UsbBus, frame_bytes: int, rate_hz: float) -> Finding:
 
 
 def raw_frame_bytes(offered: Offered, wanted: Wanted) -> int:
-    """Length of a frame where the format alone tells it; 0 for compressed ones and for wishes that are not met."""
+    """Length of a frame if the format alone determines it; 0 for compressed formats and for requests that cannot be met."""
     try:
         choice = choose(offered.formats, wanted, "")
     except TandemError:
@@ -159,7 +159,7 @@ def raw_frame_bytes(offered: Offered, wanted: Wanted) -> int:
 
 
 def check_stream(sample: Sample) -> list[Finding]:
-    """Judge what came of streaming: frames, rate, stamps."""
+    """Judge the result of streaming: frames, rate, stamps."""
     spoiled = sum(count for _, count in sample.spoiled)
     faults = ", ".join(f"{count} {fault}" for fault, count in sample.spoiled)
     if not sample.frames:
@@ -189,13 +189,13 @@ def check_stream(sample: Sample) -> list[Finding]:
 
 
 def check_taken(holders: tuple[Holder, ...], service_pid: int, status: str, *, all_seen: bool) -> Finding:
-    """Judge a camera that somebody else streams from.
+    """Judge a camera from which another process streams.
 
     Args:
         holders: processes that have its node open.
-        service_pid: main process of our own service; 0: it does not run.
-        status: what the service says of itself.
-        all_seen: whether every process could be looked at.
+        service_pid: main process of our own service; 0: it is not running.
+        status: the service's own status text.
+        all_seen: whether every process could be inspected.
     """
     if service_pid and any(holder.pid == service_pid for holder in holders):
         if "is it plugged in?" in status:

@@ -1,4 +1,4 @@
-"""Asks a camera, streams from it for a moment, and lets the checks judge. Uses the very code that `run` uses."""
+"""Queries a camera, streams from it for a moment, and lets the checks judge. Uses the same code as `run`."""
 
 import select
 from collections.abc import Iterator
@@ -30,13 +30,13 @@ from common.errors import TakenError, TandemError
 from common.frame import Frame
 
 _SAMPLE_NS: Final = 1_000_000_000
-"""How long frames are taken, from the first one on."""
+"""How long frames are taken, starting with the first one."""
 
 _FEW: Final = 9
-"""Frames that a slow camera is waited for: so many give a rate."""
+"""Number of frames to wait for from a slow camera: enough to give a rate."""
 
 _LONGEST_NS: Final = 6_000_000_000
-"""Webcams begin within 2 s; nine frames of the slowest useful one take 4 s more."""
+"""Webcams start within 2 s; nine frames at the slowest useful rate take 4 s more."""
 
 
 def examine_camera(uri: str, account: Account, unit: Unit) -> list[Finding]:
@@ -44,11 +44,11 @@ def examine_camera(uri: str, account: Account, unit: Unit) -> list[Finding]:
 
     Args:
         uri: the camera.
-        account: who is to open it.
-        unit: our own service, which may have it.
+        account: the user who must open it.
+        unit: our own service, which may have it open.
 
     Returns:
-        The findings; those that stand on one that failed are left out.
+        The findings, without those that depend on a failed one.
 
     Raises:
         SettingsError: the URI makes no sense.
@@ -77,7 +77,7 @@ def _opened(uri: str) -> Finding:
 
 
 def _denied(nodes: list[Path], account: Account) -> Iterator[Finding]:
-    """What stands in the way of nodes that gave nothing."""
+    """What prevents access to nodes that gave nothing."""
     for path in nodes:
         node = machine.read_node(path)
         if node is not None and (finding := check_access("permission", node, account)).verdict is Grade.FAIL:
@@ -113,7 +113,7 @@ def _examine(path: Path, settings: V4l2Settings, account: Account, unit: Unit) -
 
 
 def _streamed(path: Path, node: Node, settings: V4l2Settings, offered: Offered, unit: Unit) -> Iterator[Finding]:
-    """What streaming shows: the proof that the bus carries what is asked."""
+    """What streaming shows: it proves that the bus carries what is requested."""
     try:
         sample = _stream(path, settings)
     except TakenError:
@@ -146,14 +146,14 @@ def _ask(device: Device, wanted: Wanted) -> Offered:
 
 
 def _stream(path: Path, settings: V4l2Settings) -> Sample:
-    """Stream for a second from the first frame on.
+    """Stream for a second, starting with the first frame.
 
     Raises:
-        TandemError: it cannot be had.
+        TandemError: the camera cannot be had.
         OSError: the driver failed.
     """
     tally = Tally()
-    # Nothing is locked: a moment is too short for the automatisms, and the next one to open it begins anew anyhow.
+    # Nothing is locked: a moment is too short for the automatic modes, and the next program to open the camera starts afresh anyway.
     stream = Stream(path, settings, replace(settings.wishes, lock=False), tally)
     frames = total_bytes = first_ns = 0
     try:
@@ -166,7 +166,7 @@ def _stream(path: Path, settings: V4l2Settings) -> Sample:
                 break
             poller.poll((_LONGEST_NS - elapsed_ns) // 1_000_000 + 1)
             for grab in stream.take():
-                if isinstance(grab, Frame):  # the tally has the spoiled ones; one that was passed over is nothing bad
+                if isinstance(grab, Frame):  # the tally counts the spoiled ones; a skipped one is no fault
                     frames += 1
                     total_bytes += len(grab.payload)
                     first_ns = first_ns or now.monotonic_ns() - started_ns

@@ -1,6 +1,6 @@
 """A check's result and how a list of them is printed. Pure.
 
-A check takes readings and gives findings; it opens nothing. What could not be read is a warning with the way to read it, never silence.
+A check takes readings and returns findings; it opens nothing. What could not be read becomes a warning that says how to read it, never silence.
 """
 
 from collections.abc import Sequence
@@ -25,9 +25,9 @@ class Finding:
 
     Attributes:
         what: the thing checked.
-        verdict: fail: nothing will work; warn: something works badly, or could not be seen.
+        verdict: fail: nothing will work; warn: something works badly, or could not be checked.
         text: the finding.
-        remedy: what to do about it; empty where nothing is to be done.
+        remedy: what to do about it; empty if nothing is to be done.
     """
 
     what: str
@@ -37,22 +37,22 @@ class Finding:
 
 
 def ok(what: str, text: str) -> Finding:
-    """A thing that is as it should be."""
+    """A finding: something is as it should be."""
     return Finding(what=what, verdict=Grade.OK, text=text)
 
 
 def warn(what: str, text: str, remedy: str) -> Finding:
-    """A thing that works badly, or could not be seen."""
+    """A finding: something works badly, or could not be checked."""
     return Finding(what=what, verdict=Grade.WARN, text=text, remedy=remedy)
 
 
 def fail(what: str, text: str, remedy: str) -> Finding:
-    """A thing without which nothing works."""
+    """A finding: something is broken without which nothing works."""
     return Finding(what=what, verdict=Grade.FAIL, text=text, remedy=remedy)
 
 
 def table(findings: Sequence[Finding]) -> str:
-    """The findings as text: a line for each."""
+    """The findings as text, one line each."""
     width = max((len(item.what) for item in findings), default=0)
     return "\n".join(
         f"{item.verdict.value:4}  {item.what:{width}}  {item.text}" + (f" -> {item.remedy}" if item.remedy else "")
@@ -73,5 +73,5 @@ def values(findings: Sequence[Finding]) -> dict[str, Any]:
 
 
 def exit_code(findings: Sequence[Finding]) -> int:
-    """The command's exit code: 0 when nothing failed, warnings or not, else 4."""
+    """The command's exit code: 0 if nothing failed, with or without warnings, otherwise 4."""
     return CHECK_FAILED if any(item.verdict is Grade.FAIL for item in findings) else 0

@@ -31,7 +31,7 @@ _UNSYNCHRONISED: Final = 0x40
 
 
 def read_text(path: Path) -> str:
-    """A small file's content without blanks at its ends; empty where it cannot be read."""
+    """Contents of a small file, without blanks at its ends; empty if it cannot be read."""
     try:
         return path.read_text(encoding="utf-8", errors="replace").strip()
     except OSError:
@@ -57,7 +57,7 @@ def account_of(name: str) -> Account | None:
 
 
 def read_node(path: Path) -> Node | None:
-    """A device node behind a path; None if there is none."""
+    """The device node behind a path; None if there is none."""
     try:
         real = path.resolve()
         state = real.stat()
@@ -77,10 +77,10 @@ def holders_of(target: str) -> tuple[tuple[Holder, ...], bool]:
     """Processes that have a file, device or socket open.
 
     Args:
-        target: what their descriptor links to: a path, or `socket:[INODE]`.
+        target: what their descriptors link to: a path, or `socket:[INODE]`.
 
     Returns:
-        The processes, and whether all of the machine's could be looked at.
+        The processes, and whether all processes of the machine could be inspected.
     """
     found, all_seen = [], True
     for process in _processes():
@@ -100,7 +100,7 @@ def holders_of(target: str) -> tuple[tuple[Holder, ...], bool]:
 
 
 def terminals_on(path: Path) -> tuple[Holder, ...]:
-    """Processes whose controlling terminal is a device: a getty and what it started. Everybody may see that."""
+    """Processes whose controlling terminal is a device: a getty and what it started. Any user may read this."""
     try:
         number = path.stat().st_rdev
     except OSError:
@@ -122,11 +122,11 @@ def is_console(path: Path) -> bool:
 
 
 def socket_targets(port: int | None, path: str = "") -> list[str]:
-    """What descriptors of listening sockets link to.
+    """The link targets of the descriptors of listening sockets.
 
     Args:
         port: TCP port; None for a Unix socket.
-        path: of the Unix socket.
+        path: path of the Unix socket.
     """
     if port is None:
         rows = [line.split() for line in read_text(Path("/proc/net/unix")).splitlines()[1:]]
@@ -137,7 +137,7 @@ def socket_targets(port: int | None, path: str = "") -> list[str]:
 
 
 def read_usb_cameras() -> tuple[UsbCamera, ...]:
-    """USB devices with a video interface, whether the kernel drives them or not."""
+    """USB devices with a video interface, whether or not a kernel driver handles them."""
     found: dict[Path, bool] = {}
     for interface in sorted(Path("/sys/bus/usb/devices").glob("*:*")):
         if read_text(interface / "bInterfaceClass") == _VIDEO_CLASS:
@@ -147,7 +147,7 @@ def read_usb_cameras() -> tuple[UsbCamera, ...]:
 
 
 def read_usb_bus(node: Path) -> UsbBus | None:
-    """How a camera's node is plugged in; None for one that is not on USB."""
+    """How a camera's node is plugged in; None if it is not on USB."""
     device = _usb_device(node.resolve().name)
     if device is None:
         return None
@@ -164,21 +164,21 @@ def read_usb_bus(node: Path) -> UsbBus | None:
 
 
 def read_kernel_log() -> KernelLog:
-    """The kernel's log of this boot, from the kernel or else from the journal."""
+    """The kernel's log of this boot, from the kernel itself or otherwise from the journal."""
     try:
         fd = os.open("/dev/kmsg", os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError:
         return _journal_log()
     try:
         return KernelLog(readable=True, lines=tuple(_records(fd)))
-    except PermissionError:  # it may be opened by everybody and read by few
+    except PermissionError:  # everybody may open it, few may read it
         return _journal_log()
     finally:
         os.close(fd)
 
 
 def read_supply() -> Supply:
-    """What a Raspberry Pi's firmware says of its supply; nothing on other boards."""
+    """What a Raspberry Pi's firmware says about its power supply; nothing on other boards."""
     bits = read_text(Path("/sys/devices/platform/soc/soc:firmware/get_throttled"))
     if re.fullmatch(r"(0x)?[0-9a-fA-F]+", bits):
         return throttled(int(bits, 16), "get_throttled")
@@ -189,7 +189,7 @@ def read_supply() -> Supply:
 
 
 def read_disk(path: Path) -> Disk:
-    """The file system of a folder, or of the nearest one above it that exists."""
+    """The file system of a folder, or of its nearest existing parent."""
     while not path.exists() and path != path.parent:
         path = path.parent
     state = os.statvfs(path)
@@ -220,7 +220,7 @@ def read_clocks(program: Path) -> Clocks:
 
 
 def read_bluetooth() -> Bluetooth:
-    """What there is of Bluetooth."""
+    """What Bluetooth support there is."""
     adapters = sorted(entry for entry in Path("/sys/class/bluetooth").glob("hci*") if ":" not in entry.name)
     blocked = [
         adapter.name
@@ -231,7 +231,7 @@ def read_bluetooth() -> Bluetooth:
 
 
 def read_unit(name: str) -> Unit:
-    """A unit's state, as far as there is a systemd to ask."""
+    """A unit's state, if there is a systemd to ask."""
     if not Path("/run/systemd/system").is_dir():
         return Unit(name)
     wanted = (
@@ -264,7 +264,7 @@ def read_unit(name: str) -> Unit:
 
 
 class _Timex(ctypes.Structure):
-    """The head of struct timex, as far as its status; what follows is room."""
+    """The beginning of struct timex, up to its status; the rest is padding."""
 
     _fields_ = (
         ("modes", ctypes.c_uint),
@@ -278,7 +278,7 @@ class _Timex(ctypes.Structure):
 
 
 def _synchronised() -> bool:
-    """Whether a time service keeps the date: adjtimex(2) with nothing to change needs no rights."""
+    """Whether a time service keeps the date correct: adjtimex(2) that changes nothing needs no rights."""
     if sys.platform != "linux":
         return False
     state = _Timex()
@@ -307,7 +307,7 @@ def _usb_device(node: str) -> Path | None:
 
 
 def _records(fd: int) -> Iterator[LogLine]:
-    """The records that /dev/kmsg has now: `priority,number,microseconds,flags;text`, further lines belong to the first."""
+    """The records now in /dev/kmsg: `priority,number,microseconds,flags;text`. Further lines belong to the first."""
     now_s = now.monotonic_ns() / 1e9
     while True:
         try:
@@ -315,7 +315,7 @@ def _records(fd: int) -> Iterator[LogLine]:
         except BlockingIOError:
             return
         except BrokenPipeError:
-            continue  # overwritten while we read: the next one is there
+            continue  # overwritten while being read; the next one is there
         head, _, text = record.decode("utf-8", "replace").partition(";")
         fields = head.split(",")
         if len(fields) >= 3 and fields[2].isdecimal():
@@ -331,7 +331,7 @@ def _journal_log() -> KernelLog:
 
 
 def _output(program: str, *arguments: str) -> str:
-    """What a program prints; empty where there is none or it fails."""
+    """A program's output; empty if it does not exist or fails."""
     found = shutil.which(program)
     if found is None:
         return ""

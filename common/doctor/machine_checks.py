@@ -1,4 +1,4 @@
-"""Disk, power, USB trouble, clocks and Bluetooth of a machine, judged from readings. Pure."""
+"""Judges a machine's disk, power, USB trouble, clocks and Bluetooth from readings. Pure."""
 
 import re
 from collections.abc import Sequence
@@ -10,10 +10,10 @@ from common.doctor.finding import Finding, fail, ok, warn
 _MB: Final = 1_000_000
 
 _LITTLE_BYTES: Final = 50 * _MB
-"""A day's journal of a board in trouble, or ten saved pairs with their clouds."""
+"""A day's journal of a board in trouble, or ten saved pairs with their point clouds."""
 
 _COARSE_NS: Final = 100_000
-"""A clock that moves in steps longer than this (jiffies: 1 to 10 ms) cannot tell which frames belong together."""
+"""A clock with longer steps than this (jiffies: 1 to 10 ms) cannot tell which frames belong together."""
 
 _UNDER_VOLTAGE: Final = re.compile(
     r"under-?voltage detected", re.IGNORECASE
@@ -23,7 +23,7 @@ _USB_ERROR: Final = re.compile(
     r"usb \S+: (reset \S+ USB device|device descriptor read/\S+ error|device not accepting address|can't set config)"
     r"|unable to enumerate USB device|Non-zero status \(-\d+\) in video completion"
 )
-"""What the kernel's hub.c and uvc_video.c say when cable, supply or hub fail."""
+"""Messages of the kernel's hub.c and uvc_video.c when cable, supply or hub fail."""
 
 _USB_DISCONNECT: Final = re.compile(r"usb \S+: USB disconnect")
 
@@ -36,11 +36,11 @@ class Disk:
     """A file system.
 
     Attributes:
-        path: where it was asked for.
-        free_bytes: for those who are not root.
-        free_files: inodes left; 0 also where the file system does not count them.
-        counts_files: whether it does.
-        read_only: whether it is mounted so.
+        path: the path that was queried.
+        free_bytes: free for users other than root.
+        free_files: free inodes; also 0 if the file system does not count them.
+        counts_files: whether it counts inodes.
+        read_only: whether it is mounted read-only.
     """
 
     path: str
@@ -55,8 +55,8 @@ class LogLine:
     """A line of the kernel's log.
 
     Attributes:
-        age_s: how long ago, s.
-        text: without stamp.
+        age_s: its age, s.
+        text: its text, without the stamp.
     """
 
     age_s: float
@@ -78,12 +78,12 @@ class KernelLog:
 
 @dataclass(frozen=True, slots=True)
 class Supply:
-    """What the firmware of a board says of its supply.
+    """What a board's firmware says about its power supply.
 
     Attributes:
-        sensor: where it says so; empty for boards that do not.
+        sensor: where the firmware says so; empty for boards that do not.
         low_now: whether the voltage is too low now.
-        low_before: whether it was since the boot.
+        low_before: whether it was too low at any time since the boot.
     """
 
     sensor: str = ""
@@ -97,10 +97,10 @@ class Clocks:
 
     Attributes:
         date_s: the date, seconds since 1970.
-        program_s: when the newest file of this program was made, seconds since 1970: no true date lies before it.
-        synchronised: whether the kernel takes the date for synchronised (adjtimex).
+        program_s: when the newest file of this program was made, seconds since 1970. No true date can be earlier.
+        synchronised: whether the kernel considers the date synchronised (adjtimex).
         source: the kernel's clock source.
-        resolution_ns: step of CLOCK_MONOTONIC.
+        resolution_ns: step of CLOCK_MONOTONIC, ns.
     """
 
     date_s: float
@@ -112,12 +112,12 @@ class Clocks:
 
 @dataclass(frozen=True, slots=True)
 class Bluetooth:
-    """What there is of Bluetooth.
+    """What Bluetooth support there is.
 
     Attributes:
         in_python: whether this Python has Bluetooth sockets.
         adapters: names such as hci0.
-        blocked: those that are switched off (rfkill).
+        blocked: adapters that are switched off (rfkill).
     """
 
     in_python: bool
@@ -126,7 +126,7 @@ class Bluetooth:
 
 
 def check_disk(disk: Disk) -> Finding:
-    """Judge a file system: space, inodes, whether it can be written to."""
+    """Judge a file system: space, inodes, and whether it is writable."""
     if disk.read_only:
         return warn(
             "disk",
@@ -144,12 +144,12 @@ def check_disk(disk: Disk) -> Finding:
 
 
 def throttled(bits: int, sensor: str) -> Supply:
-    """Read the bits of the Raspberry Pi firmware's get_throttled."""
+    """Decode the Raspberry Pi firmware's get_throttled bits."""
     return Supply(sensor, bool(bits & _THROTTLED_NOW), bool(bits & _THROTTLED_BEFORE))
 
 
 def check_power(log: KernelLog, supply: Supply) -> Finding:
-    """Judge the supply: what the firmware says now, and what the kernel has said since the boot."""
+    """Judge the power supply from what the firmware says now and what the kernel has logged since the boot."""
     remedy = "a stronger supply and a shorter cable; the camera on a hub with its own supply"
     if supply.low_now:
         return fail("power", f"the supply's voltage is too low now ({supply.sensor})", remedy)
@@ -166,7 +166,7 @@ def check_power(log: KernelLog, supply: Supply) -> Finding:
 
 
 def check_usb_log(log: KernelLog) -> Finding:
-    """Judge what the kernel has said of USB devices since the boot."""
+    """Judge what the kernel has logged about USB devices since the boot."""
     if not log.readable:
         return _unreadable("usb-log")
     errors, pulled = _matching(log, _USB_ERROR), _matching(log, _USB_DISCONNECT)
@@ -179,7 +179,7 @@ def check_usb_log(log: KernelLog) -> Finding:
 
 
 def check_clocks(clocks: Clocks) -> list[Finding]:
-    """Judge the clocks. Only CLOCK_MONOTONIC counts for pairs; a wrong date spoils no more than the journal's dates."""
+    """Judge the clocks. Only CLOCK_MONOTONIC matters for pairs; a wrong date affects nothing but the dates in the journal."""
     if clocks.resolution_ns > _COARSE_NS:
         step = f"CLOCK_MONOTONIC moves in steps of {clocks.resolution_ns / 1e6:g} ms (clock source {clocks.source})"
         steady = fail("clock", step, "boot a kernel with high-resolution timers; no pair can be told without")
@@ -204,7 +204,7 @@ def check_bluetooth(bluetooth: Bluetooth, *, wanted: bool) -> Finding:
 
     Args:
         bluetooth: what there is.
-        wanted: whether a link asks for it.
+        wanted: whether a link needs it.
     """
     usable = [name for name in bluetooth.adapters if name not in bluetooth.blocked]
     if not bluetooth.in_python:

@@ -1,4 +1,4 @@
-"""A systemd unit judged from what systemctl says of it. Pure."""
+"""Judges a systemd unit from systemctl's output. Pure."""
 
 from dataclasses import dataclass
 
@@ -7,19 +7,19 @@ from common.doctor.finding import Finding, fail, ok, warn
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit as `systemctl show` gives it.
+    """A unit as `systemctl show` describes it.
 
     Attributes:
-        name: without suffix.
-        load: LoadState; empty where there is no systemd.
+        name: its name without suffix.
+        load: LoadState; empty if there is no systemd.
         active: ActiveState.
         sub: SubState.
         enabled: UnitFileState.
-        result: of the last run.
+        result: Result of the last run.
         restarts: NRestarts.
         status: StatusText, one line for people.
         user: User.
-        pid: MainPID; 0: it does not run.
+        pid: MainPID; 0: it is not running.
     """
 
     name: str

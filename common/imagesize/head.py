@@ -1,4 +1,4 @@
-"""What is known of an image from its header, and the limits that its size must keep."""
+"""What an image's header tells about it, and the limits that its size must respect."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -7,13 +7,13 @@ from typing import Final
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
 
 MEGAPIXEL: Final = 2**20
-"""As a megabyte here is 2^20 bytes; so the phones' "64 MP" (9248x6936) lie within 64 of them."""
+"""A megabyte here is 2^20 bytes as well. So the phones' "64 MP" (9248x6936) lie within 64 of these."""
 
 MOST_PIXELS: Final = 64 * MEGAPIXEL
-"""The limit where nobody set another: the largest usual sensor. Decoded in colour it takes 192 MB."""
+"""The default limit: the largest usual sensor. Decoded in colour it takes 192 MB."""
 
 COPY_AGAIN: Final = "copy or record the image again"
-"""The remedy for an image that is not whole or not sound."""
+"""The remedy for an image that is incomplete or damaged."""
 
 
 class ImageKind(Enum):
@@ -29,15 +29,15 @@ class ImageKind(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImageHead:
-    """What an image's header says.
+    """The content of an image's header.
 
     Attributes:
-        kind: what it is.
+        kind: the kind of image.
         width_px: width, px, at least 1.
         height_px: height, px, at least 1.
-        body_at: where in the bytes the compressed image begins; 0 where that is not looked for.
-        least_bytes: with fewer bytes than these the compressed image cannot be whole; 0: not known.
-        block_pixels: pixels of the largest piece that is decoded at once; 0: no more than the image has.
+        body_at: offset of the compressed image in the bytes; 0 if it is not looked for.
+        least_bytes: with fewer bytes the compressed image cannot be whole; 0 if not known.
+        block_pixels: pixels of the largest piece decoded at once; 0: no more than the image has.
     """
 
     kind: ImageKind
@@ -59,7 +59,7 @@ def require_pixels(size_px: tuple[int, int], most_pixels: int, name: str) -> Non
     Args:
         size_px: width and height, px.
         most_pixels: the limit.
-        name: how errors call what has this size.
+        name: what errors call the thing of this size.
 
     Raises:
         ImageSizeError: it has more pixels.
@@ -74,12 +74,12 @@ def require_pixels(size_px: tuple[int, int], most_pixels: int, name: str) -> Non
 
 
 def require_believable(head: ImageHead, most_pixels: int, name: str) -> None:
-    """Check an image's size against the limit, and that of the pieces in which it is decoded.
+    """Check an image's size, and that of the pieces in which it is decoded, against the limit.
 
     Args:
-        head: what it says of itself.
+        head: the image's header.
         most_pixels: the limit.
-        name: how errors call it.
+        name: the image's name in errors.
 
     Raises:
         ImageSizeError: it has more pixels.
@@ -90,12 +90,12 @@ def require_believable(head: ImageHead, most_pixels: int, name: str) -> None:
 
 
 def check_length(count: int, head: ImageHead, name: str) -> None:
-    """Check that there is as much compressed data as the size in the header takes at least.
+    """Check that there is at least as much compressed data as the size in the header requires.
 
     Args:
-        count: bytes of it.
-        head: what the image says of itself.
-        name: how errors call it.
+        count: number of bytes of compressed data.
+        head: the image's header.
+        name: the image's name in errors.
 
     Raises:
         SpoiledImageError: there is less.

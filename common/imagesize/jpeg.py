@@ -1,4 +1,4 @@
-"""JPEG (ITU-T T.81, annex B): the head from its segments, and whether its scans can be whole."""
+"""JPEG (ITU-T T.81, annex B): reads the header from its segments, and checks whether its scans can be whole."""
 
 import re
 import struct
@@ -9,16 +9,16 @@ from common.frame import FrameFault, SpoiledImageError
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind, check_length
 
 SOI: Final = b"\xff\xd8"
-"""How every JPEG begins."""
+"""The first bytes of every JPEG."""
 
 FRAME_HEADERS: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
-"""SOF0 to SOF15: the codes between them that are DHT, JPG and DAC are left out (ITU-T T.81, table B.1)."""
+"""SOF0 to SOF15, without the codes in between that are DHT, JPG and DAC (ITU-T T.81, table B.1)."""
 
 _MARKER: Final = re.compile(rb"\xff[^\x00\xff]", re.DOTALL)
-"""A marker, after fill bytes (B.1.1.2) and whatever a sloppy writer left before it: decoders pass over that, too."""
+"""A marker, after fill bytes (B.1.1.2) and whatever a careless writer left before it. Decoders skip that too."""
 
 _SCAN_END: Final = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]", re.DOTALL)
-"""What ends compressed data: neither a stuffed byte nor a restart marker nor a fill byte (B.1.1.5)."""
+"""A marker that ends compressed data: not a stuffed byte, a restart marker or a fill byte (B.1.1.5)."""
 
 _BARE: Final = frozenset(range(0xD0, 0xD8)) | {0x01}
 """Markers without a length: RST0 to RST7, TEM."""
@@ -28,19 +28,19 @@ _BETWEEN_SCANS: Final = frozenset({0xC4, 0xCC, 0xDA, 0xDB, 0xDC, 0xDD, 0xFE, *ra
 """Segments that may stand between scans: DHT, DAC, SOS, DQT, DNL, DRI, COM, APPn (figure B.2)."""
 
 _MOST_SCANS: Final = 64
-"""Honest progressive photographs have about 10 (the usual script); each scan more costs a pass over the whole image."""
+"""Honest progressive photographs have about 10 (the usual script). Each further scan costs a pass over the whole image."""
 
 _BLOCK_BITS: Final = {0xC0: 2, 0xC1: 2, 0xC2: 1}
-"""The fewest bits of a block of 8x8 px in Huffman coding: sequential one bit for the DC code and one for the end of block (F.1.2), progressive one bit
-in the first DC scan (G.1.2.1; AC blocks are left out in runs). Arithmetic coding has no such bound."""
+"""The fewest bits per block of 8x8 px in Huffman coding. Sequential: one bit for the DC code and one for the end of block (F.1.2). Progressive: one
+bit in the first DC scan (G.1.2.1; AC blocks are left out in runs). Arithmetic coding has no such bound."""
 
 
 def jpeg_head(data: bytes, name: str) -> ImageHead:
-    """Read the head of a JPEG.
+    """Read the header of a JPEG.
 
     Args:
         data: the encoded image; begins with SOI.
-        name: how errors call it.
+        name: the image's name in errors.
 
     Raises:
         SpoiledImageError: it has no image, two frame headers, or a segment of no length.
@@ -70,7 +70,7 @@ def jpeg_head(data: bytes, name: str) -> ImageHead:
 
 
 def _segments(data: bytes, name: str) -> Iterator[tuple[int, int]]:
-    """Code and offset of each marker before the compressed data, in order, the start of scan included."""
+    """Code and offset of each marker before the compressed data, in order, including the start of scan."""
     at = len(SOI)
     while found := _MARKER.search(data, at):
         at, code = found.start(), data[found.start() + 1]
@@ -89,15 +89,15 @@ def _segments(data: bytes, name: str) -> Iterator[tuple[int, int]]:
 
 
 def check_scans(data: bytes, head: ImageHead, name: str) -> None:
-    """Check that a JPEG has its end, not too many scans, and bytes enough.
+    """Check that a JPEG has its end, not too many scans, and enough bytes.
 
-    The end marker counts only behind the start of the compressed data: the thumbnail in an EXIF segment has one of its own. Bytes behind the end
-    are legal and common (webcams pad with zeros, phones append depth maps and films).
+    The end marker counts only after the start of the compressed data, because the thumbnail in an EXIF segment has one of its own. Bytes after the
+    end are legal and common (webcams pad with zeros, phones append depth maps and films).
 
     Args:
         data: the encoded image.
-        head: of `jpeg_head`.
-        name: how errors call it.
+        head: the result of `jpeg_head`.
+        name: the image's name in errors.
 
     Raises:
         SpoiledImageError: its end is missing, it has too many scans, or too few bytes for its size.

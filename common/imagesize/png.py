@@ -1,4 +1,4 @@
-"""PNG (specification, third edition, 5 and 11.2): the head from its first chunk, and the chunks that carry pixels."""
+"""PNG (specification, third edition, 5 and 11.2): reads the header from its first chunk, and extracts the chunks that carry pixels."""
 
 import struct
 from typing import Final
@@ -7,29 +7,29 @@ from common.frame import FrameFault, SpoiledImageError
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind, check_length, size_text
 
 PNG_START: Final = b"\x89PNG\r\n\x1a\n"
-"""How every PNG begins."""
+"""The first bytes of every PNG."""
 
 _PIXEL_CHUNKS: Final = frozenset({b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"})
 _CHANNELS: Final = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 _DEFLATE_RATIO: Final = 1032
-"""No deflate stream holds more: 258 bytes in two bits (zlib, "Maximum compression factor")."""
+"""No deflate stream expands further: 258 bytes from two bits (zlib, "Maximum compression factor")."""
 
 _MOST_CHUNKS: Final = 2**17
-"""Writers put 8 KB and more into a chunk of pixels: the largest image that is let through by default has 2^15 of them."""
+"""Writers put at least 8 KB into a chunk of pixels. The largest image allowed by default then has 2^15 of them."""
 
 _SLACK_BYTES: Final = 65_536
 
 
 def png_head(data: bytes, name: str) -> ImageHead:
-    """Read the head of a PNG.
+    """Read the header of a PNG.
 
     Args:
         data: the encoded image; begins with PNG_START.
-        name: how errors call it.
+        name: the image's name in errors.
 
     Raises:
-        SpoiledImageError: its first chunk is no sound header.
-        struct.error: it ends within that.
+        SpoiledImageError: its first chunk is not a sound header.
+        struct.error: it ends within that chunk.
     """
     length, kind, width_px, height_px, bits, colour = struct.unpack_from(">I4sIIBB", data, len(PNG_START))
     if kind != b"IHDR" or length != 13 or colour not in _CHANNELS or bits not in {1, 2, 4, 8, 16}:
@@ -45,15 +45,15 @@ def png_head(data: bytes, name: str) -> ImageHead:
 
 
 def pixel_chunks(data: bytes, head: ImageHead, name: str) -> bytes:
-    """Give the chunks of a PNG that carry pixels, its start before them, if it can be whole.
+    """Return the chunks of a PNG that carry pixels, preceded by its start, if the image can be whole.
 
     Args:
         data: the encoded image.
-        head: of `png_head`.
-        name: how errors call it.
+        head: the result of `png_head`.
+        name: the image's name in errors.
 
     Returns:
-        A PNG; the same bytes where it has no other chunks.
+        A PNG; the same bytes if it has no other chunks.
 
     Raises:
         SpoiledImageError: its end is missing, it has two headers, or too few or far too many bytes for its size.
@@ -81,7 +81,7 @@ def pixel_chunks(data: bytes, head: ImageHead, name: str) -> bytes:
 
 
 def _check_excess(pixel_bytes: int, data: bytes, head: ImageHead, name: str) -> None:
-    """Check that a PNG has not far more data than its pixels take when nothing can be compressed: a decoder unpacks them all."""
+    """Check that a PNG has not far more data than its pixels take when nothing can be compressed: a decoder unpacks all of it."""
     bits, colour = data[24], data[25]
     most = head.height_px * (head.width_px * bits * _CHANNELS[colour] // 8 + 2)
     if pixel_bytes > most + most // 64 + _SLACK_BYTES:

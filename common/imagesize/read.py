@@ -1,4 +1,4 @@
-"""The head of an image of any kind that is known, by its first bytes, and what more can be checked of that kind."""
+"""Reads the header of an image of any known kind, identified by its first bytes, and makes further checks of that kind."""
 
 import struct
 from typing import Final
@@ -14,11 +14,11 @@ _KNOWN: Final = "give a PNG, JPEG, TIFF, BMP, PGM, PPM or WebP image"
 
 
 def read_head(data: bytes, name: str) -> ImageHead:
-    """Read what an image says of itself.
+    """Read what an image says about itself.
 
     Args:
-        data: the encoded image, from anybody.
-        name: how errors call it.
+        data: the encoded image; it may come from anybody.
+        name: the image's name in errors.
 
     Raises:
         SpoiledImageError: it is of no known kind, or its header cannot be believed.
@@ -35,18 +35,18 @@ def read_head(data: bytes, name: str) -> ImageHead:
 
 
 def whole_image(data: bytes, head: ImageHead, name: str) -> bytes:
-    """Check that encoded bytes can be the whole image of their header, as far as that is seen without decoding.
+    """Check that encoded bytes can be the whole image of their header, as far as this shows without decoding.
 
     Args:
         data: the encoded image.
-        head: of `read_head`.
-        name: how errors call it.
+        head: the result of `read_head`.
+        name: the image's name in errors.
 
     Returns:
-        What a decoder should get: the same bytes; of a PNG only the chunks that carry pixels, since texts and colour profiles may be bombs.
+        What a decoder should get: the same bytes. Of a PNG only the chunks that carry pixels, because texts and colour profiles may be bombs.
 
     Raises:
-        SpoiledImageError: they cannot be.
+        SpoiledImageError: they cannot be the whole image.
     """
     match head.kind:
         case ImageKind.JPEG:

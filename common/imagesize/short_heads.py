@@ -1,4 +1,4 @@
-"""BMP, PNM and WebP: kinds of files whose size stands in their first bytes."""
+"""BMP, PNM and WebP: kinds of files whose first bytes contain the size."""
 
 import re
 import struct
@@ -10,11 +10,11 @@ from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind
 PNM_HEADER: Final = re.compile(rb"P([1-6])(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})")
 """Magic, width, height (netpbm's pbm(5), pgm(5), ppm(5)).
 
-Each blank can match in one way only: a nested quantifier took seconds for 30 blanks without a number behind them."""
+Each blank can match in only one way. A nested quantifier took seconds for 30 blanks without a number after them."""
 
 
 def bmp_head(data: bytes) -> ImageHead:
-    """BITMAPCOREHEADER or BITMAPINFOHEADER behind a BITMAPFILEHEADER (wingdi.h); a negative height means rows from the top down.
+    """Read a BITMAPCOREHEADER or BITMAPINFOHEADER after a BITMAPFILEHEADER (wingdi.h). A negative height means rows from the top down.
 
     Args:
         data: the encoded image; begins with BM.
@@ -28,24 +28,24 @@ def bmp_head(data: bytes) -> ImageHead:
 
 
 def pnm_head(found: re.Match[bytes]) -> ImageHead:
-    """The head of a portable bitmap, graymap or pixmap.
+    """Read the header of a portable bitmap, graymap or pixmap.
 
     Args:
-        found: of PNM_HEADER at the begin of the encoded image.
+        found: match of PNM_HEADER at the start of the encoded image.
     """
     return ImageHead(kind=ImageKind.PNM, width_px=int(found[2]), height_px=int(found[3]), body_at=found.end())
 
 
 def webp_head(data: bytes, name: str) -> ImageHead:
-    """RFC 9649, 2.5 to 2.7 and 3.4; RFC 6386, 9.1.
+    """Read the header of a WebP (RFC 9649, 2.5 to 2.7 and 3.4; RFC 6386, 9.1).
 
     Args:
         data: the encoded image; begins with RIFF, a length and WEBP.
-        name: how errors call it.
+        name: the image's name in errors.
 
     Raises:
-        SpoiledImageError: its first chunk is no sound header.
-        struct.error: it ends within that.
+        SpoiledImageError: its first chunk is not a sound header.
+        struct.error: it ends within that chunk.
     """
     kind = data[12:16]
     if kind == b"VP8 ":

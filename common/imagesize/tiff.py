@@ -1,4 +1,4 @@
-"""TIFF (6.0) and BigTIFF: the head from the first directory."""
+"""TIFF (6.0) and BigTIFF: reads the header from the first directory."""
 
 import struct
 from typing import Final
@@ -8,7 +8,7 @@ from common.frame import FrameFault, SpoiledImageError
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind
 
 TIFF_KINDS: Final = {b"II*\0": ("<", False), b"MM\0*": (">", False), b"II+\0": ("<", True), b"MM\0+": (">", True)}
-"""First bytes to byte order and whether it is a BigTIFF."""
+"""First bytes, mapped to byte order and whether it is a BigTIFF."""
 
 _WIDTH, _HEIGHT, _TILE_WIDTH, _TILE_HEIGHT = 256, 257, 322, 323
 _ORIENTATION: Final = 274
@@ -16,18 +16,18 @@ _TIFF_NUMBERS: Final = {1: "B", 3: "H", 4: "I", 16: "Q"}
 """BYTE, SHORT, LONG (TIFF 6.0, section 2) and LONG8."""
 
 _MOST_ENTRIES: Final = 65_535
-"""Of a directory: all that a TIFF can have; a BigTIFF could claim more."""
+"""Limit for a directory: as many as a TIFF can have; a BigTIFF could claim more."""
 
 
 def tiff_head(data: bytes, name: str) -> ImageHead:
-    """ImageWidth, ImageLength, TileWidth and TileLength of the first directory (TIFF 6.0, sections 2, 8 and 15); of doubled ones the largest.
+    """Read ImageWidth, ImageLength, TileWidth and TileLength from the first directory (TIFF 6.0, sections 2, 8, 15); of duplicates, the largest.
 
     Args:
         data: the encoded image; begins with one of TIFF_KINDS.
-        name: how errors call it.
+        name: the image's name in errors.
 
     Raises:
-        SpoiledImageError: its directory is missing, or its size is no number.
+        SpoiledImageError: its directory is missing, or its size is not a number.
         DataError: a decoder would turn or mirror it.
         struct.error: it ends within the directory.
     """
@@ -47,7 +47,7 @@ def tiff_head(data: bytes, name: str) -> ImageHead:
             raise SpoiledImageError(FrameFault.NO_START, f"{name} is a TIFF whose size is no whole number", COPY_AGAIN)
         (value,) = struct.unpack_from(f"{order}{_TIFF_NUMBERS[kind]}", data, at + entry_bytes - (8 if is_big else 4))
         values[tag] = max(values[tag], value)
-    if values[_ORIENTATION] not in {0, 1}:  # decoders turn a TIFF by it, and by no other format's
+    if values[_ORIENTATION] not in {0, 1}:  # decoders rotate a TIFF by it, but no other format
         raise DataError(
             f"{name} must be turned or mirrored to stand upright (TIFF orientation {values[_ORIENTATION]})",
             "save it upright, without that tag",

@@ -1,11 +1,11 @@
-"""A link is a packet pipe: headers with payloads go in at one end and come out whole, in order, or not at all, at the other.
+"""A link is a packet pipe: headers with payloads go in at one end; at the other they come out whole and in order, or not at all.
 
-A link has named byte paths (connections). The side that dials opens one for each lane; the side that listens learns of a connection when
-its first packet arrives. A link never blocks, never decides what a packet means, and is used by one thread only, save `Link.close`.
+A link has named byte paths (connections). The dialling side opens one for each lane; the listening side learns of a connection when its
+first packet arrives. A link never blocks and never interprets a packet. Only one thread uses it, except for `Link.close`.
 
-A packet that was taken may be lost: with its connection, with bytes that a wire loses without a word, or when nobody acknowledges it for a second on a
-link that paces itself. Then all of it is lost and the next one comes whole; a frame's loss shows as a gap in `sent_index`, and what else must be
-heard is said until it is answered.
+An accepted packet may still be lost: with its connection, with bytes that a wire drops silently, or, on a link that paces itself, when nobody
+acknowledges it for a second. Then all of it is lost and the next one arrives whole. A lost frame shows as a gap in `sent_index`; anything
+else that must be heard is repeated until it is answered.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,12 +20,12 @@ from common.protocol.message import Lane
 
 @dataclass(frozen=True, slots=True)
 class Packet:
-    """What came in over a connection.
+    """A packet received over a connection.
 
     Attributes:
         connection: the byte path, opaque.
         header: the message's header.
-        payload: its payload, often empty; backed by the transport's own memory, no copy.
+        payload: its payload, often empty; a view of the transport's own memory, not a copy.
     """
 
     connection: bytes
@@ -35,10 +35,10 @@ class Packet:
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """A connection that this side had dialled broke. The link dials again by itself.
+    """A connection that this side had dialled broke. The link redials by itself.
 
-    What was under way on it is gone, so may be what had come but was not received yet, and what is sent at that very moment: what must be
-    heard is said until it is answered.
+    What was under way on it is lost. So may be what had arrived but was not yet received, and what is sent at that very moment. Anything that must
+    be heard is therefore repeated until it is answered.
     """
 
     connection: bytes
@@ -46,7 +46,7 @@ class Broken:
 
 @dataclass(frozen=True, slots=True)
 class Garbage:
-    """Something that is no packet came in and was thrown away."""
+    """Something arrived that is not a packet, and was thrown away."""
 
     connection: bytes
 
@@ -55,7 +55,7 @@ Incoming = Packet | Broken | Garbage
 
 
 class SendResult(Enum):
-    """What became of a packet that was to be sent."""
+    """What became of a packet handed to `send`."""
 
     SENT = 0
     FULL = 1
@@ -67,7 +67,7 @@ class Link(Protocol):
 
     @property
     def kind(self) -> str:
-        """The transport's name as it stands in delays.jsonl, for example `tcp`."""
+        """The transport's name as it appears in delays.jsonl, for example `tcp`."""
 
     @property
     def dialled(self) -> dict[Lane, bytes]:
@@ -79,37 +79,37 @@ class Link(Protocol):
 
     @property
     def due_ns(self) -> int:
-        """When `receive` wants to be called next even if nothing is readable, by this machine's steady clock, ns; 2^63 - 1: never."""
+        """When `receive` must be called next even if nothing is readable, by this machine's steady clock, ns; 2^63 - 1: never."""
 
     @property
     def self_paced(self) -> bool:
-        """Whether `ready` is false until the frame before has left: then credit may run one frame ahead, and the line is never idle."""
+        """Whether `ready` is false until the previous frame has left. Then credit may run one frame ahead, and the line is never idle."""
 
     def ready(self, connection: bytes) -> bool:
-        """Whether a frame would be taken now, as far as is known without trying."""
+        """Whether a frame would be accepted now, as far as can be known without trying."""
 
     def receive(self) -> Iterator[Incoming]:
-        """Give all that has come in, without waiting."""
+        """Return everything that has arrived, without waiting."""
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Hand a packet over, without waiting."""
 
     def close(self) -> None:
-        """Give what was handed over a moment to leave, then let go of everything."""
+        """Give accepted packets a moment to leave, then release everything."""
 
 
 @runtime_checkable
 class TakesNewHosts(Protocol):
-    """What a link offers besides that can let in new hosts by a code."""
+    """The additional interface of a link that can let in new hosts by a code."""
 
     @property
     def endpoint(self) -> str:
         """Where it listens."""
 
     def open_door(self, links: Sequence[str], keys: KeyFolder) -> None:
-        """Take in new hosts by a code, for all secured links of this board.
+        """Let in new hosts by a code, for all secured links of this board.
 
         Args:
             links: the secured links' `endpoint`s.
-            keys: the board's.
+            keys: the board's keys.
         """

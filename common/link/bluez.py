@@ -1,7 +1,8 @@
-"""What BlueZ's daemon does for an RFCOMM link: it publishes the service's record, and knows devices by name.
+"""What BlueZ's daemon does for an RFCOMM link: it publishes the service's record and knows devices by name.
 
-The link listens and dials with sockets of its own, so a missing daemon, or a missing dbus-fast, which is needed to speak with it, costs no more
-than the name (decision 0012). dbus-fast wants asyncio: it is imported nowhere else, and its loop runs in a thread of its own, or for one question.
+The link listens and dials with its own sockets. So if the daemon is missing, or dbus-fast, which is needed to talk to it, only the device names and
+the published channel are lost (decision 0012). dbus-fast needs asyncio; nothing else imports it, and its loop runs in its own thread, or for a
+single question.
 """
 
 import asyncio
@@ -29,10 +30,10 @@ _LOG = logging.getLogger(__name__)
 _BLUEZ: Final = "org.bluez"
 _BUS: Final = "org.freedesktop.DBus"
 _RETRY_S: Final = 5.0
-"""A bus that is not there is looked for again after this time; once it is, nothing is asked for twice."""
+"""A missing bus is looked for again after this time. Once it is there, nothing is asked twice."""
 
 _PATIENCE_S: Final = 5.0
-"""An answer takes milliseconds; bluetoothd on a busy board was never seen to need a second."""
+"""An answer takes milliseconds. bluetoothd on a busy board was never seen to need a second."""
 
 _GOODBYE_S: Final = 1.0
 
@@ -40,10 +41,10 @@ _APPEARED: Final = f"type='signal',sender='{_BUS}',member='NameOwnerChanged',arg
 
 
 class PublishedRecord:
-    """Keeps the service's record in the daemon's directory for as long as this lives, also when the daemon is restarted; in a thread.
+    """Keeps the service's record in the daemon's directory for as long as this object lives, even if the daemon restarts. Runs in a thread.
 
     Args:
-        channel: where the link listens.
+        channel: channel on which the link listens.
     """
 
     def __init__(self, channel: int) -> None:
@@ -55,9 +56,9 @@ class PublishedRecord:
         self._thread.start()
 
     def close(self) -> None:
-        """Withdraw it."""
+        """Withdraw the record."""
         self._stop.set()
-        if self._cancel is not None:  # else the thread has not begun to wait, and looks at _stop before it does
+        if self._cancel is not None:  # otherwise the thread has not begun to wait, and checks _stop before it does
             with suppress(RuntimeError):  # the loop has just been closed
                 self._cancel()
         self._thread.join(_GOODBYE_S)
@@ -83,7 +84,7 @@ class PublishedRecord:
                 await self._keep(bus)
 
     async def _keep(self, bus: "MessageBus") -> None:
-        """Register now and whenever the daemon appears; BlueZ forgets the record when this conversation ends."""
+        """Register now and whenever the daemon appears. BlueZ forgets the record when this connection ends."""
         changed = asyncio.Event()
 
         def heard(message: "Message") -> None:
@@ -110,7 +111,7 @@ class PublishedRecord:
             "Name": Variant("s", "tandemscan"),
             "Role": Variant("s", "server"),
             "ServiceRecord": Variant("s", record_xml(self._channel)),
-        }  # no channel among the options: with one BlueZ would listen there itself
+        }  # no channel among the options: with one, BlueZ would listen there itself
         register = Message(
             destination=_BLUEZ,
             path="/org/bluez",
@@ -136,16 +137,16 @@ class PublishedRecord:
 
 
 def address_of(name: str) -> str:
-    """Find a device by name, among those that BlueZ's daemon knows.
+    """Find a device by name among those that BlueZ's daemon knows.
 
     Args:
-        name: as the device calls itself or as the user has called it; upper and lower case are the same.
+        name: the device's own name or the user's name for it; case is ignored.
 
     Returns:
         Its address.
 
     Raises:
-        UnavailableError: none is known by this name, or several are, or no daemon can be asked.
+        UnavailableError: no device has this name, several have, or no daemon can be asked.
     """
     try:
         objects = asyncio.run(_known_objects())
@@ -172,7 +173,7 @@ def address_of(name: str) -> str:
 
 
 async def _known_objects() -> dict[str, dict[str, dict[str, Any]]]:
-    """All that the daemon knows, by path and interface."""
+    """Everything that the daemon knows, by path and interface."""
     async with _system_bus() as bus:
         asking = Message(destination=_BLUEZ, path="/", interface=f"{_BUS}.ObjectManager", member="GetManagedObjects")
         return dict((await _ask(bus, asking))[0])
@@ -180,13 +181,13 @@ async def _known_objects() -> dict[str, dict[str, dict[str, Any]]]:
 
 @asynccontextmanager
 async def _system_bus() -> "AsyncIterator[MessageBus]":
-    """A conversation with the machine's daemons, for the length of a block."""
+    """A connection to the system bus for the duration of a block."""
     if not _HAS_LIBRARY:
         raise UnavailableError("dbus-fast is not installed", "apt install python3-dbus-fast")
     with ExitStack() as ending:
         try:
-            bus = MessageBus(bus_type=BusType.SYSTEM)  # Debian 12's version connects here already
-            ending.callback(bus.disconnect)  # also where it is cancelled while it connects
+            bus = MessageBus(bus_type=BusType.SYSTEM)  # Debian 12's version already connects here
+            ending.callback(bus.disconnect)  # also if it is cancelled while connecting
             async with asyncio.timeout(_PATIENCE_S):
                 await bus.connect()
         except (OSError, EOFError, AuthError, InvalidAddressError) as error:
@@ -196,7 +197,7 @@ async def _system_bus() -> "AsyncIterator[MessageBus]":
 
 
 async def _ask(bus: "MessageBus", question: "Message") -> list[Any]:
-    """Call a method; gives what it answers.
+    """Call a method and return its answer.
 
     Raises:
         UnavailableError: it failed, or the bus is gone.

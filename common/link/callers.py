@@ -1,8 +1,8 @@
 """Strangers at a board's door: plain sockets that carry words of pairing, a few at a time, each for seconds.
 
-Not ZeroMQ, which lets a stranger send a message of endlessly many parts and keeps all of them, and which can hang up on nobody. What is kept
-for a caller here is a socket and one unfinished word. When the places are taken the one who was silent longest makes room, so that nobody
-can hold them; who is in the middle of a proof stays. A caller that is hung up on may call again: nothing hangs on a connection before a proof.
+This is not ZeroMQ, which lets a stranger send a message of endlessly many parts, keeps all of them, and cannot hang up on anyone. Here a
+caller costs one socket and one unfinished word. When all places are taken, the caller that was silent longest must make room, so nobody can
+block them; a caller in the middle of a proof stays. A caller that was cut off may call again: before a proof a connection holds no state.
 """
 
 import select
@@ -19,16 +19,16 @@ from common.protocol.enrolment_words import Word
 from common.protocol.zap import plain_address
 
 _MOST: Final = 16
-"""Callers at a time; one owner pairs one host."""
+"""Callers at a time. One owner pairs one host."""
 
 _SILENCE_NS: Final = 3_000_000_000
-"""Without a whole word; nobody has to type while a connection lasts."""
+"""Time without a whole word. Nobody has to type while a connection lasts."""
 
 _CALL_NS: Final = 15_000_000_000
-"""A proof may take ten seconds."""
+"""Longest call. A proof may take ten seconds."""
 
 _AT_ONCE: Final = 32
-"""Callers accepted, or reads, in one round of the poll loop: a flood of them must not hold up frames."""
+"""Callers accepted, or reads, per round of the poll loop. A flood of them must not hold up frames."""
 
 _BACKLOG: Final = 16
 
@@ -54,7 +54,7 @@ class Said:
 
 @dataclass(frozen=True, slots=True)
 class Nonsense:
-    """A caller said something else, and was hung up on."""
+    """A caller said something that is not a word, and was cut off."""
 
     connection: bytes
     address: str
@@ -63,7 +63,7 @@ class Nonsense:
 
 @dataclass(frozen=True, slots=True)
 class Left:
-    """A caller is there no more."""
+    """A caller is gone."""
 
     connection: bytes
 
@@ -72,10 +72,10 @@ Call = Said | Nonsense | Left
 
 
 class Callers:
-    """Listens, and holds whoever calls. Its descriptor stays the same whether it listens or not.
+    """Listens for callers and holds them. Its descriptor stays the same whether it listens or not.
 
     Args:
-        stays: whether a connection is not to make room for a newcomer.
+        stays: whether a connection is exempt from making room for a newcomer.
     """
 
     def __init__(self, stays: Callable[[bytes], bool]) -> None:
@@ -86,17 +86,17 @@ class Callers:
         self._numbers = count()
 
     def fileno(self) -> int:
-        """What to wait on."""
+        """The descriptor to wait on."""
         return self._epoll.fileno()
 
     def listen(self, addresses: Sequence[tuple[str, int]]) -> None:
-        """Listen at all of these addresses, or at none.
+        """Listen on all of these addresses, or on none.
 
         Args:
-            addresses: of this machine, with their ports; `::` for IPv4, too.
+            addresses: addresses of this machine, with their ports; `::` includes IPv4.
 
         Raises:
-            OSError: one cannot be had.
+            OSError: an address cannot be had.
         """
         try:
             for host, port in addresses:
@@ -111,20 +111,20 @@ class Callers:
             raise
 
     def shut(self) -> None:
-        """Listen no more, and hang up on everybody."""
+        """Stop listening, and hang up on everybody."""
         for caller in tuple(self._callers.values()):
             self._hang_up(caller)
         for listener in self._listeners.values():
-            listener.close()  # which takes it out of the epoll, too
+            listener.close()  # which also removes it from the epoll
         self._listeners.clear()
 
     def close(self) -> None:
-        """As `shut`, for good."""
+        """Like `shut`, but for good."""
         self.shut()
         self._epoll.close()
 
     def receive(self, now_ns: int) -> Iterator[Call]:
-        """Give what has come in.
+        """Return what has arrived.
 
         Args:
             now_ns: CLOCK_MONOTONIC, ns.
@@ -136,7 +136,7 @@ class Callers:
                 yield from self._read(self._callers[fd], now_ns)
 
     def tick(self, now_ns: int) -> Iterator[Call]:
-        """Hang up on whoever is silent, or takes too long; to be called once a second."""
+        """Hang up on callers that are silent or take too long. Call this once a second."""
         for caller in tuple(self._callers.values()):
             if now_ns - caller.heard_ns >= _SILENCE_NS or now_ns - caller.since_ns >= _CALL_NS:
                 yield self._hang_up(caller)
@@ -144,7 +144,7 @@ class Callers:
             self._epoll.modify(fd, select.EPOLLIN)
 
     def say(self, connection: bytes, word: Word) -> None:
-        """Say a word to a caller; one that does not read hears nothing."""
+        """Send a word to a caller. One that does not read hears nothing."""
         for caller in self._callers.values():
             if caller.connection == connection:
                 with suppress(OSError):
@@ -156,7 +156,7 @@ class Callers:
                 accepted, address = listener.accept()
             except (BlockingIOError, ConnectionError):
                 return
-            except OSError:  # no descriptors left: the listener would be readable for ever
+            except OSError:  # no descriptors left: the listener would stay readable for ever
                 self._epoll.modify(listener, 0)
                 return
             accepted.settimeout(0)

@@ -1,7 +1,7 @@
-"""CURVE on ZeroMQ links: who listens lets in the keys that it knows, who dials knows the key that must answer.
+"""CURVE on ZeroMQ links: the listener lets in the keys that it knows; the dialler knows the key that must answer.
 
-The listener's guard answers ZeroMQ's questions (ZAP) in its owner's poll loop: no thread, no asyncio. Whoever is not let in has cost a
-handshake and at most one line in the log every ten seconds.
+The listener's guard answers ZeroMQ's questions (ZAP) in its owner's poll loop: no thread, no asyncio. A peer that is not let in costs one
+handshake and at most one log line every ten seconds.
 """
 
 import logging
@@ -23,12 +23,12 @@ _LOG = logging.getLogger(__name__)
 
 _NOW: Final = int(zmq.DONTWAIT)
 _QUIET_NS: Final = 10_000_000_000
-"""Between two lines about strangers: a person at the log sees them come, a flood of them does not fill a disk."""
+"""Time between two log lines about strangers: a person at the log sees them come, but a flood does not fill a disk."""
 
 _DOMAIN: Final = b"tandemscan"
 
 _AT_ONCE: Final = 64
-"""Answers in one round of the poll loop: a crowd at the door must not hold up frames."""
+"""Answers per round of the poll loop. Many strangers must not hold up frames."""
 
 _ENVELOPE_BYTES: Final = 33
 """What CURVE adds to each part: command name 8, nonce 8, authenticator 16, flags 1 (RFC 26, "MESSAGE")."""
@@ -36,13 +36,13 @@ _ENVELOPE_BYTES: Final = 33
 
 @dataclass(slots=True)
 class Seldom:
-    """Says when a line that strangers can cause may be written."""
+    """Decides when to write a log line that strangers can cause."""
 
     count: int = 0
     _due_ns: int = 0
 
     def now(self, now_ns: int) -> bool:
-        """Count one more; whether to write of it.
+        """Count one more event; return whether to log it.
 
         Args:
             now_ns: CLOCK_MONOTONIC, ns.
@@ -55,14 +55,14 @@ class Seldom:
 
 
 class Guard:
-    """Lets peers in by their keys. Made before the first bind of the context's sockets.
+    """Lets peers in by their keys. Make it before the first bind of the context's sockets.
 
     Args:
-        context: of the sockets that it guards.
-        keys: where the known keys are; read again whenever the file has changed.
+        context: context of the sockets that it guards.
+        keys: folder with the known keys; read again whenever the file has changed.
 
     Raises:
-        DataError: the files of keys are bad.
+        DataError: the key files are bad.
         UnavailableError: they cannot be read.
     """
 
@@ -78,16 +78,16 @@ class Guard:
         self.socket.bind(zap.ENDPOINT)
 
     def knows_nobody(self) -> bool:
-        """Look whether no peer is known at all; of a file that is bad nothing is known."""
+        """Read the keys; return whether no peer is known at all. False if the file is bad, since it says nothing."""
         self._refresh()
         return self._is_sound and not self._names
 
     def knows(self, part: zmq.Frame) -> bool:
-        """Whether the sender of a message is still known: it may have been forgotten since it was let in."""
+        """Whether the sender of a message is still known. It may have been forgotten since it was let in."""
         return part.get("User-Id") in self._users
 
     def answer(self) -> None:
-        """Answer all who are at the door."""
+        """Answer everyone who asks to be let in."""
         for _ in range(_AT_ONCE):
             if not is_readable(self.socket):
                 return
@@ -104,7 +104,7 @@ class Guard:
             self.socket.send_multipart(zap.deny(request) if name is None else zap.allow(request, _user(request.key)))
 
     def _refresh(self) -> None:
-        """Read the known keys if their file has changed; while it is bad nobody is let in."""
+        """Read the known keys if their file has changed. While it is bad, nobody is let in."""
         state = self._keys.peers_state
         if state == self._state:
             return
@@ -118,7 +118,7 @@ class Guard:
 
 
 def secure_listener(sock: "zmq.Socket[bytes]", own: OwnKey) -> None:
-    """Let only holders of keys that the context's guard knows connect to a socket that is not bound yet."""
+    """Make a socket that is not bound yet accept only keys that the context's guard knows."""
     _allow_envelope(sock)
     sock.setsockopt(zmq.ZAP_DOMAIN, _DOMAIN)
     sock.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 1)  # without a guard nobody gets in, rather than everybody
@@ -127,7 +127,7 @@ def secure_listener(sock: "zmq.Socket[bytes]", own: OwnKey) -> None:
 
 
 def secure_dialler(sock: "zmq.Socket[bytes]", own: OwnKey, peer: Peer) -> None:
-    """Let a socket that is not connected yet talk to the holder of one key only."""
+    """Make a socket that is not connected yet talk only to the holder of one key."""
     _allow_envelope(sock)
     sock.setsockopt(zmq.CURVE_SERVERKEY, peer.key.encode())
     sock.setsockopt(zmq.CURVE_PUBLICKEY, own.public.encode())
@@ -135,7 +135,7 @@ def secure_dialler(sock: "zmq.Socket[bytes]", own: OwnKey, peer: Peer) -> None:
 
 
 def _allow_envelope(sock: "zmq.Socket[bytes]") -> None:
-    """Keep the limit of a message's size, set before, what it is without keys."""
+    """Raise the message size limit, set before, by what CURVE adds, so that it means the same as without keys."""
     limit_bytes = int(sock.getsockopt(zmq.MAXMSGSIZE))
     if limit_bytes >= 0:  # -1: there is none
         sock.setsockopt(zmq.MAXMSGSIZE, limit_bytes + _ENVELOPE_BYTES)
@@ -146,7 +146,7 @@ def _names(keys: KeyFolder) -> dict[bytes, str]:
 
 
 def _user(key: bytes) -> str:
-    """What stands for a peer in ZeroMQ's user ids; a name could pass to another key."""
+    """Identifies a peer in ZeroMQ's user ids. A name could pass to another key."""
     return z85.encode(key).decode()
 
 

@@ -1,7 +1,7 @@
 """One connection that this side dials over ZeroMQ: what becomes of it, and when it is dialled again.
 
-ZeroMQ itself dials again whenever a connection breaks, and no more once the peer has turned it away. Then this does, calmly: keys change, and a
-door that was open or secured by mistake is mended while we run.
+ZeroMQ itself redials whenever a connection breaks, but stops once the peer has turned it away. Then this module redials, slowly: keys change,
+and a link that was left open or secured by mistake may be corrected while we run.
 """
 
 import logging
@@ -18,7 +18,7 @@ from common.program.logs import event
 _LOG = logging.getLogger(__name__)
 
 REDIAL_NS: Final = 15_000_000_000
-"""Each refusal is a line in the board's log (curve.py writes one every ten seconds at most); who has just paired does not wait long."""
+"""Each refusal is a line in the board's log (curve.py writes one every ten seconds at most). A host that has just been paired does not wait long."""
 
 _NEVER: Final = 2**63 - 1
 _NOW: Final = int(zmq.DONTWAIT)
@@ -31,23 +31,23 @@ _WATCHED: Final = int(
     | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
 )
 _NEWS: Final = struct.Struct("=HI")
-"""A monitor's event and its value, zmq_socket_monitor(3); pyzmq's own reader would bring asyncio in."""
+"""A monitor's event and its value, zmq_socket_monitor(3). pyzmq's own reader would pull in asyncio."""
 
 _MECHANISM_MISMATCH: Final = 0x11000002
-"""ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH in zmq.h: one side wants keys, the other one does not."""
+"""ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH in zmq.h: one side requires keys, the other does not."""
 
 _HANG_UPS: Final = 5
-"""Handshakes that the peer may break off before it is told of: a board that restarts, or a port that is forwarded to nobody yet."""
+"""Handshakes that the peer may break off before this is reported: a restarting board, or a forwarded port with nothing behind it yet."""
 
 
 class Dialled:
     """A socket that connects to one address.
 
     Args:
-        sock: with its options set, not connected yet.
+        sock: a socket with its options set, not connected yet.
         address: `tcp://HOST:PORT` or `ipc://PATH`.
-        peer: name of who must answer; empty on an open link.
-        lane: for the log.
+        peer: name of the peer that must answer; empty on an open link.
+        lane: its lane, for the log.
 
     Raises:
         zmq.ZMQError: the address makes no sense.
@@ -56,14 +56,14 @@ class Dialled:
     def __init__(self, sock: "zmq.Socket[bytes]", address: str, peer: str, lane: str) -> None:
         self.socket = sock
         self.monitor = sock.get_monitor_socket(_WATCHED)
-        is_readable(self.monitor)  # its descriptor tells of news only behind a look that found none
+        is_readable(self.monitor)  # the descriptor signals news only after a look that found none
         self.due_ns = _NEVER
         self._address, self._peer, self._lane = address, peer, lane
         self._hang_ups = 0
         sock.connect(address)
 
     def redial(self, now_ns: int) -> None:
-        """Dial again, if that is due.
+        """Redial if that is due.
 
         Args:
             now_ns: CLOCK_MONOTONIC now, ns.
@@ -76,7 +76,7 @@ class Dialled:
         self.socket.connect(self._address)
 
     def hang_up(self, now_ns: int) -> None:
-        """Want nothing of who answers; dial again later, when it may be somebody else.
+        """Drop the peer that answered; redial later, when it may be a different one.
 
         Args:
             now_ns: CLOCK_MONOTONIC now, ns.
@@ -86,13 +86,13 @@ class Dialled:
             self.socket.disconnect(self._address)
 
     def broke(self, now_ns: int) -> bool:
-        """Take one piece of news; whether it says that the connection broke.
+        """Handle one monitor event; return whether it says that the connection broke.
 
         Args:
             now_ns: CLOCK_MONOTONIC now, ns.
 
         Raises:
-            UnavailableError: the peer has turned us away; it is dialled again later.
+            UnavailableError: the peer has turned us away; it will be redialled later.
         """
         kind, value = _NEWS.unpack(self.monitor.recv_multipart(_NOW)[0])
         match kind:

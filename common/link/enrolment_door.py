@@ -1,10 +1,10 @@
-"""Where a board takes in hosts that it does not know yet: the ports behind its secured links' own, open only while that is wanted.
+"""Where a board lets in hosts that it does not know yet: the ports after its secured links' own, open only while that is wanted.
 
-It is wanted while no host is known at all, and while the owner's `board-agent pair` asks for it over a socket in the folder of keys, which
-only the owner can reach. There is one door, one code and one account of tries for all links of a board. It understands nothing but the
-words of pairing; a stranger there gets one guess at a code, and costs a line in the log.
+The door is wanted while no host is known at all, and while the owner's `board-agent pair` asks for it. That command asks over a socket in the
+key folder, which only the owner can reach. All links of a board share one door, one code and one count of tries. It understands nothing but
+the words of pairing. A stranger gets one guess at a code there, and costs one line in the log.
 
-Rule: a code is told to that command and to nobody else. No line of the log holds one: more people read logs than may let a host in.
+Rule: only that command is told the code. No log line contains one: more people read logs than may let a host in.
 """
 
 import logging
@@ -36,10 +36,10 @@ _LOG = logging.getLogger(__name__)
 
 _NOW: Final = int(zmq.DONTWAIT)
 _LOOK_NS: Final = 1_000_000_000
-"""Between two looks at whether the door should be open."""
+"""Time between two checks whether the door should be open."""
 
 _OWNER_NS: Final = 3_000_000_000
-"""`board-agent pair` says that it is still there every half second; a moment after it has gone the door closes."""
+"""`board-agent pair` reports every half second that it is still there. The door closes a moment after it has gone."""
 
 _LAST_PORT: Final = 65535
 
@@ -52,11 +52,11 @@ class DoorState:
     """What `board-agent pair` is told.
 
     Attributes:
-        address: the links that this is the door of.
+        address: the links that this door belongs to.
         code: what to type on the host now.
-        asking: name of the host that has asked last; empty if none.
-        paired: name of the host that was taken in last since the command began; empty if none.
-        failed: attempts that came to nothing since then.
+        asking: name of the host that asked last; empty if none.
+        paired: name of the host that was let in last since the command began; empty if none.
+        failed: number of failed attempts since then.
         problem: why the door cannot be opened; empty if it is open.
     """
 
@@ -68,16 +68,16 @@ class DoorState:
     problem: str = ""
 
     def encode(self) -> bytes:
-        """Its bytes."""
+        """Encode the state."""
         packed: bytes = msgpack.packb(astuple(self))
         return packed
 
     @staticmethod
     def decode(packed: bytes) -> "DoorState":
-        """Read it. The owner's terminal shows it, whose service may have been taken over: nothing in it commands a terminal.
+        """Decode a state. The owner's terminal shows it, but the service may have been taken over, so nothing in it may control a terminal.
 
         Raises:
-            ProtocolError: it is none.
+            ProtocolError: these bytes are not a state.
         """
         try:
             fields = msgpack.unpackb(packed)
@@ -95,17 +95,17 @@ class DoorState:
 
 
 class Door:
-    """Takes in hosts.
+    """Lets in new hosts.
 
     Args:
-        context: of a link's sockets.
-        links: the secured links' addresses as they are bound, `tcp://ADDRESS:PORT`.
-        keys: the board's key; a host that has proved the code is added there.
-        guard: knows whether any host is known; it lets in the one that is added.
+        context: context of a link's sockets.
+        links: the secured links' bound addresses, `tcp://ADDRESS:PORT`.
+        keys: the board's keys; a host that has proved the code is added there.
+        guard: knows whether any host is known; it lets in the added one.
 
     Raises:
-        SettingsError: there is no port behind a link's own.
-        DataError: the files of keys are bad.
+        SettingsError: a link has no port after its own.
+        DataError: the key files are bad.
         UnavailableError: they cannot be used.
     """
 
@@ -119,7 +119,7 @@ class Door:
         self._callers = Callers(self._desk.is_proving)
         self._control = context.socket(zmq.ROUTER)
         self._control.setsockopt(zmq.LINGER, 0)
-        # Its name tells nobody anything and is short: a socket's path has 107 bytes (unix(7)), most of which the folder may take.
+        # The name reveals nothing and is short: a socket's path has 107 bytes (unix(7)), most of which the folder may take.
         self._bind_control(
             keys.path / f"{CONTROL_PREFIX}{sha256(_as_given(links[0]).encode()).hexdigest()[:_NAME_DIGITS]}"
         )
@@ -138,7 +138,7 @@ class Door:
         return self._callers, self._control
 
     def answer(self) -> None:
-        """Do all that is to be done now."""
+        """Do everything that is due now."""
         now_ns = now.monotonic_ns()
         if is_readable(self._control):
             self._hear_owner(now_ns)
@@ -156,7 +156,7 @@ class Door:
         self._callers.close()
 
     def _hear_owner(self, now_ns: int) -> None:
-        """Answer `board-agent pair`; it opens the door, and ends a pause when it comes."""
+        """Answer `board-agent pair`, which opens the door and, when it starts, ends a pause."""
         if now_ns >= self._owner_until_ns:
             self._desk.pardon()
             self._state = self._before
@@ -165,7 +165,7 @@ class Door:
         self._state = replace(self._state, code=code_text(self._desk.code(now_ns)) if self._is_open else "")
         while self._control.poll(0):
             connection = self._control.recv_multipart(_NOW)[0]
-            with suppress(zmq.ZMQError):  # gone already
+            with suppress(zmq.ZMQError):  # already gone
                 self._control.send_multipart([connection, self._state.encode()], _NOW)
 
     def _open_or_close(self, now_ns: int) -> None:
@@ -220,7 +220,7 @@ class Door:
                     assert_never(output)
 
     def _show(self, code: int, name: str, address: str, now_ns: int) -> None:
-        """Tell who asks: at once when the code is new, and seldom for who else asks."""
+        """Show the code to the owner's command and log who asks: at once if the code is new, rarely for further askers."""
         if self._askers.now(now_ns) or code != self._told_code:
             self._told_code = code
             self._state = replace(self._state, code=code_text(code), asking=name)
@@ -233,7 +233,7 @@ class Door:
             _LOG.error(event("pairing_not_kept", host=clean_name(host.name), problem=error))
             return False
         self._state = replace(self._state, code="", asking="", paired=peer.name)
-        self.due_ns = now.monotonic_ns() + _LOOK_NS  # the last word leaves first
+        self.due_ns = now.monotonic_ns() + _LOOK_NS  # let the last word leave first
         _LOG.info(event("paired", host=peer.name, address=address))
         return True
 
@@ -250,7 +250,7 @@ class Door:
 
 
 def pairing_address(link: str) -> tuple[str, int]:
-    """Where a secured link's board takes in new hosts: the port behind the link's own.
+    """Where a secured link's board lets in new hosts: the port after the link's own.
 
     Args:
         link: its address, `tcp://HOST:PORT`.
@@ -268,5 +268,5 @@ def pairing_address(link: str) -> tuple[str, int]:
 
 
 def _as_given(link: str) -> str:
-    """A bound link as people write it: every interface is a star."""
+    """A bound link as people write it: a star stands for all interfaces."""
     return link.replace("[::]", "*").replace("0.0.0.0", "*")  # noqa: S104 - only to show it

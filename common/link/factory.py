@@ -1,9 +1,9 @@
-"""Link URI to link, open or with keys. The registry of transports: each is imported when it is asked for.
+"""Opens the link that a URI names, with or without keys. The registry of transports: each is imported only when needed.
 
-Other packages' links are registered as entry points of the group `tandemscan.links`; the name is the URI's scheme, lower case. The entry point
-is a callable that takes one LinkRequest (in its `uri`: the address without options, who listens, the options), opens the link and gives a
-`common.link.base.Link`; for an address or option of no use it raises a SettingsError, for a device or port that cannot be had an
-UnavailableError. Who may connect is its own matter: our keys guard tcp alone.
+Other packages register links as entry points of the group `tandemscan.links`; the name is the URI's scheme in lower case. The entry point is
+a callable that takes one LinkRequest (its `uri` holds the address without options, who listens, and the options), opens the link and
+returns a `common.link.base.Link`. It raises a SettingsError for an unusable address or option, and an UnavailableError for a device or port that
+cannot be had. Who may connect is its own concern: our keys guard tcp only.
 """
 
 import logging
@@ -29,25 +29,25 @@ _TRANSPORTS: Final = {
 }
 
 _PACKAGES: Final = {"serial": "pyserial (apt: python3-serial)"}
-"""What a transport needs beside ZeroMQ."""
+"""What a transport needs besides ZeroMQ."""
 
 
 def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = False, waits: bool = False) -> Link:
-    """Open the link: with keys where tcp leaves this machine, or where the peer at an address is known.
+    """Open a link: with keys if tcp leaves this machine, or if the peer at an address is known.
 
     Args:
         uri: what to open.
-        keys: this machine's key and those that it trusts; None where only open links can be had.
-        board: whether this side is the board, which over tcp and ipc takes no images.
-        waits: whether a device that is missing is waited for.
+        keys: this machine's key and the keys it trusts; None if only open links are possible.
+        board: whether this side is the board, which accepts no images over tcp and ipc.
+        waits: whether to wait for a missing device.
 
     Returns:
-        The open link; a dialled peer may still be absent.
+        The open link. A dialled peer may still be absent.
 
     Raises:
-        SettingsError: the address makes no sense, or needs keys and there is no folder of them.
+        SettingsError: the address makes no sense, or needs keys and there is no key folder.
         UnavailableError: the port or path is taken, the device is missing, or the peer is not known.
-        DataError: the files of keys are bad.
+        DataError: the key files are bad.
     """
     request = LinkRequest(uri=uri, keys=keys, board=board, waits=waits)
     if uri.extension:
@@ -64,26 +64,26 @@ def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = Fals
 
 
 def tell_insecure(uri: LinkUri) -> None:
-    """Say in the log, at a program's start, that a link is open because its owner wants so."""
+    """Log, at a program's start, that a link is open because its owner asked for it."""
     if uri.insecure:
         _LOG.warning(event("link_insecure", address=uri.address, meaning="no keys: whoever reaches it sees the camera"))
 
 
 def open_links(uris: Sequence[LinkUri], keys: KeyFolder | None = None, *, board: bool = False) -> list[Link]:
-    """Open the links of one side. Of several, one whose device is missing is waited for as long as another is there.
+    """Open the links of one side. If one of several lacks its device, it waits for the device as long as another link is there.
 
     Args:
         uris: what to open.
         keys: as for `open_link`.
-        board: as for `open_link`; a board whose tcp links need keys also takes in new hosts that prove a code.
+        board: as for `open_link`. A board whose tcp links need keys also lets in new hosts that prove a code.
 
     Returns:
         The open links, in that order.
 
     Raises:
-        SettingsError: an address makes no sense, or a link uses the port on which another one's new hosts are taken in.
+        SettingsError: an address makes no sense, or a link uses the port on which another link lets in new hosts.
         UnavailableError: a port or path is taken, or every device is missing.
-        DataError: the files of keys are bad.
+        DataError: the key files are bad.
     """
     if board:
         _check_doors(uris)
@@ -114,7 +114,7 @@ def _has_door(uri: LinkUri) -> bool:
 
 
 def _check_doors(uris: Sequence[LinkUri]) -> None:
-    """Refuse a tcp link on the port behind a secured one's own."""
+    """Refuse a tcp link on the port right after a secured link's port: that one is for pairing."""
     places = {
         uri.address: uri.address.removeprefix("tcp://").rpartition(":") for uri in uris if "tcp://" in uri.address
     }
@@ -129,7 +129,7 @@ def _check_doors(uris: Sequence[LinkUri]) -> None:
 
 
 def _open_door(uris: Sequence[LinkUri], links: Sequence[Link], keys: KeyFolder) -> None:
-    """Have the first secured link take in new hosts for all of them."""
+    """Have the first secured link let in new hosts for all of them."""
     if not any(_has_door(uri) for uri in uris):
         return
     pairs = zip(uris, links, strict=True)

@@ -1,8 +1,8 @@
-"""Stops listening for a moment when connections have taken half of this process's file descriptors.
+"""Stops accepting connections for a moment once they have taken half of this process's file descriptors.
 
-ZeroMQ accepts whoever dials. Without a descriptor left it cannot accept, and cannot leave it either: its thread tries again without end and takes
-half of a core (decision 0023). So it never comes to that: from half of the limit on the kernel drops what asks for a new connection, and
-connections that are there go on. Nothing is closed: to unbind would end every connection that was accepted.
+ZeroMQ accepts whoever dials. Without a free descriptor it cannot accept, but does not stop trying: its thread retries endlessly and takes half a
+core (decision 0023). So it must not come to that. From half of the limit on, the kernel drops requests for new connections, while existing
+connections go on. Nothing is closed: unbinding would end every accepted connection.
 """
 
 import array
@@ -25,20 +25,20 @@ _LOG = logging.getLogger(__name__)
 
 _NEVER: Final = 2**63 - 1
 _REST_NS: Final = 2_000_000
-"""After somebody has dialled it is looked again after this time: of a flood each call would wake a board that has frames to send."""
+"""After someone has dialled, look again after this time. In a flood, each call would otherwise wake a board that has frames to send."""
 
 _LOOK_NS: Final = 100_000_000
-"""While shut it is looked this often whether there is room again; a dialler's kernel asks again after a second."""
+"""While shut, look this often whether there is room again. A dialler's kernel retries after a second."""
 
 _LEAST_LIMIT: Final = 128
-"""A board has some 30 descriptors of its own; of a smaller limit there is nothing to give away."""
+"""A board needs some 30 descriptors itself. A smaller limit leaves none to give away."""
 
 _ATTACH_FILTER: Final = 26
 _DETACH_FILTER: Final = 27
 """SO_ATTACH_FILTER and SO_DETACH_FILTER, socket(7), asm-generic/socket.h; Python has no names for them."""
 
 _DROP_ALL: Final = struct.pack("HBBI", 0x06, 0, 0, 0)
-"""One instruction, BPF_RET | BPF_K with 0: no byte of any packet is let through (linux/filter.h)."""
+"""One instruction, BPF_RET | BPF_K with 0: lets no byte of any packet through (linux/filter.h)."""
 
 _NEWS: Final = struct.Struct("=HI")
 """A monitor's event and its value, zmq_socket_monitor(3)."""
@@ -50,14 +50,14 @@ _NOW: Final = int(zmq.DONTWAIT)
 
 
 def bind(sock: "zmq.Socket[bytes]", address: str) -> "Gate | None":
-    """Bind a socket, and put a gate before it.
+    """Bind a socket and put a gate in front of it.
 
     Args:
-        sock: with its options set.
+        sock: a socket with its options set.
         address: `tcp://HOST:PORT` or `ipc://PATH`.
 
     Returns:
-        The gate; None for ipc, whose path only its owner can reach, and where the system has none of this.
+        The gate; None for ipc, whose path only its owner can reach, and where the system has no such filters.
 
     Raises:
         zmq.ZMQError: the address cannot be had.
@@ -76,10 +76,10 @@ def bind(sock: "zmq.Socket[bytes]", address: str) -> "Gate | None":
 
 
 class Gate:
-    """Watches over one listening TCP socket.
+    """Guards one listening TCP socket.
 
     Args:
-        listening: its descriptor, which stays its owner's.
+        listening: its descriptor, which stays the caller's.
     """
 
     def __init__(self, listening: int) -> None:
@@ -92,11 +92,11 @@ class Gate:
         self.due_ns = _NEVER
 
     def fileno(self) -> int:
-        """What to wait on: readable when somebody has dialled."""
+        """The descriptor to wait on: readable when someone has dialled."""
         return self._epoll.fileno()
 
     def watch(self) -> None:
-        """Shut or open, as there are descriptors; to be called when readable or due."""
+        """Shut or open the gate according to the free descriptors. Call this when readable or due."""
         now_ns = now.monotonic_ns()
         is_due = now_ns >= self.due_ns
         if not is_due and not self._epoll.poll(0):
@@ -114,7 +114,7 @@ class Gate:
             self.due_ns = now_ns + _REST_NS
 
     def close(self) -> None:
-        """Let go of it."""
+        """Release it."""
         self._epoll.close()
         self._socket.close()
 
@@ -124,23 +124,23 @@ class Gate:
             self._socket.setsockopt(socket.SOL_SOCKET, _ATTACH_FILTER, program)
             self._shut = True
             self._times += 1
-            if self._times.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: who floods must not fill the log
+            if self._times.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: a flood must not fill the log
                 _LOG.warning(event("too_many_connections", count=self._times, descriptors=limit))
 
     def _open_again(self) -> None:
-        """Open where enough connections have gone: ZeroMQ hangs up on one that says nothing for three seconds."""
+        """Open the gate once enough connections have gone. ZeroMQ hangs up on one that says nothing for three seconds."""
         if _used() < _limit() * 3 // 8:
             self._socket.setsockopt(socket.SOL_SOCKET, _DETACH_FILTER, 0)
             self._shut = False
 
 
 def _limit() -> int:
-    """Descriptors that this process may have."""
+    """How many descriptors this process may have."""
     return os.sysconf("SC_OPEN_MAX")
 
 
 def _used() -> int:
-    """Descriptors that it has; the limit where there is none left to look with."""
+    """How many descriptors this process has; the limit if none is left to look with."""
     try:
         return sum(1 for _ in Path("/proc/self/fd").iterdir())
     except OSError:
@@ -148,7 +148,7 @@ def _used() -> int:
 
 
 def _lowest_free(sock: socket.socket) -> int:
-    """Number of the next descriptor that this process gets: it has so many at least. The limit where there is none left."""
+    """Number of the next descriptor that this process gets, so it has at least that many. The limit if none is left."""
     try:
         number = os.dup(sock.fileno())
     except OSError:

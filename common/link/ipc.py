@@ -1,10 +1,10 @@
-"""Whose an ipc path is: the folder in which its socket lies, the socket, and the process behind it.
+"""Who owns an ipc path: the folder in which its socket lies, the socket, and the process behind it.
 
-What is kept: who listens does so only in a folder in which nobody else may put his socket in place of this one (it has mode 0600: others than
-its owner and root cannot connect). Who dials believes no packet of another user's process, whatever lies under the path by then: the kernel
-says whose process it is (SO_PEERCRED, which ZeroMQ gives with each message). What is not kept: in a folder such as /tmp anybody may take a free
-name first, which is told; processes of the same user, and root's, are not told apart; and a stranger who listens there hears that somebody
-greets a board, which holds no secret. Where the kernel does not say (not Linux) owner and folder of the socket at the start must do.
+Guaranteed: the listener listens only in a folder in which nobody else can replace its socket. That socket has mode 0600, so only its owner
+and root can connect. The dialler believes no packet from another user's process, whatever lies under the path by then: the kernel says whose
+process it is (SO_PEERCRED, which ZeroMQ delivers with each message). Not guaranteed: in a folder such as /tmp anybody may take a free name
+first, which is reported. Processes of the same user, and root's, are not distinguished. A stranger who listens there learns that somebody
+greets a board, which is no secret. Where the kernel does not say (not Linux), the owner and folder of the socket at the start must suffice.
 """
 
 import os
@@ -20,7 +20,7 @@ from common.files import is_open_to_others
 
 
 def trusted_users(owner: str) -> frozenset[int]:
-    """Who may be at the other end of an ipc link, by number: this user, root, and whom the link's `owner=` names.
+    """User ids that may be at the other end of an ipc link: this user, root, and the user named by the link's `owner=`.
 
     Args:
         owner: name or number of a user; empty for none.
@@ -40,17 +40,17 @@ def trusted_users(owner: str) -> frozenset[int]:
 
 
 def check_folder(path: str, trusted: frozenset[int]) -> None:
-    """Refuse a path in a folder in which somebody else may exchange what lies there.
+    """Refuse a path in a folder in which somebody else could replace what lies there.
 
     Args:
-        path: of the socket, which need not be there.
-        trusted: who may.
+        path: path of the socket, which need not exist.
+        trusted: users who may.
 
     Raises:
-        UnavailableError: the folder is another's, or others may write to it and it is not sticky.
+        UnavailableError: the folder belongs to someone else, or others may write to it and it is not sticky.
     """
     folder = Path(path).parent
-    with suppress(OSError):  # one that is not there yet is another's error
+    with suppress(OSError):  # a missing folder is reported elsewhere
         status = folder.stat()
         if status.st_uid not in trusted:
             raise _refused(path, f"{folder} belongs to {_name(status.st_uid)}", status.st_uid)
@@ -62,14 +62,14 @@ def check_folder(path: str, trusted: frozenset[int]) -> None:
 
 
 def check_socket(path: str, trusted: frozenset[int]) -> None:
-    """Refuse a socket that is another user's, or that lies where one may put his.
+    """Refuse a socket that belongs to another user, or that lies where another user could put one.
 
     Args:
-        path: of the socket, which need not be there.
-        trusted: who may own it.
+        path: path of the socket, which need not exist.
+        trusted: users who may own it.
 
     Raises:
-        UnavailableError: it is.
+        UnavailableError: it does.
     """
     check_folder(path, trusted)
     with suppress(OSError):
@@ -84,18 +84,18 @@ def check_socket(path: str, trusted: frozenset[int]) -> None:
 
 
 def check_peer(path: str, message: zmq.Frame, trusted: frozenset[int]) -> None:
-    """Refuse a message of another user's process.
+    """Refuse a message from another user's process.
 
     Args:
-        path: of the socket.
-        message: any part of what has come in.
-        trusted: whose messages are believed.
+        path: path of the socket.
+        message: any part of the received message.
+        trusted: users whose messages are believed.
 
     Raises:
         UnavailableError: it is a stranger's.
     """
     try:
-        # libzmq, stream_engine_base.cpp: the address, then ":uid:gid:pid" where the system has SO_PEERCRED. A peer's own properties come after it.
+        # libzmq, stream_engine_base.cpp: the address, then ":uid:gid:pid" where the system has SO_PEERCRED. A peer's own properties follow it.
         uid = int(str(message.get("Peer-Address")).split(":")[-3])
     except (zmq.ZMQError, ValueError, IndexError):
         return
@@ -104,10 +104,10 @@ def check_peer(path: str, message: zmq.Frame, trusted: frozenset[int]) -> None:
 
 
 def let_in(path: str, owner: str) -> None:
-    """Give a socket that was just bound to the user who is to connect to it; it stays closed to all others but root.
+    """Give a newly bound socket to the user who is to connect to it. It stays closed to everyone else except root.
 
     Args:
-        path: of the socket.
+        path: path of the socket.
         owner: name or number of the user.
 
     Raises:
@@ -125,7 +125,7 @@ def let_in(path: str, owner: str) -> None:
 
 
 def owner_of(path: str) -> str:
-    """Whose something is, for people."""
+    """Name of a path's owner, for people."""
     try:
         return _name(os.lstat(path).st_uid)
     except OSError:

@@ -1,4 +1,4 @@
-"""The folder for sockets where nobody names one. Apart from `ipc`: `tempfile` is slow to load, and no board needs it."""
+"""The default folder for sockets. Separate from `ipc` because `tempfile` is slow to load and no board needs it."""
 
 import os
 import stat
@@ -12,13 +12,13 @@ from common.link.ipc import owner_of
 
 
 def runtime_folder(environment: Mapping[str, str]) -> Path:
-    """A folder of this user's alone for sockets: $XDG_RUNTIME_DIR, else one in the folder of temporary files.
+    """A folder for sockets that belongs to this user alone: $XDG_RUNTIME_DIR, else one in the folder of temporary files.
 
     Args:
-        environment: of the process.
+        environment: environment of the process.
 
     Raises:
-        UnavailableError: there is none, and somebody else's lies where it would be made.
+        UnavailableError: there is none, and somebody else's folder lies where it would be made.
     """
     given = Path(environment.get("XDG_RUNTIME_DIR", ""))
     with suppress(OSError):

@@ -1,4 +1,4 @@
-"""The side of an RFCOMM link that dials: it asks the peer for its channel, connects, and dials again for ever."""
+"""The dialling side of an RFCOMM link: it asks the peer for its channel, connects, and redials for ever."""
 
 import errno
 import logging
@@ -38,13 +38,13 @@ class _Progress(Enum):
 
 
 class _Dialling:
-    """Opens the dialler's line, a step at each call: ask the peer for the channel if none was given, connect.
+    """Opens the dialler's line, one step per call: ask the peer for the channel if none was given, then connect.
 
     Args:
         uri: as the user named it, for messages.
-        address: the peer's.
-        channel: 0: to be asked for.
-        unpaired: whether a peer will do that was never paired with.
+        address: the peer's address.
+        channel: the peer's channel; 0: ask for it.
+        unpaired: whether a peer that was never paired will do.
     """
 
     def __init__(self, uri: str, address: str, channel: int, *, unpaired: bool) -> None:
@@ -56,7 +56,7 @@ class _Dialling:
         self._problem = ""
 
     def __call__(self) -> RfcommLine | Opening:
-        """Go on as far as it goes now."""
+        """Go as far as possible now."""
         try:
             return self._step()
         except OSError as error:
@@ -70,7 +70,7 @@ class _Dialling:
             return Opening()
 
     def close(self) -> None:
-        """Let go of what is half open."""
+        """Release what is half open."""
         if self._socket is not None:
             self._socket.close()
         self._socket, self._progress = None, _Progress.IDLE
@@ -125,17 +125,17 @@ class _Dialling:
 
 
 class RfcommDialler(StreamLink):
-    """The side that dials; it dials again for ever.
+    """The dialling side; it redials for ever.
 
     Args:
         uri: as the user named it, for messages.
         device: address or name of the peer.
-        channel: 0: to be asked for.
-        unpaired: whether a peer will do that was never paired with.
-        waits: whether an adapter that is missing is waited for.
+        channel: the peer's channel; 0: ask for it.
+        unpaired: whether a peer that was never paired will do.
+        waits: whether to wait for a missing adapter.
 
     Raises:
-        UnavailableError: this machine has no working Bluetooth (MissingDeviceError where it lacks only the adapter), or nobody is known by that name.
+        UnavailableError: this machine has no working Bluetooth (MissingDeviceError if it lacks only the adapter), or no device has that name.
     """
 
     def __init__(self, uri: str, device: str, channel: int, *, unpaired: bool, waits: bool = False) -> None:
@@ -146,7 +146,7 @@ class RfcommDialler(StreamLink):
         super().__init__("rfcomm", LinkEnd.DIALLER, self._dialling, FRAME_BYTES, waits=waits)
 
     def close(self) -> None:
-        """Give what was handed over half a second to leave, say goodbye, hang up."""
+        """Give accepted packets half a second to leave, say goodbye, hang up."""
         super().close()
         self._dialling.close()
 
@@ -158,17 +158,17 @@ def _address_of(name: str) -> str:
 
 
 def _undialled(uri: str, error: OSError, *, published: bool) -> UnavailableError:
-    """Put what became of a call into one line with the remedy.
+    """Turn the failure of a call into a one-line error with its remedy.
 
     Args:
         uri: as the user named it.
-        error: what the kernel says.
-        published: whether the peer has just named the channel, so that the service is there.
+        error: the kernel's error.
+        published: whether the peer has just named the channel, so that the service exists.
     """
     problem = f"{uri} cannot be reached ({error.strerror})"
     if error.errno in OWN_ADAPTER:
         return UnavailableError(problem, "switch Bluetooth on: bluetoothctl power on")
-    # A connection that is there already when encryption fails, as it is after asking for the channel, is told as refused (rfcomm/core.c).
+    # If a connection exists already when encryption fails, as after asking for the channel, it is reported as refused (rfcomm/core.c).
     if error.errno in _NOT_PAIRED or (error.errno == errno.ECONNREFUSED and published):
         return UnavailableError(problem, "pair the two devices with bluetoothctl")
     if error.errno == errno.ECONNREFUSED:

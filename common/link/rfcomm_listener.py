@@ -1,7 +1,7 @@
-"""The side of an RFCOMM link that listens, for several hosts if need be.
+"""The listening side of an RFCOMM link, for several hosts if need be.
 
-It has one `StreamLink` for each device that dials, so a second host is answered (and told that the board is busy), and a host that went out of
-reach does not keep the next one out. What belongs to one adapter may vanish with it and come back at any time; the listening socket outlives it.
+It has one `StreamLink` per dialling device. So a second host gets an answer (that the board is busy), and a host that went out of reach does not
+block the next one. What belongs to one adapter may vanish with it and come back at any time; the listening socket outlives it.
 """
 
 import errno
@@ -31,7 +31,7 @@ _NEVER: Final = 2**63 - 1
 _ANY_ADAPTER: Final = "00:00:00:00:00:00"
 _BACKLOG: Final = 4
 _MOST_HOSTS: Final = 7
-"""A piconet has seven seats."""
+"""A piconet has seven places."""
 
 
 class RfcommListener:
@@ -40,12 +40,12 @@ class RfcommListener:
     Args:
         uri: as the user named it, for messages.
         adapter: address of one of this machine's adapters, or ANYONE.
-        channel: 0: the default.
-        unpaired: whether devices may dial that were never paired with.
-        waits: whether an adapter that is missing is waited for: who listens everywhere hears it when it comes.
+        channel: channel to listen on; 0: the default.
+        unpaired: whether devices that were never paired may dial.
+        waits: whether to wait for a missing adapter. A listener on all adapters hears one as soon as it comes.
 
     Raises:
-        UnavailableError: this machine has no Bluetooth (MissingDeviceError where it lacks only the adapter), or the channel is taken.
+        UnavailableError: this machine has no Bluetooth (MissingDeviceError if it lacks only the adapter), or the channel is taken.
     """
 
     kind: Final = "rfcomm"
@@ -80,21 +80,21 @@ class RfcommListener:
 
     @property
     def pollables(self) -> Sequence[select.epoll]:
-        """One epoll descriptor over all."""
+        """One epoll descriptor for everything."""
         return (self._epoll,)
 
     @property
     def due_ns(self) -> int:
-        """When `receive` wants to be called next even if nothing is readable, by this machine's steady clock, ns."""
+        """When `receive` must be called next even if nothing is readable, by this machine's steady clock, ns."""
         return min((stream.due_ns for stream in self._streams.values()), default=_NEVER)
 
     def ready(self, connection: bytes) -> bool:
-        """Whether a frame would be taken now, or is to be tried because the connection is gone."""
+        """Whether to send a frame now: it would be accepted, or the connection is gone and `send` will say so."""
         stream, name = self._find(connection)
         return stream is None or stream.ready(name)
 
     def receive(self) -> Iterator[Incoming]:
-        """Give all packets that have come in; take in who dials, forget who has gone."""
+        """Return all packets that have arrived; accept devices that dial, forget those that have gone."""
         self._accept()
         for prefix, stream in list(self._streams.items()):
             for incoming in stream.receive():
@@ -109,12 +109,12 @@ class RfcommListener:
                 self._forget(prefix)
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
-        """Hand a packet over, without waiting."""
+        """Send a packet, without waiting."""
         stream, name = self._find(connection)
         return SendResult.UNREACHABLE if stream is None else stream.send(name, header, payload)
 
     def close(self) -> None:
-        """Give what was handed over half a second to leave, say goodbye, hang up."""
+        """Give accepted packets half a second to leave, say goodbye, hang up."""
         self._record.close()
         self._listening.close()
         for prefix in list(self._streams):
@@ -129,7 +129,7 @@ class RfcommListener:
         while True:
             try:
                 accepted, _ = self._listening.accept()
-            except OSError:  # nobody, or gone already
+            except OSError:  # nobody, or already gone
                 return
             if len(self._streams) >= _MOST_HOSTS:
                 accepted.close()
@@ -146,7 +146,7 @@ class RfcommListener:
 
 
 def _once(line: RfcommLine) -> Callable[[], RfcommLine]:
-    """A line that is there now and cannot be opened again."""
+    """A line that is there now and cannot be reopened."""
     lines = [line]
 
     def opened() -> RfcommLine:

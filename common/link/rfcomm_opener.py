@@ -16,7 +16,7 @@ def open_rfcomm(request: LinkRequest) -> RfcommDialler | RfcommListener:
         request: what to open; the address is `rfcomm://DEVICE[/CHANNEL]`.
 
     Raises:
-        SettingsError: there is no device to dial, or something to listen on that is no adapter's address.
+        SettingsError: no device to dial was given, or the listening address is not an adapter's.
         UnavailableError: Bluetooth or the adapter cannot be had.
     """
     uri = request.uri

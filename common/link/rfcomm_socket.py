@@ -1,4 +1,4 @@
-"""Bluetooth sockets of the kernel: made, secured, and what this machine must have for them."""
+"""The kernel's Bluetooth sockets: made, secured, and what this machine needs for them."""
 
 import errno
 import socket
@@ -12,24 +12,24 @@ from common.errors import MissingDeviceError, UnavailableError
 
 ANYONE: Final = "*"
 DEFAULT_CHANNEL: Final = 1
-"""Where a listener is that could not publish its channel."""
+"""The channel of a listener that could not publish its channel."""
 
 FRAME_BYTES: Final = 1008
-"""Linux's RFCOMM fills frames of at most 1013 - 5 bytes (net/bluetooth/rfcomm.h, core.c); what a socket's peer has agreed to cannot be asked for.
-Whole, halved and in thirds such frames also fill the radio's packets (3-DH5, 3-DH3, 2-DH3)."""
+"""Linux's RFCOMM fills frames of at most 1013 - 5 bytes (net/bluetooth/rfcomm.h, core.c); the size agreed with a socket's peer cannot be queried.
+Whole, halved and in thirds, such frames also fill the radio's packets (3-DH5, 3-DH3, 2-DH3)."""
 
 _ADAPTERS: Final = Path("/sys/class/bluetooth")
 _SOL_BLUETOOTH, _BT_SECURITY = 274, 4
 _LEVEL_LOW, _LEVEL_MEDIUM = 1, 2
-"""include/net/bluetooth/bluetooth.h: low asks for nothing; medium for encryption, which takes pairing."""
+"""include/net/bluetooth/bluetooth.h: low requires nothing; medium requires encryption, which takes pairing."""
 
 _NO_BLUETOOTH: Final = {errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT, errno.ESOCKTNOSUPPORT}
 OWN_ADAPTER: Final = {errno.EHOSTUNREACH, errno.ENETDOWN, errno.ENODEV}
-"""What the kernel says when this machine's own adapter is off or gone."""
+"""The kernel's errors when this machine's own adapter is off or gone."""
 
 
 class SocketKind(Enum):
-    """Type and protocol of a socket; numbers of the kernel, as a Python without Bluetooth has no names for them."""
+    """Type and protocol of a socket, as kernel numbers: a Python without Bluetooth has no names for them."""
 
     L2CAP = (socket.SOCK_SEQPACKET, 0)
     RFCOMM = (socket.SOCK_STREAM, 3)
@@ -37,10 +37,10 @@ class SocketKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class RfcommLine:
-    """A connected socket, as a `StreamLink` takes it.
+    """A connected socket, in the form that a `StreamLink` takes.
 
     Attributes:
-        connected: non-blocking.
+        connected: the socket, non-blocking.
     """
 
     connected: socket.socket
@@ -50,11 +50,11 @@ class RfcommLine:
         return self.connected.fileno()
 
     def is_drained(self) -> bool:
-        """The kernel sends what was written before it closes."""
+        """Always true: the kernel sends what was written before it closes."""
         return True
 
     def discard_output(self) -> None:
-        """It cannot be taken back."""
+        """Do nothing: written bytes cannot be taken back."""
 
     def close(self) -> None:
         """Hang up."""
@@ -65,10 +65,10 @@ def new_socket(kind: SocketKind) -> socket.socket:
     """Make a non-blocking socket.
 
     Args:
-        kind: what is spoken over it.
+        kind: its protocol.
 
     Raises:
-        UnavailableError: Python or the system has none.
+        UnavailableError: Python or the system does not support it.
     """
     if not hasattr(socket, "AF_BLUETOOTH"):
         raise UnavailableError(
@@ -85,11 +85,11 @@ def new_socket(kind: SocketKind) -> socket.socket:
 
 
 def secure(made: socket.socket, *, unpaired: bool) -> None:
-    """Say what a connection must have: nothing, or the encryption that comes with pairing.
+    """Set what a connection requires: nothing, or the encryption that comes with pairing.
 
     Args:
         made: a socket that is neither connected nor listening yet.
-        unpaired: whether nothing is asked for.
+        unpaired: whether nothing is required.
 
     Raises:
         OSError: the kernel refuses.
@@ -98,13 +98,13 @@ def secure(made: socket.socket, *, unpaired: bool) -> None:
 
 
 def check_adapter(uri: str) -> None:
-    """See that this machine has an adapter at all; one that is switched off is found out by dialling.
+    """Check that this machine has an adapter at all. One that is switched off shows only when dialling.
 
     Args:
         uri: as the user named it, for messages.
 
     Raises:
-        UnavailableError: neither Python nor the kernel has Bluetooth (MissingDeviceError where only the adapter is missing).
+        UnavailableError: Python or the kernel lacks Bluetooth (MissingDeviceError if only the adapter is missing).
     """
     new_socket(SocketKind.RFCOMM).close()  # Python and kernel first
     if not any(_ADAPTERS.glob("hci*")):

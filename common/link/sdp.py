@@ -1,4 +1,4 @@
-"""The service's record in Bluetooth's directory of services (SDP): what it says, and how a host asks for it. Sans-I/O.
+"""The service's record in Bluetooth's service directory (SDP): its content, and how a host queries it. Sans-I/O.
 
 Source: Bluetooth Core Specification 5.3, volume 3, part B: data elements (3), ServiceSearchAttribute transaction (4.7).
 """
@@ -9,10 +9,10 @@ from typing import Final
 from uuid import UUID
 
 SERVICE_UUID: Final = UUID("958f2ccd-1c03-4718-99d0-a289a96d3de9")
-"""Ours, drawn at random once and for ever: boards and hosts of all versions know each other by it."""
+"""Ours: drawn at random once and for ever. Boards and hosts of all versions recognise each other by it."""
 
 PSM: Final = 1
-"""Where every Bluetooth device answers such questions (L2CAP)."""
+"""Where every Bluetooth device answers such queries (L2CAP)."""
 
 _RFCOMM: Final = 0x0003
 _PROTOCOL_DESCRIPTORS: Final = 0x0004
@@ -23,7 +23,7 @@ _MAX_CHANNEL: Final = 30
 
 
 def record_xml(channel: int) -> str:
-    """Give the record of a service on an RFCOMM channel as BlueZ takes it: class, protocols, public, name."""
+    """Return the record of a service on an RFCOMM channel in BlueZ's format: class, protocols, public, name."""
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <record>
 <attribute id="0x0001"><sequence><uuid value="{SERVICE_UUID}"/></sequence></attribute>
@@ -37,10 +37,10 @@ def record_xml(channel: int) -> str:
 
 
 def query() -> bytes:
-    """Give the question: the protocols of every record of our class."""
+    """Return the query for the protocols of every record of our class."""
     search = b"\x35\x11\x1c" + SERVICE_UUID.bytes  # a sequence of 17 bytes: one UUID of 128 bits
     wanted = b"\x35\x03\x09" + struct.pack(">H", _PROTOCOL_DESCRIPTORS)  # a sequence of 3 bytes: one attribute id
-    parameters = search + struct.pack(">H", 0xFFFF) + wanted + b"\0"  # as long as it likes, from the beginning
+    parameters = search + struct.pack(">H", 0xFFFF) + wanted + b"\0"  # an answer of any length, from the beginning
     return _HEADER.pack(_REQUEST, 1, len(parameters)) + parameters
 
 
@@ -48,10 +48,10 @@ def channel_in(answer: bytes) -> int:
     """Find the RFCOMM channel in the answer.
 
     Args:
-        answer: what came, as it is; a peer may say anything.
+        answer: the raw answer; a peer may send anything.
 
     Returns:
-        The channel; 0: the peer has no such service.
+        The channel; 0 if the peer has no such service.
     """
     if len(answer) < _HEADER.size + 2 or answer[0] != _RESPONSE:
         return 0
@@ -64,7 +64,7 @@ def channel_in(answer: bytes) -> int:
 
 
 def _find(data: bytes, depth: int) -> int:
-    """Look through nested sequences for one that is the UUID of RFCOMM and a number."""
+    """Search nested sequences for one that holds the UUID of RFCOMM and a number."""
     elements = _elements(data)
     for (kind, value), (next_kind, following) in pairwise(elements):
         if kind == _UUID and next_kind == _UINT and int.from_bytes(value[:4], "big") == _RFCOMM:

@@ -1,4 +1,4 @@
-"""Serial lines: USB gadget (ttyGS, ttyACM), adapters and real UARTs, pseudo terminals. pyserial opens the port and sets its speed."""
+"""Serial lines: USB gadget (ttyGS, ttyACM), adapters, real UARTs and pseudo terminals. pyserial opens the port and sets its speed."""
 
 import errno
 import fcntl
@@ -25,15 +25,15 @@ _GONE: Final = {errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO}
 _TAKEN: Final = {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}
 
 _QUIET_MS: Final = 5
-"""So long nothing comes when a driver has handed on all that it holds."""
+"""When nothing comes for this long, a driver has passed on everything that it holds."""
 
 _DISCARDED_BYTES: Final = 64 * 1024
 _MOST_DISCARDED: Final = 1000
-"""Reads; each gives 4 KB at most where a tty holds no more. A peer that talks for ever is not listened to for ever."""
+"""Reads; each returns at most 4 KB unless a tty holds more. A peer that never stops talking is not listened to for ever."""
 
 
 class SerialLine:
-    """An opened serial port in raw mode, for this process alone.
+    """A serial port opened in raw mode, exclusively for this process.
 
     Args:
         path: the device.
@@ -59,22 +59,22 @@ class SerialLine:
         return self._fd
 
     def is_drained(self) -> bool:
-        """Whether the driver holds nothing more, as far as it says (an adapter may still do)."""
+        """Whether the driver holds nothing more, as far as it says (an adapter still may)."""
         with suppress(OSError):
             waiting: bytes = fcntl.ioctl(self._fd, termios.TIOCOUTQ, bytes(4))
             return not any(waiting)
         return True
 
     def discard_output(self) -> None:
-        """Throw away what the driver has not sent yet."""
+        """Discard what the driver has not sent yet."""
         with suppress(termios.error):
             termios.tcflush(self._fd, termios.TCOFLUSH)
 
     def close(self) -> None:
-        """Close; what has not left is thrown away, because a UART's close may wait for it for half a minute.
+        """Close the port. Unsent bytes are discarded, because a UART's close may wait half a minute for them.
 
-        So is what has come and was not read: a gadget's port that is closed while it holds the host back never hears it again (Linux 6.1,
-        drivers/usb/gadget/function/u_serial.c: only reading lets it take more, and there is nothing left to be read).
+        Unread bytes are read and discarded too. A gadget's port that is closed while it holds the host back never receives from it again (Linux 6.1,
+        drivers/usb/gadget/function/u_serial.c: only reading makes it accept more, and then there is nothing left to read).
         """
         if not self.is_drained():
             self.discard_output()
@@ -83,7 +83,7 @@ class SerialLine:
             self._port.close()
 
     def _discard_input(self) -> None:
-        """Read until nothing more comes: to throw away what is there (tcflush) would let in as much again."""
+        """Read until nothing more comes. Flushing (tcflush) would only make room for as much again."""
         poll = select.poll()
         poll.register(self._fd, select.POLLIN)
         with suppress(OSError):
@@ -99,10 +99,10 @@ class SerialLink(StreamLink):
         path: the device.
         baud: speed, for ports that have one.
         listens: whether this side plays the listener.
-        waits: whether a device that cannot be had now is waited for.
+        waits: whether to wait for a device that cannot be had now.
 
     Raises:
-        UnavailableError: the device cannot be had; MissingDeviceError where it is not there.
+        UnavailableError: the device cannot be had; MissingDeviceError if it does not exist.
     """
 
     def __init__(self, path: str, baud: int, *, listens: bool, waits: bool = False) -> None:
@@ -117,7 +117,7 @@ def open_serial(request: LinkRequest) -> SerialLink:
         request: what to open; the address is `serial:DEVICE`.
 
     Raises:
-        UnavailableError: the device cannot be had; MissingDeviceError where it is not there.
+        UnavailableError: the device cannot be had; MissingDeviceError if it does not exist.
     """
     uri = request.uri
     path = uri.address.removeprefix("serial:")
@@ -125,9 +125,9 @@ def open_serial(request: LinkRequest) -> SerialLink:
 
 
 def _make_raw(descriptor: int) -> None:
-    """Set what pyserial leaves: no break handling, and a read that tells "nothing there" (EAGAIN) from "line lost" (b"").
+    """Set what pyserial leaves: no break handling, and reads that distinguish "nothing there" (EAGAIN) from "line lost" (b"").
 
-    With VMIN 0 and VTIME 0 a read returns 0 bytes in both cases (termios(3), non-canonical mode).
+    With VMIN 0 and VTIME 0, a read returns 0 bytes in both cases (termios(3), non-canonical mode).
     """
     attributes = termios.tcgetattr(descriptor)
     input_off = termios.BRKINT | termios.PARMRK | termios.ISTRIP | termios.INLCR | termios.IGNCR | termios.ICRNL
@@ -141,7 +141,7 @@ def _make_raw(descriptor: int) -> None:
 
 
 def _explained(path: str, error: Exception) -> UnavailableError:
-    """Put what is wrong with a port into one line with the remedy."""
+    """Turn a problem with a port into a one-line error with its remedy."""
     number = getattr(error, "errno", None)
     problem = f"serial:{path} cannot be opened ({os.strerror(number) if number else error})"
     if number in _TAKEN:
@@ -162,7 +162,7 @@ def _group(path: str) -> str:
 
 
 def _others(path: str) -> str:
-    """The serial ports that are there, as a hint."""
+    """The serial ports that exist, as a hint."""
     if sys.platform != "linux":  # list_ports raises ImportError on systems that it does not know, Android among them
         return ""
     from serial.tools import list_ports  # noqa: PLC0415 - ImportError where its platform is unknown

@@ -1,7 +1,8 @@
 """All links of one side as one source of packets.
 
-Rule: a link whose peer turns this side away (a key that it does not know) is done without while there is another, and named once; it dials again by
-itself, and a word that comes over it makes it like the others. While all are turned away the last one's refusal is everybody's.
+Rule: a link may be refused because its peer does not know this side's key. If another link remains, the session goes on without the refused
+one, which is reported once. It redials by itself, and once a packet comes over it, it counts again like the others. If all links are
+refused, the last refusal is raised for all of them.
 """
 
 import logging
@@ -15,7 +16,7 @@ _LOG = logging.getLogger(__name__)
 
 
 class SeveralLinks:
-    """Receives from links, in their order.
+    """Receives from several links, in their order.
 
     Args:
         links: open links; closed by their owner.
@@ -26,7 +27,7 @@ class SeveralLinks:
         self._refused: set[int] = set()
 
     def receive(self) -> Iterator[tuple[int, Incoming]]:
-        """Give all that has come in, without waiting, each with its link's number.
+        """Return everything that has arrived, without waiting, each item with its link's number.
 
         Raises:
             UnavailableError: every link has been refused.
@@ -42,7 +43,7 @@ class SeveralLinks:
                 self._refused.add(number)
                 if len(self._refused) == len(self._links):
                     raise
-                if is_news:  # each lane of a link is refused by itself
+                if is_news:  # each lane of a link is refused separately
                     _LOG.warning(event("link_refused", link=link.kind, problem=error.problem, remedy=error.remedy))
                 for connection in link.dialled.values():
                     yield number, Broken(connection)

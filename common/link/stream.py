@@ -1,9 +1,9 @@
-"""A link over one byte stream that may lose and spoil bytes: both lanes share it, as `common.protocol.duplex` says.
+"""A link over one byte stream that may lose and corrupt bytes. Both lanes share it, as `common.protocol.duplex` describes.
 
-A wire has no dialler: both sides open their end, one plays the dialler, and they meet by words of their own; so a peer's restart makes new
-connections here as it does elsewhere. The pollable is an epoll descriptor, which stays the same when the device goes and comes back, and which
-wakes for room to write only while bytes wait for it. Nothing here blocks. A link moves only when its owner calls it: on `receive`, on
-`send`, and when `due_ns` has come.
+A wire has no dialler. Both sides open their end, one plays the dialler, and they meet by an exchange of contact words. So a peer's restart
+makes new connections here, as on other links. The pollable is an epoll descriptor. It stays the same when the device goes and comes back,
+and it wakes for room to write only while bytes are waiting. Nothing here blocks. A link moves only when its owner calls it: `receive`,
+`send`, and whatever is due at `due_ns`.
 """
 
 import os
@@ -29,10 +29,10 @@ _NEVER: Final = 2**63 - 1
 
 _READ_BYTES: Final = 64 * 1024
 _READS: Final = 16
-"""Reads at one go: what a pty gives in pages of 4 KB then is one acknowledgement, and others get their turn."""
+"""Reads in one go. A pty delivers pages of 4 KB, which thus cost only one acknowledgement, and other links get their turn."""
 
 _REOPEN_NS: Final = 100 * _MS
-"""A device that comes back is met within this time; looking for a node that is not there costs 20 us."""
+"""A device that comes back is found within this time. Looking for a missing node costs 20 us."""
 
 _LINGER_NS: Final = 500 * _MS
 _LINGER_STEP_S: Final = 0.01
@@ -42,16 +42,16 @@ class Line(Protocol):
     """One opened end of a byte stream."""
 
     def fileno(self) -> int:
-        """Its descriptor, non-blocking; a read gives b"" only when the line is lost."""
+        """Its descriptor, non-blocking. A read returns b"" only when the line is lost."""
 
     def is_drained(self) -> bool:
-        """Whether the system has passed on all that was written, as far as it knows."""
+        """Whether the system has passed on everything that was written, as far as it knows."""
 
     def discard_output(self) -> None:
-        """Throw away what was written and has not left yet."""
+        """Discard what was written and has not left yet."""
 
     def close(self) -> None:
-        """Let go of it without waiting."""
+        """Release it without waiting."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +59,8 @@ class Opening:
     """A line that is not open yet.
 
     Attributes:
-        descriptor: when it is ready, it is to be asked again; -1: in a while.
-        events: for epoll.
+        descriptor: when this is ready, call `open_line` again; -1: call it again after a while.
+        events: epoll events to wait for.
     """
 
     descriptor: int = -1
@@ -68,14 +68,14 @@ class Opening:
 
 
 class StreamLink:
-    """Speaks over a line and opens it again whenever it was lost.
+    """Talks over a line, and reopens it whenever it is lost.
 
     Args:
         kind: the transport's name.
         side: which of the two this side plays.
-        open_line: opens the line, or tells that this takes time; raises UnavailableError.
-        frame_bytes: the transport carries bytes in frames of so many; 1: it does not.
-        waits: whether a line that cannot be had now is waited for.
+        open_line: opens the line or returns an Opening if that takes time; raises UnavailableError.
+        frame_bytes: size of the frames in which the transport carries bytes; 1 if it has none.
+        waits: whether to wait for a line that cannot be had now.
 
     Raises:
         UnavailableError: the line cannot be had now.
@@ -115,7 +115,7 @@ class StreamLink:
 
     @property
     def due_ns(self) -> int:
-        """When `receive` wants to be called next even if nothing is readable, by this machine's steady clock, ns."""
+        """When `receive` must be called next even if nothing is readable, by this machine's steady clock, ns."""
         if self._incoming:
             return 0
         if self._line is None:
@@ -138,12 +138,12 @@ class StreamLink:
         return self._duplex.counts
 
     def ready(self, connection: bytes) -> bool:
-        """Whether a frame would be taken now, or is to be tried because the connection is gone."""
+        """Whether to send a frame now: it would be accepted, or the connection is gone and `send` will say so."""
         lane = self._lane(connection)
         return lane is None or (not self._pending and self._duplex.ready(lane))
 
     def receive(self) -> Iterator[Incoming]:
-        """Give all packets that have come in, write what waits, find the device again."""
+        """Return all packets that have arrived, write what waits, and look for a lost device."""
         if self._line is None:
             self._reopen()
         self._read(_READS)
@@ -152,12 +152,12 @@ class StreamLink:
             yield self._incoming.popleft()
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
-        """Hand a packet over. A frame is FULL while the one before it is still being written, and all is before the peer was met."""
+        """Send a packet. A frame is FULL while the previous one is still being written; everything is FULL until the peer was met."""
         lane = self._lane(connection)
         if lane is None or (self._line is None and not self._dials):
             return SendResult.UNREACHABLE
         if self._line is None:
-            return SendResult.FULL  # it dials again by itself
+            return SendResult.FULL  # the link redials by itself
         if len(header) > MAX_HEADER_BYTES or len(payload) > MAX_PAYLOAD_BYTES:
             self._duplex.leave()
             self._tell_broken()
@@ -171,7 +171,7 @@ class StreamLink:
         return SendResult.SENT if taken else SendResult.FULL
 
     def close(self) -> None:
-        """Give what was handed over half a second to leave, say goodbye, then let go of the device."""
+        """Give accepted packets half a second to leave, say goodbye, then release the device."""
         deadline_ns = now.monotonic_ns() + _LINGER_NS
         while not self._has_left() and now.monotonic_ns() < deadline_ns:
             self._epoll.poll(_LINGER_STEP_S)
@@ -199,7 +199,7 @@ class StreamLink:
     def _reopen(self) -> None:
         now_ns = now.monotonic_ns()
         if self._opening.descriptor >= 0:
-            with suppress(OSError):  # who opens it may have closed it
+            with suppress(OSError):  # `open_line` may have closed it
                 self._epoll.unregister(self._opening.descriptor)
             self._opening = Opening()
         elif now_ns < self._reopen_ns:
@@ -209,7 +209,7 @@ class StreamLink:
             self._begin(self._open_line())
 
     def _begin(self, opened: Line | Opening) -> None:
-        """Wait for what is open now, or for what is not yet."""
+        """Register the open line, or the descriptor on which the opening one waits."""
         if isinstance(opened, Opening):
             self._opening = opened
             if opened.descriptor >= 0:
@@ -219,7 +219,7 @@ class StreamLink:
         self._epoll.register(opened.fileno(), self._events)
 
     def _lose(self) -> None:
-        """The device is gone, or was pulled and must be opened anew."""
+        """Close a device that is gone, or that was pulled and must be reopened."""
         assert self._line is not None
         self._epoll.unregister(self._line.fileno())
         self._line.close()
@@ -274,7 +274,7 @@ class StreamLink:
             except BlockingIOError:
                 break
             except OSError:
-                self._read(_READS)  # the peer's last words, when it was the peer who closed
+                self._read(_READS)  # the peer's last words, if it was the peer who closed
                 if self._line is not None:
                     self._lose()
                 return

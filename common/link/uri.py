@@ -1,4 +1,4 @@
-"""Link URIs: what the user names, read and checked without opening anything."""
+"""Link URIs as the user gives them, parsed and checked without opening anything."""
 
 import ipaddress
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from common.keys import KeyFolder
 from common.program.extensions import registered_names
 
 LINKS: Final = "tandemscan.links"
-"""Entry points of other packages' links; see `factory`."""
+"""Entry point group of other packages' links; see `factory`."""
 
 OWN_SCHEMES: Final = frozenset({"tcp", "ipc", "serial", "rfcomm"})
 
@@ -35,14 +35,14 @@ class LinkUri:
     """A link as the user named it.
 
     Attributes:
-        address: what the transport takes, without options.
+        address: the address that the transport takes, without options.
         listens: whether this side waits to be dialled.
-        baud: speed of a serial port that has one; None: the usual.
-        unpaired: whether Bluetooth devices will do that were never paired with.
-        insecure: whether a tcp link is to be open to everybody on every network.
-        owner: user whose an ipc link's other end may be, beside this one and root; empty for nobody.
-        extension: name under which an installed package registers this kind of link; empty: it is one of ours.
-        options: for an extension, the query without `bind` and `connect`.
+        baud: speed of a serial port that has one; None: the default.
+        unpaired: whether Bluetooth devices that were never paired may connect.
+        insecure: whether a tcp link is open to everybody on every network.
+        owner: user who, besides this user and root, may be at an ipc link's other end; empty for nobody.
+        extension: name under which an installed package registers this kind of link; empty for our own links.
+        options: for an extension: the query without `bind` and `connect`.
     """
 
     address: str
@@ -57,13 +57,13 @@ class LinkUri:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkRequest:
-    """A link that is to be opened; all that a transport is told.
+    """A request to open a link: everything that a transport is told.
 
     Attributes:
         uri: what to open.
-        keys: this machine's key and those that it trusts; None where only open links can be had.
-        board: whether this side is the board, which over tcp and ipc takes no images.
-        waits: whether a device that is missing is waited for.
+        keys: this machine's key and the keys it trusts; None if only open links are possible.
+        board: whether this side is the board, which accepts no images over tcp and ipc.
+        waits: whether to wait for a missing device.
     """
 
     uri: LinkUri
@@ -73,16 +73,16 @@ class LinkRequest:
 
 
 def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
-    """Read a link URI.
+    """Parse a link URI.
 
     Args:
-        uri: `tcp://HOST:PORT`, `ipc://PATH`, `serial:DEVICE` or `rfcomm://DEVICE[/CHANNEL]`, with `?bind=1` or `?connect=1` to swap who
-            listens; a serial port also takes `baud=N`, a Bluetooth device `unpaired=1`, tcp `insecure=1`: no keys, whoever reaches the
-            address sees the camera; ipc `owner=USER`: that user's end is trusted as one's own is.
+        uri: `tcp://HOST:PORT`, `ipc://PATH`, `serial:DEVICE` or `rfcomm://DEVICE[/CHANNEL]`. `?bind=1` or `?connect=1` swaps who listens.
+            A serial port also takes `baud=N`, a Bluetooth device `unpaired=1`. tcp takes `insecure=1`: no keys, so whoever reaches the
+            address sees the camera. ipc takes `owner=USER`: that user's end is trusted like one's own.
         listens_by_default: true on the board, which binds; false on the host, which connects.
 
     Returns:
-        The link that is meant.
+        The parsed link.
 
     Raises:
         SettingsError: the URI makes no sense.
@@ -100,7 +100,7 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
         _check_channel(uri, rest)
     if scheme == "ipc" and rest.startswith(
         "@"
-    ):  # Linux's abstract names have no owner and no mode: whoever knows one connects
+    ):  # Linux's abstract names have no owner and no mode: whoever knows one can connect
         raise SettingsError(f"link {uri!r} names no path", "give one, for example ipc://$XDG_RUNTIME_DIR/board")
     options = dict(parse_qsl(query, keep_blank_values=True))
     baud = _baud(uri, options.pop("baud")) if is_serial and "baud" in options else None
@@ -126,7 +126,7 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
 
 
 def needs_keys(uri: LinkUri) -> bool:
-    """Whether a link is for known keys only: tcp that other machines can reach, unless it is said to be insecure."""
+    """Whether a link is for known keys only: tcp that other machines can reach, unless it is marked insecure."""
     if not uri.address.startswith("tcp://") or uri.insecure:
         return False
     host = uri.address.removeprefix("tcp://").rpartition(":")[0].strip("[]")
@@ -137,7 +137,7 @@ def needs_keys(uri: LinkUri) -> bool:
 
 
 def _extension(uri: str, *, listens_by_default: bool) -> LinkUri | None:
-    """Read a URI whose scheme an installed package registers; None if none does."""
+    """Parse a URI whose scheme an installed package registers; None if there is no such package."""
     address, _, query = uri.partition("?")
     scheme, found, rest = address.partition(":")
     if not found or not rest.strip("/") or scheme not in registered_names(LINKS):

@@ -1,8 +1,8 @@
 """Waits for links, cameras and signals in one place, with few system calls.
 
-Each call into ZeroMQ costs two of them where there is no cheap cycle counter (ARM), and a zmq.Poller, which makes its lists anew for each
-wait, asks each socket twice. Here it is once, by the rule of ZMQ_FD (zmq_getsockopt(3)): a ZeroMQ socket's descriptor tells once that there
-is news, and any call of the socket may have taken it in. So ZMQ_EVENTS is asked right before waiting, and a readable descriptor says: look.
+On machines without a cheap cycle counter (ARM), each call into ZeroMQ costs two system calls. A zmq.Poller rebuilds its lists for each wait and
+asks each socket twice. Here each socket is asked once, by the rule of ZMQ_FD (zmq_getsockopt(3)): a ZeroMQ socket's descriptor signals news only
+once, and any call on the socket may have consumed it. So ZMQ_EVENTS is read right before waiting, and a readable descriptor only means: look.
 """
 
 import os
@@ -19,23 +19,23 @@ _EVENTS: Final = int(zmq.EVENTS)
 _READABLE: Final = int(zmq.POLLIN)
 
 _AWAKE_NS: Final = 200_000
-"""Longer than an echo over loopback takes; twice as long gained nothing (decision 0009)."""
+"""Longer than an echo over loopback takes. Twice as long gained nothing (decision 0009)."""
 
 _ASLEEP_NS: Final = 1_000_000_000
-"""A core that others want is left to them for so long: who gives it away waits for their milliseconds, who sleeps is woken before them."""
+"""For this long a contended core is left to others. Who yields a core waits milliseconds for it; who sleeps is woken before them."""
 
 
 def is_readable(sock: "zmq.Socket[bytes]") -> bool:
-    """Whether a ZeroMQ socket has something to receive: cheaper than the exception of one that has nothing."""
+    """Whether a ZeroMQ socket has something to receive. Cheaper than the exception of an empty one."""
     return bool(int(sock.getsockopt(_EVENTS)) & _READABLE)
 
 
 class Waiter:
-    """What is waited on.
+    """Waits on a set of pollables.
 
     Args:
-        pollables: ZeroMQ sockets, descriptors, or objects with one.
-        clock: monotonic, ns.
+        pollables: ZeroMQ sockets, descriptors, or objects that have one.
+        clock: monotonic clock, ns.
     """
 
     def __init__(self, pollables: Iterable[Any], clock: Callable[[], int] = now.monotonic_ns) -> None:
@@ -51,22 +51,22 @@ class Waiter:
                 self._sockets.append((fd, item))
 
     def add(self, fd: int, events: int = select.POLLIN) -> None:
-        """Wait on a descriptor, too.
+        """Also wait on this descriptor.
 
         Args:
             fd: the descriptor.
-            events: bits of poll(2).
+            events: poll(2) event bits.
         """
         self._poll.register(fd, events)
 
     def remove(self, fd: int) -> None:
-        """Wait on a descriptor no more."""
+        """Stop waiting on a descriptor."""
         self._poll.unregister(fd)
 
     def stay_awake(self) -> None:
-        """Let `wait` look again and again before it sleeps, for 200 us from now, as the other side's part of an echo is expected.
+        """Make `wait` poll repeatedly before it sleeps, for 200 us from now, because the other side's part of an echo is expected.
 
-        A core that rests wakes late, and not equally late on both sides of a link (decision 0009). Where others want the core it sleeps as ever.
+        An idle core wakes late, and not equally late on both sides of a link (decision 0009). Where others want the core, `wait` sleeps as usual.
         """
         now_ns = self._clock()
         if now_ns >= self._asleep_until_ns:
@@ -76,10 +76,10 @@ class Waiter:
         """Wait until there is something to look at.
 
         Args:
-            wait_ms: at most so long, ms, beside the time to stay awake.
+            wait_ms: at most this long, ms, not counting the time to stay awake.
 
         Returns:
-            Descriptors, those of ZeroMQ sockets included; a socket may turn out to have nothing to receive.
+            Descriptors, including those of ZeroMQ sockets. A socket may turn out to have nothing to receive.
         """
         ready = [fd for fd, sock in self._sockets if is_readable(sock)]
         now_ns = self._clock() if wait_ms and not ready else self._awake_until_ns

@@ -1,7 +1,7 @@
-"""ZeroMQ over tcp:// and ipc://, open or with CURVE. One side binds a ROUTER, the other dials one DEALER for each lane.
+"""ZeroMQ over tcp:// and ipc://, open or with CURVE. One side binds a ROUTER, the other dials one DEALER per lane.
 
-Frames and control thus travel on TCP connections of their own and a clock echo never waits behind image bytes. Socket options are set before
-anything is accepted. A high-water mark does not bound the age of frames; credit does (session), so the marks here are only a fence.
+Frames and control thus travel on separate TCP connections, and a clock echo never waits behind image bytes. Socket options are set before
+anything is accepted. A high-water mark does not bound the age of frames; credit does (session). So the marks here are only a safety limit.
 """
 
 import os
@@ -29,16 +29,16 @@ if TYPE_CHECKING:
     from common.link.enrolment_door import Door
 
 _SOCKET_BUFFER_BYTES: Final = 256 * 1024
-"""About five 50 KB JPEGs in the kernel at most, so that a frame is not sent long before it can leave."""
+"""At most about five 50 KB JPEGs in the kernel, so that a frame is not handed over long before it can leave."""
 
 _QUEUE_PACKETS: Final = 8
-"""Packets in ZeroMQ's own queue for a connection: a wave of echoes and a few accounts; frames wait in the outbox instead."""
+"""Packets in ZeroMQ's own queue per connection: a wave of echoes and a few accounts. Frames wait in the outbox instead."""
 
 _LINGER_MS: Final = 500
 _GONE_S: Final = 30
 _PROBE_S: Final = 5
-"""A machine that answers nothing for so long is given up by TCP, which asks at these distances. The session notices earlier. Not by ZeroMQ's heartbeat: it hears
-a peer by whole packets, of which one may take seconds, and with a full queue it ends the process (libzmq issues 3937, 4767: an assertion)."""
+"""TCP probes a silent machine at this interval and gives it up after _GONE_S. The session notices earlier. ZeroMQ's heartbeat is not used: it
+counts only whole packets, one of which may take seconds, and with a full queue it ends the process (libzmq issues 3937, 4767: an assertion)."""
 
 _SET_UP_MS: Final = 3000
 _RECONNECT_MS: Final = 50
@@ -46,7 +46,7 @@ _RECONNECT_MAX_MS: Final = 400
 """A peer that comes back is met within this time, well below the second allowed for recovery."""
 
 _COPY_BELOW_BYTES: Final = 256 * 1024
-"""Below this one memcpy into ZeroMQ's message is cheaper than pyzmq's bookkeeping for a borrowed buffer (bench_link shows it)."""
+"""Below this, one memcpy into ZeroMQ's message is cheaper than pyzmq's bookkeeping for a borrowed buffer (bench_link shows it)."""
 
 # As plain integers: pyzmq's flags are enums, whose operators cost more than the call that takes them.
 _NOW: Final = int(zmq.DONTWAIT)
@@ -54,7 +54,7 @@ _NOW_AND_MORE: Final = int(zmq.DONTWAIT | zmq.SNDMORE)
 
 
 def _most_bytes(*, board: bool) -> int:
-    """The longest part that is let in. Nobody sends images to a board: what it must keep for a peer that floods it is a few KB."""
+    """Longest part accepted. Nobody sends images to a board, so it need only keep a few KB for a peer that floods it."""
     return MAX_HEADER_BYTES if board else max(MAX_PAYLOAD_BYTES, MAX_HEADER_BYTES)
 
 
@@ -87,8 +87,8 @@ def _send(sock: zmq.Socket[bytes], prefix: list[bytes], header: bytes, payload: 
             sock.send(part, _NOW_AND_MORE)
         if not len(payload):
             sock.send(header, _NOW)
-            # ZeroMQ's own thread writes to the socket. Where both share a core, or a board has only one, it would wait until this thread
-            # rests, and an echo with it: a yield shortens its round trip by a third and makes both ways more alike (bench_clock).
+            # ZeroMQ's own thread writes to the socket. If both threads share a core, or a board has only one, that thread (and the echo) would wait
+            # until this one sleeps. A yield shortens the echo's round trip by a third and makes both directions more alike (bench_clock).
             os.sched_yield()
             return SendResult.SENT
         sock.send(header, _NOW_AND_MORE)
@@ -103,7 +103,7 @@ def _send(sock: zmq.Socket[bytes], prefix: list[bytes], header: bytes, payload: 
 
 
 def _receive_known(sock: zmq.Socket[bytes], connection: bytes, guard: "Guard") -> Iterator[Incoming]:
-    """Take one packet off a socket that has one; what comes from a peer that was forgotten meanwhile is thrown away."""
+    """Take one packet off a socket that has one. Discard it if its peer was forgotten in the meantime."""
     header = sock.recv(_NOW, copy=False)
     packet = _complete(sock, connection, header)
     if guard.knows(header):
@@ -127,17 +127,17 @@ def _complete(sock: zmq.Socket[bytes], connection: bytes, header: zmq.Frame) -> 
 
 
 class _AlwaysReady:
-    """ZeroMQ works in a thread of its own: it needs no calls in time, and tells that it is full only when it is tried."""
+    """ZeroMQ works in its own thread: it needs no timed calls, and shows that it is full only when a send is tried."""
 
     self_paced: Final = False
 
     @property
     def due_ns(self) -> int:
-        """When `receive` wants to be called even if nothing is readable: never."""
+        """When `receive` must be called even if nothing is readable: never."""
         return 2**63 - 1
 
     def ready(self, connection: bytes) -> bool:  # noqa: ARG002 - the contract of `Link`
-        """Whether a frame would be taken now, as far as is known without trying."""
+        """Whether a frame would be accepted now, as far as can be known without trying."""
         return True
 
 
@@ -147,13 +147,13 @@ class ZeroMqListener(_AlwaysReady):
     Args:
         address: `tcp://HOST:PORT` (`*` for every interface) or `ipc://PATH`.
         keys: holds this side's key and those that may connect; None: anybody may.
-        owner: of an ipc path's folder, beside this user and root; empty for nobody.
-        board: whether this side is the board: it hears short messages only.
+        owner: user who, besides this user and root, may own an ipc path's folder; empty for nobody.
+        board: whether this side is the board, which accepts short messages only.
 
     Raises:
         SettingsError: the address makes no sense.
-        UnavailableError: the port or path is taken, the path lies where others may exchange it, or the folder of keys cannot be used.
-        DataError: the files of keys are bad.
+        UnavailableError: the port or path is taken, others could replace the path, or the key folder cannot be used.
+        DataError: the key files are bad.
     """
 
     def __init__(self, address: str, keys: KeyFolder | None = None, *, owner: str = "", board: bool = False) -> None:
@@ -167,7 +167,7 @@ class ZeroMqListener(_AlwaysReady):
         self._socket = self._context.socket(zmq.ROUTER)
         _configure(self._socket, _most_bytes(board=board))
         self._guard = _guarded(self._context, self._socket, keys, own) if keys and own else None
-        self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # a vanished host is told of instead of swallowing frames
+        self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # report a vanished host instead of swallowing its frames
         before = os.umask(0o177)  # an ipc path is for its owner only
         try:
             self._gate = gate.bind(self._socket, address)
@@ -186,15 +186,15 @@ class ZeroMqListener(_AlwaysReady):
         self._door: Door | None = None
 
     def open_door(self, links: Sequence[str], keys: KeyFolder) -> None:
-        """Take in new hosts by a code, for all secured links of this board.
+        """Let in new hosts by a code, for all secured links of this board.
 
         Args:
             links: the secured links' `endpoint`s.
-            keys: the board's.
+            keys: the board's keys.
 
         Raises:
-            SettingsError: there is no port behind a link's own.
-            DataError: the files of keys are bad.
+            SettingsError: a link has no port after its own.
+            DataError: the key files are bad.
             UnavailableError: they cannot be used.
         """
         from common.link.enrolment_door import Door  # noqa: PLC0415 - as in _guarded
@@ -204,19 +204,19 @@ class ZeroMqListener(_AlwaysReady):
 
     @property
     def pollables(self) -> Sequence[Any]:
-        """The one socket, the gate, the guard's and the door's."""
+        """The main socket, the gate, and the sockets of the guard and the door."""
         gates = (self._gate,) if self._gate else ()
         guard = (self._guard.socket,) if self._guard else ()
         return (self._socket, *gates, *guard, *(self._door.pollables if self._door else ()))
 
     @property
     def due_ns(self) -> int:
-        """When `receive` wants to be called even if nothing is readable."""
+        """When `receive` must be called even if nothing is readable."""
         gate_ns = self._gate.due_ns if self._gate else super().due_ns
         return min(gate_ns, self._door.due_ns) if self._door else gate_ns
 
     def receive(self) -> Iterator[Incoming]:
-        """Give all packets that have come in; lets in those whose keys are known."""
+        """Return all packets that have arrived; let in peers whose keys are known."""
         if self._gate:
             self._gate.watch()
         if self._guard:
@@ -231,11 +231,11 @@ class ZeroMqListener(_AlwaysReady):
                 yield _receive(self._socket, connection)
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
-        """Hand a packet over for one connection."""
+        """Send a packet over one connection."""
         return _send(self._socket, [connection], header, payload)
 
     def close(self) -> None:
-        """Let what was handed over leave, then close."""
+        """Let accepted packets leave, then close."""
         if self._door:
             self._door.close()
         if self._gate:
@@ -244,19 +244,19 @@ class ZeroMqListener(_AlwaysReady):
 
 
 class ZeroMqDialer(_AlwaysReady):
-    """The side that connects, one socket for each lane; ZeroMQ dials again by itself whenever a connection breaks.
+    """The side that connects, with one socket per lane. ZeroMQ redials by itself whenever a connection breaks.
 
     Args:
         address: `tcp://HOST:PORT` or `ipc://PATH`.
         keys: holds this side's key; None on an open link.
-        peer: who must answer; None on an open link.
-        owner: user that may listen at an ipc path, beside this one and root; empty for nobody.
-        board: whether this side is the board: it hears short messages only.
+        peer: the peer that must answer; None on an open link.
+        owner: user who, besides this user and root, may listen at an ipc path; empty for nobody.
+        board: whether this side is the board, which accepts short messages only.
 
     Raises:
         SettingsError: the address makes no sense.
-        UnavailableError: the folder of keys cannot be used, or an ipc path is another user's.
-        DataError: the files of keys are bad.
+        UnavailableError: the key folder cannot be used, or an ipc path belongs to another user.
+        DataError: the key files are bad.
     """
 
     def __init__(
@@ -292,19 +292,19 @@ class ZeroMqDialer(_AlwaysReady):
 
     @property
     def pollables(self) -> Sequence[Any]:
-        """Both sockets, and their monitors' descriptors: only `receive` calls a monitor, so none of its news is taken in by another call."""
+        """Both sockets and their monitors' descriptors. Only `receive` calls a monitor, so no other call consumes its news."""
         return tuple(item for known in self._connections.values() for item in (known.socket, known.monitor.fileno()))
 
     @property
     def due_ns(self) -> int:
-        """When `receive` wants to be called even if nothing is readable: to dial again."""
+        """When `receive` must be called even if nothing is readable: to redial."""
         return min(known.due_ns for known in self._connections.values())
 
     def receive(self) -> Iterator[Incoming]:
-        """Give all packets that have come in, frames first, then the news of broken connections: a peer's last words come before its end.
+        """Return all packets that have arrived, frames first, then the broken connections: a peer's last words precede its end.
 
         Raises:
-            UnavailableError: the peer does not talk to us, or only with keys, or is another user's; it is dialled again later.
+            UnavailableError: the peer refuses us, requires keys, or belongs to another user; it will be redialled later.
         """
         now_ns = now.monotonic_ns()
         broken, refused = [], None
@@ -314,7 +314,7 @@ class ZeroMqDialer(_AlwaysReady):
         while going_on:
             going_on = False
             talking = list(self._connections.items())
-            while talking:  # by turns, for as long as each has something to say: a look costs some us
+            while talking:  # take turns while any has something to say: each check costs some us
                 lanes, talking = talking, []
                 for connection, known in lanes:
                     if is_readable(known.socket):
@@ -327,7 +327,7 @@ class ZeroMqDialer(_AlwaysReady):
                         if known.broke(now_ns):
                             broken.append(Broken(connection))
                     except UnavailableError as error:
-                        refused = error  # for when no news is left: a monitor wakes nobody a second time
+                        refused = error  # raised once no news is left, because a monitor does not wake anyone twice
         if refused is not None:
             raise refused
         yield from broken
@@ -344,11 +344,11 @@ class ZeroMqDialer(_AlwaysReady):
         return packet
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
-        """Hand a packet over; before the peer is there it is FULL (ZMQ_IMMEDIATE)."""
+        """Send a packet. Before the peer is there, the result is FULL (ZMQ_IMMEDIATE)."""
         return _send(self._connections[connection].socket, [], header, payload)
 
     def close(self) -> None:
-        """Let what was handed over leave, then close."""
+        """Let accepted packets leave, then close."""
         for known in self._connections.values():
             known.socket.disable_monitor()
         self._context.destroy(linger=_LINGER_MS)
@@ -357,7 +357,7 @@ class ZeroMqDialer(_AlwaysReady):
 def _guarded(
     context: "zmq.Context[zmq.Socket[bytes]]", sock: "zmq.Socket[bytes]", keys: KeyFolder, own: OwnKey
 ) -> "Guard":
-    """Let a socket that is not bound yet take in known keys only."""
+    """Make a socket that is not bound yet accept known keys only."""
     from common.link.curve import Guard, secure_listener  # noqa: PLC0415 - an open link does not pay for keys: half a second of a board's start
 
     secure_listener(sock, own)

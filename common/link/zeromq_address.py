@@ -1,4 +1,4 @@
-"""What ZeroMQ is asked to listen at, checked before, and its refusals in plain words."""
+"""Checks an address before ZeroMQ binds it, and explains ZeroMQ's refusals in plain words."""
 
 import errno
 import os
@@ -12,16 +12,16 @@ from common.errors import SettingsError, TakenError, UnavailableError
 from common.link.ipc import owner_of
 
 _UNIX_PATH_MAX: Final = 107
-"""Bytes of a Unix socket's path, without its end (unix(7))."""
+"""Bytes of a Unix socket's path, without the terminating zero (unix(7))."""
 
 
 def explained(address: str, error: zmq.ZMQError, remedy: str) -> SettingsError | UnavailableError:
-    """Sort ZeroMQ's refusal of an address by whose fault it is.
+    """Turn ZeroMQ's refusal of an address into an error that says whose fault it is.
 
     Args:
-        address: what was refused.
-        error: how.
-        remedy: what to do about an address that is taken or makes no sense.
+        address: the refused address.
+        error: ZeroMQ's error.
+        remedy: what to do if the address is taken or makes no sense.
     """
     why = zmq.strerror(error.errno or 0)  # the exception's own text repeats the address
     if error.errno == zmq.EADDRINUSE:
@@ -34,10 +34,10 @@ def explained(address: str, error: zmq.ZMQError, remedy: str) -> SettingsError |
 
 
 def _check_replaceable(path: str) -> None:
-    """Refuse a path that holds something else than a socket: ZeroMQ unlinks whatever is there.
+    """Refuse a path that holds anything but a socket, because ZeroMQ unlinks whatever is there.
 
     Raises:
-        UnavailableError: it does.
+        UnavailableError: it holds something else.
     """
     try:
         status = os.lstat(path)
@@ -50,12 +50,12 @@ def _check_replaceable(path: str) -> None:
 
 
 def free_path(path: str) -> None:
-    """Remove the socket of a listener that died; ZeroMQ would silently take the path even of one that lives.
+    """Remove the socket of a dead listener. ZeroMQ would silently take the path even from a live one.
 
     Raises:
         SettingsError: the path is too long for a Unix socket.
-        TakenError: somebody listens there.
-        UnavailableError: it is no socket, or may not be touched.
+        TakenError: something listens there.
+        UnavailableError: it is not a socket, or may not be touched.
     """
     if len(os.fsencode(path)) > _UNIX_PATH_MAX:
         raise SettingsError(
@@ -63,7 +63,7 @@ def free_path(path: str) -> None:
             f"use one of at most {_UNIX_PATH_MAX} bytes, for example ipc://$XDG_RUNTIME_DIR/board",
         )
     with socket.socket(socket.AF_UNIX) as probe:
-        probe.setblocking(False)  # noqa: FBT003 - who listens may never accept; then it is full, and taken
+        probe.setblocking(False)  # noqa: FBT003 - a listener may never accept; then its queue is full, and the path is taken
         try:
             probe.connect(path)
         except BlockingIOError:
@@ -81,7 +81,7 @@ def free_path(path: str) -> None:
 
 
 def plain_endpoint(endpoint: str) -> str:
-    """Give what ZeroMQ has bound as people know it: IPv4 without the brackets and prefix that it has on a socket of both versions."""
+    """Return a bound ZeroMQ endpoint as people know it: IPv4 without the brackets and prefix that it has on a dual-stack socket."""
     scheme, _, rest = endpoint.partition("://")
     host, _, port = rest.rpartition(":")
     return f"{scheme}://{host[8:-1]}:{port}" if host.startswith("[::ffff:") else endpoint

@@ -1,4 +1,4 @@
-"""Opens ZeroMQ links: with keys where tcp leaves this machine, or where the peer at an address is known."""
+"""Opens ZeroMQ links: with keys if tcp leaves this machine, or if the peer at an address is known."""
 
 from common.errors import SettingsError, UnavailableError
 from common.keys import KeyFolder
@@ -14,9 +14,9 @@ def open_zeromq(request: LinkRequest) -> ZeroMqListener | ZeroMqDialer:
         request: what to open.
 
     Raises:
-        SettingsError: the address makes no sense, or needs keys and there is no folder of them.
+        SettingsError: the address makes no sense, or needs keys and there is no key folder.
         UnavailableError: the port or path is taken, or the peer is not known.
-        DataError: the files of keys are bad.
+        DataError: the key files are bad.
     """
     uri, keys = request.uri, request.keys
     if not uri.listens and "//*:" in uri.address:
@@ -39,7 +39,7 @@ def _keys(uri: LinkUri, keys: KeyFolder | None) -> KeyFolder:
 
 
 def _peer(uri: LinkUri, keys: KeyFolder | None) -> Peer | None:
-    """Who must answer at an address; None on an open link. A loopback address may lead to a known board (a forwarded port)."""
+    """The peer that must answer at an address; None on an open link. A loopback address may lead to a known board (a forwarded port)."""
     if uri.insecure or not uri.address.startswith("tcp://"):
         return None
     if not needs_keys(uri):

@@ -1,1 +1,1 @@
-"""What both programs need of a command line, a settings file, a log and signals."""
+"""What both programs share for the command line, settings file, log and signals."""

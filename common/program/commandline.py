@@ -1,4 +1,4 @@
-"""What the commands have in common: help opens with examples, an error is one line, the exit code is the contract's."""
+"""What the commands have in common: help begins with examples, an error is one line, exit codes follow the contract."""
 
 import argparse
 import contextlib
@@ -18,18 +18,18 @@ INTERRUPTED: Final = 130
 
 _UNAVAILABLE: Final = 3
 
-# What writing to stdout fails with when the disk, a quota, a device or the terminal behind it gives out.
+# Errors on writing to stdout when the disk, a quota, a device or the terminal behind it fails.
 _WRITE_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
 
 
 class ExamplesFirstParser(argparse.ArgumentParser):
-    """A parser whose help shows its description, the examples, before everything else, as it stands.
+    """A parser whose help shows its description (the examples) first and unchanged.
 
     Its sub-parsers are of the same class.
     """
 
     def format_help(self) -> str:
-        """Give the help text."""
+        """Return the help text."""
         examples, self.description = self.description or "", None
         try:
             return f"{examples}\n{super().format_help()}"
@@ -37,17 +37,17 @@ class ExamplesFirstParser(argparse.ArgumentParser):
             self.description = examples
 
     def print_help(self, file: "SupportsWrite[str] | None" = None) -> None:
-        """Print the help text; unlike argparse's own method without hiding that it could not be written."""
+        """Print the help text. Unlike argparse's own method, this does not hide a failure to write it."""
         print(self.format_help(), end="", file=file)
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong in one line on stderr, without the usage, and leave with exit 2."""
+        """Print the problem as one line on stderr, without the usage, and exit with code 2."""
         one_line = " ".join(message.split())
         self.exit(2, f"{self.prog}: error: {one_line}: see {self.prog} --help\n")
 
 
 class _VersionAction(argparse.Action):
-    """Prints the versions and ends; unlike argparse's own action without hiding that they could not be written."""
+    """Prints the versions and exits. Unlike argparse's own action, this does not hide a failure to write them."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         print(all_versions())
@@ -55,10 +55,10 @@ class _VersionAction(argparse.Action):
 
 
 def add_version_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--version`, which needs no verb.
+    """Add `--version`, which needs no verb.
 
     Args:
-        parser: the command's own, not a verb's.
+        parser: the command's own parser, not a verb's.
     """
     parser.add_argument(
         "--version", action=_VersionAction, nargs=0, help="print the versions of package, wire and files"
@@ -68,24 +68,24 @@ def add_version_option(parser: argparse.ArgumentParser) -> None:
 def run_command(
     parser: argparse.ArgumentParser, arguments: Sequence[str] | None, command: Callable[[argparse.Namespace], int]
 ) -> int:
-    """Run one command from its arguments to its exit code, with all that it prints flushed.
+    """Run one command from its arguments to its exit code, and flush everything it prints.
 
-    Errors are one line on stderr; `--debug` shows the traceback instead. A full disk behind stdout is such an error. A reader that has
-    closed its end (`| head -1`) is none: the command says nothing and keeps its exit code, or 0 where it was cut short in printing.
+    An error is one line on stderr; `--debug` shows the traceback instead. A full disk behind stdout is such an error. A reader that has closed
+    its end (`| head -1`) is not: the command stays silent and keeps its exit code, or exits with 0 if it was cut short while printing.
 
     Args:
-        parser: knows `--debug`, and the verbs if there are any.
-        arguments: without the program's name; None for those of the process.
-        command: takes the options, gives the exit code; prints what it has to say when it is done.
+        parser: defines `--debug`, and the verbs if there are any.
+        arguments: without the program's name; None: those of the process.
+        command: takes the options, returns the exit code; prints its output when it is done.
 
     Returns:
-        The exit code: 0 done, 2 wrong usage, 3 a device or link not to be had or stdout not writable, 4 bad data, 130 interrupted.
+        The exit code: 0 done, 2 wrong usage, 3 a device or link cannot be had or stdout cannot be written, 4 bad data, 130 interrupted.
     """
     options = argparse.Namespace(debug=False)
     code = 0
     try:
         code = _ran(parser, arguments, command, options)
-        if sys.stdout is not None:  # a process may be born without one
+        if sys.stdout is not None:  # a process may be started without one
             sys.stdout.flush()
     except BrokenPipeError:
         _forget_stdout()
@@ -119,12 +119,12 @@ def _ran(
 
 
 def _say(line: str) -> None:
-    with contextlib.suppress(OSError):  # with stderr gone, too, the exit code has to do
+    with contextlib.suppress(OSError):  # if stderr is gone too, the exit code must suffice
         print(line, file=sys.stderr)
 
 
 def _forget_stdout() -> None:
-    """Send what is still buffered nowhere: the interpreter flushes once more when it ends, and would complain in its own words."""
+    """Send what is still buffered nowhere. The interpreter flushes once more at its end, and would complain in its own words."""
     with contextlib.suppress(OSError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())

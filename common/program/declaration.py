@@ -1,4 +1,4 @@
-"""How a daemon declares its settings. Light: help is made of what is declared; `settings` works out the values."""
+"""How a daemon declares its settings. Lightweight: help is built from the declarations; `settings` resolves the values."""
 
 from dataclasses import field
 from typing import Any
@@ -8,7 +8,7 @@ def setting(default: Any, doc: str) -> Any:  # noqa: ANN401 - stands in a datacl
     """Declare one setting of a settings dataclass.
 
     Args:
-        default: its value where nothing else is said.
+        default: its value if nothing else is given.
         doc: one sentence for people.
     """
     return field(default=default, metadata={"doc": doc})

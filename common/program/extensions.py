@@ -1,14 +1,14 @@
-"""What is found by a name: our own implementations, and those that installed packages register as entry points.
+"""Finds implementations by name: our own, and those that installed packages register as entry points.
 
-Rules: only registries of implementations import this. A module is imported when its name is asked for, not before. Entry points are looked
-for when a name is not ours, so that a start that needs none does not pay for the search.
+Rules: only registries of implementations import this module. An implementation is imported when its name is asked for, not before. Entry
+points are searched only if a name is not ours, so a start that needs none does not pay for the search.
 
 A package registers in its pyproject.toml, for example:
 
     [project.entry-points."tandemscan.links"]
     quic = "my_package.link:open_link"
 
-What stands there is a callable that makes the implementation; each registry says what it is called with and what it must give.
+The value is a callable that makes the implementation. Each registry states its arguments and what it must return.
 """
 
 import importlib
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 
-def named(reference: str) -> Any:  # noqa: ANN401 - whatever bears the name
+def named(reference: str) -> Any:  # noqa: ANN401 - whatever has that name
     """Import one of our own implementations.
 
     Args:
@@ -35,29 +35,29 @@ def named(reference: str) -> Any:  # noqa: ANN401 - whatever bears the name
 
 
 def registered_names(group: str) -> tuple[str, ...]:
-    """Give the names that installed packages register, in alphabetical order.
+    """Return the names that installed packages register, in alphabetical order.
 
     Args:
-        group: of entry points, for example `tandemscan.links`.
+        group: entry point group, for example `tandemscan.links`.
     """
     return tuple(sorted({point.name for point in _entry_points(group)}))
 
 
 def make_registered(group: str, name: str, kind: type, *arguments: object) -> Any:  # noqa: ANN401 - a `kind`, which is a protocol
-    """Have an installed package make what it registers under a name.
+    """Call what an installed package registers under a name, and return the implementation it makes.
 
     Args:
-        group: of entry points.
+        group: entry point group.
         name: one of `registered_names`.
-        kind: the protocol that the result must keep.
-        arguments: what its callable is called with.
+        kind: the protocol that the result must implement.
+        arguments: arguments of the registered callable.
 
     Returns:
-        What it made; it has every member of the protocol.
+        The implementation; it has every member of the protocol.
 
     Raises:
-        SettingsError: it is not there, several packages claim the name, it cannot be loaded, or it does not fit.
-        TandemError: as the package itself says it.
+        SettingsError: the name is not registered, several packages claim it, or the implementation cannot be loaded or does not fit.
+        TandemError: as raised by the package itself.
     """
     point = _only(group, name)
     where = f"{name!r} of {group} ({point.value})"
@@ -88,7 +88,7 @@ def _only(group: str, name: str) -> "EntryPoint":
 
 
 def _entry_points(group: str) -> "tuple[EntryPoint, ...]":
-    from importlib.metadata import entry_points  # noqa: PLC0415 - 30 ms of a host's start, more on a board; seldom needed
+    from importlib.metadata import entry_points  # noqa: PLC0415 - 30 ms of a host's start, more on a board; rarely needed
 
     return tuple(entry_points(group=group))
 
@@ -101,7 +101,7 @@ def _require_call(make: Any, arguments: tuple[object, ...], where: str) -> None:
     except TypeError as error:
         given = ", ".join(type(argument).__name__ for argument in arguments)
         raise SettingsError(f"{where} cannot be called with ({given}): {error}", "see its registry's rules") from None
-    except ValueError:  # a callable that tells no signature is tried
+    except ValueError:  # a callable without a known signature is simply tried
         return
 
 

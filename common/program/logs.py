@@ -5,7 +5,7 @@ import sys
 
 
 def set_up(level: int = logging.INFO) -> None:
-    """Send this process's log to stderr; journald and terminals add what else they want to know."""
+    """Send this process's log to stderr. journald and terminals add whatever else they need."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s %(message)s"))
     root = logging.getLogger()

@@ -1,7 +1,7 @@
-"""Settings with their origin: defaults, a TOML file, the environment and options, each stronger than the one before.
+"""Settings with their origin: defaults, a TOML file, the environment and options, in increasing order of precedence.
 
-A daemon declares its settings as one frozen dataclass whose fields are texts, numbers, truth values or tuples of texts, each with a
-`doc` in its metadata. Keys in the file are the field names; in the environment PREFIX_FIELD.
+A daemon declares its settings as one frozen dataclass whose fields are texts, numbers, booleans or tuples of texts, each with a
+`doc` in its metadata. Keys in the file are the field names; in the environment, PREFIX_FIELD.
 """
 
 import json
@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Resolved(Generic[T]):
-    """Settings and where each came from.
+    """Settings, and where each came from.
 
     Attributes:
         values: the settings dataclass.
@@ -37,9 +37,9 @@ def resolve(kind: type[T], prefix: str, file: Path | None, options: Mapping[str,
 
     Args:
         kind: the settings dataclass.
-        prefix: of the environment variables, for example `BOARD_AGENT`.
+        prefix: prefix of the environment variables, for example `BOARD_AGENT`.
         file: a TOML file, or None.
-        options: by field name, from the command line; None values are those not given.
+        options: options from the command line, by field name; None means not given.
 
     Returns:
         The settings with their origins.
@@ -68,12 +68,12 @@ def resolve(kind: type[T], prefix: str, file: Path | None, options: Mapping[str,
 def with_origins(
     resolved: Resolved[Any] | None, options: Mapping[str, object], words: Sequence[str]
 ) -> dict[str, dict[str, object]]:
-    """Settings and options of a run as one JSON object, by name, each with its value and its origin.
+    """Return the settings and options of a run as one JSON object, by name, each with its value and origin.
 
     Args:
-        resolved: the settings; None: the command has none.
-        options: all options by name, with the defaults of those that were not given; those that are settings too stand there as settings; the verb is left out.
-        words: of the command line; they tell which options were given.
+        resolved: the settings; None if the command has none.
+        options: all options by name, with defaults for those not given. Options that are also settings appear as settings; the verb is left out.
+        words: the command line's words; they show which options were given.
     """
     known = {f"--{name.replace('_', '-')}": name for name in options if name != "verb"}
     given: set[str] = set()
@@ -97,10 +97,10 @@ def listing(resolved: Resolved[Any], *, as_json: bool) -> str:
 
     Args:
         resolved: the settings.
-        as_json: whether as one JSON object, by name; else as a table, a line for each.
+        as_json: whether to return one JSON object, by name; otherwise a table with a line for each.
 
     Returns:
-        The text, without a newline at its end.
+        The text, without a trailing newline.
     """
     rows = [(name, getattr(resolved.values, name), origin) for name, origin in resolved.origins]
     if as_json:
@@ -113,10 +113,10 @@ def listing(resolved: Resolved[Any], *, as_json: bool) -> str:
 
 
 def log_level(name: str) -> int:
-    """Read the name of a log level.
+    """Return the log level of that name.
 
     Raises:
-        SettingsError: there is none of that name.
+        SettingsError: there is no level of that name.
     """
     levels = {"debug": logging.DEBUG, "info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
     if name.lower() not in levels:
@@ -125,7 +125,7 @@ def log_level(name: str) -> int:
 
 
 _MOST_BYTES = 1 << 20
-"""Of a settings file, which has a page."""
+"""Limit for a settings file, which usually has one page."""
 
 
 def _read(file: Path, known: set[str]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""SIGTERM and SIGINT as something a poll loop can wait for. Made once, in a process's main thread."""
+"""SIGTERM and SIGINT as something a poll loop can wait for. Create it once, in a process's main thread."""
 
 import signal
 import socket
@@ -18,12 +18,12 @@ class StopSignals:
 
     @property
     def stop(self) -> bool:
-        """Whether the process was asked to end."""
+        """Whether the process was asked to stop."""
         return bool(self._came)
 
     @property
     def interrupted(self) -> bool:
-        """Whether it was by Ctrl-C."""
+        """Whether Ctrl-C asked for it."""
         return signal.SIGINT in self._came
 
     def _note(self, number: int, frame: FrameType | None) -> None:

@@ -1,8 +1,8 @@
-"""The board's side of a session: serves one host at a time, over all links on which it says hello. Sans-I/O, `now_ns` passed in.
+"""The board's side of a session: serves one host at a time, over all links on which that host says hello. Sans-I/O, `now_ns` passed in.
 
-A frame is sent only against credit, and always over one link: the one on which the host said hello for frames last. The other links carry echoes
-and hellos. So the host decides where frames go, and the answer to its hello stands in line behind the last frame that can still come
-from anywhere: what it counts and has not come is lost.
+The board sends a frame only against credit, and always over one link: the one on which the host last said hello for frames. The other links
+carry echoes and hellos. So the host decides where frames go. The answer to its hello queues behind the last frame that can still
+come from anywhere. Any frame that this answer counts and that has not come is therefore lost.
 """
 
 from dataclasses import dataclass, field
@@ -36,22 +36,22 @@ from common.protocol.session import HELLO_RETRY_NS, MS, SILENCE_NS, STATUS_NS, S
 _NEVER = 2**63 - 1
 
 STEER_REST_NS = 500 * MS
-"""A camera is steered no more often than this: a host has to see what came of it first, which takes longer."""
+"""A camera is steered at most this often. A host must first see the effect, which takes longer than this."""
 
 
 @dataclass(slots=True)
 class _Host:
-    """The host that is served.
+    """The host being served.
 
     Attributes:
         host_id: its random id.
-        heard_ns: when it was heard last, over any link.
-        status_due_ns: when it is told the account next.
-        silence_due_ns: not before then any of its links can have been silent for too long.
-        heard_by: when it was heard last, by link.
-        frames: the connection that frames go to; None where it was lost.
+        heard_ns: when it was last heard, over any link.
+        status_due_ns: when it is next sent the account.
+        silence_due_ns: earliest time at which any of its links can have been silent for too long.
+        heard_by: when it was last heard, by link.
+        frames: the connection that frames go to; None if it was lost.
         controls: the control connections, by link.
-        below_index: frames below this one may be sent.
+        below_index: frames below this index may be sent.
     """
 
     host_id: str
@@ -65,22 +65,22 @@ class _Host:
 
     @property
     def account_lane(self) -> bytes | None:
-        """The control connection beside the frames; any where there is none."""
+        """The control connection of the link that carries frames; any other one if there is none."""
         beside = None if self.frames is None else self.controls.get(self.frames[0])
         return beside if beside is not None else next(iter(self.controls.values()), None)
 
     def excuse(self, absent_ns: int, now_ns: int) -> None:
-        """Take out of its silence the time in which this process did not run."""
+        """Do not count the time in which this process did not run as this host's silence."""
         self.heard_ns = min(now_ns, self.heard_ns + absent_ns)
         self.heard_by = {link: min(now_ns, heard_ns + absent_ns) for link, heard_ns in self.heard_by.items()}
         self.silence_due_ns = min(self.heard_by.values(), default=now_ns) + SILENCE_NS
 
     def knows(self, connection: bytes) -> bool:
-        """Whether a connection is one of this host's."""
+        """Whether a connection belongs to this host."""
         return connection == self.frames or self.controls.get(connection[0]) == connection
 
     def heard(self, connection: bytes, now_ns: int) -> None:
-        """Take note of a word over a connection."""
+        """Record that the host was heard on a connection."""
         self.heard_ns = self.heard_by[connection[0]] = now_ns
 
     def lose(self, connection: bytes) -> None:
@@ -105,9 +105,9 @@ class BoardSession:
 
     Args:
         session: random id of this process's life.
-        boot_id: names the life of the machine's clock.
-        camera: what the host must know of the camera.
-        dialled: the connections that this side opened itself (`?connect=1`), of all links; empty when the host dials.
+        boot_id: identifies this life of the machine's clock.
+        camera: what the host must know about the camera.
+        dialled: the connections that this side opened itself (`?connect=1`), on all links; empty when the host dials.
     """
 
     def __init__(
@@ -130,31 +130,31 @@ class BoardSession:
 
     @property
     def carrier(self) -> int | None:
-        """Index of the link that frames go to; None without one."""
+        """Index of the link that carries frames; None if there is none."""
         frames = None if self._host is None else self._host.frames
         return None if frames is None else frames[0]
 
     @property
     def has_host(self) -> bool:
-        """Whether a host is there that frames can or soon could be sent to."""
+        """Whether there is a host to which frames can be sent now or soon."""
         host = self._host
         return host is not None and (host.frames is not None or bool(host.controls))
 
     def begin_clock(self, boot_id: str) -> None:
-        """Take note that this machine has slept and its clock stood still: the host is to greet anew, and to learn the clock from the start.
+        """Record that this machine has slept and its clock stood still. The host must greet again and learn the clock from scratch.
 
         Args:
-            boot_id: names the new life of the clock.
+            boot_id: identifies the new life of the clock.
         """
         self._boot_id = boot_id
         self._host = None
 
     def describe(self, camera: CameraDescription, rung: Rung) -> None:
-        """Take note that the camera gives something else from now on; the host is told with the next account, which is due now.
+        """Record that the camera delivers something else from now on. The next account tells the host; it becomes due now.
 
         Args:
-            camera: what it is now.
-            rung: how far that is lowered.
+            camera: its new description.
+            rung: how far its output is lowered.
         """
         self._camera, self._rung = camera, rung
         if self._host is not None:
@@ -175,7 +175,7 @@ class BoardSession:
             connection: where it came from.
             message: what came.
             now_ns: its arrival on the board's clock, ns.
-            counts: the account of this session's frames now.
+            counts: the current account of this session's frames.
 
         Returns:
             What to send.
@@ -185,7 +185,7 @@ class BoardSession:
             return self._greet(connection, message, now_ns, counts)
         host = self._host
         if host is None or not host.knows(connection):
-            # Somebody from before a restart, or a stranger: a clock echo shows which lane it is.
+            # Someone from before a restart, or a stranger. Clock echoes run on the control lane, so knock for that one.
             return [] if isinstance(message, Bye) else [Outgoing(connection, Knock(Lane.CONTROL, self.session))]
         host.heard(connection, now_ns)
         match message:
@@ -200,22 +200,22 @@ class BoardSession:
                     self._later_ns, self._steered_ns = later_ns % self._camera.period_ns, now_ns
                 return []
             case Bye():
-                # The last account goes behind the last frame, so that what it tells of and has not come is lost. It is no Status: one of those may
-                # be under way, from before the host's last credit came, with frames behind it.
+                # The final account goes behind the last frame, so any frame that it counts and that has not come is lost. It is not a
+                # Status: one of those may be under way from before the host's last credit came, with frames behind it.
                 self._host = None
                 return [] if host.frames is None else [Outgoing(host.frames, Bye(counts))]
             case BoardHello() | Knock() | Refusal() | FrameMessage() | Pong() | Status() | End():
-                return []  # a board's words from a host: nothing a sound host sends
+                return []  # only a board sends these; a sound host never does
             case _:
                 assert_never(message)
 
     def take_steering(self) -> int:
-        """Give by how much the host wants the camera to expose later, ns, once; 0: it wants nothing."""
+        """Return by how much the host wants the camera to expose later, ns, and forget it. 0: the host wants nothing."""
         later_ns, self._later_ns = self._later_ns, 0
         return later_ns
 
     def tick(self, now_ns: int, counts: BoardCounts) -> list[Outgoing]:
-        """Do what time demands: account to the host, give up a silent one, knock where this side has dialled."""
+        """Do what is due: send the account, give up a silent host, knock on connections that this side dialled."""
         self._notice_absence(now_ns)
         outgoing: list[Outgoing] = []
         host = self._host
@@ -237,17 +237,17 @@ class BoardSession:
 
     @property
     def due_ns(self) -> int:
-        """When `tick` wants to be called next, board's clock, ns."""
+        """When `tick` must be called next, board's clock, ns."""
         due = self._knock_due_ns if self._dialled else _NEVER
         if self._host is not None:
             due = min(due, self._host.silence_due_ns, self._host.status_due_ns)
         return due
 
     def send(self, frame: Frame) -> Outgoing:
-        """Put a frame into words; its `sent` mark is set when the shell stamps it, the credit is spent by `sent`.
+        """Turn a frame into a message. The shell sets its `sent` mark when it stamps it; `sent` spends the credit.
 
         Args:
-            frame: a sound frame; only to be called while `has_credit`.
+            frame: a sound frame. Call this only while `has_credit`.
         """
         assert self._host is not None
         assert self._host.frames is not None
@@ -266,48 +266,48 @@ class BoardSession:
         return Outgoing(self._host.frames, message)
 
     def sent(self, now_ns: int) -> None:
-        """Take note that the link took the frame; where frames are far apart, accounts are rarer."""
+        """Record that the link took the frame. Where frames are far apart, accounts become rarer too."""
         apart_ns = now_ns - self._sent_ns if self._sent else 0
         self._status_ns = STATUS_NS if apart_ns < STATUS_SLOW_NS else STATUS_SLOW_NS
         self._sent, self._sent_ns = self._sent + 1, now_ns
 
     def unreachable(self, connection: bytes) -> list[Outgoing]:
-        """Take note that a connection is gone; a host that is still heard on others and has no lane for frames is asked to say hello anew."""
+        """Record that a connection is gone. A host still heard on other links, but without a frames lane, is asked to say hello again."""
         host = self._host
         if host is None or not host.knows(connection):
-            return []  # a stranger's end is nothing to the host
+            return []  # a stranger's connection does not concern the host
         host.lose(connection)
         return self._ask_for_frames_lane(host)
 
     def end(self, counts: BoardCounts) -> list[Outgoing]:
-        """Tell the host, behind the last frame, that none will follow; from now on `tick` repeats it."""
+        """Tell the host, behind the last frame, that no more will follow. From now on `tick` repeats this."""
         self._ended = True
         host = self._host
         return [] if host is None or host.frames is None else [Outgoing(host.frames, End(self.session, counts))]
 
     def leave(self, counts: BoardCounts) -> list[Outgoing]:
-        """Say goodbye to the host, with the final account; behind the last frame where its lane is there."""
+        """Say goodbye to the host with the final account: behind the last frame if there is a frames lane."""
         host = self._host
         connection = None if host is None else host.frames if host.frames is not None else host.account_lane
         return [] if connection is None else [Outgoing(connection, Bye(counts))]
 
     def _notice_absence(self, now_ns: int) -> None:
-        """Time in which this process did not run is not its host's silence."""
+        """Time in which this process did not run does not count as the host's silence."""
         absent_ns = self._presence.absent_ns(lambda: self.due_ns, now_ns)
         if self._host is not None and absent_ns:
             self._host.excuse(absent_ns, now_ns)
 
     def _ask_for_frames_lane(self, host: _Host) -> list[Outgoing]:
-        """Say where the host is known that its frames' lane is not; a knock for the control lane would say that the host is not known either."""
+        """Tell a known host that its frames lane is not known. A knock for the control lane would say that the host is unknown too."""
         if host.frames is not None:
             return []
         return [Outgoing(control, Knock(Lane.FRAMES, self.session)) for control in host.controls.values()]
 
     def _account(self, host: _Host, counts: BoardCounts) -> list[Outgoing]:
-        """Give the account of the frames, and mend what a lost packet could have left for ever.
+        """Send the account of the frames, and repair what a lost packet would otherwise leave broken for ever.
 
-        A frame that is lost without a sound takes its credit with it: behind the last frame on its own lane the account tells so. A knock
-        that is lost leaves a host without its frames' lane.
+        A frame lost without a trace takes its credit with it; the account sent behind the last frame, on the frames lane, reveals that. A lost
+        knock leaves a host without its frames lane.
         """
         outgoing: list[Outgoing] = []
         if (control := host.account_lane) is not None:
@@ -325,8 +325,8 @@ class BoardSession:
             return [Outgoing(connection, Refusal(RefusalReason.BUSY))]
         own = next((lane for lane, known in self._dialled if known == connection), hello.lane)
         if own is not hello.lane:
-            # A knock for the frames' lane, over a control lane that had just been dialled anew, was taken for this lane's own. The host has
-            # forgotten the right one, which is to be knocked on again.
+            # The host took a knock for the frames lane, sent over a newly dialled control lane, for this lane's own. It has
+            # forgotten the right connection, so that one must be knocked on again.
             if host is not None and host.frames is not None and host.frames[0] == connection[0]:
                 host.frames = None
             return [Outgoing(connection, Knock(own, self.session))]
@@ -334,7 +334,7 @@ class BoardSession:
             self._host = host = _Host(hello.host_id, now_ns, now_ns + STATUS_NS, now_ns + SILENCE_NS)
         host.heard(connection, now_ns)
         if hello.lane is Lane.FRAMES:
-            host.below_index = self._sent  # credit of an earlier connection is void
+            host.below_index = self._sent  # credit from an earlier connection is void
             host.frames = connection
         else:
             host.controls[connection[0]] = connection

@@ -1,8 +1,9 @@
-"""Packets of both lanes over one byte stream: cut into chunks, control in front of images, put together again. Sans-I/O, `now_ns` passed in.
+"""Sends packets of both lanes over one byte stream: cuts them into chunks, puts control first, reassembles them. Sans-I/O, `now_ns` passed in.
 
-A packet is u16 header length, u32 payload length, header, payload; its chunks carry consecutive numbers, so that one whose chunk is missing is
-dropped and never patched up. Only chunks on the frames' lane are acknowledged, by the newest number that came: the counter is absolute, so a
-lost acknowledgement is mended by the next. Control is neither held back nor acknowledged; it is little, and its own protocol repeats it.
+A packet is u16 header length, u32 payload length, header, payload. Its chunks carry consecutive numbers. If one is missing, the packet is
+dropped and never patched up. Only chunks on the frames lane are acknowledged, by the newest number received. That counter is absolute, so
+the next acknowledgement makes up for a lost one. Control is neither held back nor acknowledged: there is little of it, and its own
+protocol repeats it.
 """
 
 import struct
@@ -21,16 +22,17 @@ _NUMBERS: Final = 1 << 16
 _NEVER: Final = 2**63 - 1
 
 _BATCH_BYTES: Final = 64 * 1024
-"""Bytes given at one go: what a tty takes at once at most; control that comes later waits behind them."""
+"""Bytes returned at once: the most that a tty takes at once. Control that comes later waits behind them."""
 
 _QUEUE_PACKETS: Final = 32
 """Packets that may wait on a lane: a wave of echoes and a few accounts."""
 
 _ABANDON_NS: Final = 1000 * MS
-"""A frame of which nothing was acknowledged for this long is given up: who comes back shall have a fresh one."""
+"""A frame is given up when nothing of it was acknowledged for this long. A peer that comes back shall get a fresh one."""
 
 _ATTENTION_NS: Final = 100 * MS
-"""At most so much of the time between two looks counts as silence: who was not awake has not listened (an emulated board slept for seconds)."""
+"""At most this much of the time between two calls counts as silence, because a process that slept did not listen (an emulated board slept for
+seconds)."""
 
 _KIND_OF: Final = {Lane.FRAMES: UnitKind.FRAMES, Lane.CONTROL: UnitKind.CONTROL}
 _LANE_OF: Final = {kind: lane for lane, kind in _KIND_OF.items()}
@@ -38,7 +40,7 @@ _LANE_OF: Final = {kind: lane for lane, kind in _KIND_OF.items()}
 
 @dataclass(frozen=True, slots=True)
 class Whole:
-    """A packet that came in whole."""
+    """A complete received packet."""
 
     lane: Lane
     header: Buffer
@@ -58,7 +60,7 @@ class _Parcel:
         return len(self.head) + len(self.payload)
 
     def take(self, count: int) -> tuple[Buffer, bool, bool]:
-        """Give the next chunk's body, whether it is the first and whether it is the last."""
+        """Return the next chunk's body, whether it is the first one, and whether it is the last one."""
         first, start = self.at == 0, self.at - len(self.head)
         self.at += count
         if start >= 0:
@@ -69,11 +71,11 @@ class _Parcel:
 
 
 class Cutter:
-    """One side's way out: takes packets, gives bytes to write.
+    """The sending half of one side: takes packets, returns bytes to write.
 
     Args:
         side: this side.
-        frame_bytes: the line carries bytes in frames of so many; 1: it does not.
+        frame_bytes: size of the frames in which the line carries bytes; 1 if it has none.
     """
 
     def __init__(self, side: LinkEnd, frame_bytes: int = 1) -> None:
@@ -95,7 +97,7 @@ class Cutter:
 
     @property
     def abandoned(self) -> int:
-        """Packets that were given up half sent, so far."""
+        """Packets given up half sent, so far."""
         return self._abandoned
 
     @property
@@ -105,28 +107,28 @@ class Cutter:
 
     @property
     def due_ns(self) -> int:
-        """When `take` wants to be called next even if nothing has happened; 2^63 - 1: never."""
+        """When `take` must be called next even if nothing has happened; 2^63 - 1: never."""
         queue = self._frames
         if not queue or not queue[0].at:
             return self._window.due_ns
         return min(self._window.due_ns, self._looked_ns + min(_ATTENTION_NS, _ABANDON_NS - self._silent_ns))
 
     def ready(self, lane: Lane) -> bool:
-        """Whether a packet with a payload would be taken now: none is on its way on that lane, and its first chunk may leave at once."""
+        """Whether a packet with a payload would be accepted now: no other is being sent on that lane, and its first chunk may leave at once."""
         if self._queues[lane]:
             return False
         return lane is Lane.CONTROL or self._window.has_room(self._window.chunk_bytes + UNIT_OVERHEAD_BYTES)
 
     def put(self, lane: Lane, header: bytes, payload: Buffer) -> bool:
-        """Take a packet to be sent.
+        """Accept a packet for sending.
 
         Args:
-            lane: where it goes.
+            lane: the lane to send it on.
             header: at most MAX_HEADER_BYTES.
             payload: at most MAX_PAYLOAD_BYTES; kept until it has left, not copied.
 
         Returns:
-            Whether it was taken. A packet without a payload may wait in line, one with a payload only leave at once.
+            Whether it was accepted. A packet without a payload may wait in line; one with a payload must be able to leave at once.
         """
         assert len(header) <= MAX_HEADER_BYTES
         assert len(payload) <= MAX_PAYLOAD_BYTES
@@ -137,22 +139,22 @@ class Cutter:
         return True
 
     def acknowledge(self, number: int) -> None:
-        """Tell the peer, in front of all else, the newest of its FRAMES units that came."""
+        """Tell the peer, ahead of everything else, which of its FRAMES units is the newest that came."""
         self._acknowledge = number
 
     def acknowledged(self, number: int, now_ns: int) -> None:
-        """Take the peer's word of the newest FRAMES unit that came to it."""
+        """Handle the peer's acknowledgement of the newest FRAMES unit it received."""
         if self._window.acknowledged(number, now_ns):
             self._silent_ns = 0
 
     def take(self, now_ns: int) -> bytes:
-        """Give the next bytes to write; they are to be written before any others are taken.
+        """Return the next bytes to write. Write them before taking more.
 
         Args:
             now_ns: any steady clock, ns.
 
         Returns:
-            At most about 64 KB; empty while nothing may be sent.
+            At most about 64 KB; empty if nothing may be sent now.
         """
         self._window.tick(now_ns)
         frames, control = self._frames, self._control
@@ -179,7 +181,7 @@ class Cutter:
         return b"".join(parts)
 
     def _cut(self, lane: Lane, count: int, parts: list[Buffer]) -> int:
-        """Add the next chunk of a lane; gives its size on the wire."""
+        """Append the next chunk of a lane to `parts`; return its size on the wire."""
         queue = self._queues[lane]
         body, first, last = queue[0].take(count)
         if last:
@@ -191,7 +193,7 @@ class Cutter:
         return len(body) + UNIT_OVERHEAD_BYTES
 
     def _listen(self, now_ns: int) -> None:
-        """Give a frame up that has begun to leave and of which nothing was heard for too long."""
+        """Give up a frame that has begun to leave if nothing was heard about it for too long."""
         passed_ns = min(now_ns - self._looked_ns, _ATTENTION_NS)
         self._looked_ns = now_ns
         frames = self._frames
@@ -206,7 +208,7 @@ class Cutter:
 
 @dataclass(slots=True)
 class _Assembly:
-    """A packet on its way in; its chunks are copied, for a view would keep all that was read with it."""
+    """A partly received packet. Its chunks are copied, because a view would keep the whole read buffer alive."""
 
     header_bytes: int
     size_bytes: int
@@ -215,7 +217,7 @@ class _Assembly:
 
 
 class Joiner:
-    """One side's way in: takes units, gives whole packets. Keeps at most one packet for each lane, and of that only what has come."""
+    """The receiving half of one side: takes units, returns whole packets. Keeps at most one packet per lane, and only the part that has come."""
 
     def __init__(self) -> None:
         self._under_way: dict[Lane, _Assembly] = {}
@@ -223,11 +225,11 @@ class Joiner:
 
     @property
     def broken(self) -> int:
-        """Packets that had begun and lacked a chunk, so far."""
+        """Packets that had begun but lacked a chunk, so far."""
         return self._broken
 
     def add(self, unit: Unit) -> Whole | None:
-        """Take a FRAMES or CONTROL unit.
+        """Handle a FRAMES or CONTROL unit.
 
         Returns:
             The packet that it completes.

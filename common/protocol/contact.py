@@ -1,8 +1,8 @@
-"""Who is at the other end of a wire: a wire cannot tell that a program has gone, or that another has taken its place. Sans-I/O.
+"""Who is at the other end of a wire. A wire cannot tell that a program has gone, or that another has taken its place. Sans-I/O.
 
-The dialler says OPEN with a number that it has never used, until it hears ACCEPT with that number; nothing is sent before. The listener
-takes every new number for a new contact and says WHO to a dialler that it does not know; each says CLOSE when it leaves. As a wire keeps
-the order of bytes, all that follows the first OPEN or ACCEPT of a number belongs to that contact and nothing before it does.
+The dialler says OPEN with a number that it has never used, until it hears ACCEPT with that number. Nothing else is sent before. The listener
+treats every new number as a new contact, and says WHO to a dialler that it does not know. Each side says CLOSE when it leaves. A wire
+preserves the order of bytes, so everything after the first OPEN or ACCEPT of a number belongs to that contact and nothing before it does.
 """
 
 import struct
@@ -17,10 +17,10 @@ _NEVER: Final = 2**63 - 1
 _NUMBERS: Final = 1 << 32
 
 RETRY_NS: Final = 100_000_000
-"""Between two attempts to be heard; a peer that comes back is met within this time."""
+"""Time between two attempts to be heard. A peer that comes back is met within this time."""
 
 _MOST_WAITING: Final = 4
-"""Words that wait for room on the line: only the newest of a kind means anything, and a peer that talks without reading must not fill memory."""
+"""Words that may wait for room on the line. Only the newest of a kind matters, and a peer that talks without reading must not fill memory."""
 
 
 class News(Enum):
@@ -39,11 +39,11 @@ class _Word(Enum):
 
 
 class Contact:
-    """One side's knowledge of the other.
+    """What one side knows about the other.
 
     Args:
-        side: which this is.
-        number: random below 2^32, so that no earlier life of this side has used it.
+        side: which end this is.
+        number: random, below 2^32, so that no earlier life of this side has used it.
     """
 
     def __init__(self, side: LinkEnd, number: int) -> None:
@@ -55,7 +55,7 @@ class Contact:
 
     @property
     def is_up(self) -> bool:
-        """Whether the two have met."""
+        """Whether the two sides have met."""
         return self._up
 
     @property
@@ -65,13 +65,13 @@ class Contact:
 
     @property
     def due_ns(self) -> int:
-        """When `words` wants to be called next, ns; 2^63 - 1: never."""
+        """When `words` must be called next, ns; 2^63 - 1: never."""
         if self._say:
             return 0
         return self._due_ns if self._dials and not self._up else _NEVER
 
     def hear(self, body: bytes) -> News:
-        """Take a CONTACT unit's body."""
+        """Handle a CONTACT unit's body."""
         if len(body) != _WORD.size:
             return News.NONE
         value, number = _WORD.unpack(body)
@@ -81,13 +81,13 @@ class Contact:
         return self._hear_as_dialler(word, number) if self._dials else self._hear_as_listener(word, number)
 
     def hear_stranger(self, now_ns: int) -> None:
-        """Take note, as listener, of a unit from a dialler that this side does not know."""
+        """As listener, handle a unit from a dialler that this side does not know."""
         if not self._dials and now_ns >= self._due_ns:
             self._due_ns = now_ns + RETRY_NS
             self._say.append((_Word.WHO, 0))
 
     def words(self, now_ns: int) -> list[Unit]:
-        """Give what is to be said now."""
+        """Return what is to be said now."""
         if self._dials and not self._up and now_ns >= self._due_ns:
             self._due_ns = now_ns + RETRY_NS
             self._say.append((_Word.OPEN, self.number))
@@ -99,13 +99,13 @@ class Contact:
         ]
 
     def leave(self) -> None:
-        """Say goodbye next; for the dialler what follows is a new contact."""
+        """Say goodbye next. For the dialler, what follows is a new contact."""
         if self._up:
             self._say.append((_Word.CLOSE, self.number))
         self._lose_peer()
 
     def interrupt(self) -> None:
-        """Take note that the line was lost: the other end has to be met anew, and cannot be told."""
+        """Record that the line was lost: the other end must be met anew, and cannot be told."""
         self._lose_peer()
         self._say.clear()
         if not self._dials:
@@ -127,7 +127,7 @@ class Contact:
         if word is _Word.OPEN:
             self._say.append((_Word.ACCEPT, number))
             if self._up and number == self._number:
-                return News.NONE  # said twice
+                return News.NONE  # a repeated word
             self._number, self._up = number, True
             return News.MET
         if word is _Word.CLOSE and self._up and number == self._number:

@@ -1,6 +1,6 @@
-"""One end of a byte stream: bytes that came go in, packets come out; packets go in, bytes to write come out. Sans-I/O, `now_ns` passed in.
+"""One end of a byte stream: received bytes go in and packets come out; packets go in and bytes to write come out. Sans-I/O, `now_ns` passed in.
 
-Joins the parts: units (`framing`), who is there (`contact`), chunks of both lanes (`chunking`) within what the line holds (`pacing`).
+It joins these parts: units (`framing`), who is there (`contact`), and chunks of both lanes (`chunking`) within what the line holds (`pacing`).
 """
 
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from common.protocol.message import Lane
 _NEVER: Final = 2**63 - 1
 
 GAP_NS: Final = 1_000_000_000
-"""A unit is written at one go: where the line is silent for this long in the middle of one, bytes were lost. A busy machine's stalls are shorter
-(100 ms were not enough under a load of 5, 250 ms under one of 17). Whatever comes meanwhile ends the wait as well, for it fills the unit up."""
+"""A unit is written in one go. If the line is silent for this long in the middle of one, bytes were lost. A busy machine's stalls are shorter
+(100 ms were not enough under a load of 5, nor 250 ms under a load of 17). Any bytes that come meanwhile also end the wait: they fill the unit."""
 
 
 class Change(Enum):
-    """What happened beside packets: the peer was met, has gone, or something came that is no unit."""
+    """Events other than packets: the peer was met, it has gone, or something came that is not a unit."""
 
     MET = 0
     PARTED = 1
@@ -34,7 +34,7 @@ class DuplexCounts:
 
     Attributes:
         garbage_bytes: bytes that belonged to no unit.
-        broken: packets that had begun to come and lacked a chunk.
+        broken: packets that had begun to arrive but lacked a chunk.
         abandoned: packets that were given up half sent.
     """
 
@@ -48,8 +48,8 @@ class Duplex:
 
     Args:
         side: which end.
-        number: random below 2^32.
-        frame_bytes: the line carries bytes in frames of so many; 1: it does not.
+        number: random, below 2^32.
+        frame_bytes: size of the frames in which the line carries bytes; 1 if it has none.
     """
 
     def __init__(self, side: LinkEnd, number: int, frame_bytes: int = 1) -> None:
@@ -70,7 +70,7 @@ class Duplex:
 
     @property
     def number(self) -> int:
-        """Number of the contact, other for each."""
+        """Number of the contact; each contact has a different one."""
         return self._contact.number
 
     @property
@@ -91,20 +91,20 @@ class Duplex:
 
     @property
     def due_ns(self) -> int:
-        """When `take` or `silence` want to be called next even if nothing has happened; 2^63 - 1: never."""
+        """When `take` or `silence` must be called next even if nothing has happened; 2^63 - 1: never."""
         silence_ns = self._heard_ns + GAP_NS if self._deframer.partial else _NEVER
         return min(self._cutter.due_ns, self._contact.due_ns, silence_ns)
 
     def ready(self, lane: Lane) -> bool:
-        """Whether a packet with a payload would be taken now."""
+        """Whether a packet with a payload would be accepted now."""
         return self.is_up and self._cutter.ready(lane)
 
     def put(self, lane: Lane, header: bytes, payload: Buffer) -> bool:
-        """Take a packet to be sent; gives whether it was taken."""
+        """Accept a packet for sending; return whether it was accepted."""
         return self.is_up and self._cutter.put(lane, header, payload)
 
     def feed(self, data: bytes, now_ns: int) -> list[Whole | Change]:
-        """Take bytes that came.
+        """Handle received bytes.
 
         Args:
             data: what was read.
@@ -117,24 +117,24 @@ class Duplex:
         return self._accept(self._deframer.feed(data), now_ns)
 
     def silence(self, now_ns: int) -> list[Whole | Change]:
-        """Take note that nothing is there to be read; after GAP_NS a unit that is not whole will not become so."""
+        """Record that there is nothing to read. After GAP_NS an incomplete unit is given up."""
         if not self._deframer.partial or now_ns - self._heard_ns < GAP_NS:
             return []
         return self._accept(self._deframer.give_up(), now_ns)
 
     def take(self, now_ns: int) -> bytes:
-        """Give the next bytes to write; empty while there are none, or while enough is under way."""
+        """Return the next bytes to write; empty if there are none, or if enough is under way."""
         words = self._contact.words(now_ns)
         said = b"".join(part for unit in words for part in unit_parts(self._side, unit))
         return said + self._cutter.take(now_ns) if self.is_up else said
 
     def leave(self) -> None:
-        """Say goodbye with the next bytes, in front of what waits."""
+        """Say goodbye with the next bytes, ahead of what waits."""
         self._contact.leave()
         self._anew()
 
     def interrupt(self) -> bool:
-        """Take note that the line itself was lost and begins anew; gives whether the two ends had met."""
+        """Record that the line itself was lost and begins anew; return whether the two ends had met."""
         was_up = self.is_up
         self._contact.interrupt()
         self._deframer.reset()
@@ -142,7 +142,7 @@ class Duplex:
         return was_up
 
     def _anew(self) -> None:
-        """Forget all that belonged to the contact."""
+        """Forget everything that belonged to the contact."""
         counts = self.counts
         self._past = DuplexCounts(0, counts.broken, counts.abandoned)
         self._cutter = Cutter(self._side, self._frame_bytes)

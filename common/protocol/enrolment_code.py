@@ -1,13 +1,14 @@
-"""Two machines learn each other's public keys over an open line, and a code that a person carries from one to the other proves them. Sans-I/O.
+"""Two machines learn each other's public keys over an open line; a code that a person carries from one to the other proves them. Sans-I/O.
 
-The board shows six digits, the host's owner types them. For each of their 20 bits both commit to that bit, with a fresh nonce and bound to
-both keys and names, before either opens its commitment. Whoever guesses at the board succeeds with 2^-20, and a failed attempt spends the
-code. Whoever stands between has keys of its own in its commitments; it hears the host's bits one by one until its own guess of one is wrong
-there, and must guess the rest at the board: 21 x 2^-20. A recording gives nothing to try codes against: it holds only a spent code. Source: Bluetooth Core Specification 5.4, Vol 2 Part H, 7.2.3 (authentication stage 1, passkey entry)
-and 7.7.1 (f1 = HMAC-SHA-256), here over the keys' and names' digest, with the round and the side in each commitment.
+The board shows six digits and the host's owner types them. For each of their 20 bits, both sides commit to the bit before either opens its
+commitment. Each commitment has a fresh nonce and is bound to both keys and names. Someone who guesses at the board succeeds with probability
+2^-20, and a failed attempt spends the code. A man in the middle has his own keys in his commitments. He learns the host's bits one by one
+until one of his guesses there is wrong, and must then guess the rest at the board: 21 x 2^-20. A recording does not help to try codes: it
+holds only a spent code. Source: Bluetooth Core Specification 5.4, Vol 2 Part H, 7.2.3 (authentication stage 1, passkey entry) and 7.7.1
+(f1 = HMAC-SHA-256), here over the digest of the keys and names, with the round and the side in each commitment.
 
-Rules: a code serves one attempt; after three failed ones there is a pause, which grows (`Desk`). Who only asks reserves nothing: the desk is taken
-from a proof's first word to its last, for seconds at most. `now_ns` and chance are passed in.
+Rules: a code serves one attempt. After three failed attempts there is a pause, which grows (`Desk`). Asking reserves nothing: the desk is
+taken only from a proof's first word to its last, for seconds at most. `now_ns` and randomness are passed in.
 """
 
 import hashlib
@@ -40,20 +41,20 @@ CODE_DIGITS: Final = 6
 _S: Final = 1_000_000_000
 
 CODE_LIFE_NS: Final = 300 * _S
-"""A code that nobody has used so long after it was last asked for is spent: time to walk from the board to the host, not to guess."""
+"""An unused code is spent this long after it was last asked for: time to walk from the board to the host, but not to guess."""
 
 PROOF_NS: Final = 10 * _S
-"""A proof may take this long: 20 rounds of two round trips, 4 s where each takes 100 ms. Nobody has to type meanwhile."""
+"""Time limit of a proof. It has 20 rounds of two round trips: 4 s if each takes 100 ms. Nobody has to type meanwhile."""
 
 TRIES: Final = 3
 """Failed attempts before a pause."""
 
 FIRST_PAUSE_NS: Final = 60 * _S
 LONGEST_PAUSE_NS: Final = 3600 * _S
-"""Three guesses an hour for a year reach 2.5 % of the codes; nobody leaves pairing open for a year."""
+"""At three guesses an hour, a year of guessing reaches 2.5 % of the codes. Nobody leaves pairing open for a year."""
 
 _BIT_BASE: Final = 0x80
-"""A round's bit is committed as 0x80 or 0x81, as the specification has it."""
+"""A round's bit is committed as 0x80 or 0x81, as in the specification."""
 
 
 class Speaker(Enum):
@@ -69,10 +70,10 @@ def code_text(code: int) -> str:
 
 
 def read_code(text: str) -> int:
-    """Read a code as people type it, blanks and hyphens aside.
+    """Read a typed code; blanks and hyphens are ignored.
 
     Raises:
-        SettingsError: it is none.
+        SettingsError: the text is not a code.
     """
     digits = text.replace(" ", "").replace("-", "").strip()
     if len(digits) == CODE_DIGITS and digits.isascii() and digits.isdigit():
@@ -81,19 +82,19 @@ def read_code(text: str) -> int:
 
 
 def new_code(chance: Callable[[int], bytes]) -> int:
-    """Make a code, every one equally likely.
+    """Make a code; all codes are equally likely.
 
     Args:
-        chance: gives so many random bytes (`os.urandom`).
+        chance: returns that many random bytes (`os.urandom`).
     """
-    while True:  # a number beyond the greatest multiple of 10^6 would favour small codes
+    while True:  # a number beyond the largest multiple of 10^6 would favour small codes
         value = int.from_bytes(chance(4), "big")
         if value < 2**32 - 2**32 % 10**CODE_DIGITS:
             return int(value % 10**CODE_DIGITS)
 
 
 class _Proof:
-    """One side's part in an attempt: its commitments, and the check of the other's."""
+    """One side's part in an attempt: its own commitments, and the check of the other side's."""
 
     def __init__(
         self, *, side: Speaker, host: Identity, board: Identity, code: int, chance: Callable[[int], bytes]
@@ -113,15 +114,15 @@ class _Proof:
         return Commit(self.round, self._commitment(self._side, self._nonce))
 
     def keep(self, commit: Commit) -> None:
-        """Take the other side's commitment."""
+        """Store the other side's commitment."""
         self._theirs = commit.commitment
 
     def open(self) -> Open:
-        """Open the own commitment."""
+        """Open this side's commitment."""
         return Open(self.round, self._nonce)
 
     def check(self, opened: Open) -> bool:
-        """Check the other side's commitment; whether it committed to the same bit and the same keys. The next round begins."""
+        """Check the other side's commitment and begin the next round. Return whether it committed to the same bit and the same keys."""
         expected = self._commitment(self._other, opened.nonce)
         self.round += 1
         return hmac.compare_digest(expected, self._theirs)
@@ -144,7 +145,7 @@ class Asking:
 
     Args:
         host: who it is.
-        chance: gives so many random bytes.
+        chance: returns that many random bytes.
     """
 
     def __init__(self, host: Identity, chance: Callable[[int], bytes]) -> None:
@@ -160,20 +161,20 @@ class Asking:
         return Ask(self._host)
 
     def begin(self, code: int) -> Begin:
-        """Begin the proof, with what was typed; only after `Shown` has come, be it over another connection."""
+        """Begin the proof with the typed code. Call only after `Shown` has come; it may have come over another connection."""
         assert self.board is not None
         self._proof = _Proof(side=Speaker.HOST, host=self._host, board=self.board, code=code, chance=self._chance)
         self._expects = Commit
         return Begin(self._host, self._proof.commit().commitment)
 
     def receive(self, word: Word) -> Word | None:
-        """Take a word of the board's.
+        """Handle a word from the board.
 
         Returns:
-            What to answer; None when nothing is to be said now: the code is to be typed, or both are done (`proved`).
+            The answer; None if there is nothing to say now: the code is still to be typed, or both are done (`proved`).
 
         Raises:
-            ProtocolError: the board, or who stands between, does not know the code, or speaks out of turn.
+            ProtocolError: the board, or a man in the middle, does not know the code or speaks out of turn.
         """
         if isinstance(word, Shown) and self._expects is Shown and self.board is None:
             self.board = word.board
@@ -203,7 +204,7 @@ class Say:
 
 @dataclass(frozen=True, slots=True)
 class ShowCode:
-    """Desk: show this code to the board's owner; a host of that name has asked."""
+    """Desk: show this code to the board's owner. A host of that name has asked."""
 
     code: int
     name: str
@@ -211,14 +212,14 @@ class ShowCode:
 
 @dataclass(frozen=True, slots=True)
 class Enrolled:
-    """Desk: this host has proved the code; from now on it is trusted."""
+    """Desk: this host has proved the code and is trusted from now on."""
 
     host: Identity
 
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """Desk: an attempt came to nothing, and its code is spent. `pause_ns`: how long nobody may try now."""
+    """Desk: an attempt failed and its code is spent. `pause_ns`: how long nobody may try now."""
 
     name: str
     pause_ns: int
@@ -237,11 +238,11 @@ class _Attempt:
 
 
 class Desk:
-    """The board's side: shows a code, takes one proof at a time, and makes whoever guesses wait.
+    """The board's side: shows a code, takes one proof at a time, and makes guessers wait.
 
     Args:
-        board: who the board is.
-        chance: gives so many random bytes.
+        board: the board's identity.
+        chance: returns that many random bytes.
     """
 
     def __init__(self, board: Identity, chance: Callable[[int], bytes]) -> None:
@@ -254,28 +255,28 @@ class Desk:
         self._closed_until_ns = 0
 
     def code(self, now_ns: int) -> int:
-        """Give the code that the next attempt must prove; makes one if there is none, or if nobody has used it in time."""
+        """Return the code that the next attempt must prove. Make a new one if there is none or if nobody used it in time."""
         if self._code is None or (self._attempt is None and now_ns >= self._code_until_ns):
             self._code = new_code(self._chance)
             self._code_until_ns = now_ns + CODE_LIFE_NS
         return self._code
 
     def is_proving(self, connection: bytes) -> bool:
-        """Whether the attempt of the moment is this connection's."""
+        """Whether this connection is making the current attempt."""
         return self._attempt is not None and self._attempt.connection == connection
 
     def pardon(self) -> None:
-        """Forget failed attempts, and the code shown so far: the owner stands at the board and says so."""
+        """Forget failed attempts and the code shown so far: the owner stands at the board and asks for it."""
         self._failures = 0
         self._closed_until_ns = 0
         if self._attempt is None:
             self._code = None
 
     def receive(self, connection: bytes, word: Word, now_ns: int) -> list[Output]:
-        """Take a word.
+        """Handle a word.
 
         Args:
-            connection: whose it is.
+            connection: the connection it came from.
             word: what was said.
             now_ns: CLOCK_MONOTONIC, ns.
         """
@@ -301,7 +302,7 @@ class Desk:
         return []
 
     def _refusal(self, connection: bytes, now_ns: int) -> list[Output]:
-        """Send a host away while a proof or a pause lasts; else nothing."""
+        """Turn a host away while a proof or a pause lasts; otherwise return nothing."""
         reason, until_ns = Denial.PAUSE, self._closed_until_ns
         if self._attempt is not None:
             reason, until_ns = Denial.BUSY, self._attempt.until_ns

@@ -1,6 +1,6 @@
-"""Words of pairing to bytes and back: a msgpack array [version, kind, fields…] of at most 255 bytes, every field checked, behind one byte of length.
+"""Encodes and decodes the words of pairing: a msgpack array [version, kind, fields…] of at most 255 bytes, preceded by one byte of length.
 
-What has come of a word is all that is kept for a stranger.
+Every field is checked. For a stranger, nothing is kept but the part of a word that has come.
 """
 
 from typing import Any, Final, assert_never
@@ -26,7 +26,7 @@ from common.protocol.zap import KEY_BYTES
 from common.versions import ENROLMENT_VERSION
 
 MAX_WORD_BYTES: Final = 255
-"""The longest honest word, a key and a commitment with a name of 64 letters of 2 bytes, has 203."""
+"""The longest honest word has 203 bytes: a key and a commitment, with a name of 64 letters of 2 bytes."""
 
 MAX_NAME: Final = 64
 
@@ -35,16 +35,16 @@ _LONGEST_S: Final = 86_400
 
 
 def encode_word(word: Word) -> bytes:
-    """Give a word's bytes, without their length."""
+    """Encode a word, without its length byte."""
     packed: bytes = msgpack.packb([ENROLMENT_VERSION, _KINDS.index(type(word)), *_fields(word)])
     return packed
 
 
 def decode_word(packed: bytes) -> Word:
-    """Read a word.
+    """Decode a word.
 
     Raises:
-        ProtocolError: these bytes are none.
+        ProtocolError: these bytes are not a word.
     """
     if len(packed) > MAX_WORD_BYTES:
         raise _bad(f"{len(packed)} bytes")
@@ -63,7 +63,7 @@ def decode_word(packed: bytes) -> Word:
 
 
 def frame_word(word: Word) -> bytes:
-    """Give a word's bytes as they travel.
+    """Encode a word with its length byte, as it travels.
 
     Raises:
         ProtocolError: it is too long.
@@ -75,24 +75,24 @@ def frame_word(word: Word) -> bytes:
 
 
 class WordReader:
-    """Makes words of a byte stream, however it is chopped; keeps one unfinished word at most."""
+    """Assembles words from a byte stream in chunks of any size; keeps at most one unfinished word."""
 
     def __init__(self) -> None:
         self._unread = b""
 
     @property
     def unread_bytes(self) -> int:
-        """What is kept of a word that is not whole yet."""
+        """Number of bytes kept of an incomplete word."""
         return len(self._unread)
 
     def feed(self, received: bytes) -> list[Word]:
-        """Give the words that are whole now.
+        """Return the words that are now complete.
 
         Args:
             received: what has come.
 
         Raises:
-            ProtocolError: these bytes are none; there is no going on.
+            ProtocolError: these bytes are not words; the stream cannot be continued.
         """
         unread, words = self._unread + received, []
         while unread and len(unread) > unread[0]:

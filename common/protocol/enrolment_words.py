@@ -1,4 +1,4 @@
-"""The words of pairing by a code (`pairing_code` says who says which when, `pairing_wire` how they travel)."""
+"""The words of pairing by a code. `enrolment_code` says who says what when; `enrolment_wire` says how the words travel."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -10,7 +10,7 @@ COMMITMENT_BYTES: Final = 32
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What one side says of itself, in the open.
+    """What one side says about itself, unencrypted.
 
     Attributes:
         key: its public key, 32 bytes.
@@ -70,7 +70,7 @@ class Denial(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Refuse:
-    """Either side: no. `seconds` until it may be tried again, where that is known; else 0."""
+    """Either side: no. `seconds` until it may be tried again, if known; else 0."""
 
     reason: Denial
     seconds: int = 0

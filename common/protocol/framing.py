@@ -1,10 +1,10 @@
-"""Units in a byte stream that may lose, add and spoil bytes: marker, length, header CRC, body, CRC-32. Sans-I/O: bytes in, units out.
+"""Units in a byte stream that may lose, add or corrupt bytes: marker, length, header CRC, body, CRC-32. Sans-I/O: bytes in, units out.
 
-Layout (little endian): marker u8, head u16 (kind 2 bits, first 1, last 1, body length 12), number u16, header check u16, body, CRC-32 u32. The
-header check is the lower half of the CRC-32 over the first five bytes, so that a spoiled length is not believed; the CRC-32 runs over these
-and the body. Rules: a unit is given only whole and unaltered; after anything that is none the search goes on one byte behind the marker
-that misled, so that no good unit is passed over; never more than one unit's bytes are kept. Each side has a marker of its own: what a
-line echoes back is garbage to its sender. Both markers have the upper bit set, which a login prompt's text has not.
+Layout (little endian): marker u8, head u16 (kind 2 bits, first 1, last 1, body length 12), number u16, header check u16, body, CRC-32 u32.
+The header check is the lower half of the CRC-32 over the first five bytes; it keeps a corrupted length from being believed. The CRC-32
+covers these five bytes and the body. Rules: only whole, unaltered units are returned. After anything else the search resumes one byte
+behind the misleading marker, so no good unit is skipped. At most one unit's bytes are kept. Each side has its own marker, so whatever a
+line echoes back is garbage to its sender. Both markers have the top bit set, which the text of a login prompt has not.
 """
 
 import struct
@@ -16,7 +16,8 @@ from zlib import crc32
 from common.frame import Buffer
 
 MAX_BODY_BYTES: Final = 4085
-"""With its 11 bytes of frame a unit is 4096 bytes at most: bounds what a spoiled length can hold up; a pty gives no more at a time."""
+"""With its 11 bytes of framing a unit has at most 4096 bytes. This limits how long a corrupted length can hold up the line; a pty gives no
+more at a time."""
 
 _START: Final = struct.Struct("<BHH")
 _CHECK: Final = struct.Struct("<H")
@@ -32,19 +33,19 @@ _LENGTH_MASK: Final = 0xFFF
 
 
 class LinkEnd(Enum):
-    """Who wrote a unit; the value is the marker that it begins with."""
+    """Who wrote a unit. The value is the marker that the unit begins with."""
 
     DIALLER = 0xA5
     LISTENER = 0xC6
 
     @property
     def peer(self) -> "LinkEnd":
-        """The other one."""
+        """The other end."""
         return LinkEnd.LISTENER if self is LinkEnd.DIALLER else LinkEnd.DIALLER
 
 
 class UnitKind(Enum):
-    """What a unit carries: a chunk of a packet on one of the lanes, word of the chunks that came, or word of who is there."""
+    """What a unit carries: a chunk of a packet on one of the lanes, an acknowledgement of chunks, or a contact word."""
 
     FRAMES = 0
     CONTROL = 1
@@ -54,13 +55,13 @@ class UnitKind(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unit:
-    """What was written at one go.
+    """The bytes written in one go.
 
     Attributes:
         kind: what it carries.
-        first: whether a packet begins with it.
-        last: whether a packet ends with it.
-        number: counts the units of a kind, modulo 65536; of an ACK: the newest FRAMES unit that came.
+        first: whether it begins a packet.
+        last: whether it ends a packet.
+        number: counts the units of a kind, modulo 65536. In an ACK: the newest FRAMES unit received.
         body: at most MAX_BODY_BYTES.
     """
 
@@ -75,7 +76,7 @@ _KINDS: Final = tuple(UnitKind)
 
 
 def unit_parts(side: LinkEnd, unit: Unit) -> tuple[bytes, Buffer, bytes]:
-    """Give a unit's bytes on the wire in three parts, so that a large body need not be copied here.
+    """Return a unit's bytes on the wire in three parts, so that a large body need not be copied here.
 
     Args:
         side: who writes it.
@@ -111,17 +112,17 @@ class Deframer:
 
     @property
     def partial(self) -> bool:
-        """Whether a unit has begun that is not whole yet."""
+        """Whether a unit has begun that is not yet complete."""
         return bool(self._rest)
 
     def feed(self, data: bytes) -> list[Unit]:
-        """Take bytes as they come, chopped in any way.
+        """Take bytes in chunks of any size.
 
         Args:
             data: what was read.
 
         Returns:
-            The units that are whole now; their bodies are views, no copies.
+            The units completed by these bytes. Their bodies are views, not copies.
         """
         if self._rest:
             data = self._rest + data
@@ -131,7 +132,7 @@ class Deframer:
         return units
 
     def give_up(self) -> list[Unit]:
-        """Stop waiting for the rest of a unit, because the line has been silent in the middle of it: bytes of it were lost.
+        """Stop waiting for the rest of a unit: the line fell silent in the middle of it, so bytes were lost.
 
         Returns:
             Whole units that had been taken for its body.
@@ -146,12 +147,12 @@ class Deframer:
         return units
 
     def reset(self) -> None:
-        """Forget a unit that is not whole: another stream begins."""
+        """Forget an incomplete unit because a new stream begins."""
         self._garbage_bytes += len(self._rest)
         self._rest = b""
 
     def _scan(self, data: bytes, units: list[Unit]) -> int:
-        """Collect whole units; gives where the first byte stands that more bytes must come for."""
+        """Collect whole units; return the position of the first byte that still needs more bytes behind it."""
         view = memoryview(data)
         end, at = len(data), 0
         while True:

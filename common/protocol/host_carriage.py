@@ -1,6 +1,6 @@
-"""Which of a host's links its frames come over: wanted, agreed to by the board, given up for another. Sans-I/O, `now_ns` passed in.
+"""Which of a host's links carries frames: one is wanted, the board agrees, or it is given up for another. Sans-I/O, `now_ns` passed in.
 
-The board agrees by answering a hello on that link's frames' lane; until then frames come as before.
+The board agrees by answering a hello on that link's frames lane. Until then frames come as before.
 """
 
 from collections.abc import Sequence
@@ -11,25 +11,25 @@ from common.protocol.message import Lane
 from common.protocol.session import HELLO_RETRY_NS, MS, LinkDown, Output
 
 STUCK_NS: Final = 1000 * MS
-"""A link whose frames' lane leaves a hello unanswered for this long gives way to another: five hellos."""
+"""A link whose frames lane leaves a hello unanswered for this long gives way to another. This is five hellos."""
 
 SILENCE_BESIDE_NS: Final = 1500 * MS
-"""The carrier is lost when unheard for this long while another link was heard: three accounts of the board and three waves have not come."""
+"""The carrier is lost when it is silent for this long while another link was heard: three accounts and three waves are missing."""
 
 _NEVER: Final = 2**63 - 1
 
 
 class Carriage:
-    """The link that frames come over, and the one that they are to come over.
+    """The link that carries frames now, and the link that shall carry them.
 
     Args:
         host_id: random id of this process's life.
         paths: all links.
 
     Attributes:
-        carrier: the link that frames come over now; None: none.
-        wanted: the link that they are to come over; None: none.
-        pending: whether the board has not agreed to that yet.
+        carrier: the link that carries frames now; None if there is none.
+        wanted: the link that shall carry them; None if there is none.
+        pending: whether the board has yet to agree to `wanted`.
     """
 
     def __init__(self, host_id: str, paths: Sequence[HostPath]) -> None:
@@ -43,15 +43,15 @@ class Carriage:
 
     @property
     def due_ns(self) -> int:
-        """When `tick` wants to be called next, host's clock, ns."""
+        """When `tick` must be called next, host's clock, ns."""
         return self._hello_due_ns if self.pending else _NEVER
 
     def tick(self, now_ns: int) -> list[Output]:
-        """Say hello for frames again while it is unanswered."""
+        """Repeat an unanswered hello for frames."""
         return self._insist(now_ns) if self.pending and now_ns >= self._hello_due_ns else []
 
     def want(self, path: HostPath, now_ns: int) -> list[Output]:
-        """Let frames come over a link that is open.
+        """Ask for frames over an open link.
 
         Args:
             path: which.
@@ -61,15 +61,15 @@ class Carriage:
         return self._insist(now_ns)
 
     def want_again(self, now_ns: int) -> list[Output]:
-        """Say hello for frames anew where they are wanted, if they are."""
+        """Say hello for frames again on the wanted link, if there is one."""
         return [] if self.wanted is None else self.want(self.wanted, now_ns)
 
     def agree(self, path: HostPath) -> None:
-        """Take note that the board sends its frames over this link now."""
+        """Record that the board now sends its frames over this link."""
         self.carrier, self.pending = path, False
 
     def lose(self, path: HostPath, now_ns: int) -> list[Output]:
-        """Take note that a link is lost: where frames were wanted there, they are to come over another one if there is one."""
+        """Record that a link is lost. If frames were wanted there, ask for them on another open link."""
         if self.carrier is path:
             self.carrier = None
         if self.wanted is not path:
@@ -79,12 +79,12 @@ class Carriage:
         return [] if following is None else self.want(following, now_ns)
 
     def end(self) -> None:
-        """Take note that the board has gone: frames come over no link, and are wanted on none."""
+        """Record that the board has gone: no link carries frames, and none is wanted."""
         self.carrier = self.wanted = None
         self.pending = False
 
     def is_silent(self, path: HostPath, now_ns: int) -> bool:
-        """Whether a link has been silent for too long: the carrier sooner than others, because frames have to go on."""
+        """Whether a link has been silent for too long. The carrier is given up sooner than other links, because frames must go on."""
         if now_ns - path.heard_ns >= path.silence_ns:
             return True
         return path is self.carrier and any(
@@ -92,11 +92,11 @@ class Carriage:
         )
 
     def absent(self, absent_ns: int, now_ns: int) -> None:
-        """Take out of the waiting for an answer the time in which this process did not run."""
+        """Do not count the time in which this process did not run as waiting for an answer."""
         self._pending_since_ns = min(now_ns, self._pending_since_ns + absent_ns)
 
     def _insist(self, now_ns: int) -> list[Output]:
-        """Say hello for frames where they are wanted, or give that link up for another."""
+        """Say hello for frames on the wanted link, or give it up for another."""
         assert self.wanted is not None
         wanted = self.wanted
         others = [path for path in self._paths if path.is_open and path is not wanted]

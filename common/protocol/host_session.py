@@ -1,12 +1,12 @@
-"""The host's side of a session over one or several links: finds the board, grants credit, echoes clocks, tells fresh frames from stale. Sans-I/O.
+"""The host's side of a session over one or several links: finds the board, grants credit, echoes clocks, separates fresh frames from stale ones.
 
-A link is open when the board answers hello on its control lane; all open links lead to one life of one board. Frames come over one of them, the
-carrier: the one on which the board answered hello for frames last. That answer stands in line behind the last frame of this lane, and overtakes what
-is under way on others: what it counts and has not come is lost, and a frame that comes behind a newer one stays lost (`StaleReason.LATE`).
-`now_ns` is passed in; which open link is to be the carrier is its owner's choice (`carry`).
+Sans-I/O; `now_ns` is passed in. A link is open when the board answers a hello on its control lane. All open links lead to one life of one
+board. Frames come over one of them, the carrier: the link on which the board last answered a hello for frames. That answer queues behind
+the last frame of its lane and overtakes what is under way on other links. So any frame that it counts and that has not come is lost, and
+a frame that comes behind a newer one stays lost (`StaleReason.LATE`). The session's owner chooses the carrier among the open links (`carry`).
 
-Nothing that arrives is believed: a refusal counts on a lane that this side dialled only, a frame only within the credit that was granted, an account
-only up to that credit. Time in which this process did not run is nobody's silence.
+The session trusts nothing that arrives: a refusal counts only on a lane that this side dialled, a frame only within the credit granted, an
+account only up to that credit. Time in which this process did not run counts as nobody's silence.
 """
 
 from collections.abc import Sequence
@@ -55,7 +55,7 @@ from common.protocol.session import (
 )
 
 _FOREIGN_RETRY_NS: Final = 5000 * MS
-"""A link that leads to another board, or is refused beside one that is not, is asked again after this time: the cable may be moved."""
+"""Retry time for a link that leads to another board, or refuses us while another link is open: someone may move the cable."""
 
 _TOO_MANY: Final = Unbelievable("an account of more frames than were allowed")
 
@@ -65,7 +65,7 @@ class HostSession:
 
     Args:
         host_id: random id of this process's life.
-        links: for each link the connections that this side opened; empty where the board dials (`?bind=1`), then its knocks tell them.
+        links: for each link, the connections that this side opened. Empty where the board dials (`?bind=1`); its knocks then reveal them.
     """
 
     def __init__(self, host_id: str, links: Sequence[dict[Lane, bytes]]) -> None:
@@ -85,7 +85,7 @@ class HostSession:
 
     @property
     def carrier(self) -> int | None:
-        """The link that frames come over now."""
+        """The link that frames come over now; None if there is none."""
         carrier = self._carriage.carrier
         return None if carrier is None else carrier.link
 
@@ -97,7 +97,7 @@ class HostSession:
 
     @property
     def due_ns(self) -> int:
-        """When `tick` wants to be called next, host's clock, ns."""
+        """When `tick` must be called next, host's clock, ns."""
         return min((self._carriage.due_ns, *(path.due_ns for path in self._paths)))
 
     def receive(  # noqa: PLR0911 - one line for each kind of message
@@ -120,9 +120,9 @@ class HostSession:
                 return [] if self._leaving else self._answer_knock(path, connection, message, now_ns)
             case Refusal(reason):
                 if connection not in path.dialled.values():
-                    return []  # whoever called here may be anybody
+                    return []  # on a lane that others dial, the caller may be anybody
                 if not path.is_open and any(other.is_open for other in self._paths):
-                    path.shut(now_ns + _FOREIGN_RETRY_NS)  # our board talks to us elsewhere: this is another one
+                    path.shut(now_ns + _FOREIGN_RETRY_NS)  # our board is on another link: this is a different one
                 return [Refused(reason, path.link)]
             case BoardHello():
                 if connection == path.lanes.get(Lane.CONTROL):
@@ -131,7 +131,7 @@ class HostSession:
             case FrameMessage():
                 return self._take_frame(path, message, now_ns)
             case HostHello() | Ping() | Credit() | Steer():
-                return []  # a host's words from a board: nothing a sound board sends
+                return []  # only a host sends these; a sound board never does
             case Pong() | Status() | End():
                 return self._attend(path, connection, message, now_ns)
             case Bye(counts):
@@ -140,7 +140,7 @@ class HostSession:
                 assert_never(message)
 
     def tick(self, now_ns: int) -> list[Output]:
-        """Do what time demands: hello again while unanswered, the next clock wave, give up a silent or stuck link."""
+        """Do what is due: repeat unanswered hellos, begin the next clock wave, give up a silent or stuck link."""
         self._notice_absence(now_ns)
         outputs: list[Output] = []
         for path in self._paths:
@@ -154,20 +154,20 @@ class HostSession:
         return outputs + self._carriage.tick(now_ns)
 
     def carry(self, link: int, now_ns: int) -> list[Output]:
-        """Let frames come over that link from now on; until the board has agreed they come as before.
+        """Ask the board to send frames over this link. Until it agrees, they come as before.
 
         Args:
-            link: which; one that is not open is not asked.
+            link: which one; a link that is not open is ignored.
             now_ns: host's clock, ns.
         """
         path = self._paths[link]
         return self._carriage.want(path, now_ns) if path.is_open and path is not self._carriage.wanted else []
 
     def grant(self, slots: int) -> list[Output]:
-        """Let the board have credit for this many frames beyond the last one that came; credit is never taken back.
+        """Grant the board credit for this many frames beyond the last one that came. Credit is never taken back.
 
         Args:
-            slots: free places for frames now.
+            slots: places now free for frames.
         """
         carrier, stream = self._carriage.carrier, self._stream
         if carrier is None or stream is None or stream.next_index + slots <= stream.below_index:
@@ -186,13 +186,13 @@ class HostSession:
         return [] if carrier is None else [Outgoing(carrier.lanes[Lane.CONTROL], Steer(later_ns))]
 
     def probe(self, now_ns: int) -> None:
-        """Let the next echoes be asked for as soon as the lines permit: something waits for an answer that is younger than itself."""
+        """Send the next echoes as soon as the lines permit: something waits for an answer younger than itself."""
         for path in self._paths:
             if path.is_open:
                 path.waves.hasten(now_ns)
 
     def begin_clock(self, now_ns: int) -> list[Output]:
-        """Take note that this machine's clock stood still: every echo under way is void, and so is the credit that was granted.
+        """Record that this machine's clock stood still. All echoes under way are void, and so is the credit granted.
 
         Args:
             now_ns: host's clock, ns.
@@ -203,11 +203,11 @@ class HostSession:
         return self._carriage.want_again(now_ns)
 
     def interrupted(self, connection: bytes, now_ns: int) -> list[Output]:
-        """Take note that a connection broke: what was under way on it is gone, so its link's lanes are greeted anew."""
+        """Record that a connection broke. What was under way on it is gone, so both lanes of its link are greeted again."""
         return self._lose(self._paths[connection[0]], now_ns)
 
     def leave(self) -> list[Output]:
-        """Say goodbye, so that the board is free for another host at once; its last account answers."""
+        """Say goodbye, so that the board is free for another host at once. It answers with its last account."""
         self._leaving = True
         return [Outgoing(path.lanes[Lane.CONTROL], Bye()) for path in self._paths if path.is_open]
 
@@ -220,15 +220,15 @@ class HostSession:
         if lane is Lane.FRAMES and path.is_open:
             return self._carriage.want(path, now_ns) if path is self._carriage.wanted else []
         if path.is_open and knock.session == path.session and knock.lane is Lane.FRAMES:
-            # The board knows us and has lost its frames' lane, which it says on all others; the carrier has to answer then, or gives way.
+            # The board knows us but has lost its frames lane, and says so on every other lane. The carrier must answer now or give way.
             path.heard_ns = now_ns
             return [] if self._carriage.pending else self._carriage.want_again(now_ns)
-        # The board has forgotten us: for a while one of the two was not there, and its clock may have stood still meanwhile.
+        # The board has forgotten us: one of the two was gone for a while, and its clock may have stood still in that time.
         void: list[Output] = [ClockVoid()] if path.is_open and knock.session == path.session else []
         return void + self._lose(path, now_ns)
 
     def _notice_absence(self, now_ns: int) -> None:
-        """Take out of all silence the time in which this process did not run."""
+        """Do not count the time in which this process did not run as anyone's silence."""
         absent_ns = self._presence.absent_ns(lambda: self.due_ns, now_ns)
         if not absent_ns:
             return
@@ -237,10 +237,10 @@ class HostSession:
         self._carriage.absent(absent_ns, now_ns)
 
     def _open(self, path: HostPath, hello: BoardHello, now_ns: int) -> list[Output]:
-        """Take a board's hello on a control lane."""
+        """Handle a board's hello on a control lane."""
         if path.hello is not None:
             if path.hello.boot_id == hello.boot_id:
-                return []  # the answer to a hello that was said twice
+                return []  # the answer to a repeated hello
             return self._lose(path, now_ns) + self._open(path, hello, now_ns)  # the board has slept
         others = [other for other in self._paths if other.hello is not None and other.hello.session != hello.session]
         path.session = hello.session
@@ -254,7 +254,7 @@ class HostSession:
         return outputs if self._carriage.wanted is not None else outputs + self._carriage.want(path, now_ns)
 
     def _doubt(self, path: HostPath, hello: BoardHello, others_heard_ns: int, now_ns: int) -> list[Output]:
-        """A link leads to another life of a board than the others do: it is new, and those will fall silent, or it is another board."""
+        """Handle a link that leads to another life of a board: either it is new and the other links will fall silent, or it is another board."""
         if path.foreign_since_ns is None:
             path.foreign_since_ns = now_ns
         if now_ns - path.foreign_since_ns < TAKEOVER_NS or others_heard_ns <= path.foreign_since_ns:
@@ -264,7 +264,7 @@ class HostSession:
         return [Outgoing(path.lanes[Lane.CONTROL], Bye()), OtherBoard(path.link, hello)]
 
     def _lose(self, path: HostPath, now_ns: int) -> list[Output]:
-        """A link is lost: it is greeted anew, and frames come over another one if there is one."""
+        """Give a link up and greet it again. Frames move to another link if there is one."""
         outputs: list[Output] = [LinkDown(path.link)] if path.is_open else []
         path.shut(now_ns)
         outputs += path.greet(self._host_id, now_ns)
@@ -274,16 +274,16 @@ class HostSession:
             outputs.append(Vanished(orderly=False))
         return outputs
 
-    # Frames' lane.
+    # The frames lane.
 
     def _accept(self, path: HostPath, hello: BoardHello, now_ns: int) -> list[Output]:
-        """Take a board's hello on a frames' lane."""
+        """Handle a board's hello on a frames lane."""
         if path.hello is None:
             return []
         if (path.hello.session, path.hello.boot_id) != (hello.session, hello.boot_id):
-            return self._lose(path, now_ns)  # the board began a new life between the two lanes, or slept
+            return self._lose(path, now_ns)  # between the two lanes the board began a new life, or slept
         if path is not self._carriage.wanted:
-            # The answer to a hello of a while ago: the board may send its frames there now.
+            # The answer to an old hello: the board may now send its frames there.
             return self._carriage.want_again(now_ns)
         stream = self._stream
         resumed = stream is not None and stream.hello.session == hello.session
@@ -293,7 +293,7 @@ class HostSession:
         else:
             lost = stream.resume(hello)
         path.heard_ns = now_ns
-        if resumed and not self._carriage.pending:  # the answer to a hello said twice: credit is void once more
+        if resumed and not self._carriage.pending:  # the answer to a repeated hello: credit is void again
             return [Counted(hello.counts, ended=False, lost=lost)]
         self._carriage.agree(path)
         self._streams = True
@@ -305,7 +305,7 @@ class HostSession:
         if stream is None or frame.session != stream.hello.session:
             return [Stale(frame, StaleReason.OLD_SESSION)]
         if stream.hello.boot_id != self._boot_id:
-            return [Stale(frame, StaleReason.OLD_SESSION)]  # sent before a sleep; its marks are of the clock before
+            return [Stale(frame, StaleReason.OLD_SESSION)]  # sent before a sleep, so its marks are on the earlier clock
         taken = stream.take(frame.sent_index)
         if isinstance(taken, StaleReason):
             return [Stale(frame, taken)]
@@ -322,7 +322,7 @@ class HostSession:
         echoes, ping = path.waves.begin_wave(now_ns, standby=path is not carrier)
         if ping is None:
             return []
-        # Credit is granted up to an index, so repeating it is harmless and mends one that a broken connection swallowed.
+        # Credit is granted up to an index. Repeating it is harmless, and replaces a grant that a broken connection swallowed.
         below_index = 0 if path is not carrier or self._stream is None else self._stream.below_index
         return [*echoes, Outgoing(control, ping), *([Outgoing(control, Credit(below_index))] if below_index else [])]
 
@@ -340,7 +340,7 @@ class HostSession:
                     return []
                 if not stream.can_be(counts):
                     return [_TOO_MANY]
-                # What it tells of and has not come before it is lost.
+                # A frame that this account counts and that has not come before it is lost.
                 behind = connection == path.lanes.get(Lane.FRAMES)
                 lost = stream.pass_over(counts.sent) if behind else 0
                 told = Counted(counts, ended=isinstance(message, End), lost=lost)
@@ -351,17 +351,17 @@ class HostSession:
                 assert_never(message)
 
     def _take_goodbye(self, path: HostPath, connection: bytes, counts: BoardCounts, now_ns: int) -> list[Output]:
-        """Take a board's goodbye. It may come on one lane just after the other one broke: its account is the session's last all the same."""
+        """Handle a board's goodbye. It may come on one lane just after the other broke; its account is still the session's last."""
         stream = self._stream
         if stream is None or path.session != stream.hello.session or connection not in path.lanes.values():
             return []
         if counts.sent < stream.next_index:
             return []
-        # Answered, so that the board keeps the connection until its last words were read.
+        # Answer it, so that the board keeps the connection until its last words are read.
         answer, can_be = Outgoing(connection, Bye()), stream.can_be(counts)
         lost = stream.pass_over(counts.sent) if can_be and connection == path.lanes.get(Lane.FRAMES) else 0
         told = Counted(counts, ended=False, lost=lost, last=True) if can_be else _TOO_MANY
-        if self._leaving:  # it is the board's answer to our own goodbye
+        if self._leaving:  # the board's answer to our own goodbye
             return [answer, told]
         for known in self._paths:
             if known.is_open:

@@ -1,8 +1,8 @@
-"""The closed union of messages that board and host exchange. Values only; their bytes are wire.py's, their order session's.
+"""The closed union of messages that board and host exchange. Values only: `wire.py` encodes them, `session.py` orders them.
 
-A *connection* is one byte path between the two; a link has two of them, one for each lane, so that clock echoes and control never wait behind
-image bytes. `sent_index` numbers the frames that a board's session has sent, from 0: credit is granted up to an index, so that granting
-twice is harmless and every gap is a loss.
+A *connection* is one byte path between the two. A link has two of them, one for each lane, so that clock echoes and control never wait
+behind image bytes. `sent_index` numbers the frames that a board's session has sent, starting at 0. Credit is granted up to an index, so
+granting twice is harmless and every gap is a loss.
 """
 
 from dataclasses import dataclass, field
@@ -20,14 +20,14 @@ class Lane(Enum):
 
 
 class Pacing(Enum):
-    """Who sets a camera's pace: its own clock, or the credit that it is granted."""
+    """Who sets a camera's pace: its own clock, or the credit that the host grants."""
 
     CLOCK = 0
     DEMAND = 1
 
 
 class Steering(Enum):
-    """How a camera can be made to expose later within its period, if at all: by moving the grid of its stamps, or by starting its stream anew."""
+    """How a camera can be made to expose later within its period: not at all, by shifting the grid of its stamps, or by restarting its stream."""
 
     NONE = 0
     GRID = 1
@@ -53,7 +53,7 @@ class RefusalReason(Enum):
 
 @dataclass(frozen=True, slots=True)
 class BoardCounts:
-    """What became of a board session's frames so far: grabbed = sent + all dropped + the one that may wait in the outbox."""
+    """What became of a board session's frames so far. grabbed = sent + all dropped + the one that may wait in the outbox."""
 
     grabbed: int = 0
     sent: int = 0
@@ -62,15 +62,15 @@ class BoardCounts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraDescription:
-    """What a host must know of the board's camera.
+    """What a host must know about the board's camera.
 
     Attributes:
         name: for people.
-        width_px: image width as it was asked for, px; frames of a lower rung may be smaller.
-        height_px: the same for the height.
+        width_px: image width as requested, px. Frames of a lower rung may be smaller.
+        height_px: image height as requested, px.
         pixel_format: encoding of the frames.
         period_ns: nominal time between frames, ns.
-        pacing: its own clock or the host's demand.
+        pacing: whether its own clock or the host's demand sets the pace.
         steering: how its phase can be moved.
     """
 
@@ -84,22 +84,22 @@ class CameraDescription:
 
     @property
     def has_exact_stamps(self) -> bool:
-        """Whether its stamps say by definition when its images were exposed: a replay's do, whose images have no other time."""
+        """Whether its stamps are the exposure times by definition. This holds for a replay: its images have no other time."""
         return self.pacing is Pacing.DEMAND or self.steering is Steering.GRID
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rung:
-    """How far the board has lowered what its camera gives, so that the link carries it.
+    """How far the board has lowered the camera's output so that the link can carry it.
 
     Attributes:
-        index: 0: as it was asked for.
-        last: the index of the lowest rung; 0: nothing can or may be lowered.
-        changes: how often it went down or up in this session.
-        period_ns: nominal time between frames now, ns; 0 before it is known.
-        quality: of the JPEG images now, in the camera's own unit; 0 where it cannot be set.
-        width_px: of the images now, px; 0 where it cannot be set.
-        height_px: the same.
+        index: index of the current rung; 0 is what was asked for.
+        last: index of the lowest rung; 0 means that nothing can or may be lowered.
+        changes: how often the rung went down or up in this session.
+        period_ns: current nominal time between frames, ns; 0 before it is known.
+        quality: current JPEG quality, in the camera's own unit; 0 where it cannot be set.
+        width_px: current image width, px; 0 where it cannot be set.
+        height_px: current image height, px; 0 where it cannot be set.
     """
 
     index: int = 0
@@ -113,7 +113,7 @@ class Rung:
 
 @dataclass(frozen=True, slots=True)
 class HostHello:
-    """Host: I am here, and this connection is for that lane."""
+    """Host: I am here, and this connection is for this lane."""
 
     host_id: str
     lane: Lane
@@ -121,7 +121,7 @@ class HostHello:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardHello:
-    """Board: accepted. Frames will be numbered from `counts.sent` on."""
+    """Board: accepted. Frames will be numbered starting at `counts.sent`."""
 
     session: str
     boot_id: str
@@ -132,9 +132,9 @@ class BoardHello:
 
 @dataclass(frozen=True, slots=True)
 class Knock:
-    """Board: I don't know you (or I have just dialled you); say hello on this connection for that lane.
+    """Board: I do not know you (or have just dialled you). Say hello on this connection, for this lane.
 
-    `session` tells a host at once that a board's new connection is not a second board's.
+    `session` tells the host at once that the new connection comes from the same board and not from a second one.
     """
 
     lane: Lane
@@ -172,7 +172,7 @@ class FrameMessage:
 
 @dataclass(frozen=True, slots=True)
 class Ping:
-    """Host: clock echo, please. `t0_ns` is the host's clock just before sending; `wave` keeps late answers out of a later estimate."""
+    """Host: clock echo, please. `t0_ns` is the host's clock just before sending; `wave` keeps late answers out of later estimates."""
 
     wave: int
     t0_ns: int
@@ -180,7 +180,7 @@ class Ping:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pong:
-    """Board: the echo; `t1_ns` on arrival, `t2_ns` just before sending, both on the board's clock."""
+    """Board: the echo. `t1_ns` is the arrival and `t2_ns` the moment just before sending, both on the board's clock."""
 
     wave: int
     t0_ns: int
@@ -190,7 +190,7 @@ class Pong:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """Board: what became of my frames so far, and what the camera gives now."""
+    """Board: what became of my frames so far, and what the camera delivers now."""
 
     session: str
     counts: BoardCounts
@@ -199,7 +199,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """Board: the last frame has been sent (follows it on the frames' connection)."""
+    """Board: the last frame has been sent. This message follows it on the frames connection."""
 
     session: str
     counts: BoardCounts
@@ -207,14 +207,14 @@ class End:
 
 @dataclass(frozen=True, slots=True)
 class Bye:
-    """Either side: I am leaving on purpose. From a board it carries its final counts."""
+    """Either side: I am leaving on purpose. A board's goodbye carries its final counts."""
 
     counts: BoardCounts = BoardCounts()
 
 
 @dataclass(frozen=True, slots=True)
 class Steer:
-    """Host: let your camera expose later by so much, from now on. Less than a period; whether it did is seen in the stamps."""
+    """Host: make your camera expose later by this much from now on. Less than one period. The stamps show whether it did."""
 
     later_ns: int
 

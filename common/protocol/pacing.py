@@ -1,13 +1,14 @@
-"""How much may be under way on a line whose rate nobody knows: measured from acknowledgements. Sans-I/O, `now_ns` passed in.
+"""Limits how much may be under way on a line of unknown rate, by measuring acknowledgements. Sans-I/O, `now_ns` passed in.
 
-The bound on unacknowledged bytes is rate x (least round trip + 10 ms) - the bytes of the unit that took the least round trip (5 ms' worth at
-most), so that what is written next waits about 10 ms at most behind what was written before; but never below two chunks of 256 bytes, which
-keep a slow line busy.
-The rate is the largest delivery rate of late, a sample being what arrived between a unit's writing and its acknowledgement over that time
-(Cheng et al., "Delivery Rate Estimation", draft-cheng-iccrg-delivery-rate-estimation-02). As a busy line always holds a queue, the least
-round trip is measured anew every ten seconds with the line let run empty (BBR's ProbeRTT, draft-cardwell-iccrg-bbr-congestion-control-02,
-4.3.4). Where acknowledgements again and again leave nothing under way although more waited to be written, the line is not full: one of the
-two programs is seldom awake, or an adapter hands bytes on in heaps. Then the 10 ms become more, until the line no longer runs empty. Lengths of a tty's output queue are not asked for: drivers and adapters tell less than they hold.
+The bound on unacknowledged bytes is rate x (least round trip + 10 ms) - the bytes of the unit with the least round trip (at most 5 ms'
+worth). So what is written next waits at most about 10 ms behind what was written before. The bound is never below two chunks of 256
+bytes, which keep a slow line busy.
+The rate is the largest recent delivery rate. One sample is the bytes that arrived between a unit's writing and its acknowledgement, over
+that time (Cheng et al., "Delivery Rate Estimation", draft-cheng-iccrg-delivery-rate-estimation-02). A busy line always holds a queue, so
+the least round trip is measured again every ten seconds after letting the line run empty (BBR's ProbeRTT,
+draft-cardwell-iccrg-bbr-congestion-control-02, 4.3.4). If acknowledgements repeatedly leave nothing under way although more waits to be
+written, the line is not full: one of the two programs is seldom awake, or an adapter passes bytes on in bursts. Then the 10 ms grow until
+the line no longer runs empty. The length of a tty's output queue is not used: drivers and adapters report less than they hold.
 """
 
 from collections import deque
@@ -19,7 +20,7 @@ from common.protocol.framing import MAX_BODY_BYTES, UNIT_OVERHEAD_BYTES
 MS: Final = 1_000_000
 
 MIN_CHUNK_BYTES: Final = 256
-"""Small enough that two of them are worth waiting for at 115200 baud (46 ms), large enough that their frames cost 4 %."""
+"""Small enough that waiting for two of them is bearable at 115200 baud (46 ms), large enough that their framing costs 4 %."""
 
 _CHUNK_NS: Final = 2_500_000
 """A chunk takes this long on the line: a quarter of the slack, so that the line does not run empty between two acknowledgements."""
@@ -27,20 +28,20 @@ _CHUNK_NS: Final = 2_500_000
 _SLACK_NS: Final = 10 * MS
 
 _MOST_SLACK_NS: Final = 500 * MS
-"""Round trips of 200 ms were seen between two programs on a board with six busy others; least ones of 7 ms beside them."""
+"""Round trips of 200 ms were seen between two programs on a board with six other busy ones, beside least round trips of 7 ms."""
 
 _MOST_AHEAD_BYTES: Final = 256 * 1024
-"""What such a slack may come to: less than the 640 KB that Linux holds for a tty (drivers/tty/tty_buffer.c) and drops what is more."""
+"""Upper limit of such a slack: less than the 640 KB that Linux holds for a tty (drivers/tty/tty_buffer.c) before it drops the rest."""
 
 _RATE_SPAN_NS: Final = 1000 * MS
-"""The rate is the largest of this span and the one before: a line that has become slower is believed after two seconds."""
+"""The rate is the largest in this span and the one before. When a line slows down, the rate follows within two seconds."""
 
 _ROUND_TRIP_SPAN_NS: Final = 10_000 * MS
 
 _FIRST_PATIENCE_NS: Final = 1000 * MS
 _LEAST_PATIENCE_NS: Final = 200 * MS
 _MOST_PATIENCE_NS: Final = 2000 * MS
-"""Without word of them for this long (four round trips, within these limits) the units under way are written off."""
+"""Units under way are written off after this long without an acknowledgement (four round trips, within these limits)."""
 
 _MOST_REMEMBERED: Final = 4096
 _NUMBERS: Final = 1 << 16
@@ -48,7 +49,7 @@ _NUMBERS: Final = 1 << 16
 
 @dataclass(slots=True, kw_only=True)
 class _UnderWay:
-    """A unit that was written, with the state of delivery at that moment."""
+    """A unit that was written, with the delivery state at that moment."""
 
     number: int
     size_bytes: int
@@ -65,7 +66,7 @@ class Window:
     """The bound on unacknowledged bytes of one direction of a line.
 
     Args:
-        frame_bytes: the line carries bytes in frames of so many (RFCOMM), so units fill whole frames or even parts of one; 1: it does not.
+        frame_bytes: size of the frames in which the line carries bytes (RFCOMM); units then fill whole frames or equal parts of one. 1: no frames.
     """
 
     def __init__(self, frame_bytes: int = 1) -> None:
@@ -97,7 +98,7 @@ class Window:
 
     @property
     def chunk_bytes(self) -> int:
-        """How large a chunk's body is to be now."""
+        """How large a chunk's body should be now."""
         body = min(MAX_BODY_BYTES, max(MIN_CHUNK_BYTES, int(max(self._rate_before, self._rate_now) * _CHUNK_NS)))
         return fill(body + UNIT_OVERHEAD_BYTES, self._frame_bytes) - UNIT_OVERHEAD_BYTES
 
@@ -113,23 +114,23 @@ class Window:
         limit = int(rate * (self._round_trip_ns + _SLACK_NS) - own_bytes)
         more = int(rate * (self._slack_ns - _SLACK_NS))
         limit = max(2 * least_bytes, limit, min(limit + more, _MOST_AHEAD_BYTES))
-        # On a slow line the slack is less than a chunk: without a whole one more than is known to fit, no higher rate would ever be seen.
+        # On a slow line the slack is less than a chunk. Unless a whole chunk more than is known to fit may leave, a higher rate is never seen.
         return limit if self.chunk_bytes + UNIT_OVERHEAD_BYTES > least_bytes else -(-limit // least_bytes) * least_bytes
 
     def has_room(self, size_bytes: int) -> bool:
-        """Whether a unit of that size may be written now."""
+        """Whether a unit of this size may be written now."""
         return not self._under_way_bytes or self._under_way_bytes + size_bytes <= self.limit_bytes
 
     def starved(self) -> None:
-        """Take note that there was room and nothing to write: rates measured on what is under way may be too small."""
+        """Record that there was room but nothing to write: rates measured from what is under way may be too small."""
         self._starved_until_bytes = self._delivered_bytes + self._under_way_bytes
 
     def sent(self, number: int, size_bytes: int, now_ns: int) -> None:
-        """Take note of a unit that is being written.
+        """Record that a unit is being written.
 
         Args:
-            number: of the unit.
-            size_bytes: on the wire.
+            number: the unit's number.
+            size_bytes: its size on the wire.
             now_ns: any steady clock, ns.
         """
         alone = not self._under_way_bytes
@@ -153,10 +154,10 @@ class Window:
             self._forget(self._under_way.popleft())
 
     def acknowledged(self, number: int, now_ns: int) -> bool:
-        """Take note that a unit has come, and with it the fate of all before it is known.
+        """Record that a unit has arrived; this also settles the fate of all units before it.
 
         Args:
-            number: of the unit; one that is not under way teaches nothing.
+            number: the unit's number; one that is not under way is ignored.
             now_ns: any steady clock, ns.
 
         Returns:
@@ -178,7 +179,7 @@ class Window:
         return True
 
     def tick(self, now_ns: int) -> None:
-        """Do what time demands: write off what nobody acknowledges, let the line run empty to measure its round trip."""
+        """Do what is due: write off unacknowledged units, or let the line run empty to measure its round trip."""
         if self._under_way_bytes and now_ns >= self.due_ns:
             for unit in self._under_way:
                 unit.counts = False
@@ -201,7 +202,7 @@ class Window:
             self._under_way_bytes -= unit.size_bytes
 
     def _adapt_slack(self) -> None:
-        """Allow for more under way after the second acknowledgement in a row that left the line empty for want of leave."""
+        """Allow more under way once two acknowledgements in a row have left the line empty because of the bound."""
         if self._under_way_bytes:
             self._ran_empty = False
             self._slack_ns -= (self._slack_ns - _SLACK_NS) // 8
@@ -219,7 +220,7 @@ class Window:
             self._probing = False
         took_ns = max(unit.sent_ns - unit.first_sent_ns, now_ns - unit.delivered_ns)
         if took_ns < self._round_trip_ns:
-            return  # acknowledgements that came in a heap
+            return  # acknowledgements that came in a burst
         rate = (self._delivered_bytes - unit.delivered_bytes) / took_ns
         if unit.starved and rate <= max(self._rate_before, self._rate_now):
             return
@@ -229,13 +230,13 @@ class Window:
 
 
 def fill(unit_bytes: int, frame_bytes: int) -> int:
-    """Give the size of a unit that leaves no frame half full.
+    """Return the size of a unit that leaves no frame half full.
 
     Args:
-        unit_bytes: how large it was to be.
+        unit_bytes: the desired size.
         frame_bytes: what one frame of the line carries.
 
     Returns:
-        A multiple of the frame, at most `unit_bytes`; for less than a frame its next greater even part.
+        A multiple of the frame, at most `unit_bytes`. For less than a frame: the next larger equal part of one.
     """
     return unit_bytes // frame_bytes * frame_bytes or frame_bytes // (frame_bytes // unit_bytes)

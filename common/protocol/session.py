@@ -1,9 +1,9 @@
-"""What both roles of a session share: what they put out, and the times after which they act.
+"""What both roles of a session share: their outputs, and the times after which they act.
 
-A session may go over several links at once. Each connection's name begins with the number of its link, so that it is unique over all of them.
+A session may use several links at once. Each connection's name begins with the number of its link, so names are unique across links.
 
 The state machines (`board_session`, `host_session`) are sans-I/O: messages and `now_ns` go in, a list of outputs comes out. Shells own
-sockets and clocks; they send an `Outgoing` as it is, except that `wire.encode_stamped` sets its send time at the last moment.
+the sockets and clocks. They send each `Outgoing` unchanged, except that `wire.encode_stamped` sets its send time at the last moment.
 """
 
 from dataclasses import dataclass
@@ -15,19 +15,19 @@ from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Messa
 MS: Final = 1_000_000
 
 HELLO_RETRY_NS: Final = 200 * MS
-"""Between two attempts to be heard; a peer that appears is met within this time."""
+"""Time between two attempts to be heard. A peer that appears is met within this time."""
 
 TAKEOVER_NS: Final = 1000 * MS
-"""A host unheard for this long gives way to another one that knocks: two missed clock waves."""
+"""After this much silence from its host, a board accepts another host. This is two missed clock waves."""
 
 SILENCE_NS: Final = 3000 * MS
-"""A peer unheard for this long is taken as gone: longer than any stall seen on Wi-Fi or of a swapping phone."""
+"""After this much silence a peer is considered gone. No stall seen on Wi-Fi or on a swapping phone lasted longer."""
 
 STATUS_NS: Final = 500 * MS
-"""Between two accounts of the board's frames."""
+"""Time between two accounts of the board's frames."""
 
 STATUS_SLOW_NS: Final = 1000 * MS
-"""The same where frames are further apart than this: half a percent of a line of 115200 baud is one account a second."""
+"""The same where frames are further apart than this: one account a second takes 0.5 % of a 115200 baud line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +45,9 @@ class Outgoing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Accepted:
-    """Host: the board sends its frames over that link from now on.
+    """Host: from now on the board sends its frames over this link.
 
-    `resumed` says that it is the session that we had before, of which `lost` frames never came.
+    `resumed` means that this is the session we had before; `lost` of its frames never came.
     """
 
     hello: BoardHello
@@ -58,7 +58,7 @@ class Accepted:
 
 @dataclass(frozen=True, slots=True)
 class LinkUp:
-    """Host: our board answers on that link, which may carry frames now."""
+    """Host: our board answers on this link, which may now carry frames."""
 
     link: int
     hello: BoardHello
@@ -66,7 +66,7 @@ class LinkUp:
 
 @dataclass(frozen=True, slots=True)
 class LinkDown:
-    """Host: that link is lost, or (`stuck`) leaves a hello for frames unanswered; it is greeted again and again."""
+    """Host: this link is lost or, if `stuck`, leaves a hello for frames unanswered. The session keeps greeting it."""
 
     link: int
     stuck: bool = False
@@ -74,7 +74,7 @@ class LinkDown:
 
 @dataclass(frozen=True, slots=True)
 class OtherBoard:
-    """Host: that link leads to another board than the one that we talk to; nothing of it is used."""
+    """Host: this link leads to a different board from the one we talk to. Nothing from it is used."""
 
     link: int
     hello: BoardHello
@@ -82,7 +82,7 @@ class OtherBoard:
 
 @dataclass(frozen=True, slots=True)
 class Arrived:
-    """Host: a frame of the running session; `lost` frames before it never came."""
+    """Host: a frame of the running session. `lost` frames before it never came."""
 
     frame: FrameMessage
     lost: int
@@ -90,10 +90,10 @@ class Arrived:
 
 
 class StaleReason(Enum):
-    """Why a frame that came must not be used.
+    """Why a received frame must not be used.
 
-    LATE: a newer one had overtaken it over another link; it has been counted as lost then and stays so.
-    BEYOND_CREDIT: the board had no leave to send it; an honest one never does.
+    LATE: a newer frame overtook it on another link. It was counted as lost then and stays lost.
+    BEYOND_CREDIT: the board had no credit for it. An honest board never does this.
     """
 
     OLD_SESSION = 0
@@ -112,7 +112,7 @@ class Stale:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Echo:
-    """Host: one clock echo. t0, t3 on the host's clock, t1, t2 on the board's; ns. Waves are numbered for each link."""
+    """Host: one clock echo. t0 and t3 are on the host's clock, t1 and t2 on the board's; ns. Each link numbers its own waves."""
 
     wave: int
     t0_ns: int
@@ -124,7 +124,10 @@ class Echo:
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """Host: the board's account of the running session; `ended` when no frame will follow; `lost` frames that it tells of never came; `last` answers our goodbye."""
+    """Host: the board's account of the running session.
+
+    `ended`: no frame will follow. `lost`: frames in this account that never came. `last`: this answers our goodbye.
+    """
 
     counts: BoardCounts
     ended: bool
@@ -134,14 +137,14 @@ class Counted:
 
 @dataclass(frozen=True, slots=True)
 class Stepped:
-    """Host: the board's camera gives something else from now on."""
+    """Host: the board's camera delivers something else from now on."""
 
     rung: Rung
 
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """Host: the board at the end of a link does not talk to us."""
+    """Host: the board at the other end of a link refuses to talk to us."""
 
     reason: RefusalReason
     link: int = 0
@@ -149,19 +152,19 @@ class Refused:
 
 @dataclass(frozen=True, slots=True)
 class Unbelievable:
-    """Host: the board says what cannot be; nothing of it was used."""
+    """Host: the board says something that cannot be true. None of it was used."""
 
     problem: str
 
 
 @dataclass(frozen=True, slots=True)
 class ClockVoid:
-    """Host: the board had forgotten us, so that one of the two clocks may have stood still: nothing learnt of them so far may be used."""
+    """Host: the board had forgotten us. One of the two clocks may have stood still, so nothing learnt about them so far may be used."""
 
 
 @dataclass(frozen=True, slots=True)
 class Vanished:
-    """Host: the board fell silent or said goodbye; frames still under way in that session are unknown."""
+    """Host: the board fell silent or said goodbye. The fate of frames still under way in that session is unknown."""
 
     orderly: bool
 

@@ -1,4 +1,4 @@
-"""When a host asks its board for the time over one link: waves of echoes, many while little is known, few later. Sans-I/O, `now_ns` passed in."""
+"""When a host asks its board for the time over one link: waves of echoes, many at first, few later. Sans-I/O, `now_ns` passed in."""
 
 from typing import Final
 
@@ -7,38 +7,38 @@ from common.protocol.session import MS, Echo
 
 WAVE_ECHOES: Final = 3
 WAVE_ECHOES_EARLY: Final = 5
-"""Echoes back to back: the first wakes both sides up, the others measure without that bias (study of links, 3d)."""
+"""Echoes back to back. The first wakes both sides; the others measure without that bias (study of links, 3d)."""
 
 WAVE_NS: Final = 500 * MS
-"""Between two waves. An echo costs the board as much as half a frame (bench_link): 6 a second do for a clock whose skew is known."""
+"""Time between two waves. An echo costs the board as much as half a frame (bench_link). 6 a second suffice once the skew is known."""
 
 WAVE_STANDBY_NS: Final = 1000 * MS
-"""The same on a link that carries no frames: it only has to be known as alive, and how far away it is."""
+"""The same on a link that carries no frames. It only needs to show that it is alive and how long its delay is."""
 
 WAVE_YOUNG_NS: Final = 250 * MS
 YOUNG_NS: Final = 10_000 * MS
-"""So long after the beginning of a session the skew is hardly known, and an offset grows old quickly."""
+"""For this long after a session begins the skew is hardly known, and an offset quickly becomes outdated."""
 
 REPEATS: Final = 5
 SLOW_ECHO_NS: Final = 1 * MS
-"""An echo that took longer than any swift link's says little; while the skew is learnt it is repeated, up to so many times a wave: errors
-after ten seconds of Wi-Fi are halved by it (bench_clock)."""
+"""A slower echo than any fast link's says little. While the skew is being learnt it is repeated, up to a limit per wave. This halves the
+errors after ten seconds of Wi-Fi (bench_clock)."""
 
 WAVE_EARLY_NS: Final = 50 * MS
 EARLY_NS: Final = 1000 * MS
-"""In its first second there is no estimate worth the name."""
+"""In the first second of a session there is no usable estimate."""
 
 WAVE_HASTE_NS: Final = 10 * MS
-"""Between the beginnings of two waves where something waits for an echo: a frame, or the end of a doubt."""
+"""Time from the start of one wave to the next while something waits for an echo: a frame, or the end of a doubt."""
 
 WAVE_PATIENCE_NS: Final = 1000 * MS
-"""An echo under way is waited for this long before another wave: on a slow line a wave takes longer than the time between two."""
+"""How long to wait for an echo under way before another wave. On a slow line a wave takes longer than the time between two."""
 
 WAVE_REST: Final = 8
-"""After a wave the line has this many times its length for other things: echoes at 115200 baud would else take 2 % of it."""
+"""After a wave the line is left to other traffic for this many times the wave's length. Otherwise echoes take 2 % of 115200 baud."""
 
 WAVE_REST_YOUNG: Final = 1
-"""The same while the skew is learnt: 7 % of such a line for ten seconds."""
+"""The same while the skew is being learnt: 7 % of such a line for ten seconds."""
 
 
 class Waves:
@@ -61,11 +61,11 @@ class Waves:
 
     @property
     def due_ns(self) -> int:
-        """When `begin_wave` wants to be called next, host's clock, ns."""
+        """When `begin_wave` must be called next, host's clock, ns."""
         return self._due_ns
 
     def open(self, now_ns: int) -> None:
-        """The link came up: echoes under way are of an earlier connection, perhaps of another clock."""
+        """Record that the link came up. Echoes under way belong to an earlier connection, perhaps to another clock."""
         self._wave += 1
         self._first_wave = self._wave
         self._echoes_left = 0
@@ -74,19 +74,19 @@ class Waves:
         self._opened_ns = self._due_ns = now_ns
 
     def hasten(self, now_ns: int) -> None:
-        """Let the next wave begin as soon as one that is under way has ended."""
+        """Let the next wave begin as soon as the current one has ended."""
         if not self._unanswered:
             self._due_ns = min(self._due_ns, max(now_ns, self._wave_ns + WAVE_HASTE_NS))
 
     def begin_wave(self, now_ns: int, *, standby: bool) -> tuple[list[Echo], Ping | None]:
-        """Begin a wave that is due.
+        """Begin the wave that is due.
 
         Args:
             now_ns: host's clock, ns.
             standby: whether the link carries no frames.
 
         Returns:
-            Echoes of the wave before, if it was cut short, and the first question; None while the wave before is still under way.
+            Echoes of the previous wave if it was cut short, and the first question; None while the previous wave is still under way.
         """
         if self._unanswered and now_ns - self._wave_ns < WAVE_PATIENCE_NS:
             self._due_ns = min(now_ns + WAVE_EARLY_NS, self._wave_ns + WAVE_PATIENCE_NS)
@@ -102,18 +102,17 @@ class Waves:
         return self._given(), self._ping()
 
     def answered(self, pong: Pong, now_ns: int) -> tuple[list[Echo], Ping | None]:
-        """Take an answer; one from before the link came up tells nothing, as it may be of another clock.
+        """Handle an answer. One from before the link came up is ignored, because it may be from another clock.
 
-        One of an older wave is a fact like any other, but no further question follows it: where a round trip takes longer than a wave is waited for, all are.
-
-        A swift echo is kept until its wave has ended. To learn from it takes longer than the echo did; the board's processor would rest meanwhile and wake
-        late, so that every question travelled longer than its answer (decision 0009).
+        An answer to an older wave is a fact like any other, but triggers no further question. Where a round trip takes longer than the wait for a
+        wave, all answers are of that kind. A fast echo is kept until its wave has ended: learning from it takes longer than the echo did, so the
+        board's processor would go idle meanwhile and wake late, and every question would travel longer than its answer (decision 0009).
 
         Args:
             pong: the answer.
             now_ns: its arrival, host's clock, ns.
 
-        Returns:
+        Echoes to learn from, and the wave's next question if there is one.
             Echoes to learn from, and the wave's next question, if there is one.
         """
         if self._first_wave < pong.wave < self._wave:

@@ -1,8 +1,8 @@
-"""Messages to bytes and back: a msgpack array [version, kind, fields…] as header, and for frames the image beside it.
+"""Encodes and decodes messages: a msgpack array [version, kind, fields…] as header and, for frames, the image beside it.
 
-Rules: every field is checked for type and range before it is believed; a header has at most MAX_HEADER_BYTES and no nesting beyond what a
-message needs; anything else raises ProtocolError and nothing more. The first two elements keep their place in every future version, so
-that two versions can at least tell each other so.
+Rules: every field is checked for type and range before it is believed. A header has at most MAX_HEADER_BYTES and no more nesting than a
+message needs. Anything else raises ProtocolError, and nothing but that. The first two elements keep their place in every future version,
+so two versions can at least tell each other that they differ.
 """
 
 from collections.abc import Callable
@@ -46,7 +46,7 @@ from common.protocol.wire_fields import (
 from common.versions import PROTOCOL_VERSION, other_protocol
 
 MAX_HEADER_BYTES: Final = 2048
-"""The longest honest header, a board's hello with all its texts at full length, stays below 600 bytes."""
+"""The longest honest header is a board's hello with all texts at full length. It stays below 600 bytes."""
 
 MAX_PAYLOAD_BYTES: Final = 16 * 1024 * 1024
 """Largest frame on any link (DESIGN's contract suite): 4096 x 2048 raw YUYV fits."""
@@ -77,16 +77,16 @@ _FRAME_RANGES: Final = (
     (-MOST_NS, MOST_NS),
     (-MOST_NS, MOST_NS),
 )
-"""Of a frame's numbers: index, sequence, width, height, encoding, exposure time (which may be missing), three times."""
+"""Ranges of a frame's numbers: index, sequence, width, height, encoding, exposure time (may be missing), three times."""
 
 _EXPOSURE_AT: Final = 5
 
 _PACKER: Final = msgpack.Packer()
-"""One for all: `packb` makes a new one each time with a buffer of 1 MiB, which a 32-bit libc maps and unmaps for each (1.7 ms of a board)."""
+"""Shared by all calls. `packb` makes a new one each time with a 1 MiB buffer, which a 32-bit libc maps and unmaps each time (1.7 ms on a board)."""
 
 
 class VersionError(ProtocolError):
-    """Raised for a header of another protocol version. Nobody's fault: one of the two needs an update.
+    """Raised for a header of another protocol version. Nobody's fault: one of the two sides needs an update.
 
     Args:
         theirs: the peer's version.
@@ -98,7 +98,7 @@ class VersionError(ProtocolError):
 
 
 def encode(message: Message) -> tuple[bytes, Buffer]:
-    """Give a message's header and payload; the payload is the frame's own buffer, not a copy.
+    """Encode a message as header and payload. The payload is the frame's own buffer, not a copy.
 
     Args:
         message: any message.
@@ -111,11 +111,11 @@ def encode(message: Message) -> tuple[bytes, Buffer]:
 
 
 def encode_stamped(message: Message, clock: Callable[[], int]) -> tuple[bytes, Buffer]:
-    """Like `encode`, but the send time of a frame, ping or pong is read when all else is encoded: just before the first byte is written.
+    """Like `encode`, but read the send time of a frame, ping or pong last of all: just before the first byte is written.
 
     Args:
-        message: any message; its own send time, if it has one, is not looked at.
-        clock: gives the sender's clock, ns.
+        message: any message; its own send time, if it has one, is ignored.
+        clock: returns the sender's clock, ns.
 
     Returns:
         Header bytes and payload.
@@ -123,17 +123,17 @@ def encode_stamped(message: Message, clock: Callable[[], int]) -> tuple[bytes, B
     if not isinstance(message, FrameMessage | Ping | Pong):
         return encode(message)
     fields = _fields(message)
-    fields[-1] = MOST_NS  # the send time comes last in all three; this one takes the nine bytes of any 64 bit integer
+    fields[-1] = MOST_NS  # the send time comes last in all three; MOST_NS takes nine bytes, as any 64-bit integer does
     header: bytes = _PACKER.pack([PROTOCOL_VERSION, _KIND_OF[type(message)], *fields])
     payload = message.payload if isinstance(message, FrameMessage) else b""
     return header[:-8] + clock().to_bytes(8, "big"), payload
 
 
 def decode(header: Buffer, payload: Buffer = b"") -> Message:
-    """Read one message.
+    """Decode one message.
 
     Args:
-        header: the header's bytes, from anybody.
+        header: the header's bytes; they may come from anybody.
         payload: the bytes that came with it; kept, not copied.
 
     Returns:
@@ -177,7 +177,7 @@ def decode(header: Buffer, payload: Buffer = b"") -> Message:
 
 
 def encode_for_any_version(version: int, refusal: Refusal) -> bytes:
-    """Give a refusal's header in the envelope of another version, so that an older or newer peer can read why.
+    """Encode a refusal in the envelope of another version, so that an older or newer peer can read the reason.
 
     Args:
         version: the peer's version.
@@ -205,7 +205,7 @@ def _fields(message: Message) -> list[Any]:  # noqa: C901, PLR0911, PLR0912 - on
             times = [message.exposure_ns, marks.exposed_ns, marks.grabbed_ns, marks.sent_ns]
             return [message.session, message.sent_index, message.sequence, *size, *times]
         case Ping(wave, t0_ns):
-            # As long as its answer: on a serial line 18 bytes more one way would make the clock wrong by 0.14 ms (640 kbit/s).
+            # As long as its answer. On a 640 kbit/s serial line, 18 more bytes in one direction would shift the clock by 0.14 ms.
             return [wave, MOST_NS, MOST_NS, t0_ns]
         case Pong(wave=wave, t0_ns=t0_ns, t1_ns=t1_ns, t2_ns=t2_ns):
             return [wave, t0_ns, t1_ns, t2_ns]
@@ -255,7 +255,7 @@ def _read(kind: type, reader: "FieldReader") -> Message:  # noqa: PLR0911 - one 
             reader.time_ns(),
             reader.time_ns(),
             reader.time_ns(),
-        )  # filling in the middle
+        )  # skip the padding in the middle
         return Ping(wave, t0_ns)
     if kind is Pong:
         return Pong(wave=reader.count(), t0_ns=reader.time_ns(), t1_ns=reader.time_ns(), t2_ns=reader.time_ns())
@@ -285,7 +285,7 @@ def _read(kind: type, reader: "FieldReader") -> Message:  # noqa: PLR0911 - one 
 
 
 def _read_frame(items: list[Any], payload: Buffer) -> FrameMessage:
-    """Read the message that comes thirty times a second: the same checks as a reader's, in one loop.
+    """Decode the message that comes thirty times a second, with the checks of FieldReader in one loop.
 
     Args:
         items: the whole header, version and kind included.

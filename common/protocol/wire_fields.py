@@ -1,4 +1,4 @@
-"""Fields of a header that are believed: each is checked for type and range, and in its order. No I/O."""
+"""Reads the fields of a header in order, checking each for type and range. No I/O."""
 
 from enum import Enum
 from typing import Any, Final, TypeVar
@@ -8,15 +8,15 @@ from common.frame import PixelFormat
 from common.protocol.message import BoardCounts, CameraDescription, DropReason, Pacing, Rung, Steering
 
 MAX_SIZE_PX: Final = 16384
-"""Largest width and height of a frame, px: well beyond any camera, and 28 bits for their product."""
+"""Largest width and height of a frame, px: well beyond any camera. Their product fits into 28 bits."""
 
 MAX_TEXT: Final = 96
 MAX_COUNT: Final = 2**53
 MOST_NS: Final = 2**62
-"""146 years in ns: no honest clock is further from its zero; keeps sums inside 64 bits."""
+"""146 years in ns: no honest clock is further from its zero. Keeps sums within 64 bits."""
 
 MAX_PERIOD_NS: Final = 3_600_000_000_000
-"""A frame an hour: what counts as a pair follows from the period, so it is believed only as far as somebody would call it a stream."""
+"""One frame an hour. The period decides what counts as a pair, so it is believed only as far as the result is still a stream."""
 
 PIXEL_FORMATS: Final = tuple(PixelFormat)
 DROP_REASONS: Final = tuple(DropReason)
@@ -25,7 +25,7 @@ E = TypeVar("E", bound=Enum)
 
 
 def bad_field(problem: str) -> ProtocolError:
-    """The error of a field that is not believed."""
+    """Make the error for a field that is not believed."""
     return ProtocolError(problem, "the packet is dropped; check what else talks to this address")
 
 
@@ -50,7 +50,7 @@ class FieldReader:
         return self._integer(-MOST_NS, MOST_NS)
 
     def later_ns(self) -> int:
-        """A length of time, ns."""
+        """A duration, ns."""
         return self._integer(0, MOST_NS)
 
     def size_px(self) -> int:
@@ -65,18 +65,18 @@ class FieldReader:
         return value
 
     def enum(self, kind: type[E]) -> E:
-        """A member of an enumeration of numbers."""
+        """A member of an enum with integer values."""
         try:
             return kind(self._integer(0, MAX_COUNT))
         except ValueError:
             raise bad_field(f"field {self._at} is no {kind.__name__}") from None
 
     def choice(self, options: tuple[E, ...]) -> E:
-        """One of these, by its place."""
+        """One of these options, by its index."""
         return options[self._integer(0, len(options) - 1)]
 
     def camera(self) -> CameraDescription:
-        """What a board says of its camera."""
+        """A board's description of its camera."""
         name, width_px, height_px = self.text(), self.size_px(), self.size_px()
         return CameraDescription(
             name=name,
@@ -99,7 +99,7 @@ class FieldReader:
         )
 
     def rung(self) -> Rung:
-        """How far a board has lowered what its camera gives."""
+        """How far a board has lowered its camera's output."""
         index, last, changes, period_ns = self.count(), self.count(), self.count(), self._integer(1, MAX_PERIOD_NS)
         quality, width_px, height_px = self.count(), self._integer(0, MAX_SIZE_PX), self._integer(0, MAX_SIZE_PX)
         return Rung(
@@ -124,6 +124,6 @@ class FieldReader:
             raise bad_field("fields are missing")
         self._at = at + 1
         value = self._items[at]
-        if type(value) is not int or not low <= value <= high:  # bool is an int to isinstance
+        if type(value) is not int or not low <= value <= high:  # to isinstance, a bool is an int
             raise bad_field(f"field {self._at} is no integer in {low}..{high}")
         return int(value)

@@ -1,6 +1,6 @@
-"""ZeroMQ's authentication protocol, the handler's side: who asks to be let in with which key, and the answer. Sans-I/O.
+"""ZeroMQ's authentication protocol, handler's side: who asks to be let in with which key, and the answer. Sans-I/O.
 
-ZeroMQ asks once for each connection, over inproc, when the peer has proved that it holds its key. Source: ZeroMQ RFC 27 (ZAP), sections
+ZeroMQ asks once per connection, over inproc, once the peer has proved that it holds its key. Source: ZeroMQ RFC 27 (ZAP), sections
 "The request message" and "The reply message"; RFC 26 (CurveZMQ) for the key.
 """
 
@@ -23,12 +23,12 @@ _CURVE: Final = b"CURVE"
 
 @dataclass(frozen=True, slots=True)
 class ZapRequest:
-    """A peer at the door.
+    """A peer that asks to be let in.
 
     Attributes:
-        request_id: goes back with the answer, opaque.
+        request_id: echoed in the answer; opaque.
         address: the peer's network address, for people.
-        key: the public key that it holds, 32 bytes; empty for a peer that uses none.
+        key: the public key that it holds, 32 bytes; empty for a peer without one.
     """
 
     request_id: bytes
@@ -37,7 +37,7 @@ class ZapRequest:
 
 
 def read_request(parts: Sequence[bytes]) -> ZapRequest:
-    """Read what ZeroMQ asks.
+    """Read ZeroMQ's request.
 
     Args:
         parts: the message's parts, without the envelope.
@@ -56,20 +56,20 @@ def read_request(parts: Sequence[bytes]) -> ZapRequest:
 
 
 def plain_address(address: str) -> str:
-    """Give a network address as people know it: IPv4 without the prefix that it has on a socket of both versions."""
+    """Return a network address as people know it: IPv4 without the prefix that it has on a dual-stack socket."""
     return address.removeprefix("::ffff:")
 
 
 def allow(request: ZapRequest, user: str) -> list[bytes]:
-    """Give the answer that lets a peer in.
+    """Return the answer that lets a peer in.
 
     Args:
-        request: what was asked.
-        user: what stands for the peer; every message of its carries it as its user id.
+        request: the request to answer.
+        user: identifies the peer; each of its messages carries this as its user id.
     """
     return [_VERSION, request.request_id, b"200", b"OK", user.encode(), b""]
 
 
 def deny(request: ZapRequest) -> list[bytes]:
-    """Give the answer that sends a peer away; it hears the number 400."""
+    """Return the answer that turns a peer away; the peer sees the number 400."""
     return [_VERSION, request.request_id, b"400", b"unknown key", b"", b""]
