@@ -1,7 +1,7 @@
 """Starts the two ends of every interface that the delay benchmark measures on this machine; connects to boards elsewhere.
 
 Shell: starts real processes and stops them again, whatever happens. If something is not available, it says why in
-    words.
+words.
 """
 
 import fcntl

@@ -27,8 +27,8 @@ class Reason(Enum):
 class BoardPair:
     """The corners of one pair.
 
-    name: how reports name the pair.
-        name: how reports call the pair.
+    Attributes:
+        name: how reports name the pair.
         left_px: (N, 2) float64.
         right_px: (N, 2) float64, in the same order.
     """

@@ -2,8 +2,7 @@
 
 A core: corners in, values out; no files. Every pair is used or rejected with its reason.
 
-Order: each camera alone (any size, any lens) -> the relative pose that most pairs agree on -> bundle adjustment of
-    everything
+Order: each camera alone (any size, any lens) -> the relative pose that most pairs agree on -> bundle adjustment of all
 (`bundle.py`) -> pairs that do not fit are rejected and the adjustment is repeated until nothing changes.
 """
 

@@ -60,8 +60,8 @@ def calibrate_alone(
         points_m: (N, 3) corners in the board's axes.
         size_px: width and height of the side's images.
 
-    The pairs left, those rejected, and the camera with one pose for each pair left.
-        The pairs left, those taken out, and the camera with one pose for each pair left.
+    Returns:
+        The pairs left, those rejected, and the camera with one pose for each pair left.
 
     Raises:
         DataError: fewer than three pairs are left.

@@ -1,10 +1,9 @@
 """Writes files whole or not at all.
 
 Rule: every writer of this package uses `replacing`; none opens its target for writing itself. So a link under a
-    result's name is
-replaced, never followed. What people keep and read (reports, rigs, pages: `write_text`) also survives a power cut. A
-run writes many images and clouds; these are synced together with their folder (`listed.py`), in a thread that nobody
-waits for.
+result's name is replaced, never followed. What people keep and read (reports, rigs, pages: `write_text`) also survives
+a power cut. A run writes many images and clouds; these are synced together with their folder (`listed.py`), in a thread
+that nobody waits for.
 """
 
 import os

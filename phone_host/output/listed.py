@@ -1,10 +1,9 @@
 """Folders of results. The file `.tandemscan` in the folder lists what is ours, and so tells it from everything else.
 
 Rules: a name is listed before anything is made under it, so that a killed run leaves nothing that the next one takes
-    for foreign.
-A later run removes what is listed and what it would write itself, and nothing else. If anything foreign has such a
-name, the run ends before it changes anything. Links are never ours. The list is a file of its own and not part of
-report.json, because that one is written at the end, which a killed run does not reach.
+for foreign. A later run removes what is listed and what it would write itself, and nothing else. If anything foreign
+has such a name, the run ends before it changes anything. Links are never ours. The list is a file of its own and not
+part of report.json, because that one is written at the end, which a killed run does not reach.
 """
 
 import errno

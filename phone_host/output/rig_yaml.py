@@ -1,11 +1,11 @@
 """rig.yaml: a calibrated rig as OpenCV FileStorage YAML, readable by `cv2.FileStorage` anywhere.
 
 Keys: format_version (absent: 1); left_image_width, left_image_height, right_image_width, right_image_height (px); M1 D1
-    M2 D2 (camera matrices and
-distortion, left and right); R T (right from left, T in metres); R1 R2 P1 P2 Q (rectification); rectified_image_width,
-rectified_image_height (the size for which P1 and P2 hold); board_side; rms_left rms_right rms_stereo (px, .Nan =
-unknown); time_offset_ns, time_offset_uncertainty_ns (host's stamp minus board's; absent: not measured).
-`read_rig` reads only the rig; the rectification is computed from it again. R1 to Q are there for other programs.
+M2 D2 (camera matrices and distortion, left and right); R T (right from left, T in metres); R1 R2 P1 P2 Q
+(rectification); rectified_image_width, rectified_image_height (the size for which P1 and P2 hold); board_side; rms_left
+rms_right rms_stereo (px, .Nan = unknown); time_offset_ns, time_offset_uncertainty_ns (host's stamp minus board's;
+absent: not measured). This program reads only the rig and computes the rectification from it. R1 to Q are there for
+other programs.
 """
 
 import math

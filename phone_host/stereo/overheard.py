@@ -11,8 +11,7 @@ bars, child processes, faulthandler and C++'s std::cerr are not affected. OpenCV
 reports by an exception or by returning no image.
 
 Rules: one decoding at a time (a lock), because the variable belongs to the process. With any other C library nothing is
-    captured and the lines go where they
-went before.
+captured and the lines go where they went before.
 """
 
 import ctypes

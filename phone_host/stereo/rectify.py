@@ -32,7 +32,7 @@ _RECALIBRATE = "calibrate the rig again"
 # Undistortion is iterative; 5 iterations (OpenCV's default) leave 0.1 px in the corners of a wide lens.
 _UNDISTORT = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
 _ROUND_TRIP_LIMIT_PX = 0.01
-_SAMPLES_PER_EDGE = 65  # the outline bends slowly: with more than 65 samples it moves by less than 0.01 px
+_SAMPLES_PER_EDGE = 65  # the outline bends slowly: between two of 65 samples it moves by less than 0.01 px
 # A polynomial fitted to points in the middle may fold back near the corners; the usable field of view then ends before
 # that.
 _FIELD_SHARES = (1.0, 0.97, 0.94, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5)

@@ -3,10 +3,9 @@
 The pattern has four ArUco markers in the corners, by which it is found, and twelve cells between them: the Gray code of
 the refresh number. A frame whose exposure sees two refreshes therefore shows one number or the other. The screen's
 clock need not be known, because both cameras' stamps are compared with the same count. A number stands for a whole
-refresh (16.7 ms at 60 Hz). The extremes show where within it a frame
-falls: a camera that drifts against the screen sees each number from its first to its last moment. A camera that keeps
-    step does not; the
-uncertainty then covers what remains open.
+refresh (16.7 ms at 60 Hz). The extremes show where within it a frame falls: a camera that drifts against the screen
+sees each number from its first to its last moment. A camera that keeps step does not; the uncertainty then covers what
+remains open.
 """
 
 from dataclasses import dataclass
