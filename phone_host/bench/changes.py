@@ -27,7 +27,7 @@ class Change:
     Attributes:
         words: the text that the user typed.
         rate_hz: rate of the cameras.
-        size: size of the images; their bytes scale with their pixels unless given.
+        size: size of the images; their bytes scale with their pixels unless frame_bytes is given.
         frame_bytes: mean size of a frame.
         fifo: depth and policy.
         processing_factor: predicted processing time as a multiple of the measured one.

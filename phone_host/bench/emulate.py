@@ -1,8 +1,8 @@
 """Emulates what an interface does to bytes: rate, delay, jitter, stalls, lost bytes. Pure, `now_ns` passed in; `relay` moves the bytes.
 
 Order is kept, as on any byte stream. All connections of a link share one direction's rate, as they share one cable or
-one radio. A direction holds a bounded number of bytes. When it is full, it is not read from, and the sender notices
-this as it would notice a full driver queue.
+one radio. A direction holds a bounded number of bytes. When it is full, the relay stops reading from the
+sender, which notices this as it would notice a full driver queue.
 """
 
 import random
@@ -44,7 +44,7 @@ class Profile:
         jitter_ns: added to the delay, evenly spread from 0 to this; order is kept.
         stall_share: probability that a segment is lost and has to be sent again, 0 to 1.
         stall_ns: how long nothing arrives after such a loss, as with TCP, whose receiver waits for the missing segment.
-        byte_loss: probability that a byte vanishes unnoticed, 0 to 1; only on serial lines.
+        byte_loss: probability that a byte vanishes silently, 0 to 1; only on serial lines.
         source: where the figures come from.
     """
 
@@ -134,8 +134,8 @@ PROFILES: Final = (
         bytes_per_s=4_000_000,  # half of 65 Mbit/s, the highest rate of one stream in 20 MHz (IEEE 802.11n, MCS 7): contention and acknowledgements take the rest
         delay_ns=1 * _MS,
         jitter_ns=9
-        * _MS,  # 2 to 10 ms of jitter, as libsoftwaresync's setting is taken to have (study, goal 7; issue of the clocks)
-        stall_share=1e-4,  # 2 to 10 ms of jitter, as libsoftwaresync's setting is assumed to have (study, goal 7; issue of the clocks)
+        * _MS,  # 2 to 10 ms of jitter, as libsoftwaresync's setting is assumed to have (study, goal 7; issue of the clocks)
+        stall_share=1e-4,  # a guess: what 802.11's own retries leave over
         stall_ns=200 * _MS,  # TCP's least retransmission timeout in Linux (TCP_RTO_MIN, include/net/tcp.h)
         source="802.11n, one stream of 20 MHz; jitter of 9 ms; one segment in 10 000 comes 200 ms late",
     ),

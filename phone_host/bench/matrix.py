@@ -145,7 +145,7 @@ class _Bar:
         return self._signals.stop
 
     def rendered(self) -> None:
-        """Count a rendered image; raise if the user wants to stop."""
+        """Show the progress after a rendered image; raise if the user wants to stop."""
         if self.stopped():
             raise _StoppedError
 

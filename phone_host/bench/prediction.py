@@ -1,4 +1,4 @@
-"""Predicts settings that were not run from the measured cells of a matrix: what to draw from, and how close the prediction comes. Pure.
+"""Predicts settings that were not run, from the measured cells of a matrix: what to draw from, and how close the prediction comes. Pure.
 
 When a cell is compared with its own prediction (`held_out`), it contributes only what is known without running it:
 which frames are shown, how large and how often. If the other cells do not tell enough, the result says so instead of
