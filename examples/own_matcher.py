@@ -1,7 +1,7 @@
-"""An algorithm of your own in place of the matcher: `python examples/own_matcher.py LINK CAMERA RIG [PAIRS]`.
+"""Use your own matching algorithm: `python examples/own_matcher.py LINK CAMERA RIG [PAIRS]`.
 
-Here: OpenCV's block matcher. Give the object to `open_scanner`; or publish it under a name, so that `phone-host run --matcher opencv-bm` finds it, by
-an entry point in your package's pyproject.toml:
+This example uses OpenCV's block matcher. Pass the object to `open_scanner`. Or publish it under a name, so that
+`phone-host run --matcher opencv-bm` finds it, with an entry point in your package's pyproject.toml:
 
     [project.entry-points."tandemscan.matchers"]
     opencv-bm = "your_package:BlockMatcher"
@@ -17,7 +17,7 @@ from phone_host.model import Disparity, Image, RectifiedPair
 
 
 class BlockMatcher:
-    """OpenCV's block matcher behind the protocol of a matcher.
+    """OpenCV's block matcher behind the matcher protocol.
 
     Args:
         disparities: 0 <= d < this is searched, px.
@@ -27,7 +27,7 @@ class BlockMatcher:
         self._matcher = cv2.StereoBM.create(numDisparities=-(-disparities // 16) * 16, blockSize=15)
 
     def match(self, pair: RectifiedPair) -> Disparity:
-        """Give (H, W) float32, px; NaN = none. OpenCV gives sixteenths of a pixel, and negative ones for none."""
+        """Return (H, W) float32, px; NaN = none. OpenCV gives sixteenths of a pixel, and negative values for none."""
         found = self._matcher.compute(_grey(pair.left), _grey(pair.right)).astype(np.float32)
         found /= np.float32(16)
         found[found < 0] = np.nan
@@ -39,7 +39,7 @@ def _grey(image: Image) -> Image:
 
 
 def main(link: str, camera: str, rig: str, pairs: str = "20") -> None:
-    """Scan with it."""
+    """Scan with this matcher."""
     with open_scanner(
         link=link, camera=camera, rig=rig, matcher=BlockMatcher(128), pairs=int(pairs), lossless=True
     ) as scanner:

@@ -1,4 +1,4 @@
-"""Plot where the time goes: `python examples/plot_delays.py LINK CAMERA [PAIRS]` writes delays.svg. No rig is needed: pairs are measured, not matched."""
+"""Plot where the time goes: `python examples/plot_delays.py LINK CAMERA [PAIRS]` writes delays.svg. It needs no rig: pairs are not matched."""
 
 import sys
 from pathlib import Path
@@ -12,7 +12,7 @@ WIDTH_PX, ROW_PX, LEFT_PX = 800, 28, 120
 
 
 def main(link: str, camera: str, pairs: str = "300") -> None:
-    """Measure, and plot the median and the 95th percentile of each delay as bars."""
+    """Measure, then plot the median and the 95th percentile of each delay as bars."""
     with open_scanner(link=link, camera=camera, pairs=int(pairs), lossless=True) as scanner:
         ledgers = [result.ledger for result in scanner]
     delays_ms = {name: np.array([getattr(ledger, f"{name}_ns") for ledger in ledgers]) / 1e6 for name in DELAYS}

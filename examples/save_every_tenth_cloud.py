@@ -1,6 +1,7 @@
 """Save every tenth cloud as PLY: `python examples/save_every_tenth_cloud.py LINK CAMERA RIG [PAIRS]`.
 
-For example after `phone-host demo`, with the board's side in another terminal (the demo's last lines say how, add --link tcp://127.0.0.1:5555):
+For example after `phone-host demo`, with the board side running in another terminal (the demo's last lines show the
+command; add --link tcp://127.0.0.1:5555):
 
     python examples/save_every_tenth_cloud.py tcp://127.0.0.1:5555 'replay:out/demo/film/right?fps=15&loop=1' out/demo/rig.yaml
 """
@@ -13,7 +14,7 @@ from phone_host.output.ply import write_ply
 
 
 def main(link: str, camera: str, rig: str, pairs: str = "100") -> None:
-    """Scan, and save."""
+    """Scan and save."""
     with open_scanner(link=link, camera=camera, rig=rig, pairs=int(pairs), lossless=True) as scanner:
         for result in scanner:
             cloud = result.processed.cloud

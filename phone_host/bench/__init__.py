@@ -1,1 +1,1 @@
-"""The delay benchmark: `delay-bench` runs every interface over sizes, qualities and rates, and foretells what was not run."""
+"""The delay benchmark: `delay-bench` runs every interface over sizes, qualities and rates, and predicts settings that were not run."""

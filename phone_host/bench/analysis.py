@@ -1,4 +1,4 @@
-"""What follows from the measured cells together: each interface's latency and rate, predictions beside measurements, settings not run. Pure."""
+"""Draws conclusions from all measured cells: latency and rate of each interface, predictions beside measurements, settings not run. Pure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ from phone_host.sync.fifo import FifoSettings, Overflow
 _SELF_PACED: Final = ("serial", "rfcomm")
 
 _ENOUGH_PAIRS: Final = 10
-"""A rate told by fewer is itself off by more than a tenth."""
+"""With fewer pairs, a rate is itself off by more than a tenth."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class InterfaceFit:
     """Propagation over one interface, from all of its runs.
 
     Attributes:
-        interface: which.
+        interface: the interface.
         results: its runs that gave pairs.
         fit: latency + bytes / rate.
     """
@@ -56,14 +56,15 @@ class InterfaceFit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checked:
-    """One run beside what the model says of it from all other runs.
+    """One run beside what the model predicts for it from all other runs.
 
     Attributes:
-        case: which.
-        pairs: that it gave.
-        measured: the run.
-        predicted: from the others; or why not.
-        queues: what the queues make of the run's own link, capture and processing: what differs from the run is the model's own error.
+        case: the case of the run.
+        pairs: number of pairs that it gave.
+        measured: its measured figures.
+        predicted: predicted from the other runs; or why not.
+        queues: what the queues make of the run's own link, capture and processing; any difference from the run is the
+            model's own error.
     """
 
     case: Case
@@ -75,14 +76,14 @@ class Checked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Errors:
-    """How far predictions were from measurements, relative, 0 = not at all; NaN without predictions. Runs of a few pairs are left out.
+    """Relative errors of predictions, 0 = exact; NaN without predictions. Runs with few pairs are left out.
 
     Attributes:
         runs: how many were predicted.
         rate: median error of the pairs per second.
-        worst_rate: the greatest.
+        worst_rate: its greatest error.
         end_to_end: median error of the median end-to-end delay.
-        worst_end_to_end: the greatest.
+        worst_end_to_end: its greatest error.
     """
 
     runs: int
@@ -98,7 +99,7 @@ class WhatIf:
 
     Attributes:
         interface: its name.
-        setting: what is different, in words.
+        setting: the difference, in words.
         figures: predicted; or why not.
         asked_for: whether the user named it (`--predict`).
     """
@@ -111,7 +112,7 @@ class WhatIf:
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
-    """Everything that follows from a matrix.
+    """All conclusions from a matrix.
 
     Attributes:
         fits: one for each interface.
@@ -125,20 +126,20 @@ class Analysis:
 
     @property
     def held_out(self) -> Errors:
-        """Of each run predicted from the others."""
+        """Errors of each run's prediction from the other runs."""
         return _errors([(one, one.predicted) for one in self.checked])
 
     @property
     def queues(self) -> Errors:
-        """Of the queues alone, with each run's own link and processing."""
+        """Errors of the queues alone, given each run's own link and processing."""
         return _errors([(one, one.queues) for one in self.checked])
 
 
 def analyse(results: Sequence[CaseResult], fifo: FifoSettings, changes: Sequence[Change] = ()) -> Analysis:
-    """Look at all runs together.
+    """Analyse all runs together.
 
     Args:
-        results: what was measured.
+        results: the measured cases.
         fifo: the queue of all runs.
         changes: settings that the user wants predicted, for each interface.
     """
@@ -165,7 +166,7 @@ def analyse(results: Sequence[CaseResult], fifo: FifoSettings, changes: Sequence
 
 
 def regime_of(result: CaseResult, fifo: FifoSettings) -> Judgement:
-    """Which queueing regime held in a run, and what would help."""
+    """Judge which queueing regime held in a run, and what would help."""
     pairs = len(result.ledgers)
     return judge(
         figures_of(
@@ -180,7 +181,7 @@ def regime_of(result: CaseResult, fifo: FifoSettings) -> Judgement:
 
 
 def statistics_of(result: CaseResult) -> DelayStatistics:
-    """The spreads of one run's pairs after the warm-up."""
+    """Return the spreads of one run's pairs after the warm-up."""
     statistics = DelayStatistics()
     for ledger in result.ledgers:
         statistics.add(ledger)
@@ -188,7 +189,7 @@ def statistics_of(result: CaseResult) -> DelayStatistics:
 
 
 def typical_and_slow(result: CaseResult) -> tuple[int, int]:
-    """Which of a run's pairs stand for it: the one at the median of end-to-end, and the one at its 99th percentile."""
+    """Choose two pairs that represent a run: the one at the median of end-to-end, and the one at its 99th percentile."""
     order = np.argsort(values_of(result.ledgers, lambda ledger: ledger.end_to_end_ns), kind="stable")
     last = order.size - 1
     return int(order[last // 2]), int(order[round(0.99 * last)])
@@ -230,7 +231,7 @@ def _cell(result: CaseResult, fifo: FifoSettings) -> Cell:
 
 
 def _lost_share(result: CaseResult) -> float:
-    """Of the frames for which there was a host, those that a newer one replaced or whose pair the FIFO dropped."""
+    """Return the share of frames, of those for which a host was there, that a newer one replaced or whose pair the FIFO dropped."""
     replaced = dict(result.board.dropped).get("replaced", 0)
     kept = result.board.sent / max(1, result.board.sent + replaced)
     return 1.0 - kept * (1.0 - result.counts.dropped / max(1, result.counts.paired))
@@ -241,7 +242,7 @@ def _all_ledgers(results: Sequence[CaseResult]) -> tuple[PairLedger, ...]:
 
 
 def _what_ifs(cells: Sequence[Cell], fifo: FifoSettings, changes: Sequence[Change]) -> list[WhatIf]:
-    """Each interface's heaviest run with one thing changed, and the profiles that nobody ran in place of its link."""
+    """Predict each interface's heaviest run with one thing changed, and with its link replaced by each profile that nobody ran."""
     found = []
     heaviest: dict[str, Cell] = {}
     for cell in cells:
@@ -274,7 +275,7 @@ def _what_ifs(cells: Sequence[Cell], fifo: FifoSettings, changes: Sequence[Chang
 
 
 def _left_out(profile: Profile | None) -> str:
-    """What of a profile the model does not know, in words."""
+    """Say in words what the model does not know of a profile."""
     return ", without its losses" if profile is not None and (profile.byte_loss or profile.stall_share) else ""
 
 
@@ -289,7 +290,7 @@ def _images(images: Images) -> str:
 
 def _changes(target: Target) -> list[tuple[str, Target]]:
     images = target.images
-    # A JPEG's bytes go with its pixels, at the same quality of the same scene.
+    # A JPEG's bytes scale with its pixels, at the same quality of the same scene.
     smaller = Images(
         width_px=images.width_px // 2,
         height_px=images.height_px // 2,

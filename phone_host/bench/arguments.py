@@ -1,4 +1,4 @@
-"""The options of delay-bench: light, for help needs no OpenCV."""
+"""The options of delay-bench. Light: help must not need OpenCV."""
 
 import argparse
 from pathlib import Path

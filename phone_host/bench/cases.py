@@ -1,4 +1,4 @@
-"""What the delay benchmark measures: combinations of link, emulated interface, image size, JPEG quality and frame rate. Pure."""
+"""The combinations that the delay benchmark measures: link, emulated interface, image size, JPEG quality and frame rate. Pure."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from phone_host.bench.emulate import Profile
 T = TypeVar("T")
 
 LOCAL_LINKS: Final = ("tcp", "ipc", "serial", "rfcomm")
-"""The kinds of link whose two ends can be put up on one machine; a remote board is named by its URI."""
+"""The kinds of link whose two ends can both run on one machine; a remote board is named by its URI."""
 
 SHAPED_LINKS: Final = ("tcp", "ipc", "serial")
-"""Those that can stand in for another interface."""
+"""The links that can stand in for another interface."""
 
 BOARD_SETS: Final = 0
-"""In place of a JPEG quality: the remote board's own camera decides, and this side cannot know."""
+"""Stands in place of a JPEG quality when a remote board's own camera decides; this side cannot know it."""
 
 _LEAST_PX, _MOST_PX = 64, 4096
 _MOST_HZ: Final = 240
@@ -42,7 +42,7 @@ class Interface:
 
     Attributes:
         link: kind of a local link, or the URI of a remote board.
-        profile: what it stands in for; None: for itself.
+        profile: the interface that it stands in for; None: itself.
     """
 
     link: str
@@ -50,7 +50,7 @@ class Interface:
 
     @property
     def is_remote(self) -> bool:
-        """Whether the board is another machine's."""
+        """Whether the board is another machine."""
         return self.link not in LOCAL_LINKS
 
     def __str__(self) -> str:
@@ -62,10 +62,10 @@ class Case:
     """One combination that is measured.
 
     Attributes:
-        interface: what carries it.
-        size: of the images of both cameras.
-        quality_percent: of the JPEGs, 1 to 100; BOARD_SETS where a remote board's camera decides.
-        rate_hz: of both cameras.
+        interface: the interface that carries its frames.
+        size: image size of both cameras.
+        quality_percent: quality of the JPEGs, 1 to 100; BOARD_SETS where a remote board's camera decides.
+        rate_hz: rate of both cameras.
     """
 
     interface: Interface
@@ -75,13 +75,13 @@ class Case:
 
     @property
     def images(self) -> str:
-        """What the cameras show, in words."""
+        """What the cameras show, as text."""
         quality = f" JPEG {self.quality_percent}" if self.quality_percent != BOARD_SETS else ""
         return f"{self.size}{quality} at {self.rate_hz} frames/s"
 
     @property
     def short(self) -> str:
-        """The same for a table, for example `640x480 q80 30/s`."""
+        """The same in short for a table, for example `640x480 q80 30/s`."""
         quality = f" q{self.quality_percent}" if self.quality_percent != BOARD_SETS else ""
         return f"{self.size}{quality} {self.rate_hz}/s"
 
@@ -93,7 +93,7 @@ def parse_links(text: str) -> tuple[str, ...]:
     """Read names of links and URIs of boards, for example `tcp,ipc` or `serial,tcp://192.168.7.2:5555`.
 
     Raises:
-        SettingsError: one is neither.
+        SettingsError: an item is neither.
     """
     names = _items(text)
     for name in names:
@@ -107,14 +107,14 @@ def parse_links(text: str) -> tuple[str, ...]:
 
 
 def interfaces(links: Sequence[str], profiles: Sequence[Profile]) -> tuple[Interface, ...]:
-    """What to measure, from `--links` and `--emulate`.
+    """Choose what to measure, from `--links` and `--emulate`.
 
     Args:
-        links: as named; empty: with profiles each one's own carrier, without them every kind.
-        profiles: to stand in for; empty: nothing is emulated.
+        links: as named; if empty, each profile's own carrier, or every kind if there are no profiles.
+        profiles: interfaces to emulate; empty: nothing is emulated.
 
     Raises:
-        SettingsError: a link that is named cannot be shaped.
+        SettingsError: a named link cannot be shaped.
     """
     if not profiles:
         return tuple(Interface(link) for link in links or LOCAL_LINKS)
@@ -128,7 +128,7 @@ def parse_sizes(text: str) -> tuple[Size, ...]:
     """Read image sizes, for example `320x240,640x480`.
 
     Raises:
-        SettingsError: that is no size, or one of no use.
+        SettingsError: an item is not a size, or the size is out of range.
     """
 
     def size(item: str) -> Size:
@@ -146,7 +146,7 @@ def parse_qualities(text: str) -> tuple[int, ...]:
     """Read JPEG qualities, for example `50,80`.
 
     Raises:
-        SettingsError: that is no whole number from 1 to 100.
+        SettingsError: an item is not a whole number from 1 to 100.
     """
 
     def quality(item: str) -> int:
@@ -161,7 +161,7 @@ def parse_rates(text: str) -> tuple[int, ...]:
     """Read frame rates, for example `15,30`.
 
     Raises:
-        SettingsError: that is no whole number from 1 to 240.
+        SettingsError: an item is not a whole number from 1 to 240.
     """
 
     def rate(item: str) -> int:
@@ -175,7 +175,7 @@ def parse_rates(text: str) -> tuple[int, ...]:
 def cases(
     measured: Sequence[Interface], sizes: Sequence[Size], qualities: Sequence[int], rates_hz: Sequence[int]
 ) -> tuple[Case, ...]:
-    """All combinations; interfaces side by side, so that a change of the machine's load touches all of them."""
+    """Return all combinations, with the interfaces next to each other, so that a change of the machine's load affects all of them."""
     return tuple(
         Case(interface=interface, size=size, quality_percent=quality, rate_hz=rate_hz)
         for size, quality, rate_hz, interface in product(sizes, qualities, rates_hz, measured)
@@ -183,7 +183,7 @@ def cases(
 
 
 def _items(text: str) -> tuple[str, ...]:
-    """The parts between commas, each once, in their order."""
+    """Return the parts between commas, each once, in their order."""
     return tuple(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
 
 
@@ -195,5 +195,5 @@ def _parsed(text: str, parse: Callable[[str], T], problem: str, remedy: str) -> 
 
 
 def _is_number(text: str, least: int, most: int) -> bool:
-    # Six digits at most: int() itself raises for thousands of them.
+    # Six digits at most, because int() itself raises for thousands of them.
     return text.isascii() and text.isdigit() and len(text) <= 6 and least <= int(text) <= most

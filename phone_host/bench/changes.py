@@ -1,4 +1,4 @@
-"""Settings that are to be predicted instead of run, as `--predict` names them. Pure."""
+"""Settings to predict instead of running them, as `--predict` names them. Pure."""
 
 import math
 from collections.abc import Sequence
@@ -22,16 +22,16 @@ _MOST_FACTOR: Final = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What is to be different from a run; None: as it was run.
+    """The differences from a run; None means as it was run.
 
     Attributes:
-        words: as it was asked for.
-        rate_hz: of the cameras.
-        size: of the images; their bytes go with their pixels where nothing else is said.
+        words: the text that the user typed.
+        rate_hz: rate of the cameras.
+        size: size of the images; their bytes scale with their pixels unless frame_bytes is given.
         frame_bytes: mean size of a frame.
         fifo: depth and policy.
-        processing_factor: how many times as long as what was measured processing takes.
-        profile: an interface in place of the link, by its figures.
+        processing_factor: predicted processing time as a multiple of the measured one.
+        profile: an interface that replaces the link, described by its figures.
     """
 
     words: str
@@ -43,7 +43,7 @@ class Change:
     profile: Profile | None = None
 
     def applied(self, target: Target) -> Target:
-        """The setting with what is different."""
+        """Return the setting with these differences applied."""
         images = target.images
         if self.size is not None:
             share = self.size.width_px * self.size.height_px / (images.width_px * images.height_px)
@@ -68,10 +68,10 @@ class Change:
 
 
 def parse_changes(texts: Sequence[str]) -> tuple[Change, ...]:
-    """Read what `--predict` names, for example `fps=60,fifo=4:block`.
+    """Read the arguments of `--predict`, for example `fps=60,fifo=4:block`.
 
     Raises:
-        SettingsError: one makes no sense.
+        SettingsError: one is not valid.
     """
     return tuple(_change(text) for text in texts)
 

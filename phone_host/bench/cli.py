@@ -1,4 +1,4 @@
-"""delay-bench: its options, and what it does with them, which is imported when it runs."""
+"""delay-bench: its options, and its command, which is imported only when it runs."""
 
 import argparse
 import importlib
@@ -16,13 +16,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: without the program's name; None for those of the process.
 
     Returns:
-        The exit code: 0 done, 2 wrong usage, 3 a link, a process or stdout cannot be had, 4 nothing was measured, 130 interrupted.
+        The exit code: 0 done, 2 wrong usage, 3 a link, a process or stdout is not available, 4 nothing was measured,
+        130 interrupted.
     """
     return run_command(parser(), arguments, _run)
 
 
 def parser() -> argparse.ArgumentParser:
-    """All options."""
+    """Make the parser with all options."""
     made = ExamplesFirstParser("delay-bench", description=EXAMPLES)
     add_version_option(made)
     add_arguments(made)
@@ -32,7 +33,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Import what is asked for, and run it. The only place that imports by a name."""
+    """Import what the options ask for, and run it. The only place that imports by name."""
     command = importlib.import_module(
         "phone_host.bench." + ("profile_list" if options.emulate == "list" else "command")
     )

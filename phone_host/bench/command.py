@@ -1,4 +1,4 @@
-"""What delay-bench does: the delays of every link and stage, measured on this machine."""
+"""The command delay-bench: measures the delays of every link and stage on this machine."""
 
 import argparse
 import json
@@ -34,7 +34,7 @@ _FILES = ("delay-bench.json", "delay-bench.html", "trace.json", "delay-bench.svg
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the cases that are asked for, print their delays, write the files."""
+    """Run the cases that the options ask for, print their delays, write the files."""
     settings, changes = _settings(options), parse_changes(options.predict)
     asked = _interfaces(options)
     matrix = parse_sizes(options.size), parse_qualities(options.quality), parse_rates(options.fps)
@@ -63,13 +63,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _interfaces(options: argparse.Namespace) -> tuple[Interface, ...]:
-    """What the options ask for."""
+    """Return the interfaces that the options ask for."""
     links = parse_links(options.links) if options.links else ()
     return interfaces(links, parse_profiles(options.emulate) if options.emulate else ())
 
 
 def _available(asked: Sequence[Interface]) -> tuple[list[Interface], list[tuple[Interface, str]]]:
-    """Those that can be had here, and the others with the reason, which is said at once."""
+    """Return the interfaces that are available here, and the others with the reason, which is printed at once."""
     here, not_run = [], []
     for interface in asked:
         reason = why_not_measurable(interface)
@@ -84,7 +84,7 @@ def _available(asked: Sequence[Interface]) -> tuple[list[Interface], list[tuple[
 
 
 def _tell(options: argparse.Namespace, results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> None:
-    """Print the table or the object, and write the files."""
+    """Print the table or the JSON object, and write the files."""
     report = as_json(results, under, analysis)
     if options.json:
         print(json.dumps(report))
@@ -129,13 +129,13 @@ def _write(out: Path, files: dict[str, str]) -> None:
 
 
 def _print(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> None:
-    """A table for each kind of images, stage by stage, the interfaces below each other."""
+    """Print a table for each kind of images, stage by stage, with the interfaces below each other."""
     console = Console(highlight=False)
     console.print(f"{under.machine}, {under.date}, matcher {under.matcher}", soft_wrap=True)
     for group in grouped(results):
         table = Table(title=f"{group[0].case.images}, delays in ms", title_justify="left")
         table.add_column("stage")
-        table.add_column("link", overflow="fold")  # a board's URI is long, and its end is what tells it from another
+        table.add_column("link", overflow="fold")  # boards' URIs are long and differ at their ends
         for name in PERCENTILES:
             table.add_column(name, justify="right")
         for row in rows(group):

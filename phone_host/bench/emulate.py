@@ -1,7 +1,8 @@
-"""What an interface does to bytes: rate, delay, jitter, stalls, lost bytes. Pure, `now_ns` passed in; `relay` moves the bytes.
+"""Emulates what an interface does to bytes: rate, delay, jitter, stalls, lost bytes. Pure, `now_ns` passed in; `relay` moves the bytes.
 
-Order is kept, as on any byte stream. All connections of a link share one direction's rate, as they share one cable or one radio. What a
-direction holds is bounded: a full one is not read from, and the sender feels it as it feels a full driver queue.
+Order is kept, as on any byte stream. All connections of a link share one direction's rate, as they share one cable or
+one radio. A direction holds a bounded number of bytes. When it is full, the relay stops reading from the
+sender, which notices this as it would notice a full driver queue.
 """
 
 import random
@@ -18,17 +19,17 @@ _S: Final = 1_000_000_000
 _NEVER: Final = 2**63 - 1
 
 SEGMENT_BYTES: Final = 1448
-"""Payload of a TCP segment with time stamps in an Ethernet frame of 1500 bytes: what one lost packet holds up."""
+"""Payload of a TCP segment with time stamps in an Ethernet frame of 1500 bytes; this is what one lost packet holds up."""
 
 _LEAST_GRAIN_BYTES: Final = 32
 _GRAIN_NS: Final = 200_000
-"""A direction hands on what it has in pieces of this much time: finer than anything that is measured here, coarse enough to be cheap."""
+"""A direction passes its bytes on in pieces of this duration: finer than anything measured here, coarse enough to be cheap."""
 
 _QUEUE_NS: Final = 5 * _MS
 """A sender's queue holds this much time of the rate, as fq_codel aims for (RFC 8290, section 5.2.2, target 5 ms) ..."""
 
 _LEAST_QUEUE_BYTES: Final = 2 * SEGMENT_BYTES
-"""... but no less than two packets, else the line would run dry."""
+"""... but no less than two packets, or the line would run dry."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,14 +37,14 @@ class Profile:
     """How an interface behaves, the same in both directions.
 
     Attributes:
-        name: as it is asked for.
+        name: the name by which users ask for it.
         carrier: the kind of link that stands in for it when none is named.
-        bytes_per_s: of payload; 0: as fast as it goes.
-        delay_ns: from leaving one end to arriving at the other, at least.
-        jitter_ns: added to it, evenly spread from 0 to this; order is kept.
-        stall_share: probability that a segment is lost and has to come again, 0 to 1.
-        stall_ns: for so long nothing arrives then, as with TCP, whose receiver waits for the missing segment.
-        byte_loss: probability that a byte vanishes without a word, 0 to 1; only on serial lines.
+        bytes_per_s: rate of payload; 0: unlimited.
+        delay_ns: least time from leaving one end to arriving at the other.
+        jitter_ns: added to the delay, evenly spread from 0 to this; order is kept.
+        stall_share: probability that a segment is lost and has to be sent again, 0 to 1.
+        stall_ns: how long nothing arrives after such a loss, as with TCP, whose receiver waits for the missing segment.
+        byte_loss: probability that a byte vanishes silently, 0 to 1; only on serial lines.
         source: where the figures come from.
     """
 
@@ -59,7 +60,7 @@ class Profile:
 
     @property
     def held_bytes(self) -> int:
-        """How much one direction holds at most: its queue, and what is under way meanwhile."""
+        """The most bytes that one direction holds: its queue, and what is under way meanwhile."""
         if not self.bytes_per_s:
             return 64 * 1024
         on_the_way = self.bytes_per_s * (self.delay_ns + self.jitter_ns) / _S
@@ -67,9 +68,10 @@ class Profile:
 
 
 NOTHING: Final = Profile(name="none", carrier="serial", bytes_per_s=0.0, delay_ns=0)
-"""A line that adds nothing: what joins two pseudo terminals."""
+"""A line that adds nothing; it joins two pseudo terminals."""
 
-# The figures are those of the study of transports where it has any (section 2 and goal 7 there, its sources in brackets); the rest is said.
+# The figures are those of the study of transports where it has any (section 2 and goal 7, its sources in brackets);
+# other sources are stated.
 PROFILES: Final = (
     Profile(
         name="usb-serial",
@@ -101,7 +103,7 @@ PROFILES: Final = (
         carrier="serial",
         bytes_per_s=80_000,  # RFCOMM between a phone and a small board (flutter_bluetooth_serial#102)
         delay_ns=3_750_000,  # a five-slot packet and its answer take six slots of 0.625 ms (osted.dk/tinyblue)
-        jitter_ns=7_500_000,  # one of them sent again costs as much once more, two twice
+        jitter_ns=7_500_000,  # sending one of them again costs as much once more, twice for two
         source="RFCOMM between a phone and a small board, 80 kB/s; slots of 0.625 ms",
     ),
     Profile(
@@ -132,7 +134,7 @@ PROFILES: Final = (
         bytes_per_s=4_000_000,  # half of 65 Mbit/s, the highest rate of one stream in 20 MHz (IEEE 802.11n, MCS 7): contention and acknowledgements take the rest
         delay_ns=1 * _MS,
         jitter_ns=9
-        * _MS,  # 2 to 10 ms of jitter, as libsoftwaresync's setting is taken to have (study, goal 7; issue of the clocks)
+        * _MS,  # 2 to 10 ms of jitter, as libsoftwaresync's setting is assumed to have (study, goal 7; issue of the clocks)
         stall_share=1e-4,  # a guess: what 802.11's own retries leave over
         stall_ns=200 * _MS,  # TCP's least retransmission timeout in Linux (TCP_RTO_MIN, include/net/tcp.h)
         source="802.11n, one stream of 20 MHz; jitter of 9 ms; one segment in 10 000 comes 200 ms late",
@@ -145,7 +147,7 @@ def parse_profiles(text: str) -> tuple[Profile, ...]:
     """Read names of profiles, for example `bluetooth,wifi`.
 
     Raises:
-        SettingsError: one is not there.
+        SettingsError: a name is unknown.
     """
     known = {profile.name: profile for profile in PROFILES}
     names = tuple(dict.fromkeys(part.strip() for part in text.split(",")))
@@ -156,11 +158,11 @@ def parse_profiles(text: str) -> tuple[Profile, ...]:
 
 
 class Way(Generic[K]):
-    """One direction of a link: bytes of any number of connections go in, and come out when it is time.
+    """One direction of a link: bytes of any number of connections go in, and come out when they are due.
 
     Args:
         profile: how it behaves.
-        seed: of jitter and loss; the same seed gives the same run.
+        seed: seed of jitter and loss; the same seed gives the same run.
     """
 
     def __init__(self, profile: Profile, seed: int = 0) -> None:
@@ -175,20 +177,20 @@ class Way(Generic[K]):
 
     @property
     def room_bytes(self) -> int:
-        """How much more it takes now; 0 while it is full."""
+        """How many more bytes it takes now; 0 while it is full."""
         return max(0, self._profile.held_bytes - self._held_bytes)
 
     @property
     def due_ns(self) -> int:
-        """When the next bytes arrive; 2^63 - 1 while there are none."""
+        """When the next bytes arrive; 2^63 - 1 if there are none."""
         return self._held[0][0] if self._held else _NEVER
 
     def put(self, key: K, data: bytes, now_ns: int) -> None:
-        """Let bytes of a connection leave.
+        """Send bytes of a connection.
 
         Args:
             key: the connection.
-            data: its bytes; none at all (an end of stream) arrive in their turn, too.
+            data: its bytes; an empty value (end of stream) also arrives in its turn.
             now_ns: any steady clock, ns.
         """
         profile = self._profile
@@ -204,7 +206,7 @@ class Way(Generic[K]):
             self._hold(self._free_ns + profile.delay_ns + jitter_ns + self._stall(len(grain)), key, self._spoil(grain))
 
     def take(self, now_ns: int) -> list[tuple[K, bytes]]:
-        """Give what has arrived, in order."""
+        """Return what has arrived, in order."""
         came: list[tuple[K, bytes]] = []
         while self._held and self._held[0][0] <= now_ns:
             _, key, data = self._held.popleft()
@@ -213,13 +215,13 @@ class Way(Generic[K]):
         return came
 
     def _hold(self, due_ns: int, key: K, data: bytes) -> None:
-        # Order is kept: what comes early waits for what went before it.
+        # Order is kept: bytes that would arrive early wait for those before them.
         self._last_ns = max(self._last_ns, due_ns)
         self._held.append((self._last_ns, key, data))
         self._held_bytes += len(data)
 
     def _stall(self, size_bytes: int) -> int:
-        """How much later than usual these bytes arrive because their segment was lost, ns."""
+        """Return how much later than usual these bytes arrive because their segment was lost, ns."""
         share = self._profile.stall_share * size_bytes / SEGMENT_BYTES
         if not share or self._random.random() >= share:
             return 0
@@ -227,9 +229,9 @@ class Way(Generic[K]):
         return self._profile.stall_ns
 
     def _spoil(self, data: bytes) -> bytes:
-        """The bytes that survive."""
+        """Return the bytes that survive."""
         share = self._profile.byte_loss
-        if not share or self._random.random() >= share * len(data):  # one byte of a grain at most: the share is tiny
+        if not share or self._random.random() >= share * len(data):  # at most one byte of a grain: the share is tiny
             return data
         self.lost_bytes += 1
         at = self._random.randrange(len(data))

@@ -1,6 +1,7 @@
-"""The two ends of every interface that the delay benchmark measures, put up on this machine; and boards that are elsewhere.
+"""Starts the two ends of every interface that the delay benchmark measures on this machine; connects to boards elsewhere.
 
-Shell: starts real processes and takes them down again, whatever happens. What cannot be had says why in words.
+Shell: starts real processes and stops them again, whatever happens. If something is not available, it says why in
+words.
 """
 
 import fcntl
@@ -27,9 +28,9 @@ from phone_host.stream.frame_sink import NoFrames
 from phone_host.stream.receiver import Receiver
 
 _CHANNEL: Final = 22
-"""For the benchmark's own RFCOMM listener: in the range that profiles do not use by themselves (1 to 30 exist)."""
+"""For the benchmark's own RFCOMM listener: in the range that profiles do not use on their own (channels 1 to 30 exist)."""
 
-# Numbers of the kernel: a Python without Bluetooth has no names for them.
+# The kernel's numbers, because a Python without Bluetooth has no names for them.
 _AF_BLUETOOTH, _BTPROTO_HCI = 31, 1
 
 # include/net/bluetooth/hci_sock.h: _IOR('H', 211, int), and the head of struct hci_dev_info (92 bytes): number, name, address.
@@ -39,12 +40,12 @@ _DEVICE_INFO: Final = struct.Struct("=H8s6s")
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """A case's link, ready to be dialled.
+    """A case's link, ready to connect to.
 
     Attributes:
         address: link URI for the host.
         board: the board's process; None for a remote board.
-        relay: the line's process; None where there is none.
+        relay: the relay's process; None if there is none.
     """
 
     address: str
@@ -57,10 +58,11 @@ class Ends:
             self.board.check()
 
     def stop(self, seen: LinkAccount) -> tuple[BoardAccount, RelayAccount | None]:
-        """End what was started.
+        """Stop what was started.
 
         Args:
-            seen: what the receiver saw; a remote board goes on, and its account is what it said of this time.
+            seen: what the receiver saw; a remote board keeps running, and its account is what it reported for this
+                time.
         """
         board = self.board.stop() if self.board is not None else _account_of(seen)
         return board, self.relay.stop() if self.relay is not None else None
@@ -68,24 +70,24 @@ class Ends:
 
 @contextmanager
 def open_ends(interface: Interface, camera: str, folder: Path) -> Iterator[Ends]:
-    """Both ends of an interface for the length of a block.
+    """Run both ends of an interface while a block runs.
 
     Args:
-        interface: what to put up.
+        interface: the interface to start.
         camera: URI of the board's camera.
         folder: for sockets and names of terminals.
 
     Raises:
-        UnavailableError: the board's process or the line did not come up.
+        UnavailableError: the board's process or the relay did not start.
     """
     if interface.is_remote:
         yield Ends(interface.link, None, None)
     elif interface.link == "rfcomm":
-        # A machine's own two adapters have no reason to be paired with each other.
+        # A machine's own two adapters are normally not paired with each other.
         with board_process(camera, f"rfcomm://*/{_CHANNEL}?unpaired=1") as board:
             yield Ends(f"rfcomm://{_adapters()[0]}/{_CHANNEL}?unpaired=1", board, None)
     elif interface.link == "serial":
-        # A line of two terminals needs somebody who passes on the bytes, even one that adds nothing.
+        # A line of two terminals needs a process that passes on the bytes, even if it adds nothing.
         profile = interface.profile or NOTHING
         with relay_process("serial", "-", folder, profile) as relay, board_process(camera, relay.board) as board:
             yield Ends(relay.host, board, relay)
@@ -100,7 +102,7 @@ def open_ends(interface: Interface, camera: str, folder: Path) -> Iterator[Ends]
 
 
 def why_not_measurable(interface: Interface) -> str:
-    """Why an interface cannot be measured here; empty if it can, as far as is known without trying."""
+    """Say why an interface cannot be measured here; empty if it can, as far as is known without trying."""
     if interface.link != "rfcomm":
         return ""
     if len(adapters := _adapters()) < 2:
@@ -110,18 +112,18 @@ def why_not_measurable(interface: Interface) -> str:
 
 
 def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | None:
-    """Ask a remote board what its camera shows: that, and nothing else, can be measured there.
+    """Ask a remote board what its camera shows; nothing else can be measured there.
 
     Args:
         uri: its link.
-        patience_ns: how long an absent board is waited for.
+        patience_ns: how long to wait for an absent board.
         stop: asked several times a second.
 
     Returns:
-        The case; None when `stop` ended it.
+        The case; None if `stop` ended it.
 
     Raises:
-        UnavailableError: there is no board, it is busy, or its images come on demand only.
+        UnavailableError: there is no board, it is busy, or it gives images only on demand.
     """
     link = open_link(parse_link(uri, listens_by_default=False), usual_keys())
     receiver = Receiver([link], now.random_id(), NoFrames())
@@ -150,7 +152,7 @@ def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | No
 
 
 def _account_of(seen: LinkAccount) -> BoardAccount:
-    """What a board that goes on said of the time in which this host was there."""
+    """Return what a board that keeps running reported for the time in which this host was connected."""
     grabbed = sent = 0
     dropped: dict[str, int] = {}
     for account in seen.sessions:
@@ -163,7 +165,7 @@ def _account_of(seen: LinkAccount) -> BoardAccount:
 
 
 def _adapters() -> list[str]:
-    """Addresses of this machine's Bluetooth adapters; none where the kernel has no Bluetooth."""
+    """Return the addresses of this machine's Bluetooth adapters; none if the kernel has no Bluetooth."""
     try:
         asker = socket.socket(_AF_BLUETOOTH, socket.SOCK_RAW, _BTPROTO_HCI)
     except OSError:

@@ -1,4 +1,4 @@
-"""A matrix of cases run one after the other, with a progress bar, until a signal comes or one fails. Shell."""
+"""Runs a matrix of cases one after another, with a progress bar, until a signal comes or one fails. Shell."""
 
 import tempfile
 from collections.abc import Callable, Sequence
@@ -19,23 +19,23 @@ from phone_host.children.board_process import socket_folder
 from phone_host.scene.film import Film
 
 _RENDER_S: Final = 0.06
-"""An image takes about this long to render, for the progress bar's idea of the time that remains."""
+"""About how long an image takes to render; the progress bar estimates the remaining time with it."""
 
 _SET_UP_S: Final = 2.0
-"""A run takes so much longer than its seconds: processes begin and end."""
+"""A run takes this much longer than its seconds, because processes start and stop."""
 
 
 class _StoppedError(Exception):
-    """Raised inside the rendering when the user wants to stop."""
+    """Raised during rendering when the user wants to stop."""
 
 
 @dataclass(slots=True)
 class Outcome:
-    """What a matrix of cases has given.
+    """The results of a matrix of cases.
 
     Attributes:
         results: of the cases that were run, in order.
-        failure: what ended it before its time; None where nothing did.
+        failure: the error that ended it early; None if there was none.
     """
 
     results: list[CaseResult] = field(default_factory=list)
@@ -43,17 +43,17 @@ class Outcome:
 
 
 def remote_cases(remote: Sequence[Interface], signals: StopSignals) -> list[Case]:
-    """What the boards elsewhere show; fewer when a signal comes meanwhile.
+    """Ask the remote boards what they show; returns fewer cases if a signal comes meanwhile.
 
     Args:
         remote: interfaces that are boards' URIs.
-        signals: asked while a board is waited for.
+        signals: checked while waiting for a board.
 
     Returns:
         A case for each board.
 
     Raises:
-        UnavailableError: a board is not there.
+        UnavailableError: a board did not answer.
     """
     found = []
     for interface in remote:
@@ -65,12 +65,12 @@ def remote_cases(remote: Sequence[Interface], signals: StopSignals) -> list[Case
 
 
 def measure(planned: Sequence[Case], settings: RunSettings, signals: StopSignals) -> Outcome:
-    """Run all cases, until a signal comes or one fails; what was measured before stays.
+    """Run all cases until a signal comes or one fails; earlier results are kept.
 
     Args:
         planned: in the order in which they are run.
-        settings: of all cases.
-        signals: asked several times a second.
+        settings: for all cases.
+        signals: checked several times a second.
     """
     outcome = Outcome()
     run_s = _SET_UP_S + WARM_UP_S + settings.seconds
@@ -109,11 +109,11 @@ def measure(planned: Sequence[Case], settings: RunSettings, signals: StopSignals
 
 
 class _Bar:
-    """The progress bar over the whole matrix, in seconds of expected time; nothing where stderr is no terminal.
+    """The progress bar over the whole matrix, in seconds of expected time; hidden if stderr is not a terminal.
 
     Args:
-        total_s: all work.
-        signals: asked while work goes on.
+        total_s: expected time of all work.
+        signals: checked during the work.
     """
 
     def __init__(self, total_s: float, signals: StopSignals) -> None:
@@ -133,19 +133,19 @@ class _Bar:
         self._progress.stop()
 
     def begin(self, what: str, length_s: float) -> None:
-        """A piece of work begins, so the one before is done."""
+        """Begin a piece of work; the one before it is done."""
         self._done_s += self._length_s
         self._length_s, self._begun_ns = length_s, now.monotonic_ns()
         self._progress.update(self._task, description=what, completed=self._done_s)
 
     def stopped(self) -> bool:
-        """Show how far it is; gives whether the user wants to stop."""
+        """Show the progress; return whether the user wants to stop."""
         elapsed_s = (now.monotonic_ns() - self._begun_ns) / 1e9
         self._progress.update(self._task, completed=self._done_s + min(elapsed_s, self._length_s))
         return self._signals.stop
 
     def rendered(self) -> None:
-        """An image was rendered."""
+        """Show the progress after a rendered image; raise if the user wants to stop."""
         if self.stopped():
             raise _StoppedError
 
@@ -153,7 +153,7 @@ class _Bar:
 def _films(
     planned: Sequence[Case], size: Size, folder: Path, advance: Callable[[], None]
 ) -> dict[tuple[Size, int], Film]:
-    """The films of one size, in all its qualities."""
+    """Render the films of one size, in all its qualities."""
     qualities = tuple(dict.fromkeys(case.quality_percent for case in planned if case.size == size))
     try:
         films = render(size, qualities, folder / str(size), advance)
@@ -163,7 +163,7 @@ def _films(
 
 
 def _fresh(folder: Path) -> Path:
-    """A new folder for one run's sockets."""
+    """Make a new folder for one run's sockets."""
     try:
         folder.mkdir()
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The delay benchmark's page: one self-contained HTML document, offline, light and dark, desk and phone. Pure."""
+"""The delay benchmark's page: one self-contained HTML document, offline, light and dark, desktop and phone. Pure."""
 
 import math
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ from phone_host.svg.plots import Budget, Quantity, Strips, budgets, distribution
 
 _FIGURE_PX: Final = 760
 _LETTER_PX: Final = 8
-"""Room for a letter of 12 px text, generously."""
+"""Space for a letter of 12 px text, generous."""
 
 
 _FIT_WORDS: Final = (
@@ -48,12 +48,12 @@ _WHAT_IF_WORDS: Final = (
 
 
 def page(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> str:
-    """A self-contained HTML page: the interfaces beside each other, the model beside the measurement, then every run stage by stage.
+    """Make a self-contained HTML page: the interfaces side by side, the model beside the measurement, then every run stage by stage.
 
     Args:
         results: what was measured.
         under: machine, date, settings.
-        analysis: what follows from the results.
+        analysis: conclusions from the results.
     """
     head = (
         f"<header><h1>Delays of every interface and stage</h1><p class='sub'>{escape(under.machine)} · {escape(under.date)} · "
@@ -66,14 +66,14 @@ def page(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -
 
 
 def figure(results: Sequence[CaseResult], under: Conditions) -> str:
-    """One picture for a README: where the time goes over each interface, for the images that most interfaces were measured with.
+    """Make one picture for a README: where the time goes over each interface, for the images measured with the most interfaces.
 
     Args:
         results: what was measured; at least one with pairs.
         under: machine, date, settings.
 
     Returns:
-        An SVG file that stands alone, in light and dark.
+        An SVG file that stands alone, for light and dark mode.
     """
     groups = grouped([result for result in results if result.ledgers])
     chosen = max(groups, key=len)
@@ -86,7 +86,7 @@ def figure(results: Sequence[CaseResult], under: Conditions) -> str:
 
 
 def _standalone(title: str, labels: Sequence[tuple[str, int]], plot: str) -> str:
-    """A plot as an SVG file of its own, with a title and a legend above it."""
+    """Make a plot into an SVG file of its own, with a title and a legend above it."""
     width_px, height_px = (int(part) for part in plot.partition('viewBox="0 0 ')[2].partition('"')[0].split())
     x, names = 0, ""
     for name, colour in labels:
@@ -185,7 +185,7 @@ def _what_ifs(analysis: Analysis) -> str:
 
 
 def _card(results: Sequence[CaseResult], under: Conditions) -> str:
-    """The card of one kind of images: a bar for each interface, each delay and stage by itself, the lives of single pairs."""
+    """Make the card of one kind of images: a bar for each interface, each delay and stage, the lives of single pairs."""
     title = results[0].case.images
     useful = [result for result in results if result.ledgers]
     if not useful:
@@ -214,7 +214,7 @@ def _card(results: Sequence[CaseResult], under: Conditions) -> str:
 
 
 def _summary(result: CaseResult, under: Conditions) -> str:
-    """One run's counts, which regime held, and what would help."""
+    """List one run's counts, which regime held, and what would help."""
     sentence, *remedies = regime_lines(result, under.fifo)
     help_ = f"<ul>{''.join(f'<li>{escape(remedy)}</li>' for remedy in remedies)}</ul>" if remedies else ""
     return f"<li>{escape(str(result.case.interface))}: {escape(summary_line(result))}<br>{escape(sentence)}{help_}</li>"

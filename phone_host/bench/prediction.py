@@ -1,7 +1,8 @@
-"""From measured cells of a matrix to settings that were not run: what to draw from, and how near the prediction comes. Pure.
+"""Predicts settings that were not run, from the measured cells of a matrix: what to draw from, and how close the prediction comes. Pure.
 
-A cell that is compared with its own prediction (`held_out`) gives nothing to it but what is known without running it: which frames are shown, how
-large, how often. What a cell cannot know from the others it says so instead of guessing.
+When a cell is compared with its own prediction (`held_out`), it contributes only what is known without running it:
+which frames are shown, how large and how often. If the other cells do not tell enough, the result says so instead of
+guessing.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,15 +19,15 @@ from phone_host.measure.delay_fit import LIKE_SIZES, DelayFit, Values, fit_delay
 from phone_host.sync.fifo import FifoSettings
 
 _FRAMES: Final = 3000
-"""Frames that a prediction runs: the p95 of 3000 values is known to 0.4 percentage points of rank."""
+"""Frames that a prediction simulates: the p95 of 3000 values is known to 0.4 percentage points of rank."""
 
 _SEED: Final = 1
 
 _SLOWER: Final = 1.15
-"""Frames that begin this much more seldom than the camera shows them, while the processor waits, wait for the line."""
+"""If frames begin this many times more rarely than the camera shows them while the processor waits, then they wait for the line."""
 
 _LEAST_GAPS: Final = 10
-"""Fewer tell no median that a single hitch would not move."""
+"""With fewer gaps, a single hitch would move the median."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -34,10 +35,10 @@ class Images:
     """What the board's camera shows.
 
     Attributes:
-        width_px: of an image.
-        height_px: of an image.
-        period_ns: time between two.
-        size_bytes: (N,) of the frames in their order.
+        width_px: image width.
+        height_px: image height.
+        period_ns: time between two images.
+        size_bytes: (N,) sizes of the frames in their order.
     """
 
     width_px: int
@@ -47,7 +48,7 @@ class Images:
 
     @property
     def work(self) -> float:
-        """What a pair costs in matching, up to a factor: pixels times disparities, which grow with the width."""
+        """The cost of matching a pair, up to a factor: pixels times disparities, which grow with the width."""
         return float(self.width_px) ** 2 * self.height_px
 
 
@@ -57,12 +58,12 @@ class Cell:
 
     Attributes:
         interface: its name.
-        self_paced: whether its link gives a frame to the line only when the one before has left.
+        self_paced: whether its link puts a frame on the line only when the one before has left.
         images: what was shown.
         fifo: the queue before the worker.
         ledgers: of its pairs, at least one.
         pairs_per_s: rate of results.
-        lost_share: of the frames that the board grabbed, those that a newer one replaced or the FIFO dropped.
+        lost_share: share of the frames that the board grabbed which a newer one replaced or the FIFO dropped.
     """
 
     interface: str
@@ -76,14 +77,14 @@ class Cell:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """A setting to be predicted.
+    """A setting to predict.
 
     Attributes:
         interface: its name.
         link: what it does to a frame.
         images: what the board's camera shows.
         fifo: depth and policy.
-        processing_factor: how many times as long as what was measured processing takes.
+        processing_factor: predicted processing time as a multiple of the measured one.
     """
 
     interface: str
@@ -102,11 +103,11 @@ class Unknown:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figures:
-    """What is compared, predicted or measured; delays in ns.
+    """The figures that are compared, predicted or measured; delays in ns.
 
     Attributes:
         pairs_per_s: rate of results.
-        lost_share: of the frames that the board grabbed, those that a newer one replaced or the FIFO dropped, 0 to 1.
+        lost_share: share of the frames that the board grabbed which a newer one replaced or the FIFO dropped, 0 to 1.
         propagation_p50_ns: on the link.
         queuing_p95_ns: waiting for the worker.
         starvation_p50_ns: how long the worker had nothing to do.
@@ -124,19 +125,19 @@ class Figures:
 
 
 def values_of(ledgers: Sequence[PairLedger], value: Callable[[PairLedger], int]) -> Values:
-    """A column of numbers out of ledgers: (N,) float64."""
+    """Extract a column of numbers from ledgers: (N,) float64."""
     return np.array([value(ledger) for ledger in ledgers], dtype=np.float64)
 
 
 def fit_of(ledgers: Sequence[PairLedger], *, intervals: bool) -> DelayFit:
-    """Propagation as latency + bytes / rate over these pairs."""
+    """Fit propagation as latency + bytes / rate over these pairs."""
     size = values_of(ledgers, lambda ledger: ledger.bytes)
     delay = values_of(ledgers, lambda ledger: ledger.propagation_ns)
     return fit_delay(size, delay) if intervals else fit_delay(size, delay, draws=0)
 
 
 def measured(cell: Cell) -> Figures:
-    """The figures of a cell as they were measured."""
+    """Return the measured figures of a cell."""
 
     def percentile(value: Callable[[PairLedger], int], rank: float) -> float:
         return float(np.percentile(values_of(cell.ledgers, value), rank))
@@ -156,8 +157,8 @@ def held_out(cell: Cell, cells: Sequence[Cell]) -> Figures | Unknown:
     """Predict a cell from all others.
 
     Args:
-        cell: the one that gives nothing.
-        cells: all of them.
+        cell: the cell that contributes nothing.
+        cells: all cells.
     """
     others = [other for other in cells if other is not cell]
     link = learn_link(cell.interface, cell.images, others)
@@ -167,11 +168,12 @@ def held_out(cell: Cell, cells: Sequence[Cell]) -> Figures | Unknown:
 
 
 def with_own_delays(cell: Cell, cells: Sequence[Cell]) -> Figures | Unknown:
-    """Let a cell's frames go through the queues once more, its own delays drawn anew: what differs from the run is the queues' error alone.
+    """Send a cell's frames through the queues once more, with its own delays drawn again; any difference from the run is the queues' error alone.
 
     Args:
-        cell: which.
-        cells: all of them: the line through all frames of its interface says how much of the link's delay is bytes.
+        cell: the cell.
+        cells: all cells; the line through all frames of its interface says how much of the link's delay depends on
+            bytes.
     """
     link = learn_link(cell.interface, cell.images, cells)
     if isinstance(link, Unknown):
@@ -187,7 +189,7 @@ def foretell(target: Target, cells: Sequence[Cell]) -> Figures | Unknown:
 
     Args:
         target: the setting.
-        cells: what was measured; cells of the target's interface are drawn from before others.
+        cells: what was measured; cells of the target's interface are preferred.
 
     Returns:
         The figures, or why there are none.
@@ -212,7 +214,7 @@ def foretell(target: Target, cells: Sequence[Cell]) -> Figures | Unknown:
 
 
 def learn_link(interface: str, images: Images, cells: Sequence[Cell]) -> LinkModel | Unknown:
-    """What a link does to frames of this size, from the cells that ran over it."""
+    """Learn what a link does to frames of this size from the cells that ran over it."""
     mine = [cell for cell in cells if cell.interface == interface]
     if not mine:
         return Unknown(f"nothing else was measured over {interface}")
@@ -223,7 +225,8 @@ def learn_link(interface: str, images: Images, cells: Sequence[Cell]) -> LinkMod
         wanted = float(np.median(images.size_bytes))
         if not size.min() / LIKE_SIZES <= wanted <= size.max() * LIKE_SIZES:
             return Unknown(f"frames of one size only were measured over {interface}")
-        # No line can be told from frames of one size; how much of it is latency hardly matters for frames of the same.
+        # Frames of one size do not determine a line. How much of the delay is latency hardly matters for frames of the
+        # same size.
         latency_ns, ns_per_byte = 0.5 * float(np.median(delay)), 0.5 * float(np.median(delay / size))
     else:
         fit = fit_of(ledgers, intervals=False)
@@ -231,7 +234,7 @@ def learn_link(interface: str, images: Images, cells: Sequence[Cell]) -> LinkMod
     if mine[0].self_paced:
         taken = [_occupied(cell) for cell in mine]
         full = [one.ns_per_byte for one in taken if one.is_full]
-        # Lines that were full tell how long a byte takes them, others only that it takes no longer.
+        # Lines that were full show how long a byte takes; others show only that it takes no longer.
         ns_per_byte = float(np.median(full)) if full else min(ns_per_byte, *(one.ns_per_byte for one in taken))
     return LinkModel(
         latency_ns=latency_ns,
@@ -243,16 +246,16 @@ def learn_link(interface: str, images: Images, cells: Sequence[Cell]) -> LinkMod
 
 @dataclass(frozen=True, slots=True)
 class _Occupied:
-    """How long a self-paced line was taken, a byte, ns, from one frame's beginning to the next's; `is_full`: because of the line, not of the camera."""
+    """How long a self-paced line was occupied from one frame's beginning to the next's, ns per byte. `is_full`: the line was the cause, not the camera."""
 
     ns_per_byte: float
     is_full: bool
 
 
 def _occupied(cell: Cell) -> _Occupied:
-    """How long a line that begins a frame when the one before has left was taken for a byte, in the median.
+    """Return the median time per byte that a line is occupied which begins a frame only when the one before has left.
 
-    What the machine adds to propagation does not hold up the next frame, but tilts the fitted line.
+    What the machine adds to propagation does not delay the next frame, but it tilts the fitted line.
     """
     gaps = np.array([after.board.sent_ns - before.board.sent_ns for before, after in pairwise(cell.ledgers)])
     if gaps.size < _LEAST_GAPS:
@@ -264,7 +267,7 @@ def _occupied(cell: Cell) -> _Occupied:
 
 
 def nominal_link(profile: Profile, *, self_paced: bool) -> LinkModel:
-    """A link that nobody ran, from its profile's figures alone."""
+    """Make the model of a link that nobody ran, from its profile's figures alone."""
     random = np.random.default_rng(_SEED)
     middle_ns = profile.jitter_ns / 2.0
     spread_ns = random.uniform(-middle_ns, middle_ns, 1000) if profile.jitter_ns else np.zeros(1)
@@ -277,10 +280,10 @@ def nominal_link(profile: Profile, *, self_paced: bool) -> LinkModel:
 
 
 def _services(images: Images, cells: Sequence[Cell]) -> Values:
-    """Processing delays to draw from: of the same size if there are any, over whichever interface, else scaled by the work.
+    """Return processing delays to draw from: those of the same size over any interface; if there are none, others scaled by the work.
 
-    What else the machine does changes from run to run by more than what an interface costs the processor: all runs of a size together tell more
-    than those over one interface.
+    The machine's other load varies more from run to run than the processor time that an interface costs. So all runs of
+    a size together tell more than those over one interface.
     """
     alike = [cell for cell in cells if cell.images.work == images.work]
     if alike:
@@ -294,7 +297,7 @@ def _services(images: Images, cells: Sequence[Cell]) -> Values:
     if len(by_work) == 1:
         drawn *= images.work / nearest.images.work
         return drawn
-    # Two sizes or more: what a pair costs is a part that every pair costs and a part by its work.
+    # Two sizes or more: a pair's cost has a constant part and a part proportional to its work.
     works = np.array(list(by_work))
     medians = np.array([np.median(values) for values in by_work.values()])
     slope, base = np.polyfit(works, medians, 1)

@@ -1,4 +1,4 @@
-"""What `delay-bench --emulate list` prints: the interfaces that a link can be let behave as."""
+"""Prints the list of `delay-bench --emulate list`: the interfaces that a link can emulate."""
 
 import argparse
 import json
@@ -8,7 +8,7 @@ from phone_host.bench.emulate import PROFILES
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print them."""
+    """Print the profiles."""
     if options.json:
         print(json.dumps({"profiles": [asdict(profile) for profile in PROFILES]}))
         return 0

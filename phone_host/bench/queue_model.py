@@ -1,11 +1,11 @@
-"""A pair's way as a chain of queues, run forward in time: what rate, delays and losses follow from a setting. Pure.
+"""Models a pair's way as a chain of queues, simulated forward in time: rate, delays and losses that follow from a setting. Pure.
 
-No distribution is assumed. Cameras are clocks, so arrivals are periodic (D), not Poisson; what a frame costs on the link follows from its bytes; what it
-costs in processing is drawn from what was measured (G), neighbours together, because a busy machine is slow in spells. There is one link, one worker,
-and a bounded queue before each: D/G/1 queues with loss, in tandem. Their exact recursion, event after event, is Lindley's (D. V. Lindley, "The theory
-of queues with a single server", Mathematical Proceedings of the Cambridge Philosophical Society 48, 1952), with the outbox's and the FIFO's rules
-for what gives way.
-All times in ns; draws come from a generator that is passed in.
+No distribution is assumed. Cameras are clocks, so arrivals are periodic (D), not Poisson. A frame's cost on the link
+follows from its bytes. Its cost in processing is drawn from measurements (G), neighbours together, because a busy
+machine is slow for a while at a time. There is one link, one worker, and a bounded queue before each: D/G/1 queues with
+loss, in tandem. Their exact recursion, event by event, is Lindley's (D. V. Lindley, "The theory of queues with a single
+server", Mathematical Proceedings of the Cambridge Philosophical Society 48, 1952), with the outbox's and the FIFO's
+rules for which frame or pair is dropped. All times in ns; draws come from a generator that is passed in.
 """
 
 from collections import deque
@@ -22,8 +22,8 @@ Values = NDArray[np.float64]
 
 _MOST_UNDER_WAY: Final = 4
 _SWIFT: Final = 4
-"""The receiver's rules for credit (docs/decisions/0003): one frame under way, one more for each period that the round trip is long, four while a frame
-takes less than a quarter of a period."""
+"""The receiver's rules for credit (docs/decisions/0003): one frame under way, plus one for each period of the round
+trip; four while a frame takes less than a quarter of a period."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -31,9 +31,9 @@ class LinkModel:
     """What the link does to a frame.
 
     Attributes:
-        latency_ns: of a frame without bytes.
-        ns_per_byte: its time on the line.
-        spread_ns: (N,) what was measured beyond the two, to be drawn from; at least one.
+        latency_ns: delay of a frame without bytes.
+        ns_per_byte: time that a byte takes on the line.
+        spread_ns: (N,) measured delay beyond these two, to draw from; at least one.
         self_paced: whether the board gives it a frame only when the one before has left (serial lines).
     """
 
@@ -45,15 +45,15 @@ class LinkModel:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Setting:
-    """Everything that decides what becomes of the frames.
+    """Everything that decides what happens to the frames.
 
     Attributes:
-        period_ns: of the board's camera.
-        size_bytes: (N,) of its frames, shown again and again in this order.
+        period_ns: period of the board's camera.
+        size_bytes: (N,) sizes of its frames, repeated in this order.
         capture_ns: (N,) capture delays to draw from.
         link: between board and host.
         pairing_ns: (N,) pairing delays to draw from.
-        wake_ns: (N,) what an idle worker takes until it has the pair, to draw from.
+        wake_ns: (N,) times that an idle worker takes until it has the pair, to draw from.
         service_ns: (N,) processing delays to draw from.
         fifo: depth and policy before the worker.
     """
@@ -73,8 +73,8 @@ class Served:
     """What a FIFO and its worker did.
 
     Attributes:
-        start_ns: (N,) when each arrival was taken; NaN: it gave way.
-        done_ns: (N,) when it was done; NaN: it gave way.
+        start_ns: (N,) when each arrival was taken; NaN: it was dropped.
+        done_ns: (N,) when it was done; NaN: it was dropped.
     """
 
     start_ns: Values
@@ -82,18 +82,18 @@ class Served:
 
     @property
     def dropped(self) -> int:
-        """Arrivals that gave way."""
+        """Number of arrivals that were dropped."""
         return int(np.isnan(self.start_ns).sum())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Predicted:
-    """What a setting leads to; delays of the pairs that were done, (M,) each, ns.
+    """What follows from a setting; delays of the pairs that were done, (M,) each, ns.
 
     Attributes:
         pairs_per_s: rate of results.
-        replaced_share: of the grabbed frames, those that a newer one replaced in the outbox.
-        dropped_share: of the pairs, those that the FIFO dropped.
+        replaced_share: share of the grabbed frames that a newer one replaced in the outbox.
+        dropped_share: share of the pairs that the FIFO dropped.
         capture_ns: delays as DESIGN, section 4, defines them.
         outbox_ns: waiting for the link.
         propagation_ns: on the link.
@@ -101,7 +101,7 @@ class Predicted:
         queuing_ns: waiting for the worker.
         starvation_ns: how long the worker had nothing to do before each.
         processing_ns: from dequeued to done.
-        end_to_end_ns: the sum, starvation aside.
+        end_to_end_ns: the sum of all but starvation.
     """
 
     pairs_per_s: float
@@ -124,10 +124,10 @@ def serve(
 
     Args:
         queued_ns: (N,) when each arrives, ascending.
-        service_ns: (M,) how long the 1st, 2nd, ... that is taken takes; M >= N.
-        depth: most that wait.
-        overflow: what gives way; `block`, whose source would not have sent, counts as drop-newest.
-        wake_ns: (M,) what the worker takes until it has the 1st, 2nd, ... if it was idle; None: nothing.
+        service_ns: (M,) processing time of the 1st, 2nd, ... arrival that is taken; M >= N.
+        depth: how many may wait.
+        overflow: what is dropped; `block`, whose source would not have sent, counts as drop-newest.
+        wake_ns: (M,) time until an idle worker has the 1st, 2nd, ... arrival; None: no time.
 
     Returns:
         When each was taken and done.
@@ -159,22 +159,22 @@ def serve(
 
 
 def predict(setting: Setting, frames: int, random: np.random.Generator) -> Predicted:
-    """Let frames go their way.
+    """Simulate the frames' way.
 
     Args:
-        setting: what decides.
+        setting: the setting.
         frames: how many the camera gives.
         random: for the draws.
 
     Returns:
-        What became of them.
+        What happened to them.
     """
 
     def drawn(values: Values) -> Values:
         return np.take(values, neighbours(values.size, frames, random))
 
     exposed_ns = np.arange(frames) * setting.period_ns
-    # A driver gives frames in their order: none overtakes the one before.
+    # A driver gives frames in order: none overtakes the one before.
     grabbed_ns = np.maximum.accumulate(exposed_ns + drawn(setting.capture_ns))
     sizes = np.resize(setting.size_bytes, frames)
     on_line_ns, spread_ns = setting.link.ns_per_byte * sizes, drawn(setting.link.spread_ns)
@@ -187,8 +187,8 @@ def predict(setting: Setting, frames: int, random: np.random.Generator) -> Predi
     while index < frames:
         free_ns = way.may_send_ns()
         if free_ns > grabbed_ns[-1]:
-            break  # what came afterwards would have replaced it
-        if grabbed_ns[index] < free_ns:  # the newest of those that came meanwhile
+            break  # later frames would have replaced it
+        if grabbed_ns[index] < free_ns:  # take the newest of those that came meanwhile
             index = int(np.searchsorted(grabbed_ns, free_ns, side="right")) - 1
         sent_ns[index] = max(grabbed_ns[index], free_ns)
         received_ns[index] = way.send(sent_ns[index], on_line_ns[index], spread_ns[index])
@@ -201,7 +201,8 @@ def predict(setting: Setting, frames: int, random: np.random.Generator) -> Predi
     served = serve(
         queued_ns=queued_ns[chosen], service_ns=service_ns, depth=fifo.depth, overflow=fifo.overflow, wake_ns=wake_ns
     )
-    # What is taken after the last arrival was not pushed out because nothing followed: the stream goes on in truth.
+    # A pair taken after the last arrival escaped being pushed out only because nothing followed; in truth the stream
+    # goes on.
     done = np.flatnonzero(served.start_ns <= queued_ns[chosen[-1]])
     pair = chosen[done]
     finished_ns, started_ns = served.done_ns[done], served.start_ns[done]
@@ -222,7 +223,7 @@ def predict(setting: Setting, frames: int, random: np.random.Generator) -> Predi
 
 
 class _Way:
-    """The link and what holds the board back from it."""
+    """The link, and the rules that make the board wait for it."""
 
     def __init__(self, setting: Setting) -> None:
         self._link = setting.link
@@ -235,10 +236,10 @@ class _Way:
         self._transit_ns = np.inf
 
     def may_send_ns(self) -> float:
-        """From when on the next frame may leave."""
+        """Return the time from which the next frame may leave."""
         credit_ns = -np.inf
         if self._blocking_depth:
-            # With `block` credit follows the FIFO's free places: one more than was taken out of it.
+            # With `block`, credit follows the FIFO's free places: one more than was taken out of it.
             if len(self._started_ns) >= self._blocking_depth:
                 credit_ns = self._started_ns[-self._blocking_depth] + self._link.latency_ns
         elif len(self._received_ns) >= (under_way := self._under_way()):
@@ -246,7 +247,7 @@ class _Way:
         return max(credit_ns, self._line_free_ns) if self._link.self_paced else credit_ns
 
     def send(self, sent_ns: float, on_line_ns: float, spread_ns: float) -> float:
-        """A frame leaves; gives when it has come."""
+        """Send a frame; return when it arrives."""
         self._line_free_ns = max(sent_ns, self._line_free_ns) + on_line_ns
         came_ns = max(sent_ns, self._line_free_ns + self._link.latency_ns + spread_ns)
         came_ns = max(came_ns, self._received_ns[-1]) if self._received_ns else came_ns
@@ -255,7 +256,7 @@ class _Way:
         return came_ns
 
     def queue(self, queued_ns: float, service_ns: float, wake_ns: float) -> None:
-        """Its pair is queued: with `block`, where nothing gives way, this is when it will be taken."""
+        """Queue its pair. With `block`, where nothing is dropped, this determines when it is taken."""
         idle = self._worker_free_ns <= queued_ns
         start_ns = queued_ns + wake_ns if idle else self._worker_free_ns
         self._started_ns.append(start_ns)

@@ -1,7 +1,8 @@
-"""The line between the benchmark's two real ends, in a process of its own: moves bytes as a profile says, knows nothing of what they mean.
+"""The relay between the benchmark's two real ends, in a process of its own: moves bytes as a profile says and knows nothing of messages.
 
-`tcp` and `ipc`: the host connects here, and each of its connections goes on to the board. `serial`: two pseudo terminals, one for each end.
-Root of its process. It holds little: its sockets' buffers are small, a `Way` is bounded, and what is full is not read from.
+`tcp` and `ipc`: the host connects here, and each of its connections continues to the board. `serial`: two pseudo
+terminals, one for each end. Root of its process. It holds little: its sockets' buffers are small, a `Way` is bounded,
+and a full one is not read from.
 """
 
 import argparse
@@ -27,26 +28,26 @@ from phone_host.bench.emulate import SEGMENT_BYTES, Profile, Way
 from phone_host.children.child_process import GOODBYE_S, child_process
 
 _SOCKET_BUFFER_BYTES: Final = 16 * 1024
-"""Of each socket: with the loopback's own segments of 64 KB a buffer would hold a second of Bluetooth."""
+"""Size of each socket's buffers. With the loopback's own segments of 64 KB, a buffer would hold a second of Bluetooth."""
 
 _LONGEST_WAIT_S: Final = 0.5
 _QUANTUM_BYTES: Final = 16 * 1024
-"""Read from one connection at one go; fair enough between the two of a link, whose control messages are small."""
+"""Most bytes read from one connection at once. Fair enough between a link's two connections, because control messages are small."""
 
 _DIAL_AGAIN_NS: Final = 100_000_000
-"""While the board is not there, connections of the host wait unaccepted: one that were taken and closed would look to it like a peer that hangs up."""
+"""While the board is not there, the host's connections wait unaccepted. If one were accepted and closed, the host would see a peer that hangs up."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RelayAccount:
-    """What a relay says at its end.
+    """What a relay reports when it ends.
 
     Attributes:
-        to_host_bytes: that it passed on from the board.
-        to_board_bytes: that it passed on from the host.
-        lost_bytes: that it let vanish, both directions.
+        to_host_bytes: bytes passed on from the board.
+        to_board_bytes: bytes passed on from the host.
+        lost_bytes: bytes that it dropped, both directions.
         stalls: lost segments, both directions.
-        cpu_s: time of the processor that it took.
+        cpu_s: processor time used.
     """
 
     to_host_bytes: int
@@ -72,11 +73,11 @@ class _End:
 
     @property
     def is_over(self) -> bool:
-        """Whether all that will ever come for it has been written, or can't be."""
+        """Whether everything that will ever come for it has been written, or can't be."""
         return self.broken or (self.told_end and not self.pending)
 
     def write(self, data: bytes) -> None:
-        """Write what can be written; the rest waits."""
+        """Write as much as possible; the rest waits."""
         self.pending += data
         try:
             done = os.write(self.descriptor, self.pending)
@@ -90,12 +91,12 @@ class _End:
 
 
 class Relay:
-    """Moves bytes between ends, both directions each at the profile's rate.
+    """Moves bytes between ends, each direction at the profile's rate.
 
     Args:
         profile: how the line behaves.
-        listener: where connections of the host come in; None for a pair of pseudo terminals.
-        dial: gives a socket to the board.
+        listener: accepts the host's connections; None for a pair of pseudo terminals.
+        dial: returns a socket to the board.
     """
 
     def __init__(self, profile: Profile, listener: socket.socket | None, dial: Callable[[], socket.socket]) -> None:
@@ -108,13 +109,13 @@ class Relay:
         self._gone_bytes = [0, 0]
 
     def join(self, board: _End, host: _End) -> None:
-        """Let two ends be connected."""
+        """Connect two ends."""
         board.peer, host.peer = host, board
         board.way, host.way = self._to_host, self._to_board
         self._ends += [board, host]
 
     def run(self, wake: socket.socket) -> RelayAccount:
-        """Move bytes until there is something to read from `wake`."""
+        """Move bytes until `wake` becomes readable."""
         while not select.select([wake], [], [], 0)[0]:
             self._step(wake)
         used = resource.getrusage(resource.RUSAGE_SELF)
@@ -134,7 +135,7 @@ class Relay:
         )
 
     def _step(self, wake: socket.socket) -> None:
-        # An end whose peer is not being read feels it by not being read itself.
+        # If an end's peer cannot be written to, do not read the end: its sender then notices.
         readers = [
             end
             for end in self._ends
@@ -146,7 +147,7 @@ class Relay:
         due_ns = min(self._to_host.due_ns, self._to_board.due_ns, *(() if may_dial else (self._dial_due_ns,)))
         wait_s = min(_LONGEST_WAIT_S, max(0.0, (due_ns - now_ns) / 1e9))
         listening = [self._listener.fileno()] if self._listener is not None and may_dial else []
-        # select, not epoll: its timeout is exact to the microsecond, epoll's to the millisecond.
+        # select, not epoll: its timeout is exact to the microsecond, epoll's only to the millisecond.
         ready, writable, _ = select.select(
             [wake.fileno(), *listening, *(end.descriptor for end in readers)],
             [end.descriptor for end in writers],
@@ -177,7 +178,7 @@ class Relay:
             return
         try:
             theirs, _ = listener.accept()
-        except OSError:  # the host has thought better of it
+        except OSError:  # the host has given up
             ours.close()
             return
         for sock in (theirs, ours):
@@ -209,10 +210,10 @@ class Relay:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a relay: says in one line where its host's end (and a serial line's board's end) is, and at its end in another what it moved.
+    """Run a relay. It prints one line with the address of the host's end (and of a serial line's board end), and at its end one with what it moved.
 
     Args:
-        arguments: kind, the board's address (for tcp and ipc) or a folder, and the profile as JSON.
+        arguments: kind, the board's address (for tcp and ipc) or `-`, a folder, and the profile as JSON.
     """
     parser = argparse.ArgumentParser("relay")
     parser.add_argument("kind", choices=("tcp", "ipc", "serial"))
@@ -230,7 +231,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _say(what: object) -> None:
-    """The two lines of this process's protocol with the one that started it."""
+    """Write a line of this process's two-line protocol with its parent process."""
     with suppress(BrokenPipeError):
         sys.stdout.write(json.dumps(what) + "\n")
         sys.stdout.flush()
@@ -238,7 +239,7 @@ def _say(what: object) -> None:
 
 @contextmanager
 def _opened(kind: str, board: str, folder: Path, profile: Profile) -> Iterator[tuple[Relay, dict[str, str]]]:
-    """A relay with its ends, and their addresses."""
+    """Open a relay with its ends; yield it and their addresses."""
     if kind == "serial":
         with _terminals(folder) as ((board_end, host_end), paths):
             relay = Relay(profile, None, socket.socket)
@@ -268,7 +269,7 @@ def _dialled(family: socket.AddressFamily, address: str) -> socket.socket:
 
 
 def _small_socket(family: socket.AddressFamily) -> socket.socket:
-    """A socket that holds little. Segments as on Ethernet: with the loopback's own a small buffer would not take even one."""
+    """Make a socket that holds little. It uses Ethernet's segment size: a small buffer would not take even one of the loopback's own segments."""
     sock = socket.socket(family)
     for option in (socket.SO_RCVBUF, socket.SO_SNDBUF):
         sock.setsockopt(socket.SOL_SOCKET, option, _SOCKET_BUFFER_BYTES)
@@ -279,7 +280,7 @@ def _small_socket(family: socket.AddressFamily) -> socket.socket:
 
 @contextmanager
 def _terminals(folder: Path) -> Iterator[tuple[tuple[_End, _End], tuple[Path, Path]]]:
-    """Two pseudo terminals, raw; both stay open here, so that an end nobody has opened yet is silent and no error."""
+    """Open two raw pseudo terminals. Both stay open here, so that an end that nobody has opened yet is silent and not an error."""
     paths = (folder / "ttyBoard", folder / "ttyHost")
     pairs = [pty.openpty() for _ in paths]
     ends = []
@@ -316,7 +317,7 @@ class RelayProcess:
         self.host: str = said["host"]
 
     def stop(self) -> RelayAccount:
-        """Ask it to end; gives its account."""
+        """Ask it to end; return its account."""
         self._process.terminate()
         try:
             return RelayAccount(**json.loads(self._process.communicate(timeout=GOODBYE_S)[0]))
@@ -326,11 +327,11 @@ class RelayProcess:
 
 @contextmanager
 def relay_process(kind: str, board: str, folder: Path, profile: Profile) -> Iterator[RelayProcess]:
-    """A relay in a process of its own for the length of a block.
+    """Run a relay in a process of its own while a block runs.
 
     Args:
         kind: `tcp`, `ipc` or `serial`.
-        board: address of the board's own end; of no meaning for `serial`.
+        board: address of the board's own end; ignored for `serial`.
         folder: for sockets and names of terminals.
         profile: how the line behaves.
     """

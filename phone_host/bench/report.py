@@ -1,4 +1,4 @@
-"""What the delay benchmark measured, as a JSON object. Every number's unit stands in its key."""
+"""The delay benchmark's measurements as a JSON object. Every key names its number's unit."""
 
 import os
 import platform
@@ -22,7 +22,7 @@ PERCENTILES: Final = ("p50", "p95", "p99", "max")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conditions:
-    """Under what the figures were measured.
+    """The conditions of the measurement.
 
     Attributes:
         machine: processor, system, versions.
@@ -42,7 +42,7 @@ class Conditions:
 
 
 def conditions(settings: RunSettings, not_run: Sequence[tuple[Interface, str]]) -> Conditions:
-    """Look at this machine and the clock on its wall."""
+    """Read the machine's data and the wall clock."""
     versions = f"Python {platform.python_version()}, pyzmq {zmq.pyzmq_version()}, libzmq {zmq.zmq_version()}"
     system = f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}"
     return Conditions(
@@ -56,12 +56,12 @@ def conditions(settings: RunSettings, not_run: Sequence[tuple[Interface, str]]) 
 
 
 def as_json(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> dict[str, object]:
-    """The object of delay-bench.json.
+    """Make the object of delay-bench.json.
 
     Args:
         results: what was measured.
         under: machine, date, settings.
-        analysis: what follows from the results.
+        analysis: conclusions from the results.
     """
     return {
         "machine": under.machine,
@@ -80,7 +80,7 @@ def as_json(results: Sequence[CaseResult], under: Conditions, analysis: Analysis
 
 
 def losses(result: CaseResult) -> dict[str, int]:
-    """Everything that did not become a result, by what became of it, over the whole run; reasons with nothing are left out."""
+    """Count everything that did not become a result in the whole run, by what happened to it; reasons with a count of 0 are left out."""
     counts, link = result.counts, result.link
     lost = {f"{reason}_on_board": count for reason, count in result.board.dropped}
     lost["lost_on_link"] = sum(account.lost for account in link.sessions)
@@ -94,7 +94,7 @@ def losses(result: CaseResult) -> dict[str, int]:
 
 
 def grouped(results: Sequence[CaseResult]) -> list[list[CaseResult]]:
-    """Runs of the same images together, in their order."""
+    """Group runs of the same images, in their order."""
     groups: dict[str, list[CaseResult]] = {}
     for result in results:
         groups.setdefault(result.case.images, []).append(result)
@@ -156,7 +156,7 @@ def _spread(spread: Spread) -> dict[str, float | None]:
 
 
 def percentiles(spread: Spread) -> dict[str, float]:
-    """The percentiles that are told, by their names, and the mean, ns."""
+    """Return the percentiles that are reported, by name, and the mean, ns."""
     return {
         "p50": spread.p50_ns,
         "p95": spread.p95_ns,
@@ -186,7 +186,7 @@ def _interface(one: InterfaceFit) -> dict[str, object]:
         "rate_low_bytes_per_s": fit.least_bytes_per_s,
         "rate_high_bytes_per_s": fit.most_bytes_per_s,
     }
-    # An endless rate has no number in JSON: the slope beside it says what was found.
+    # JSON has no number for an infinite rate; the slope beside it says what was found.
     numbers = {key: None if value == float("inf") else _number(value) for key, value in (finite | rates).items()}
     return {"link": str(one.interface), "fitted_frames": fit.points, **numbers}
 

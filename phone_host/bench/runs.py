@@ -1,8 +1,8 @@
-"""The delay benchmark: for each interface, image size, quality and rate a real board-agent process and a host, with every delay of every pair.
+"""The delay benchmark: for each interface, image size, quality and rate it runs a real board-agent process and a host, and records every delay.
 
-Root beside `host`: what is measured is the product itself over rendered films; only what carries the bytes may be an emulation, and is called
-one. The first second of a run (`WARM_UP_S`) is left out of its statistics: caches, the clock estimate and credit settle there. Counts are
-of the whole run.
+Root beside `host`. It measures the product itself over rendered films; only what carries the bytes may be emulated, and
+is then named so. The first second of a run (`WARM_UP_S`) is left out of its statistics, because caches, the clock
+estimate and credit settle then. Counts cover the whole run.
 """
 
 from bisect import bisect_right
@@ -39,10 +39,10 @@ from phone_host.sync.fifo import FifoSettings
 WARM_UP_S: Final = 1.0
 
 _FILM_FPS: Final = 8
-"""Images of the film per second of its scene; a run shows them at its own rate, then the scene only moves faster."""
+"""Images of the film per second of its scene. A run shows them at its own rate; the scene then only moves faster."""
 
 PATIENCE_NS: Final = 15_000_000_000
-"""For the board process to come up and the first pair to be done, on a small and busy machine."""
+"""Time for the board process to start and the first pair to be done on a small, busy machine."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,17 +50,17 @@ class CaseResult:
     """One measured combination.
 
     Attributes:
-        case: which.
+        case: the case.
         ledgers: of the pairs after the warm-up, in the order in which they were done.
-        measured_s: from the last pair of the warm-up to the last pair, s; 0 without pairs after it.
+        measured_s: from the last pair of the warm-up to the last pair, s; 0 if no pair came after it.
         uncertainty_ns: of the clock estimate at the run's end; NaN without one.
-        bound_ns: of the same estimate, hard; never smaller.
+        bound_ns: hard bound of the same estimate; never smaller than the uncertainty.
         board: the board's account of the whole run.
-        link: the receiver's account of it.
+        link: the receiver's account of the whole run.
         counts: of frames and pairs on the host.
         processed: pairs that were done.
-        undecodable: pairs whose bytes were no images.
-        relay: the account of the process that played the line; None where there was none.
+        undecodable: pairs whose bytes were not images.
+        relay: the account of the process that emulated the line; None if there was none.
     """
 
     case: Case
@@ -83,7 +83,7 @@ class CaseResult:
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
-    """What is the same for all cases.
+    """Settings that all cases share.
 
     Attributes:
         matcher: of the stereo core.
@@ -97,7 +97,7 @@ class RunSettings:
 
 
 def rig_of(size: Size) -> Rig:
-    """The rendered rig of that size: two ideal cameras, already rectified, with the field of view of `matched_rig`."""
+    """Return the rendered rig of that size: two ideal cameras, already rectified, with the field of view of `matched_rig`."""
     full = matched_rig()
     focal_px = float(full.left.matrix[0, 0]) * size.width_px / full.left.width_px
     centre_px = ((size.width_px - 1) / 2, (size.height_px - 1) / 2)
@@ -110,9 +110,9 @@ def render(size: Size, qualities: Sequence[int], folder: Path, advance: Callable
     """Render the films of one size.
 
     Args:
-        size: of the images.
-        qualities: of the JPEGs; for a remote board's BOARD_SETS the own camera's are of the usual quality.
-        folder: gets a folder for each quality and camera.
+        size: size of the images.
+        qualities: JPEG qualities; for a remote board's BOARD_SETS, the own camera's images have the usual quality.
+        folder: receives a folder for each quality and camera.
         advance: called after each of `film_images()` images.
 
     Returns:
@@ -131,7 +131,7 @@ def render(size: Size, qualities: Sequence[int], folder: Path, advance: Callable
 
 
 def film_images() -> int:
-    """How many images are rendered for one size, over both cameras."""
+    """Return how many images are rendered for one size, over both cameras."""
     return 2 * round(_FILM_FPS * DEMO_PERIOD_S)
 
 
@@ -141,17 +141,17 @@ def run_case(
     """Measure one combination.
 
     Args:
-        case: which.
-        film: of its size and quality; of a remote board's case only the host's side is shown.
+        case: the case.
+        film: of its size and quality; for a remote board only the host's side is shown.
         folder: for sockets and names of terminals.
-        settings: of all cases.
+        settings: for all cases.
         stop: asked several times a second.
 
     Returns:
-        What was measured, perhaps over a shorter time because `stop` ended it; None when it ended it before the warm-up was over.
+        What was measured, over a shorter time if `stop` ended it; None if `stop` ended it before the warm-up was over.
 
     Raises:
-        UnavailableError: a process did not come up, or died.
+        UnavailableError: a process did not start, or died.
     """
     shown = replace(film, fps=case.rate_hz)
     ledgers: list[PairLedger] = []
@@ -217,7 +217,8 @@ def after_warm_up(ledgers: Sequence[PairLedger]) -> tuple[tuple[PairLedger, ...]
         ledgers: of a run, in the order in which they were done.
 
     Returns:
-        The pairs done later, and the time from the last pair of the warm-up to the last of them, s: as many intervals as pairs.
+        The pairs done later, and the time from the last pair of the warm-up to the last of them, s: as many intervals
+        as pairs.
     """
     if not ledgers:
         return (), 0.0

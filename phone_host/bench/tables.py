@@ -1,4 +1,4 @@
-"""What the delay benchmark measured, as rows of tables and lines of text, for the terminal and the page. Pure."""
+"""The delay benchmark's measurements as table rows and lines of text, for the terminal and the page. Pure."""
 
 import math
 from collections.abc import Sequence
@@ -43,10 +43,10 @@ PREDICTION_COLUMNS: Final = (
 
 
 def rows(results: Sequence[CaseResult]) -> list[tuple[str, ...]]:
-    """The terminal's table: stage, link, percentiles in ms; the stages of processing are indented below it.
+    """Make the terminal's table: stage, link, percentiles in ms; the stages of processing are indented below processing.
 
     Args:
-        results: the runs to stand below each other, stage by stage.
+        results: the runs to list below each other, stage by stage.
     """
     spreads = [(str(result.case.interface), statistics_of(result)) for result in results]
     table = []
@@ -63,7 +63,7 @@ def _cell(value_ns: float) -> str:
 
 
 def summary_line(result: CaseResult) -> str:
-    """Pairs, rate, losses and clock of one run in a line; uncertainty and bound of the clock are of one moment, so the bound is the wider."""
+    """Summarise pairs, rate, losses and clock of one run in a line. The clock's uncertainty and bound are of the same moment, so the bound is wider."""
     lost = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in losses(result).items()) or "nothing"
     if result.ledgers:
         worst_us = statistics_of(result).spread("uncertainty").p95_ns / 1e3
@@ -79,13 +79,13 @@ def summary_line(result: CaseResult) -> str:
 
 
 def regime_lines(result: CaseResult, fifo: FifoSettings) -> tuple[str, ...]:
-    """Which queueing regime held in a run, then what would help."""
+    """Say which queueing regime held in a run, then what would help."""
     judgement = regime_of(result, fifo)
     return (judgement.sentence, *judgement.remedies)
 
 
 def error_lines(analysis: Analysis) -> list[str]:
-    """How far predictions were from measurements, in words; nothing where nothing was predicted."""
+    """Say how far predictions were from measurements; nothing if nothing was predicted."""
     return [
         f"{what}, {errors.runs} runs: pairs/s off by {100 * errors.rate:.0f} % (median; {100 * errors.worst_rate:.0f} % at worst), "
         f"end-to-end p50 by {100 * errors.end_to_end:.0f} % ({100 * errors.worst_end_to_end:.0f} %)"
@@ -98,7 +98,7 @@ def error_lines(analysis: Analysis) -> list[str]:
 
 
 def rate_text(bytes_per_s: float) -> str:
-    """A rate in words, with three digits."""
+    """Write a rate with three digits."""
     if bytes_per_s != bytes_per_s or bytes_per_s == float("inf"):  # noqa: PLR0124 - NaN is the only value unlike itself
         return "any" if bytes_per_s == float("inf") else "\u2013"
     unit, name = next(((unit, name) for unit, name in _RATES if bytes_per_s >= 0.9995 * unit), _RATES[-1])
@@ -106,12 +106,12 @@ def rate_text(bytes_per_s: float) -> str:
 
 
 def latency_text(fit: DelayFit) -> str:
-    """A fitted latency in words; 0 only tells that it is less than clocks and scatter let be told."""
+    """Write a fitted latency. 0 means only that it is too small to measure, given the clocks and the scatter."""
     return "too small to tell" if fit.latency_ns == 0.0 else duration_text(fit.latency_ns)
 
 
 def fit_rows(analysis: Analysis) -> list[tuple[str, ...]]:
-    """Each interface's latency and rate with their 95 % intervals, and how well the clocks were known there."""
+    """List each interface's latency and rate with their 95 % intervals, and how well its clocks were known."""
     rows: list[tuple[str, ...]] = []
     for one in analysis.fits:
         fit = one.fit
@@ -136,7 +136,7 @@ def fit_rows(analysis: Analysis) -> list[tuple[str, ...]]:
 
 
 def fit_lines(analysis: Analysis) -> list[str]:
-    """Each interface's latency and rate for the terminal, with their 95 % intervals."""
+    """List each interface's latency and rate for the terminal, with their 95 % intervals."""
     lines = []
     for one in analysis.fits:
         if math.isnan(one.fit.ns_per_byte):
@@ -153,7 +153,7 @@ def fit_lines(analysis: Analysis) -> list[str]:
 
 
 def prediction_lines(analysis: Analysis) -> list[str]:
-    """Each run beside its prediction from the other runs, and what the user wanted to be predicted, for the terminal."""
+    """List each run beside its prediction from the other runs, and the predictions that the user asked for, for the terminal."""
     lines = []
     if len(analysis.checked) > 1:
         lines = ["", "end-to-end p50 and pairs/s, measured and predicted from the other runs:"]
@@ -178,7 +178,7 @@ def prediction_lines(analysis: Analysis) -> list[str]:
 
 
 def checked_rows(analysis: Analysis) -> list[tuple[str, ...]]:
-    """Each run: measured, and predicted from the others; `12.1 | 11.9`."""
+    """List each run as measured and as predicted from the others: `12.1 | 11.9`."""
     rows: list[tuple[str, ...]] = []
     for one in analysis.checked:
         name, images = str(one.case.interface), one.case.short
@@ -191,7 +191,7 @@ def checked_rows(analysis: Analysis) -> list[tuple[str, ...]]:
 
 
 def what_if_rows(analysis: Analysis) -> list[tuple[str, ...]]:
-    """Each setting that was not run, predicted."""
+    """List the prediction for each setting that was not run."""
     return [
         (one.interface, one.setting, *_figure_texts(one.figures))
         if isinstance(one.figures, Figures)

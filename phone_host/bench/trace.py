@@ -1,8 +1,9 @@
-"""Every pair's life as a trace for Perfetto or chrome://tracing. Pure: ledgers in, text out.
+"""Writes every pair's life as a trace for Perfetto or chrome://tracing. Pure: ledgers in, text out.
 
-The format is Google's "Trace Event Format", JSON object form: complete events (`X`) for the delays, metadata (`M`) for names, a flow (`s` to `f`,
-bound to the slice that encloses it, `bp: e`) from the board's `sent` to the host's `received`. Times are µs with three decimals, counted
-from the first exposure. Slices of one thread must not overlap in part: where pairs overlap in a delay, further threads of that name hold them.
+The format is Google's "Trace Event Format", JSON object form: complete events (`X`) for the delays, metadata (`M`) for
+names, a flow (`s` to `f`, bound to the enclosing slice, `bp: e`) from the board's `sent` to the host's `received`.
+Times are µs with three decimals, counted from the first exposure. Slices of one thread must not partly overlap: where
+pairs overlap in a delay, further threads of that name hold them.
 """
 
 import json
@@ -14,15 +15,15 @@ from typing import Final
 from common.ledger import PairLedger, StageTimes
 
 _LANES: Final = 100
-"""Thread ids of a kind of slice begin at its number times this."""
+"""Thread ids of a kind of slice begin at (its number + 1) times this."""
 
 
 @dataclass(frozen=True, slots=True)
 class TracedRun:
-    """A run to be shown.
+    """A run to show.
 
     Attributes:
-        name: of the run.
+        name: name of the run.
         ledgers: of its pairs, in the order in which they were done.
     """
 
@@ -32,7 +33,7 @@ class TracedRun:
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """One of the delays: on which machine it is shown, and between which marks it lies."""
+    """One of the delays, and whether it is shown on the board or on the host."""
 
     name: str
     on_board: bool
@@ -49,13 +50,13 @@ _KINDS: Final = (
 
 
 def trace_json(runs: Sequence[TracedRun]) -> str:
-    """The whole file.
+    """Make the whole file.
 
     Args:
         runs: each becomes two processes, its board and its host.
 
     Returns:
-        A JSON object with `traceEvents`, metadata first, then by time.
+        A JSON object with `traceEvents`: metadata first, then events by time.
     """
     exposed = [ledger.board.exposed_ns for run in runs for ledger in run.ledgers]
     zero_ns = min(exposed, default=0)
@@ -83,18 +84,18 @@ def trace_json(runs: Sequence[TracedRun]) -> str:
 
 
 class _Lanes:
-    """Threads for slices that may overlap: each goes to the first whose last slice has ended."""
+    """Threads for slices that may overlap: each slice goes to the first thread whose last slice has ended."""
 
     def __init__(self) -> None:
         self._ends_ns: list[list[int]] = [[] for _ in _KINDS]
 
     @property
     def counts(self) -> list[int]:
-        """Threads in use for each kind."""
+        """The number of threads in use for each kind."""
         return [len(ends) for ends in self._ends_ns]
 
     def place(self, kind: int, start_ns: int, end_ns: int) -> int:
-        """The thread's id for a slice."""
+        """Choose the thread for a slice; return its id."""
         ends = self._ends_ns[kind]
         lane = next((lane for lane, end in enumerate(ends) if end <= start_ns), len(ends))
         if lane == len(ends):
@@ -110,7 +111,7 @@ def _tid(kind: int, lane: int) -> int:
 def _pair(
     ledger: PairLedger, zero_ns: int, pids: tuple[int, int], lanes: _Lanes, flow: int
 ) -> Iterator[dict[str, object]]:
-    """All events of one pair; `pids` of host and board."""
+    """Make all events of one pair; `pids` are those of host and board."""
     board = ledger.board
     marks = (
         board.exposed_ns,
@@ -128,7 +129,8 @@ def _pair(
         "time_skew_us": ledger.time_skew_ns / 1e3,
         "clock_uncertainty_us": ledger.uncertainty_ns / 1e3,
     }
-    # Propagation carries the clock estimate's error, which may exceed a delay of some µs: nothing is received before it is sent.
+    # Propagation includes the clock estimate's error, which may exceed a delay of some µs. So correct marks to keep
+    # received after sent.
     for index, (kind, (start_ns, end_ns)) in enumerate(zip(_KINDS, pairwise(accumulate(marks, max)), strict=True)):
         place = {"pid": pids[kind.on_board], "tid": lanes.place(index, start_ns, end_ns)}
         yield _slice(kind.name, start_ns=start_ns - zero_ns, length_ns=end_ns - start_ns, place=place, about=about)
@@ -139,7 +141,7 @@ def _pair(
     at_ns = ledger.dequeued_ns
     for stage in fields(StageTimes):
         length_ns = getattr(ledger.stages, stage.name)
-        # The last one, write, ends with processing; between the others hardly anything passes.
+        # The last stage, write, ends together with processing; hardly any time passes between the others.
         begin_ns = ledger.done_ns - length_ns if stage.name == "write" else at_ns
         place = {"pid": pids[0], "tid": _tid(len(_KINDS) - 1, 0)}
         yield _slice(

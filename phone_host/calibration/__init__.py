@@ -1,1 +1,1 @@
-"""From views of a board to a rig, and from what two cameras see to the difference of their stamps."""
+"""Computes a rig from views of a chessboard, and the time offset from what two cameras see."""

@@ -1,4 +1,4 @@
-"""Values around a calibration: pairs of board views, why one is not used, what came out. No behaviour."""
+"""The values of a calibration: pairs of board views, why a pair is not used, and the result. No behaviour."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -28,7 +28,7 @@ class BoardPair:
     """The corners of one pair.
 
     Attributes:
-        name: how reports call the pair.
+        name: how reports name the pair.
         left_px: (N, 2) float64.
         right_px: (N, 2) float64, in the same order.
     """
@@ -45,7 +45,7 @@ class Rejected:
     Attributes:
         name: the pair.
         reason: why.
-        detail: the same in words with numbers.
+        detail: the reason in words, with numbers.
     """
 
     name: str
@@ -59,9 +59,9 @@ class Used:
 
     Attributes:
         name: the pair.
-        left_px: its root mean square reprojection error in the left image, px.
+        left_px: root mean square reprojection error in the left image, px.
         right_px: the same, right.
-        vertical_px: its root mean square vertical error after rectification, px; NaN when the rig cannot be rectified.
+        vertical_px: root mean square vertical error after rectification, px; NaN when the rig cannot be rectified.
     """
 
     name: str
@@ -72,16 +72,16 @@ class Used:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """What came out.
+    """The result of a calibration.
 
     Attributes:
         rig: the two cameras.
-        rectification: of the rig; None when it cannot be rectified: `obstacle` says why.
-        obstacle: why not, and the remedy.
+        rectification: of the rig; None when the rig cannot be rectified (see `obstacle`).
+        obstacle: why it cannot be rectified, and the remedy.
         used: pairs used.
-        rejected: pairs rejected here.
+        rejected: pairs that the calibration rejected.
         vertical_px: (M,) absolute vertical error of every corner used, after rectification.
-        baseline_sigma_m: how far the corners' noise leaves the baseline open, m.
+        baseline_sigma_m: standard deviation of the baseline that the corners' noise leaves, m.
         tilts_deg: (V,) angle between each board and the image plane.
         spread: share of the image's width and height that the corners span, the smaller over both cameras.
         distortion_terms: number of coefficients estimated for each camera.

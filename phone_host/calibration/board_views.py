@@ -1,4 +1,4 @@
-"""From the image files of both sides to board corners: every pair read, searched, and kept or rejected with its reason."""
+"""Finds the board in the image files of both sides: every pair is read, searched, and kept or rejected with its reason."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -18,7 +18,7 @@ Size = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class BoardViews:
-    """What the images hold.
+    """What was found in the images.
 
     Attributes:
         pairs: corners of the pairs whose board was found in both images.

@@ -1,9 +1,10 @@
 """Bundle adjustment of a stereo rig: both cameras, their relative pose and every board pose at once.
 
-`cv2.stereoCalibrate` stops far from the optimum when views tell little (measured on a real rig with the board at 1.3 m: it
-stopped at a baseline of 78.8 mm or 79.6 mm, depending on its start; the optimum, and the published value, is 80.17 mm), takes
-one image size, and lets single bad corners pull at full weight. Here: Levenberg-Marquardt on the exact problem, board poses
-eliminated by the Schur complement, Huber's weights, and the covariance that says how well the views determine the rig.
+`cv2.stereoCalibrate` stops far from the optimum when the views say little. (Measured on a real rig with the board at
+1.3 m: it stopped at a baseline of 78.8 mm or 79.6 mm, depending on its start; the optimum, and the published value, is
+80.17 mm.) It also takes only one image size and gives single bad corners full weight. This module uses
+Levenberg-Marquardt on the exact problem, eliminates the board poses by the Schur complement, uses Huber's weights, and
+computes the covariance, which says how well the views determine the rig.
 
 Source: B. Triggs et al., "Bundle Adjustment - A Modern Synthesis", 2000. Derivatives: `cv2.projectPoints`, `cv2.composeRT`.
 """
@@ -22,15 +23,16 @@ CAMERA_PARAMETERS = 9
 _RIG = slice(2 * CAMERA_PARAMETERS, 2 * CAMERA_PARAMETERS + 6)
 _GLOBALS = _RIG.stop
 _MAX_STEPS = 200
-_PASSES = 2  # the second with a noise estimate that the first one's outliers no longer blow up
+_PASSES = 2  # the second pass has a noise estimate that the first one's outliers no longer inflate
 _CONVERGED = 1e-9  # relative decrease of the cost; the baseline then moves by less than a micrometre
 _DAMPING_START, _DAMPING_LEAST, _DAMPING_MOST = 1e-3, 1e-12, 1e12
 # Huber's threshold in standard deviations: at 2.5, Gaussian noise loses 1 % of its information. The factor turns a median of
 # absolute values into a standard deviation (Gaussian).
 _HUBER_SIGMAS, _MEDIAN_TO_SIGMA = 2.5, 1.4826
-_LEAST_SIGMA_PX = 0.02  # no corner detector is better; with exact corners of a test the cost stays quadratic
-# Where views leave the principal point open (all boards parallel), it stays near the middle: a prior of a tenth of the image
-# width, ten times wider than lenses are off; views that tell it outweigh it ten-thousandfold.
+_LEAST_SIGMA_PX = 0.02  # no corner detector is better; with a test's exact corners this keeps the cost quadratic
+# Where the views do not determine the principal point (all boards parallel), this prior keeps it near the middle: a
+# tenth of the image width, ten times more than lenses are off. Views that do determine it outweigh the prior
+# ten-thousandfold.
 _PRINCIPAL_POINT_SHARE = 0.1
 
 
@@ -49,7 +51,7 @@ class BundleView:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class BundleState:
-    """All that is estimated.
+    """Everything that is estimated.
 
     Attributes:
         left: (9,) float64: fx fy cx cy k1 k2 p1 p2 k3.
@@ -68,12 +70,12 @@ class BundleState:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class BundleResult:
-    """The optimum and how sure it is.
+    """The optimum and its uncertainty.
 
     Attributes:
         state: the optimum.
         left_errors_px: (V, N, 2) measured minus projected.
-        right_errors_px: (V, N, 2).
+        right_errors_px: (V, N, 2), the same.
         baseline_sigma_m: standard deviation of the baseline that the corners' noise leaves, m.
     """
 
@@ -83,17 +85,17 @@ class BundleResult:
     baseline_sigma_m: float = field(default=float("nan"))
 
     def rms_px(self) -> float:
-        """Root mean square distance of all corners of both cameras, px (as OpenCV's stereoCalibrate counts)."""
+        """Return the root mean square distance of all corners of both cameras, px (counted like OpenCV's stereoCalibrate)."""
         return rms_px(self.left_errors_px, self.right_errors_px)
 
     def view_rms_px(self) -> tuple[Vector, Vector]:
-        """Root mean square distance of each view, (V,) px, left and right."""
+        """Return the root mean square distance of each view, (V,) px, left and right."""
         left, right = ((errors**2).sum(axis=2).mean(axis=1) for errors in (self.left_errors_px, self.right_errors_px))
         return np.sqrt(left), np.sqrt(right)
 
 
 def rms_px(*errors: Vector) -> float:
-    """Root mean square length of (..., 2) errors, px."""
+    """Return the root mean square length of (..., 2) errors, px."""
     stacked = np.concatenate([e.reshape(-1, 2) for e in errors])
     return float(np.sqrt((stacked**2).sum(axis=1).mean()))
 
@@ -105,13 +107,13 @@ def adjust(
     free_camera: NDArray[np.bool_],
     sizes_px: tuple[tuple[int, int], tuple[int, int]],
 ) -> BundleResult:
-    """Find the rig that explains the corners best.
+    """Find the rig that best explains the corners.
 
     Args:
         views: the pairs, V >= 1.
         points_m: (N, 3) corners in the board's axes.
-        start: a state near enough: each camera calibrated alone, the relative pose of any one view.
-        free_camera: (9,) which camera parameters are estimated; the others keep their start.
+        start: a state close enough: each camera calibrated alone, the relative pose of any one view.
+        free_camera: (9,) which camera parameters are estimated; the others keep their start values.
         sizes_px: width and height of the left and the right images.
 
     Returns:
@@ -140,10 +142,10 @@ def adjust(
 
 
 def project_view(state: BundleState, pose: Vector, points_m: Vector) -> tuple[Vector, Vector]:
-    """Where both cameras see a board, (N, 2) px each.
+    """Project a board into both cameras, (N, 2) px each.
 
     Args:
-        state: the rig (its poses are not looked at).
+        state: the rig (its poses are ignored).
         pose: (6,) rotation vector and translation of the board, m.
         points_m: (N, 3) corners in the board's axes.
     """
@@ -154,14 +156,14 @@ def project_view(state: BundleState, pose: Vector, points_m: Vector) -> tuple[Ve
 
 
 def camera_arrays(parameters: Vector) -> tuple[Vector, Vector]:
-    """The (3, 3) camera matrix and the (5,) distortion of nine parameters."""
+    """Return the (3, 3) camera matrix and the (5,) distortion made of nine parameters."""
     fx, fy, cx, cy = parameters[:4]
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]), parameters[4:].copy()
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _System:
-    """Normal equations in blocks: G of the globals, P_v of each pose, C_v between them; gradients g and p_v."""
+    """Normal equations in blocks: G for the globals, P_v for each pose, C_v between them; gradients g and p_v."""
 
     G: Vector
     C: Vector
@@ -170,7 +172,7 @@ class _System:
     p: Vector
 
     def reduced(self, damping: float, free: NDArray[np.bool_]) -> tuple[Vector, Vector, Vector]:
-        """Eliminate the poses: matrix and right side of the free globals, and the inverse pose blocks."""
+        """Eliminate the poses; return matrix and right side for the free globals, and the inverse pose blocks."""
         poses = self.P + damping * _diagonals(self.P)
         inverse = np.linalg.inv(poses)
         coupled = self.C[:, free] @ inverse
@@ -180,7 +182,7 @@ class _System:
         return np.asarray(matrix, np.float64), np.asarray(right, np.float64), np.asarray(inverse, np.float64)
 
     def step(self, damping: float, free: NDArray[np.bool_]) -> tuple[Vector, Vector]:
-        """The damped step: globals (24,), poses (V, 6)."""
+        """Return the damped step: globals (24,), poses (V, 6)."""
         matrix, right, inverse = self.reduced(damping, free)
         step = np.zeros(_GLOBALS)
         step[free] = np.linalg.solve(matrix, right)
@@ -190,7 +192,7 @@ class _System:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Problem:
-    """What stays fixed during a minimisation; the prior is (expected globals, weight beside squared pixels)."""
+    """What stays fixed during a minimisation. The prior is (expected globals, weight relative to squared pixels)."""
 
     views: list[BundleView]
     points_m: Vector
@@ -198,7 +200,7 @@ class _Problem:
     threshold_px: float
 
     def cost(self, state: BundleState) -> float:
-        """Huber's cost of all corners, and the prior's; infinite where the state makes no sense."""
+        """Return Huber's cost of all corners plus the prior's; infinite if the state gives non-finite projections."""
         errors = _errors(self.views, self.points_m, state)
         lengths = np.concatenate([np.linalg.norm(e.reshape(-1, 2), axis=1) for e in errors])
         if not np.isfinite(lengths).all():
@@ -225,13 +227,13 @@ class _Problem:
 
 
 def _minimise(problem: _Problem, state: BundleState, free: NDArray[np.bool_]) -> BundleState:
-    """Levenberg-Marquardt until the cost stands still."""
+    """Run Levenberg-Marquardt until the cost stops falling."""
     damping, cost, system = _DAMPING_START, problem.cost(state), problem.normal_equations(state)
     for _ in range(_MAX_STEPS):
         try:
             tried = _moved(state, *system.step(damping, free))
             tried_cost = problem.cost(tried)
-        except (np.linalg.LinAlgError, cv2.error):  # a step into numbers that are none
+        except (np.linalg.LinAlgError, cv2.error):  # the step led to invalid numbers
             tried, tried_cost = state, np.inf
         if tried_cost < cost:
             gain, state, cost = (cost - tried_cost) / cost, tried, tried_cost
@@ -247,7 +249,7 @@ def _minimise(problem: _Problem, state: BundleState, free: NDArray[np.bool_]) ->
 
 
 def _linearised(view: BundleView, points_m: Vector, state: BundleState, pose: Vector) -> tuple[Vector, Vector, Vector]:
-    """Errors (2N, 2) of both cameras, and what the projections (4N,) do with the globals (24) and the pose (6)."""
+    """Return errors (2N, 2) of both cameras, and the derivatives of the projections (4N,) by the globals (24) and by the pose (6)."""
     rotation, translation, *parts = cv2.composeRT(pose[:3], pose[3:], state.rotation, state.translation_m)
     left, by_left = cv2.projectPoints(points_m, pose[:3], pose[3:], *camera_arrays(state.left))
     right, by_right = cv2.projectPoints(points_m, rotation, translation, *camera_arrays(state.right))
@@ -278,13 +280,13 @@ def _huber_weights(errors: Vector, threshold_px: float) -> Vector:
 
 
 def _sigma_px(errors: tuple[Vector, Vector]) -> float:
-    """Robust standard deviation of one coordinate, px."""
+    """Return the robust standard deviation of one coordinate, px."""
     values = np.abs(np.concatenate([e.reshape(-1) for e in errors]))
     return max(float(np.median(values)) * _MEDIAN_TO_SIGMA, _LEAST_SIGMA_PX)
 
 
 def _prior(sizes_px: tuple[tuple[int, int], tuple[int, int]]) -> tuple[Vector, Vector]:
-    """Expected globals and how sure that is: 1 / standard deviation squared."""
+    """Return the expected globals and their weights: 1 / standard deviation squared."""
     expected, weight = np.zeros(_GLOBALS), np.zeros(_GLOBALS)
     for side, (width, height) in enumerate(sizes_px):
         at = side * CAMERA_PARAMETERS + 2
@@ -310,5 +312,5 @@ def _moved(state: BundleState, step: Vector, poses: Vector) -> BundleState:
 
 
 def _diagonals(blocks: Vector) -> Vector:
-    """(V, 6, 6) blocks with everything but their diagonals 0."""
+    """Return (V, 6, 6) blocks with everything except their diagonals set to 0."""
     return np.asarray(blocks * np.eye(blocks.shape[1]), dtype=np.float64)

@@ -1,9 +1,9 @@
-"""Calibration of two cameras from pairs of chessboard views: from corners to a rig, a verdict and what to do about it.
+"""Calibrates two cameras from pairs of chessboard views: corners in, a rig and its figures out.
 
 A core: corners in, values out; no files. Every pair is used or rejected with its reason.
 
-Order: each camera alone (any size, any lens) -> the relative pose most pairs agree on -> bundle adjustment of all
-(`bundle.py`) -> pairs that do not fit are rejected and the adjustment repeated until nothing changes.
+Order: each camera alone (any size, any lens) -> the relative pose that most pairs agree on -> bundle adjustment of all
+(`bundle.py`) -> pairs that do not fit are rejected and the adjustment is repeated until nothing changes.
 """
 
 import math
@@ -45,15 +45,16 @@ Sizes = tuple[tuple[int, int], tuple[int, int]]
 _RADIAL_1 = np.array([1, 1, 1, 1, 1, 0, 0, 0, 0], dtype=bool)
 _USUAL = np.array([1, 1, 1, 1, 1, 1, 1, 1, 0], dtype=bool)
 _FULL = np.ones(9, dtype=bool)
-# The third radial coefficient bends the corners of the image, where few boards reach: it is taken only with many pairs and
-# where it explains 1 % of the error. Of four real rigs one gains so much (0.182 -> 0.178 px); the others gain 0.8 % and less.
+# The third radial coefficient bends the corners of the image, which few boards reach. It is used only with many pairs
+# and only if it explains 1 % of the error. Of four real rigs one gains that much (0.182 -> 0.178 px); the others gain
+# 0.8 % or less.
 _FULL_PAIRS, _FULL_GAIN = 10, 0.01
 
-# A pair is out when its error is twice the median pair's, but never below these: sharper than that no harm is done.
+# A pair is rejected when its error is twice the median pair's, but never below this floor: smaller errors do no harm.
 _OUTLIER_FACTOR, _OUTLIER_FLOOR_PX = 2.0, 0.3
-# Rows carry a third of the information and scatter more from pair to pair.
+# Row errors carry a third of the information and scatter more from pair to pair.
 _ROWS_FACTOR = 2.5
-# The right view predicted from the left one, with cameras that are not tuned to each other yet.
+# Limits for the right view predicted from the left one, while the cameras are not yet adjusted to each other.
 _MOVED_FACTOR, _MOVED_FLOOR_PX = 5.0, 3.0
 
 
@@ -63,16 +64,16 @@ def calibrate(
     sizes_px: Sizes,
     board_side: Side = Side.LEFT,
 ) -> Calibration:
-    """Calibrate a rig from the corners of a board seen by both cameras.
+    """Calibrate a rig from the corners of a chessboard seen by both cameras.
 
     Args:
         pairs: corners of each pair, any number.
         board: the board.
         sizes_px: width and height of the left and of the right images.
-        board_side: which camera hangs on the board (the computer), stored in the rig.
+        board_side: which camera is on the board (the computer); stored in the rig.
 
     Returns:
-        The calibration, every pair used or rejected.
+        The calibration, with every pair used or rejected.
 
     Raises:
         DataError: fewer than three pairs are left.
@@ -103,10 +104,10 @@ def calibrate(
 def _agreed_start(
     pairs: list[BoardPair], points_m: Vector, left: LoneCamera, right: LoneCamera
 ) -> tuple[BundleState, list[BoardPair], list[Rejected]]:
-    """The relative pose of the one pair that most others agree with; pairs that disagree are out.
+    """Find the relative pose of the one pair that most others agree with; reject pairs that disagree.
 
-    Each pair alone gives a relative pose. It is judged by how well it predicts the right corners of all pairs from their left
-    poses; the median over the pairs does not care how wild the wild ones are.
+    Each pair gives a relative pose on its own. It is judged by how well it predicts the right corners of all pairs from
+    their left poses. The median over the pairs ignores how large the outliers are.
     """
     candidates = [_relative(a, b) for a, b in zip(left.poses, right.poses, strict=True)]
     states = [
@@ -141,7 +142,7 @@ def _agreed_start(
 
 
 def _relative(left: Vector, right: Vector) -> tuple[Vector, Vector]:
-    """Rotation vector and translation, right from left, of two poses of one board."""
+    """Return the rotation vector and translation, right from left, from two poses of one board."""
     inverse = np.asarray(cv2.Rodrigues(left[:3])[0]).T
     rotation = np.asarray(cv2.Rodrigues(right[:3])[0]) @ inverse
     return np.ravel(cv2.Rodrigues(rotation)[0]).astype(np.float64), right[3:] - rotation @ left[3:]
@@ -150,7 +151,7 @@ def _relative(left: Vector, right: Vector) -> tuple[Vector, Vector]:
 def _adjust_robustly(
     pairs: list[BoardPair], points_m: Vector, start: BundleState, sizes_px: Sizes
 ) -> tuple[BundleResult, list[BoardPair], list[Rejected], NDArray[np.bool_]]:
-    """Adjust, take the worst pair out, adjust again, until all fit; then choose the distortion model."""
+    """Adjust, reject the worst pair and adjust again until all fit; then choose the distortion model."""
     rejected: list[Rejected] = []
     while True:
         free = _USUAL if len(pairs) >= USUAL_PAIRS else _RADIAL_1
@@ -159,7 +160,7 @@ def _adjust_robustly(
         misfits = _misfits(pairs, result, points_m, sizes_px)
         if not misfits:
             break
-        worst, why = misfits[0]  # one at a time: it spoils the errors of the others
+        worst, why = misfits[0]  # one at a time: the worst pair distorts the errors of the others
         rejected.append(why)
         pairs = [pair for index, pair in enumerate(pairs) if index != worst]
         require_enough(pairs, rejected)
@@ -174,7 +175,7 @@ def _adjust_robustly(
 def _misfits(
     pairs: list[BoardPair], result: BundleResult, points_m: Vector, sizes_px: Sizes
 ) -> list[tuple[int, Rejected]]:
-    """Pairs that fit much worse than the others, the worst first: by reprojection, or by rows that do not meet."""
+    """Find pairs that fit much worse than the others, worst first: by reprojection error, or by rows that do not match."""
     errors = np.max(result.view_rms_px(), axis=0)
     usual = float(np.median(errors))
     by_error = errors / max(_OUTLIER_FACTOR * usual, _OUTLIER_FLOOR_PX)
@@ -189,7 +190,7 @@ def _misfits(
     try:
         rig = _rig(result.state, sizes_px)
         rectification = rectify_rig(rig)
-    except DataError:  # swapped, vertical, ...: told at the end, by the same check
+    except DataError:  # swapped, vertical, ...: the same check reports it at the end
         vertical = np.zeros(len(pairs))
     else:
         vertical = np.array([_rms(_vertical_errors_px(pair, rig, rectification)) for pair in pairs])
@@ -212,7 +213,7 @@ def _misfits(
 
 
 def _all_invertible(state: BundleState, sizes_px: Sizes) -> bool:
-    """Whether both radial models grow all the way to the image's corners: a fold there is a fit gone wild."""
+    """Return whether both radial models grow all the way to the image's corners; if one folds back, the fit has failed."""
     return all(_grows(parameters, size) for parameters, size in zip((state.left, state.right), sizes_px, strict=True))
 
 
@@ -226,13 +227,13 @@ def _grows(parameters: Vector, size_px: tuple[int, int]) -> bool:
 
 
 def _misfit(pair: BoardPair, state: BundleState, points_m: Vector, *, error_px: float, usual_px: float) -> Rejected:
-    """Say why a pair does not fit: each view on its own tells whether corners jump or the board moved."""
+    """Say why a pair does not fit: fitting each view alone shows whether corners jump or the board moved."""
     own = {
         side: rms_px(own_errors_px(points_m, corners_of(pair, side), parameters))
         for side, parameters in ((Side.LEFT, state.left), (Side.RIGHT, state.right))
     }
     side = max(own, key=lambda each: own[each])
-    # More than half of the error is there already when the view stands alone: then it is that view's corners.
+    # If a view fitted alone already has more than half of the error, the fault is in its corners.
     if own[side] > error_px / 2:
         reason = Reason.CORNERS_LEFT if side is Side.LEFT else Reason.CORNERS_RIGHT
         detail = f"corners in the {side.value} image are off by {own[side]:.2f} px, others by {usual_px:.2f} px"
@@ -255,7 +256,7 @@ def _summed_up(
     board_side: Side,
     distortion_terms: int,
 ) -> Calibration:
-    """Turn the optimum into a rig and its figures."""
+    """Make a rig and its figures from the optimum."""
     state = result.state
     rig = replace(
         _rig(state, sizes_px),
@@ -318,7 +319,7 @@ def _rms(values: Vector) -> float:
 
 
 def _tilt_deg(pose: Vector) -> float:
-    """Angle between a board and the left image plane."""
+    """Return the angle between a board and the left image plane."""
     normal_z = abs(float(np.asarray(cv2.Rodrigues(pose[:3])[0])[2, 2]))
     return math.degrees(math.acos(min(normal_z, 1.0)))
 

@@ -1,4 +1,4 @@
-"""One camera on its own: OpenCV's calibration, without the views that are plainly wrong. Gives `calibrate.py` its start."""
+"""Calibrates one camera alone with OpenCV, without views that are plainly wrong. Gives `calibrate.py` its start."""
 
 from dataclasses import dataclass, replace
 
@@ -12,18 +12,18 @@ from phone_host.calibration.target import Corners
 from phone_host.model import Side
 
 LEAST_PAIRS = 3
-"""Fewer tell focal length and distortion from nothing (Zhang 2000: two views without distortion)."""
+"""Fewer pairs do not determine focal length and distortion (Zhang 2000: two views suffice only without distortion)."""
 
 USUAL_PAIRS = 5
-"""From here on the usual four distortion coefficients are estimated; with fewer pairs the first radial one alone."""
+"""From this many pairs on, the usual four distortion coefficients are estimated; with fewer, only the first radial one."""
 
-# Before anything is sure: only views that are plainly wrong.
+# Nothing is certain yet, so only views that are plainly wrong are rejected.
 _GROSS_FACTOR, _GROSS_FLOOR_PX = 4.0, 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoneCamera:
-    """One camera on its own: its parameters, and the poses (V, 6) of the boards in its axes."""
+    """One camera calibrated alone: its parameters, and the poses (V, 6) of the boards in its axes."""
 
     side: Side
     parameters: Vector
@@ -31,12 +31,12 @@ class LoneCamera:
 
 
 def corners_of(pair: BoardPair, side: Side) -> Corners:
-    """The corners of one side of a pair."""
+    """Return the corners of one side of a pair."""
     return pair.left_px if side is Side.LEFT else pair.right_px
 
 
 def require_enough(pairs: list[BoardPair], rejected: list[Rejected]) -> None:
-    """Check that a calibration can be made.
+    """Check that there are enough pairs for a calibration.
 
     Raises:
         DataError: fewer than three pairs are left.
@@ -52,7 +52,7 @@ def require_enough(pairs: list[BoardPair], rejected: list[Rejected]) -> None:
 def calibrate_alone(
     pairs: list[BoardPair], side: Side, points_m: Vector, size_px: tuple[int, int]
 ) -> tuple[list[BoardPair], list[Rejected], LoneCamera]:
-    """Calibrate one camera; views that are plainly wrong are taken out until none is left.
+    """Calibrate one camera; reject views that are plainly wrong until none is left.
 
     Args:
         pairs: all pairs.
@@ -61,7 +61,7 @@ def calibrate_alone(
         size_px: width and height of the side's images.
 
     Returns:
-        The pairs left, those taken out, and the camera with one pose for each pair left.
+        The pairs left, those rejected, and the camera with one pose for each pair left.
 
     Raises:
         DataError: fewer than three pairs are left.
@@ -74,7 +74,7 @@ def calibrate_alone(
         limit = max(_GROSS_FACTOR * float(np.median(errors)), _GROSS_FLOOR_PX)
         if errors.max() <= limit:
             return pairs, rejected, camera
-        worst = int(errors.argmax())  # one at a time: a single wild view spoils the errors of the others
+        worst = int(errors.argmax())  # one at a time: a single wild view distorts the errors of the others
         rejected.append(
             Rejected(
                 pairs[worst].name,
@@ -106,19 +106,19 @@ def _opencv_camera(
 
 
 def with_poses(camera: LoneCamera, pairs: list[BoardPair], points_m: Vector) -> LoneCamera:
-    """The camera with one pose for each of the pairs that are left."""
+    """Return the camera with one pose for each of the pairs that are left."""
     poses = [fit_pose(points_m, corners_of(pair, camera.side), camera.parameters) for pair in pairs]
     return replace(camera, poses=np.array(poses))
 
 
 def fit_pose(points_m: Vector, corners: Corners, parameters: Vector) -> Vector:
-    """(6,) pose of the board that fits one view best."""
+    """Return the (6,) pose of the board that best fits one view."""
     _, rotation, translation = cv2.solvePnP(points_m, corners, *camera_arrays(parameters), flags=cv2.SOLVEPNP_ITERATIVE)
     return np.concatenate([np.ravel(rotation), np.ravel(translation)]).astype(np.float64)
 
 
 def own_errors_px(points_m: Vector, corners: Corners, parameters: Vector) -> Vector:
-    """(N, 2) measured minus projected corners of one view, px, with the board's pose fitted to this view alone."""
+    """Return (N, 2) measured minus projected corners of one view, px, with the board's pose fitted to this view alone."""
     pose = fit_pose(points_m, corners, parameters)
     seen = cv2.projectPoints(points_m, pose[:3], pose[3:], *camera_arrays(parameters))[0]
     return np.asarray(corners - np.asarray(seen).reshape(-1, 2), dtype=np.float64)

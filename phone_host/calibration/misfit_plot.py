@@ -1,4 +1,4 @@
-"""How well each time offset would fit, as an SVG file of its own. Pure: values in, text out."""
+"""Plots the misfit of each time offset as a standalone SVG file. Pure: values in, text out."""
 
 from html import escape
 from typing import Final

@@ -1,7 +1,7 @@
 """The calibration target: a chessboard, its corners in an image, and their order.
 
-Corners come as (N, 2), row by row, the same order as `Board.points_m`. Two views of one board must agree on which corner is the
-first; `order_by_colour` and `agree` see to that.
+Corners come as (N, 2), row by row, in the order of `Board.points_m`. Two views of one board must agree on which corner
+comes first; `order_by_colour` and `agree` ensure that.
 """
 
 import re
@@ -23,16 +23,16 @@ _LENGTH = re.compile(r"\A\s*(\d+(?:\.\d*)?|\.\d+)\s*(mm|cm|m|)\s*\Z")
 _LEAST_CORNERS, _MOST_CORNERS = 3, 100
 _LARGEST_SQUARE_M = 2.0
 
-# Sector-based detection (Duda and Frese, BMVC 2018), with and without contrast normalisation: glare on paper defeats the one,
-# weak contrast the other; EXHAUSTIVE finds a few more and misses a few others. Measured on 174 images of four real rigs: the
-# first way finds 164, all ways together 174.
+# Sector-based detection (Duda and Frese, BMVC 2018), with and without contrast normalisation: glare on paper defeats
+# one, weak contrast the other; EXHAUSTIVE finds a few more and misses a few others. Measured on 174 images of four real
+# rigs: the first way finds 164, all ways together 174.
 _NORMALISED = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
 _WAYS = (_NORMALISED, cv2.CALIB_CB_ACCURACY, _NORMALISED | cv2.CALIB_CB_EXHAUSTIVE)
-# Noise and moire hide squares at full size that half the size shows.
+# Noise and moire can hide squares at full size that are visible at half size.
 _SMALLER = 0.5
-# Photographs of 12 MPx take seconds and gain nothing: the refinement works at full size in any case.
+# Larger photographs (12 MPx) take seconds and gain nothing: the refinement works at full size anyway.
 _LARGEST_SEARCHED_PX = 1600
-# Refinement window: beyond a third of the distance to the next corner it would see that one's edges.
+# Refinement window: a window of more than a third of the distance to the next corner would include that corner's edges.
 _WINDOW_SHARE = 0.3
 _DETECTOR_WEIGHT = 1 / 3  # see find_corners
 _REFINE = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-4)
@@ -43,12 +43,12 @@ class Board:
     """A chessboard.
 
     Attributes:
-        columns: inner corners of a row.
-        rows: inner corners of a column.
+        columns: inner corners in a row.
+        rows: inner corners in a column.
         square_m: side of a square, m.
 
     Raises:
-        SettingsError: a size that no board has.
+        SettingsError: no board has such a size.
     """
 
     columns: int
@@ -65,7 +65,7 @@ class Board:
             raise SettingsError(f"--square {self.square_m:g} m", "give the side of a square, such as 25mm")
 
     def points_m(self) -> NDArray[np.float64]:
-        """(N, 3) float64, m: the inner corners, row by row, in the board's own plane z = 0."""
+        """Return the inner corners, row by row, in the board's own plane z = 0: (N, 3) float64, m."""
         rows, columns = np.mgrid[0 : self.rows, 0 : self.columns]
         return np.column_stack([columns.ravel(), rows.ravel(), np.zeros(rows.size)]) * self.square_m
 
@@ -81,7 +81,7 @@ def parse_board(corners: str, square: str) -> Board:
         The board.
 
     Raises:
-        SettingsError: one of the two makes no sense.
+        SettingsError: one of the two is not valid.
     """
     counts = re.fullmatch(r"\s*(\d{1,3})\s*[xX]\s*(\d{1,3})\s*", corners)
     if counts is None:
@@ -97,17 +97,17 @@ def parse_board(corners: str, square: str) -> Board:
 def find_corners(image: Image, board: Board) -> Corners:
     """Find the inner corners of a board in an image.
 
-    Where the detector works at full size, its corners and those of a gradient refinement are averaged, one to two: their
-    errors are independent enough. Stereo RMS of four real rigs: 0.141 0.188 0.221 0.174 px; refined corners alone 0.159 0.192
-    0.214 0.180 px, the detector's alone 0.183 0.276 0.328 0.206 px.
+    If the detector succeeds at full size, its corners and those of a gradient refinement are averaged with weights 1 to
+    2, because their errors are independent enough. Stereo RMS of four real rigs: 0.141 0.188 0.221 0.174 px; refined
+    corners alone 0.159 0.192 0.214 0.180 px, the detector's alone 0.183 0.276 0.328 0.206 px.
 
     Args:
         image: (H, W) grey or (H, W, 3) BGR, uint8.
         board: what to look for.
 
     Returns:
-        The corners in the order of `Board.points_m`, the first inner square white where the board's parity tells; empty when
-        the board was not found.
+        The corners in the order of `Board.points_m`, with the first inner square white if the board's parity tells;
+        empty if the board was not found.
     """
     grey = to_grey(image)
     found, scale = _search(grey, board)
@@ -119,10 +119,10 @@ def find_corners(image: Image, board: Board) -> Corners:
 
 
 def order_by_colour(corners: Corners, grey: Image, board: Board) -> Corners:
-    """Give corners the board's own order, as far as its colours tell.
+    """Give corners the board's own order, as far as its colours determine it.
 
-    Rows run so that the grid is not mirrored. Where one count is even and the other odd, half a turn swaps black and white:
-    then the square inside the first four corners is the white one. Other boards look the same after half a turn.
+    Rows run so that the grid is not mirrored. If one count is even and the other odd, half a turn swaps black and
+    white; then the square inside the first four corners is the white one. Other boards look the same after half a turn.
 
     Args:
         corners: (N, 2), in any of the orders a detector may give.
@@ -142,10 +142,11 @@ def order_by_colour(corners: Corners, grey: Image, board: Board) -> Corners:
 
 
 def agree(left: Corners, right: Corners, board: Board) -> Corners:
-    """Give the right view's corners the left view's order, where the colours cannot tell.
+    """Give the right view's corners the left view's order, where the colours do not determine it.
 
-    Of the turns under which the board looks the same (half a turn; quarter turns of a square board), the one whose rows and
-    columns point most nearly the same way in both images is taken: the cameras do not stand on their heads to each other.
+    The board looks the same after some turns (half a turn; quarter turns of a square board). Of these, take the one
+    whose rows and columns point most nearly the same way in both images: neither camera is upside down relative to the
+    other.
 
     Args:
         left: (N, 2) corners of the left view.
@@ -156,7 +157,7 @@ def agree(left: Corners, right: Corners, board: Board) -> Corners:
         The right corners, reordered.
     """
     if (board.columns + board.rows) % 2 == 1:
-        return right  # the colours have told
+        return right  # the colours have determined the order
     reference = left.reshape(board.rows, board.columns, 2)
     grid = right.reshape(board.rows, board.columns, 2)
     turns = (0, 1, 2, 3) if board.rows == board.columns else (0, 2)
@@ -165,7 +166,7 @@ def agree(left: Corners, right: Corners, board: Board) -> Corners:
 
 
 def _search(grey: Image, board: Board) -> tuple[Corners, float]:
-    """Corners in the full image's pixels, and the scale they were found at."""
+    """Return corners in the full image's pixels, and the scale at which they were found."""
     largest = max(grey.shape)
     first = min(1.0, _LARGEST_SEARCHED_PX / largest)
     for scale in (first, first * _SMALLER):
@@ -177,7 +178,7 @@ def _search(grey: Image, board: Board) -> tuple[Corners, float]:
             found, corners = cv2.findChessboardCornersSB(searched, (board.columns, board.rows), flags=way)
             if found:
                 factors = np.array([searched.shape[1] / grey.shape[1], searched.shape[0] / grey.shape[0]])
-                # Pixel centres are integers: the scale is about the corner of the image at (-0.5, -0.5).
+                # Pixel centres are integers, so the scale is about the corner of the image at (-0.5, -0.5).
                 return (np.asarray(corners, dtype=np.float64).reshape(-1, 2) + 0.5) / factors - 0.5, scale
     return np.empty((0, 2)), first
 
@@ -186,7 +187,7 @@ def _refine(grey: Image, corners: Corners, board: Board) -> Corners:
     grid = corners.reshape(board.rows, board.columns, 2)
     spacings = [np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1)]
     window = max(2, int(min(spacings) * _WINDOW_SHARE))
-    # A light blur takes the noise out of the gradients: a tenth less reprojection error on real rigs.
+    # A light blur removes noise from the gradients: a tenth less reprojection error on real rigs.
     smooth = cv2.GaussianBlur(grey, (0, 0), 1.0)
     refined = cv2.cornerSubPix(
         smooth, corners.astype(np.float32).reshape(-1, 1, 2), (window, window), (-1, -1), _REFINE
@@ -195,7 +196,7 @@ def _refine(grey: Image, corners: Corners, board: Board) -> Corners:
 
 
 def _brightness(grid: Corners, column: int, grey: Image) -> float:
-    """Mean of the middle of the square right of corner `column` in the first row."""
+    """Return the mean brightness in the middle of the square right of corner `column` in the first row."""
     middle = grid[:2, column : column + 2].reshape(-1, 2).mean(axis=0)
     reach = max(1, int(np.linalg.norm(grid[0, column + 1] - grid[0, column]) / 6))
     x, y = (int(v) for v in np.rint(middle))
@@ -204,7 +205,7 @@ def _brightness(grid: Corners, column: int, grey: Image) -> float:
 
 
 def _same_way(first: Corners, second: Corners) -> float:
-    """How much rows and columns of two (rows, columns, 2) grids point the same way: 2 = exactly, -2 = the opposite way."""
+    """Return how much rows and columns of two (rows, columns, 2) grids point the same way: 2 = exactly, -2 = the opposite way."""
     total = 0.0
     for grid_end in (np.s_[0, -1], np.s_[-1, 0]):
         a, b = first[grid_end] - first[0, 0], second[grid_end] - second[0, 0]

@@ -1,7 +1,7 @@
-"""What a calibration is good for, and what to do about it, in words.
+"""Says in words what a calibration is good for and what to do about it.
 
-The measure is the vertical error after rectification: a matcher looks along rows, and rows that are off by half a pixel cost it
-more than blur or noise do: one pixel off, and a 9x7 census finds no partner.
+The measure is the vertical error after rectification, because a matcher searches along rows. Rows that are off by half
+a pixel cost it more than blur or noise do; at one pixel a 9x7 census finds no partner.
 """
 
 from collections import Counter
@@ -15,15 +15,15 @@ from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
 GOOD_PX, USABLE_PX = 0.25, 0.5
 """Limits of the 95th percentile of the vertical error."""
 
-# Real rigs fit to 0.15 to 0.4 px; beyond this no tuning helps, something is wrong at the root.
+# Real rigs fit to 0.15 to 0.4 px. Beyond this no tuning helps; something basic is wrong.
 _CONTRADICTION_PX = 1.0
-# A baseline known to 1 % is a depth known to 1 %; at 5 % there is no scale to speak of.
+# A baseline known to 1 % gives depth known to 1 %; at 5 % there is practically no scale.
 _BASELINE_GOOD, _BASELINE_USABLE = 0.01, 0.05
 _FEW_PAIRS = 6
 _WANTED_PAIRS = 10
-# Corners that span less leave the rest of the image to the polynomial's fantasy.
+# Corners that span less leave the polynomial undetermined in the rest of the image.
 _WANTED_SPREAD = 0.6
-# The focal length shows in foreshortening only: 1 - cos(15 deg) = 3 %.
+# Only foreshortening reveals the focal length: 1 - cos(15 deg) = 3 %.
 _WANTED_TILT_DEG = 15.0
 _MANY_REJECTED = 1 / 3
 
@@ -42,7 +42,7 @@ class Assessment:
 
     Attributes:
         verdict: the verdict.
-        remedies: sentences, the most important first; empty when there is nothing to better.
+        remedies: sentences, the most important first; empty when nothing needs to improve.
     """
 
     verdict: Verdict
@@ -58,8 +58,8 @@ def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Assessmen
     """Judge a calibration.
 
     Args:
-        calibration: what came out.
-        rejected: all pairs that are not used, those the calibration never saw included.
+        calibration: the result to judge.
+        rejected: all pairs that are not used, including those the calibration never saw.
 
     Returns:
         The verdict with remedies.
@@ -109,7 +109,7 @@ def _open_baseline(calibration: Calibration, baseline_m: float) -> str:
 
 
 def _hints(calibration: Calibration, rejected: tuple[Rejected, ...]) -> list[str]:
-    """What would make the next calibration better; none of it changes the verdict."""
+    """Return what would make the next calibration better; none of it changes the verdict."""
     hints = []
     if calibration.spread < _WANTED_SPREAD:
         hints.append(

@@ -1,4 +1,4 @@
-"""Which image of the left camera belongs to which of the right one: by the number in the name, else in name order."""
+"""Pairs the images of the left and the right camera: by the number in the name, else in name order."""
 
 import glob
 import re
@@ -17,9 +17,9 @@ class ViewFiles:
 
     Attributes:
         pairs: (name, left file, right file), in order.
-        left_alone: files of the left side without partner.
-        right_alone: files of the right side without partner.
-        by_number: whether numbers in the names made the pairs; otherwise their order did.
+        left_alone: files of the left side without a partner.
+        right_alone: files of the right side without a partner.
+        by_number: whether files were paired by the numbers in their names; otherwise by order.
     """
 
     pairs: tuple[tuple[str, Path, Path], ...]
@@ -66,7 +66,7 @@ def pair_files(left: str, right: str) -> ViewFiles:
 
 
 def _images(given: str, side: str) -> list[Path]:
-    """Image files of a folder or a glob, without hidden ones, numbers in names as numbers."""
+    """Return the image files of a folder or a glob, without hidden ones, sorted with numbers in names as numbers."""
     if Path(given).is_dir():
         found = [path for path in Path(given).iterdir() if path.suffix.lower() in _SUFFIXES]
     else:
@@ -80,16 +80,16 @@ def _images(given: str, side: str) -> list[Path]:
 
 
 def _natural(path: Path) -> tuple[list[tuple[int, str]], str]:
-    """A sort key: digits compare as numbers, the rest as text."""
+    """Return a sort key in which digits compare as numbers and the rest as text."""
     parts = re.split(r"(\d+)", path.name)
     return [(int(part), "") if part.isdigit() else (-1, part) for part in parts], str(path)
 
 
 def _numbered(left: list[Path], right: list[Path]) -> tuple[dict[int, Path], dict[int, Path]] | None:
-    """Files by the number in their names; None when no number tells the files of each side apart and meets on both.
+    """Return the files by the number in their names; None if no number tells each side's files apart and occurs on both sides.
 
-    Names may hold more than one number (`cam0_0012`, `0012_cam1`): the place, counted from the end, that pairs most files is
-    the one that counts the views. Files without a number there stay alone.
+    Names may hold more than one number (`cam0_0012`, `0012_cam1`). The one that counts the views is at the place,
+    counted from the end, that pairs most files. Files without a number there stay alone.
     """
     best: tuple[dict[int, Path], dict[int, Path]] | None = None
     most = 0
@@ -102,7 +102,7 @@ def _numbered(left: list[Path], right: list[Path]) -> tuple[dict[int, Path], dic
 
 
 def _by_number(files: list[Path], place: int) -> dict[int, Path]:
-    """Files by the number at a place; empty when two files share one there."""
+    """Return the files by the number at a place; empty if two files share one there."""
     numbers = [(path, _NUMBER.findall(path.stem)) for path in files]
     found = [(int(parts[-place]), path) for path, parts in numbers if len(parts) >= place]
     by_number = dict(found)

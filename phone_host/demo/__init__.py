@@ -1,1 +1,1 @@
-"""phone-host demo: both programs on this machine before a scene whose depth is known."""
+"""phone-host demo: runs both programs on this machine with a scene whose depth is known."""

@@ -1,4 +1,4 @@
-"""The demo's page: what the two cameras saw, the depth, how wrong it is, and every delay."""
+"""The demo's page: what the two cameras saw, the depth, its error, and every delay."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from phone_host.report.report_page import Figure, Headline, PageData, delay_seri
 from phone_host.report.run_page import camera_table, notes, pictures, unused_table
 
 _GOOD_PERCENT = 0.6
-"""Depth error that the figures of the stereo core allow at 2 m; the demo's scene lies between 0.7 and 2.5 m."""
+"""Depth error at 2 m that the stereo core's figures allow; the demo's scene lies between 0.7 and 2.5 m."""
 
 
 def demo_page(run: RunSnapshot, errors: DepthErrors, last: CheckedPair | None, ledgers: Sequence[PairLedger]) -> str:
@@ -18,8 +18,8 @@ def demo_page(run: RunSnapshot, errors: DepthErrors, last: CheckedPair | None, l
 
     Args:
         run: the run.
-        errors: the depth against the truth.
-        last: the pair to show; None when there was none.
+        errors: errors of the depth against the truth.
+        last: the pair to show; None if there was none.
         ledgers: of all pairs, in order.
 
     Returns:

@@ -1,4 +1,4 @@
-"""The demo: a rendered moving scene, a real board-agent process and the host on this machine, checked against the scene's truth."""
+"""The demo: a rendered moving scene, a real board-agent process and the host on this machine, compared with the scene's truth."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -27,13 +27,13 @@ from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
 
 FPS: Final = 15
-"""Leaves the stereo pipeline its time on two small cores, so that the demo shows delays and not an overload."""
+"""Leaves the stereo pipeline enough time on two small cores, so that the demo shows delays and not an overload."""
 
 NEAR_M: Final = 0.6
 """Nearest depth searched; the demo's scene begins at 0.7 m."""
 
 _CHECKED_PAIRS: Final = 8
-"""Pairs whose depth is compared with the truth, spread over the run; each costs some 0.1 s afterwards."""
+"""Number of pairs whose depth is compared with the truth; each costs about 0.1 s afterwards."""
 
 _CHECK_EVERY: Final = 15
 _BOARD_PATIENCE_NS: Final = 10_000_000_000
@@ -44,10 +44,10 @@ class CheckedPair:
     """One pair kept for the comparison with the truth.
 
     Attributes:
-        processed: what the pipeline made of it.
+        processed: the pipeline's output.
         ledger: its marks and delays.
-        left_index: which image of the film the board showed.
-        right_index: which image the host's own camera showed.
+        left_index: number of the film image that the board showed.
+        right_index: number of the film image that the host's own camera showed.
     """
 
     processed: Processed
@@ -58,18 +58,18 @@ class CheckedPair:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DepthErrors:
-    """How far the measured depth is from the truth, over all checked pairs and all pixels that both cameras see.
+    """Errors of the measured depth against the truth, over all checked pairs and all pixels that both cameras see.
 
     Attributes:
         pairs: pairs compared.
         pixels: pixels compared.
-        density: share of them that got a depth.
+        density: share of them that have a depth.
         disparity_px: median |disparity error|, px.
-        outliers: share of measured pixels that are off by more than 2 px.
+        outliers: share of measured pixels whose error exceeds 2 px.
         depth_mm: median |depth error|, mm.
-        depth_p95_mm: 95th percentile of it, mm.
+        depth_p95_mm: its 95th percentile, mm.
         depth_percent: median |depth error| / depth, percent.
-        at_1_m_mm: median |depth error| of pixels between 0.9 and 1.1 m, mm; NaN where none is.
+        at_1_m_mm: median |depth error| of pixels between 0.9 and 1.1 m, mm; NaN if there are none.
         at_2_m_mm: the same between 1.8 and 2.2 m.
         wrong_pairs: checked pairs whose two images show different moments.
     """
@@ -94,7 +94,7 @@ class DemoRun:
         film: what both cameras replay.
         rig: the cameras.
         out: folder for results.
-        sockets: folder of this user's alone, in which the two programs meet.
+        sockets: folder of this user alone, in which the two programs meet.
         resolved: the settings of the run with their origins.
     """
 
@@ -122,11 +122,11 @@ class DemoRun:
 
         Args:
             seconds: how long, from the first pair on.
-            stop: ends the run earlier.
+            stop: asked repeatedly; True ends the run early.
             watch: called several times a second.
 
         Raises:
-            UnavailableError: the board process did not come up or died.
+            UnavailableError: the board process did not start, or died.
         """
         with board_process(self._film.replay_uri(self._film.left), self.address) as board:
 
@@ -141,7 +141,7 @@ class DemoRun:
         """Compare the kept pairs with the scene.
 
         Args:
-            scene: the one that the film shows.
+            scene: the scene that the film shows.
         """
         left_pose, right_pose = rig_poses(self._rig)
         sensors = ((self._rig.left, left_pose), (self._rig.right, right_pose))
@@ -181,7 +181,7 @@ class DemoRun:
         self.ledgers.append(ledger)
         if (len(self.ledgers) - 1) % _CHECK_EVERY:
             return
-        # The board's stamp is known on this clock to some 50 us; the images are 1 / 15 s apart.
+        # The board's stamp is known on this clock to about 50 us; the images are 1 / 15 s apart.
         left_index, right_index = (
             self._film.index_at(ledger.board.exposed_ns),
             self._film.index_at(ledger.host.exposed_ns),
@@ -194,7 +194,7 @@ class DemoRun:
 
 
 def truth_json(errors: DepthErrors) -> dict[str, float | int | None]:
-    """The comparison as a JSON object; None where nothing was measured."""
+    """Return the comparison as a JSON object; None where nothing was measured."""
     return {
         name: None if math.isnan(value) else value
         for name in DepthErrors.__slots__

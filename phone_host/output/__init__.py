@@ -1,1 +1,1 @@
-"""File formats of results: PFM, PLY, PNG. One file each."""
+"""Writers and readers of results: PFM, PLY, PNG, one module per file format."""

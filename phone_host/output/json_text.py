@@ -1,4 +1,4 @@
-"""JSON as its standard has it (RFC 8259, section 6): Python's own writer would put NaN and Infinity, which other readers refuse."""
+"""Writes JSON as its standard requires (RFC 8259, section 6): Python's own writer emits NaN and Infinity, which other readers refuse."""
 
 import json
 import math
@@ -6,14 +6,14 @@ from typing import Any
 
 
 def json_text(value: Any, indent: int | None = None) -> str:  # noqa: ANN401 - whatever JSON can hold
-    """Write a value as JSON; a number that is none (NaN) or not finite becomes null.
+    """Write a value as JSON; NaN and infinite numbers become null.
 
     Args:
-        value: of dicts with text keys, lists, tuples, texts, numbers, truth values and None.
-        indent: blanks for each level; None for one line.
+        value: made of dicts with text keys, lists, tuples, strings, numbers, booleans and None.
+        indent: spaces per level; None for one line.
 
     Returns:
-        The text, without a newline at its end.
+        The text, without a final newline.
     """
     return json.dumps(_finite(value), indent=indent, allow_nan=False)
 

@@ -1,9 +1,9 @@
-"""Folders of results, in which ours are told from everything else: what is ours is listed in the folder, in the file `.tandemscan`.
+"""Folders of results. The file `.tandemscan` in the folder lists what is ours, and so tells it from everything else.
 
-Rules: a name is listed before anything is made under it, so that a run that was killed leaves nothing that the next one takes for foreign.
-A later run removes what is listed and what it would write itself, and nothing else; whatever else bears such a name ends it before it has
-changed anything. Links are never ours. A list of its own rather than one in report.json: that one is written at the end, which a killed run
-does not reach.
+Rules: a name is listed before anything is made under it, so that a killed run leaves nothing that the next one takes
+for foreign. A later run removes what is listed and what it would write itself, and nothing else. If anything foreign
+has such a name, the run ends before it changes anything. Links are never ours. The list is a file of its own and not
+part of report.json, because that one is written at the end, which a killed run does not reach.
 """
 
 import errno
@@ -23,24 +23,24 @@ LIST: Final = ".tandemscan"
 
 _HEAD: Final = "# What tandemscan has written here. A later run replaces this, and nothing else.\n"
 _MOST_BYTES: Final = 64 << 20
-"""Five million pairs."""
+"""Enough for five million pairs."""
 
 _TEMPORARY: Final = re.compile(r"\.(.+)\.[0-9a-f]{16}\.part")
 _FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 class ListedFolder:
-    """A folder of results, cleared of those that an earlier run left under the names that this one uses.
+    """A folder of results. Results of an earlier run are removed if they have names that this run uses.
 
     Args:
-        path: made if missing.
-        names: which names in it are removed if they are ours, and written anew.
-        kept: which names are left as they are if they are ours, since they are replaced one by one.
-        inner: which files may lie in folders among `names`.
+        path: created if missing.
+        names: pattern of the names that are removed if they are ours, and written anew.
+        kept: pattern of the names that stay if they are ours, because they are replaced one by one.
+        inner: pattern of the files that may lie in folders among `names`.
 
     Raises:
-        UnavailableError: such a name belongs to somebody else's file, or to a link.
-        OSError: as the operating system gives it.
+        UnavailableError: such a name belongs to a foreign file, or to a link.
+        OSError: as the operating system reports it.
     """
 
     def __init__(self, path: Path, names: str, *, kept: str = "(?!)", inner: str = "(?!)") -> None:
@@ -68,7 +68,7 @@ class ListedFolder:
         """List names before they are written.
 
         Raises:
-            OSError: as the operating system gives it; nothing is listed then.
+            OSError: as the operating system reports it; nothing is listed then.
         """
         lines = "".join(f"{name}\n" for name in names).encode()
         if os.write(self._list, lines) < len(lines):
@@ -77,10 +77,10 @@ class ListedFolder:
         self._size_bytes += len(lines)
 
     def create(self, name: str) -> int:
-        """Make a file that is not there yet; gives its descriptor, for writing.
+        """Create a file that does not exist yet; return its descriptor, for writing.
 
         Raises:
-            OSError: as the operating system gives it.
+            OSError: as the operating system reports it.
         """
         self.add(name)
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -88,16 +88,18 @@ class ListedFolder:
 
     @contextmanager
     def new_folder(self, name: str) -> Iterator[Path]:
-        """Make a folder that is not there yet; it appears under its name when the block ends well, with files that survive a power cut.
+        """Create a folder that does not exist yet. It appears under its name when the block ends without an error; its files then survive a power cut.
 
         Args:
-            name: of the folder, in this one.
+            name: name of the folder, in this one.
 
         Yields:
-            Where to write its files, which must be among `inner`. The path leads to the open folder: whoever exchanges its name changes nothing.
+            Where to write its files, which must match `inner`. The path leads to the open folder, so replacing its name
+            has no effect.
 
         Raises:
-            OSError: as the operating system gives it, FileExistsError among others; nothing of the folder is left then.
+            OSError: as the operating system reports it, for example FileExistsError; nothing of the folder is left
+                then.
         """
         self.add(name)
         part = f"{name}.part"
@@ -120,13 +122,13 @@ class ListedFolder:
         """Write a listed file, whole or not at all; it survives a power cut.
 
         Raises:
-            OSError: as the operating system gives it.
+            OSError: as the operating system reports it.
         """
         with replacing_in(self.descriptor, name) as file:
             file.write(text.encode())
 
     def sync(self) -> None:
-        """Have the list and all names in the folder survive a power cut.
+        """Make the list and all names in the folder survive a power cut.
 
         Raises:
             OSError: the disk fails.
@@ -135,14 +137,14 @@ class ListedFolder:
         sync_folder(self.descriptor)
 
     def close(self) -> None:
-        """Let go of the folder."""
+        """Close the folder."""
         for descriptor in (self._list, self.descriptor):
             if descriptor >= 0:
                 os.close(descriptor)
         self._list = self.descriptor = -1
 
     def _lock(self) -> None:
-        """Keep other runs out until this one has closed the folder; where the file system has no locks, nobody is kept out."""
+        """Keep other runs out until this one has closed the folder. Where the file system has no locks, do nothing."""
         try:
             fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -162,7 +164,7 @@ class ListedFolder:
             raise self._in_the_way(error.problem) from None
         if not text.startswith(_HEAD):
             raise self._in_the_way(f"{path} was not written by this program")
-        # Of a last line without its end nothing was made yet.
+        # If the last line has no end, nothing was made under it yet.
         return set(text.removeprefix(_HEAD).rpartition("\n")[0].splitlines())
 
     def _write(self, names: set[str]) -> int:
@@ -172,7 +174,7 @@ class ListedFolder:
         return len(lines)
 
     def _ours(self, wanted: re.Pattern[str], listed: set[str]) -> list[str]:
-        """The names of a kind in the folder, all of which must be ours."""
+        """Return the names in the folder that match; raise if one of them is not ours."""
         found = [name for name in _entries(self.descriptor) if wanted.fullmatch(plain_name(name))]
         for name in found:
             path, mode = self._path / name, os.lstat(name, dir_fd=self.descriptor).st_mode
@@ -183,7 +185,7 @@ class ListedFolder:
         return found
 
     def _check_inside(self, name: str) -> None:
-        """Refuse a folder of ours into which somebody has put something else."""
+        """Refuse a folder of ours that contains something foreign."""
         if not stat.S_ISDIR(os.lstat(name, dir_fd=self.descriptor).st_mode):
             return
         folder = os.open(name, _FOLDER, dir_fd=self.descriptor)
@@ -213,15 +215,15 @@ class ListedFolder:
 
 
 def claim(path: Path, *names: str) -> None:
-    """Make names in a folder ours before they are written: those that are free, or left by an earlier run.
+    """List names in a folder as ours before they are written; they must be free or left by an earlier run.
 
     Args:
-        path: the folder, made if missing.
-        names: what is to be written there.
+        path: the folder, created if missing.
+        names: names of what will be written there.
 
     Raises:
-        UnavailableError: such a name belongs to somebody else's file, or to a link.
-        OSError: as the operating system gives it.
+        UnavailableError: such a name belongs to a foreign file, or to a link.
+        OSError: as the operating system reports it.
     """
     folder = ListedFolder(path, "(?!)", kept="|".join(re.escape(name) for name in names))
     try:
@@ -231,7 +233,7 @@ def claim(path: Path, *names: str) -> None:
 
 
 def _way_to(folder: int, path: Path) -> Path:
-    """A path to an open folder."""
+    """Return a path to an open folder."""
     way = Path(f"/proc/self/fd/{folder}")
     return way if way.exists() else path
 
@@ -250,7 +252,7 @@ def _entries(folder: int) -> list[str]:
 
 
 def plain_name(name: str) -> str:
-    """The name under which something is listed: a file or folder that was begun and not finished counts as the finished one."""
+    """Return the name under which something is listed: an unfinished file or folder counts as the finished one."""
     if begun := _TEMPORARY.fullmatch(name):
         return begun.group(1)
     return name.removesuffix(".part")

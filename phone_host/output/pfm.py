@@ -1,7 +1,8 @@
 """Middlebury's PFM files: one float32 per pixel, bottom row first, +inf = no value.
 
 Source: https://vision.middlebury.edu/stereo/data/scenes2014/ ("disp*.pfm") and https://www.pauldebevec.com/Research/HDR/PFM/.
-In memory the top row comes first and NaN means no value; only this module knows the file's order and its infinity.
+In memory the top row comes first and NaN means no value; only this module deals with the file's row order and its
+infinity.
 """
 
 import re
@@ -13,8 +14,8 @@ from common.errors import DataError
 from phone_host.model import Disparity
 from phone_host.output.atomic import write_bytes
 
-# Magic, width, height, scale; one white space ends the header (the data may begin with any byte). A larger header than 256
-# bytes is no PFM: three numbers never need that.
+# Magic, width, height, scale; one white space character ends the header (the data may begin with any byte). A header of
+# more than 256 bytes is not PFM: three numbers never need that much.
 _HEADER = re.compile(rb"\A(Pf|PF)\s+(\d{1,6})\s+(\d{1,6})\s+([-+0-9.eE]{1,32})\s")
 _HEADER_LIMIT_BYTES = 256
 
@@ -42,10 +43,10 @@ def read_pfm(path: Path) -> Disparity:
         path: the file.
 
     Returns:
-        (H, W) float32, top row first, NaN where the file holds no finite value.
+        (H, W) float32, top row first; NaN where the file holds no finite value.
 
     Raises:
-        DataError: the file is missing, is no one-channel PFM, or is cut short.
+        DataError: the file is missing, is not a one-channel PFM, or is cut short.
     """
     try:
         content = path.read_bytes()

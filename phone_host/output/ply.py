@@ -1,7 +1,7 @@
 """Coloured point clouds as binary PLY: metres, x y z float32, red green blue uchar, little endian.
 
-The vertices are packed once into a structured array and written with one call: text PLY by `numpy.savetxt` takes 330 ms for a
-640x480 cloud, this takes milliseconds.
+The vertices are packed into a structured array once and written with one call. This takes milliseconds; text PLY by
+`numpy.savetxt` takes 330 ms for a 640x480 cloud.
 Source: Greg Turk, "The PLY Polygon File Format", 1994.
 """
 
@@ -45,11 +45,11 @@ def pack_ply(cloud: CloudImage, colours: Image) -> tuple[bytes, NDArray[np.void]
     """Pack a cloud image into PLY's header and vertices.
 
     Args:
-        cloud: (H, W, 3) float32, m; pixels with a value that is not finite are left out.
-        colours: (H, W) grey or (H, W, 3) BGR, uint8, of the same size.
+        cloud: (H, W, 3) float32, m; pixels with a non-finite value are left out.
+        colours: (H, W) grey or (H, W, 3) BGR, uint8, same size.
 
     Returns:
-        The header, and (N,) vertices to be written after it.
+        The header, and the (N,) vertices to write after it.
 
     Raises:
         ValueError: the two sizes differ.
@@ -95,7 +95,7 @@ def write_ply(path: Path, cloud: CloudImage, colours: Image) -> int:
 
 
 def read_ply(path: Path) -> PointCloud:
-    """Read a PLY file of the form `write_ply` gives.
+    """Read a PLY file in the form that `write_ply` writes.
 
     Args:
         path: the file.
@@ -104,7 +104,7 @@ def read_ply(path: Path) -> PointCloud:
         Its points and colours.
 
     Raises:
-        DataError: the file is missing, of another form, or not as long as its header says.
+        DataError: the file is missing, has another form, or its length does not match its header.
     """
     try:
         content = path.read_bytes()

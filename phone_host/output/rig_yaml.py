@@ -1,10 +1,11 @@
 """rig.yaml: a calibrated rig as OpenCV FileStorage YAML, readable by `cv2.FileStorage` anywhere.
 
-Keys: format_version (absent: 1); left_image_width, left_image_height, right_image_width, right_image_height (px); M1 D1 M2 D2 (camera matrices and
-distortion, left and right); R T (right from left, T in metres); R1 R2 P1 P2 Q (rectification); rectified_image_width,
-rectified_image_height (the size P1 and P2 belong to); board_side; rms_left rms_right rms_stereo (px, .Nan = unknown);
-time_offset_ns, time_offset_uncertainty_ns (host's stamp minus board's; absent: not measured).
-Reading takes the rig and makes its own rectification from it: R1 to Q are there for other programs.
+Keys: format_version (absent: 1); left_image_width, left_image_height, right_image_width, right_image_height (px); M1 D1
+M2 D2 (camera matrices and distortion, left and right); R T (right from left, T in metres); R1 R2 P1 P2 Q
+(rectification); rectified_image_width, rectified_image_height (the size for which P1 and P2 hold); board_side; rms_left
+rms_right rms_stereo (px, .Nan = unknown); time_offset_ns, time_offset_uncertainty_ns (host's stamp minus board's;
+absent: not measured). This program reads only the rig and computes the rectification from it. R1 to Q are there for
+other programs.
 """
 
 import math
@@ -20,10 +21,10 @@ from common.versions import RIG_FORMAT
 from phone_host.model import CameraModel, Rectification, Rig, Side, TimeOffset
 from phone_host.output.atomic import write_text
 
-_DISTORTION_LENGTHS = (4, 5, 8, 12, 14)  # those OpenCV's model defines
+_DISTORTION_LENGTHS = (4, 5, 8, 12, 14)  # the lengths that OpenCV's model defines
 _LARGEST_IMAGE_PX = 100_000
-_ROTATION_TOLERANCE = 1e-6  # files hold 16 digits; a matrix typed with 6 digits is off by as much
-# No two cameras of one scanner stand farther apart; a larger number is a T in millimetres.
+_ROTATION_TOLERANCE = 1e-6  # files hold 16 digits; a matrix typed with 6 digits has this error
+# The two cameras of a scanner never stand farther apart; a larger number is a T in millimetres.
 _LARGEST_BASELINE_M = 10.0
 _LARGEST_OFFSET_NS = 2e9  # no camera with its driver is seconds behind another one
 
@@ -34,7 +35,7 @@ def write_rig(path: Path, rig: Rig, rectification: Rectification) -> None:
     Args:
         path: the file; it appears whole or not at all.
         rig: the two cameras.
-        rectification: made from the same rig.
+        rectification: computed from the same rig.
 
     Raises:
         OSError: the file cannot be written.
@@ -68,18 +69,18 @@ def write_rig(path: Path, rig: Rig, rectification: Rectification) -> None:
     storage.writeComment(
         "the host camera's stamp minus the board camera's for one moment, ns, and what contains it in 99.9 %"
     )
-    # Real numbers: FileStorage's integers have 32 bits, 2 s.
+    # Written as reals: FileStorage's integers have 32 bits, which is 2 s.
     storage.write("time_offset_ns", float(rig.time_offset.offset_ns))
     storage.write("time_offset_uncertainty_ns", float(rig.time_offset.uncertainty_ns))
     write_text(path, storage.releaseAndGetString())
 
 
 def write_time_offset(path: Path, offset: TimeOffset) -> None:
-    """Put a time offset into a rig.yaml; all else in it stays as it is.
+    """Put a time offset into a rig.yaml; everything else in it stays as it is.
 
     Args:
-        path: a file that `read_rig` takes.
-        offset: what was measured.
+        path: a file that `read_rig` accepts.
+        offset: the measured offset.
 
     Raises:
         OSError: the file cannot be written.
@@ -100,7 +101,7 @@ def read_rig(path: Path) -> Rig:
         The rig.
 
     Raises:
-        DataError: the file is missing or no FileStorage YAML, or a key is missing or makes no sense; names file and key.
+        DataError: the file is missing or not FileStorage YAML, or a key is missing or not valid; names file and key.
     """
     reader = _Reader(path)
     reader.require_known_format()
@@ -123,7 +124,7 @@ def read_rig(path: Path) -> Rig:
 
 
 _MOST_BYTES = 1 << 20
-"""Of a rig.yaml, which has two pages."""
+"""Limit for a rig.yaml, which is about two pages long."""
 
 
 class _Reader:
@@ -140,13 +141,13 @@ class _Reader:
         except UnicodeDecodeError as error:
             raise self._no_storage() from error
         if not text.lstrip("\ufeff").startswith("%YAML"):
-            # OpenCV would also take JSON and XML, and abort on other text with a message of its own.
+            # OpenCV would also accept JSON and XML, and abort on other text with a message of its own.
             raise self._no_storage()
         try:
             self._storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         except (cv2.error, SystemError) as error:
             raise self._no_storage() from error
-        if not self._storage.root().isMap():  # a list, or nothing: OpenCV aborts when it is asked for a key
+        if not self._storage.root().isMap():  # a list, or nothing: OpenCV aborts when asked for a key
             raise self._no_storage()
 
     def _no_storage(self) -> DataError:
@@ -162,7 +163,7 @@ class _Reader:
         return node
 
     def require_known_format(self) -> None:
-        """Check that this program knows the file's format; a newer one may mean something else by the same keys."""
+        """Check that this program knows the file's format; a newer format may use the same keys with another meaning."""
         node = self._storage.getNode("format_version")
         if node.empty():
             return
@@ -174,7 +175,7 @@ class _Reader:
             raise self.problem("format_version", known, "update tandemscan, or calibrate again")
 
     def matrix(self, key: str) -> NDArray[np.float64]:
-        """Any matrix of finite numbers, as float64."""
+        """Read any matrix of finite numbers, as float64."""
         node = self._node(key)
         try:
             values = node.mat() if node.isMap() else None
@@ -194,7 +195,7 @@ class _Reader:
         return matrix
 
     def camera_model(self, width_key: str, height_key: str, matrix_key: str, distortion_key: str) -> CameraModel:
-        """One camera."""
+        """Read one camera."""
         matrix = self._shaped(matrix_key, (3, 3))
         if not (matrix[0, 0] > 0 and matrix[1, 1] > 0) or not np.array_equal(matrix[2], [0, 0, 1]):
             raise self.problem(
@@ -212,7 +213,7 @@ class _Reader:
         )
 
     def size(self, key: str) -> int:
-        """An image's width or height."""
+        """Read an image's width or height."""
         node = self._node(key)
         value = node.real() if node.isInt() or node.isReal() else math.nan
         if not (1 <= value <= _LARGEST_IMAGE_PX and value == int(value)):
@@ -220,14 +221,14 @@ class _Reader:
         return int(value)
 
     def rotation(self, key: str) -> NDArray[np.float64]:
-        """A rotation matrix."""
+        """Read a rotation matrix."""
         matrix = self._shaped(key, (3, 3))
         if np.abs(matrix @ matrix.T - np.eye(3)).max() > _ROTATION_TOLERANCE or np.linalg.det(matrix) < 0:
             raise self.problem(key, "is no rotation", "calibrate again")
         return matrix
 
     def baseline(self, key: str) -> NDArray[np.float64]:
-        """A translation between two cameras, m."""
+        """Read a translation between two cameras, m."""
         matrix = self.matrix(key)
         if matrix.size != 3:
             raise self.problem(key, f"has {matrix.size} values", "it must have 3")
@@ -239,12 +240,12 @@ class _Reader:
         return matrix.reshape(3)
 
     def number(self, key: str) -> float:
-        """A figure that may be missing (NaN)."""
+        """Read a figure that may be missing (NaN)."""
         node = self._storage.getNode(key)
         return float(node.real()) if node.isReal() or node.isInt() else math.nan
 
     def time_offset(self) -> TimeOffset:
-        """What was measured, or that nothing was."""
+        """Read the measured time offset, or return the default if none was measured."""
         offset_ns, uncertainty_ns = self.number("time_offset_ns"), self.number("time_offset_uncertainty_ns")
         if math.isnan(offset_ns) and math.isnan(uncertainty_ns):
             return TimeOffset()
@@ -257,6 +258,6 @@ class _Reader:
         return TimeOffset(round(offset_ns), round(uncertainty_ns))
 
     def text(self, key: str, default: str) -> str:
-        """A word, or its default."""
+        """Read a word; return the default if it is missing."""
         node = self._storage.getNode(key)
         return str(node.string()) if node.isString() else default

@@ -1,1 +1,1 @@
-"""What both cameras saw, kept for later."""
+"""Keeps what both cameras saw, for later."""

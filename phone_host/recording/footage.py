@@ -1,6 +1,6 @@
-"""Frames of both cameras with their stamps, kept for a while: from a board and the own camera, or from folders kept by an earlier run.
+"""Keeps frames of both cameras with their stamps for a while: from a board and the own camera, or from folders of an earlier run.
 
-In a folder a frame's name is its stamp: `board/<ns>.jpg` and `host/<ns>.jpg`, ns on the host's clock.
+In a folder a frame's file name is its stamp: `board/<ns>.jpg` and `host/<ns>.jpg`, ns on the host's clock.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,12 +28,12 @@ from phone_host.stream.receiver import Receiver
 
 _STEP_S: Final = 0.05
 _ENOUGH_BYTES: Final = 400 * 1024 * 1024
-"""Half a minute of raw 640x480 images of both cameras; the memory of a phone."""
+"""Half a minute of raw 640x480 images of both cameras; limited by a phone's memory."""
 
 
 @dataclass(frozen=True, slots=True)
 class Footage:
-    """What both cameras took.
+    """The frames of both cameras.
 
     Attributes:
         board: frames of the board's camera, in order.
@@ -45,7 +45,7 @@ class Footage:
 
 
 class _Keeper:
-    """Keeps every frame of both cameras: a sink of the board's, and what the own camera delivers to."""
+    """Keeps every frame of both cameras: the frame sink for the board's frames, and the receiver of the own camera's."""
 
     def __init__(self) -> None:
         self.board: list[Shot] = []
@@ -53,7 +53,7 @@ class _Keeper:
         self.kept_bytes = 0
 
     def begin(self, camera: CameraDescription) -> None:
-        """See FrameSink; a later life's frames are kept behind those of the one before."""
+        """See FrameSink; frames of a later session are appended to those of the one before."""
 
     def change_period(self, board_period_ns: int) -> None:
         """See FrameSink."""
@@ -102,19 +102,19 @@ def film(
     stop: Callable[[], bool],
     advance: Callable[[float], None],
 ) -> Footage:
-    """Keep what both cameras take.
+    """Keep the frames of both cameras.
 
     Args:
-        links: open links to the board; closed by this.
-        camera: the own camera, open; closed by this.
-        seconds: how long, from the board's first frame on.
-        wait_ns: an absent board is waited for this long; None for ever.
-        stop: ends it earlier.
-        advance: told the share that is done, 0 to 1.
+        links: open links to the board; this function closes them.
+        camera: the own camera, open; this function closes it.
+        seconds: how long to record, from the board's first frame on.
+        wait_ns: how long to wait for an absent board; None means for ever.
+        stop: asked repeatedly; True ends the recording early.
+        advance: called with the share that is done, 0 to 1.
 
     Raises:
-        UnavailableError: no board, or it does not talk to this host.
-        DataError: a camera shows images on demand and so has no stamps.
+        UnavailableError: there is no board, or it does not talk to this host.
+        DataError: a camera shows images on demand and so has no time stamps.
     """
     pacing = camera.description.pacing
     if not has_own_time(pacing):
@@ -149,7 +149,7 @@ def film(
 
 
 def _check(receiver: Receiver, own: OwnCamera) -> None:
-    """Raise what has gone wrong in a thread, and DataError for a board whose stamps are no times."""
+    """Raise a thread's failure, and DataError for a board whose stamps are not times."""
     for failure in (receiver.failure, own.failure):
         if failure is not None:
             raise failure
@@ -159,11 +159,11 @@ def _check(receiver: Receiver, own: OwnCamera) -> None:
 
 
 def keep(footage: Footage, folder: Path) -> None:
-    """Write frames into the folders `board` and `host`; raw ones are left out, they have no file format.
+    """Write frames into the folders `board` and `host`; raw frames are left out, because they have no file format.
 
     Raises:
         OSError: the folder cannot be written to.
-        UnavailableError: images that an earlier call did not write are there.
+        UnavailableError: the folder holds images that an earlier call did not write.
     """
     for side, shots in (("board", footage.board), ("host", footage.host)):
         suffixes = {PixelFormat.MJPEG: ".jpg", PixelFormat.PNG: ".png"}
@@ -180,7 +180,7 @@ def read(folder: Path) -> Footage:
     """Read what `keep` wrote.
 
     Raises:
-        DataError: a folder is missing or empty, or a name is no stamp.
+        DataError: a folder is missing or empty, or a name is not a stamp.
     """
     sides = []
     for side in ("board", "host"):

@@ -1,1 +1,1 @@
-"""A run as text, as JSON and as a page."""
+"""Presents a run as text, as JSON and as a page."""

@@ -1,7 +1,7 @@
 """The frame of every HTML page: document, cards, tables, plots in two widths, one style. Pure: values in, text out.
 
-A page refers to nothing outside itself and runs no script: it opens offline, years later, from any folder, in light and dark,
-on a phone. All text that comes from outside is escaped.
+A page refers to nothing outside itself and runs no script. So it opens offline, years later, from any folder, in light
+and dark mode and on a phone. All text that comes from outside is escaped.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,14 +12,14 @@ from phone_host.svg.plot_parts import STYLE
 
 WIDE_PX: Final = 960
 NARROW_PX: Final = 340
-"""Plots are drawn twice, for a desk's window and for a phone's: scaled text would be illegible on one of them."""
+"""Plots are drawn twice, for a desktop window and for a phone, because scaled text would be illegible on one of them."""
 
 HALF_PX: Final = 450
 """Width of a plot that shares its row with another."""
 
 
 def document(title: str, body: str) -> str:
-    """An HTML document in the style of all our pages, from a body that is already HTML.
+    """Make an HTML document in the style of all our pages from a body that is already HTML.
 
     Args:
         title: plain text.
@@ -33,11 +33,11 @@ def document(title: str, body: str) -> str:
 
 
 def section(title: str, explanation: str, content: str) -> str:
-    """One card of a page.
+    """Make one card of a page.
 
     Args:
         title: plain text.
-        explanation: plain text below it, may be empty.
+        explanation: plain text below the title, may be empty.
         content: HTML.
     """
     words = f"<p>{escape(explanation)}</p>" if explanation else ""
@@ -45,21 +45,21 @@ def section(title: str, explanation: str, content: str) -> str:
 
 
 def two_widths(draw: Callable[[int], str], wide_px: int = WIDE_PX) -> str:
-    """A plot drawn for a wide window and for a phone; the window's width chooses.
+    """Show a plot drawn for a wide window or one drawn for a phone; the window's width decides.
 
     Args:
-        draw: gives the plot for a width in px.
-        wide_px: width on a wide window.
+        draw: returns the plot for a width in px.
+        wide_px: width in a wide window.
     """
     return f'<div class="wide">{draw(wide_px)}</div><div class="narrow">{draw(NARROW_PX)}</div>'
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, tight: bool = False) -> str:
-    """A table that scrolls by itself where it is too wide.
+    """Make a table that scrolls on its own if it is too wide.
 
     Args:
         columns: names.
-        rows: plain texts; a row with fewer cells than columns ends in one that takes their room.
+        rows: plain texts; if a row has fewer cells than columns, its last cell spans the rest.
         tight: small print, for many columns.
     """
     head = "".join(f"<th>{escape(name)}</th>" for name in columns)

@@ -1,7 +1,7 @@
 """A run as one self-contained HTML page: pictures, delays of all pairs as plots, key figures. Pure: data in, text out.
 
-The page refers to nothing outside itself and runs no script: it opens offline, years later, from any folder, in light and dark,
-on a phone. What was not measured is said to be so. All text that comes from outside is escaped.
+The page refers to nothing outside itself and runs no script. So it opens offline, years later, from any folder, in
+light and dark mode and on a phone. The page says what was not measured. All text that comes from outside is escaped.
 """
 
 import base64
@@ -37,14 +37,14 @@ MEANINGS: Final = (
     ("queuing", "waiting in the FIFO for the processor"),
     ("processing", "decode, rectify, match, reproject and write"),
 )
-"""The delays that add up to end-to-end, in their order on the life line (DESIGN, section 4)."""
+"""The delays that add up to end-to-end, in the order in which they occur (DESIGN, section 4)."""
 
 _END_TO_END: Final = "from the middle of the exposure until the results are written: the sum of the delays above"
 _STARVATION: Final = "how long the processor had nothing to do before this pair; no part of end-to-end"
 
 
 class Headline(Enum):
-    """How a run went; the page shows it as a colour and a sign."""
+    """How a run went; the page shows it as a colour and a symbol."""
 
     GOOD = "good"
     WARNING = "warning"
@@ -53,7 +53,7 @@ class Headline(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
-    """One number to read first.
+    """One key number.
 
     Attributes:
         label: what it is.
@@ -98,16 +98,16 @@ class Table:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DelaySeries:
-    """The delays of all pairs, in the order in which they were done; `delay_series` makes it from ledgers.
+    """The delays of all pairs, in the order in which the pairs were done; `delay_series` makes it from ledgers.
 
     Attributes:
         time_s: (N,) float64, when each pair was done, counted from the first, s.
         delays: the delays that add up to end-to-end, N values each.
         end_to_end: their sum.
         starvation: how long the processor waited before each pair.
-        stages: shares of processing.
+        stages: the parts of processing.
         time_skew: signed.
-        uncertainty: of the clocks' offset.
+        uncertainty: of the clock offset.
     """
 
     time_s: NDArray[np.float64]
@@ -120,24 +120,24 @@ class DelaySeries:
 
     @property
     def pairs(self) -> int:
-        """N."""
+        """The number of pairs, N."""
         return int(self.time_s.size)
 
 
 @dataclass(frozen=True, slots=True)
 class PageData:
-    """All that stands on a page.
+    """Everything on a page.
 
     Attributes:
-        title: of the run.
+        title: title of the run.
         subtitle: when, where, how long; may be empty.
         verdict: how it went.
         sentence: the verdict in words.
         figures: key figures, most important first.
         pictures: left, right, disparity.
         delays: of all pairs.
-        tables: drops by reason and the like.
-        notes: what to know or try next, a sentence each.
+        tables: drops by reason and similar.
+        notes: what to know or try next, one sentence each.
     """
 
     title: str
@@ -152,10 +152,10 @@ class PageData:
 
 
 def delay_series(ledgers: Sequence[PairLedger]) -> DelaySeries:
-    """Columns out of ledgers.
+    """Make the series of all delays from ledgers.
 
     Args:
-        ledgers: one a pair, in the order in which they were done; may be empty.
+        ledgers: one per pair, in the order in which the pairs were done; may be empty.
 
     Returns:
         The series of every delay.
@@ -189,10 +189,10 @@ def delay_series(ledgers: Sequence[PairLedger]) -> DelaySeries:
 
 
 def page(data: PageData) -> str:
-    """The whole page.
+    """Make the whole page.
 
     Args:
-        data: what stands on it.
+        data: its content.
 
     Returns:
         An HTML document.
@@ -248,7 +248,7 @@ def _data_uri(picture: Picture) -> str:
 
 
 def _delays(series: DelaySeries) -> list[str]:
-    """The cards with plots."""
+    """Make the cards with plots."""
     if not series.pairs:
         return [section("Delays", "No pair was processed, so there are no delays to show.", "")]
     names = [(quantity.label, quantity.colour) for quantity in series.delays]
@@ -297,7 +297,7 @@ def _delays(series: DelaySeries) -> list[str]:
 
 
 def _glossary(quantities: tuple[Quantity, ...]) -> str:
-    """What each delay means, folded away: tooltips do not exist on a phone."""
+    """Make the list of what each delay means, collapsed; phones have no tooltips."""
     items = "".join(f"<dt>{escape(one.label)}</dt><dd>{escape(one.meaning)}</dd>" for one in quantities)
     return f'<details><summary>What each delay means</summary><dl class="words">{items}</dl></details>'
 

@@ -1,4 +1,4 @@
-"""A run in figures: the report.json object. Pure; times in ms, None where nothing was measured."""
+"""Makes the report.json object of a run. Pure; times in ms, None where nothing was measured."""
 
 import math
 from dataclasses import asdict
@@ -88,7 +88,7 @@ def _sink(sink: SinkAccount) -> dict[str, object]:
 
 
 def spread_ms(spread: Spread) -> dict[str, float | int | None]:
-    """Give a spread in ms, rounded to the ns."""
+    """Convert a spread to ms, rounded to the ns."""
     values = {
         "p50": spread.p50_ns,
         "p95": spread.p95_ns,
@@ -100,7 +100,7 @@ def spread_ms(spread: Spread) -> dict[str, float | int | None]:
 
 
 def age_bound(run: RunSnapshot) -> str:
-    """Say how old a pair can get in the FIFO, from its depth and policy and the rates of this run."""
+    """Say how old a pair can get in the FIFO, given its depth and policy and this run's rates."""
     depth, processing = run.fifo.depth, run.delays.spread("processing")
     if run.fifo.overflow is Overflow.DROP_OLDEST:
         return f"{depth} frame period(s): newer pairs push older ones out"
@@ -167,7 +167,7 @@ def _clock(run: RunSnapshot) -> dict[str, object]:
 
 
 def _camera(health: CameraHealth) -> dict[str, object]:
-    """What is known of the own camera; its stamps' figures only where they are arrivals."""
+    """Return what is known of the own camera; figures of its stamps only if they are arrival times."""
     values = health_values(health)
     if health.jitter_ns is None:
         return values

@@ -1,4 +1,4 @@
-"""A run's page: the last pair, every delay, who waits for whom, how the own camera has fared. The demo's page shares its parts."""
+"""A run's page: the last pair, every delay, who waits for whom, how the own camera fared. The demo's page uses parts of it."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ def run_page(run: RunSnapshot, last: Processed | None, board_side: Side, ledgers
 
     Args:
         run: the run.
-        last: its last pair; None when there was none.
+        last: its last pair; None if there was none.
         board_side: which of its views is the board's.
         ledgers: of all pairs, or of evenly chosen ones, in order.
 
@@ -49,7 +49,7 @@ def run_page(run: RunSnapshot, last: Processed | None, board_side: Side, ledgers
 
 
 def notes(run: RunSnapshot) -> tuple[str, ...]:
-    """Who waits for whom and what would help, what makes depth wrong, and how the cameras' exposures stand to each other."""
+    """Say who waits for whom and what would help, what makes depth wrong, and how the cameras' exposures relate in time."""
     judgement = judge(figures(run))
     return (
         f"Queue: {judgement.sentence}.",
@@ -61,7 +61,7 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
 
 
 def links_tables(run: RunSnapshot) -> tuple[Table, ...]:
-    """The links side by side, where there were several."""
+    """Make a table of the links side by side, if there were several."""
     if len(run.link.links) < 2:
         return ()
     rows = []
@@ -75,7 +75,7 @@ def links_tables(run: RunSnapshot) -> tuple[Table, ...]:
 
 
 def camera_table(health: CameraHealth) -> Table:
-    """How the own camera has fared."""
+    """Make a table of how the own camera fared."""
     rows = [
         ("measured rate", "unknown" if health.period_ns is None else f"{1e9 / health.period_ns:.2f} frames/s"),
         ("unplugged", str(health.unplugged)),
@@ -128,7 +128,7 @@ def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
 
 
 def _measured(label: str, value: float, decimals: int, unit: str, note: str) -> Figure:
-    """A figure that may not be known (NaN)."""
+    """Make a figure that may be unknown (NaN)."""
     return (
         Figure(label=label, value="-", unit="", note=f"not measured; {note}")
         if np.isnan(value)
@@ -137,10 +137,10 @@ def _measured(label: str, value: float, decimals: int, unit: str, note: str) -> 
 
 
 def pictures(last: Processed | None, board_side: Side = Side.LEFT) -> tuple[Picture, ...]:
-    """The views of a pair, and its disparity where there is one.
+    """Return the views of a pair, and its disparity if there is one.
 
     Args:
-        last: the pair; None when there was none.
+        last: the pair; None if there was none.
         board_side: which of the views is the board's.
     """
     if last is None:
@@ -158,7 +158,7 @@ def pictures(last: Processed | None, board_side: Side = Side.LEFT) -> tuple[Pict
 
 
 def unused_table(run: RunSnapshot) -> Table:
-    """What was not used, by place and reason."""
+    """Make a table of what was not used, by place and reason."""
     rows = tuple((item.words, str(item.count)) for item in unused(run))
     return Table("Frames and pairs that were not used", ("what", "count"), rows)
 

@@ -1,4 +1,4 @@
-"""A run in some lines for people. Pure."""
+"""Summarises a run in a few lines of text. Pure."""
 
 import math
 from typing import Final
@@ -16,7 +16,7 @@ _MS: Final = 1e6
 
 
 def summary(run: RunSnapshot) -> str:
-    """Say in a few lines what the run was."""
+    """Summarise the run in a few lines."""
     rate = "" if math.isnan(run.pairs_per_second) else f" in {run.seconds:.1f} s ({run.pairs_per_second:.1f} /s)"
     lines = [f"{run.processed} pairs{rate}, ended: {run.ended.replace('_', ' ')}"]
     if run.processed:
@@ -42,7 +42,7 @@ def summary(run: RunSnapshot) -> str:
 
 
 def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
-    """Say how the two cameras' exposures stand to each other, and what came of steering them."""
+    """Say how the two cameras' exposures relate in time, and what steering them achieved."""
     lines = []
     if phase is not None:
         drift = (
@@ -60,7 +60,7 @@ def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
 
 
 def camera_troubles(health: CameraHealth) -> list[str]:
-    """Say what has befallen a camera, in one line; nothing where nothing has."""
+    """Say in one line what went wrong with a camera; nothing if nothing did."""
     parts = [
         *([f"unplugged {health.unplugged} times"] if health.unplugged else []),
         *([f"stalled {health.stalls} times"] if health.stalls else []),
@@ -75,7 +75,7 @@ def camera_troubles(health: CameraHealth) -> list[str]:
 
 
 def _agreement(run: RunSnapshot) -> list[str]:
-    """How well the two cameras' stamps agree; nothing where they say by definition when their images were exposed."""
+    """Say how well the two cameras' stamps agree; nothing if the stamps are exposure times by definition."""
     offset = run.time_offset
     known = f"+-{offset.uncertainty_ns / _MS:.2f} ms"
     if offset != TimeOffset():
@@ -86,7 +86,7 @@ def _agreement(run: RunSnapshot) -> list[str]:
 
 
 def _arrivals(health: CameraHealth, offset: TimeOffset) -> list[str]:
-    """What the stamps of an own camera mean that tells of arrivals only."""
+    """Say what the stamps of an own camera mean that only tells arrival times."""
     if health.jitter_ns is None:
         return []
     jitter = f"images arrive up to {health.jitter_ns / _MS:.1f} ms late (p95)"
@@ -106,7 +106,7 @@ def _arrivals(health: CameraHealth, offset: TimeOffset) -> list[str]:
 
 
 def _links(link: LinkAccount) -> list[str]:
-    """The links side by side, where there are several."""
+    """List the links side by side, if there are several."""
     if len(link.links) < 2:
         return []
     lines = [f"{'link':14} {'frames':>9} {'carried':>9} {'lost':>9} {'age p50':>9} {'p95':>9}"]
@@ -118,7 +118,7 @@ def _links(link: LinkAccount) -> list[str]:
 
 
 def _unused_lines(run: RunSnapshot) -> list[str]:
-    """What was not used, and what was not written."""
+    """Say what was not used, and what was not written."""
     parts = [f"{item.count} {item.words}" for item in unused(run)]
     lines = [f"not used: {', '.join(parts) or 'nothing'}"]
     if run.unwritten.lines or run.unwritten.pairs:

@@ -1,8 +1,8 @@
-"""Rays: which way each pixel looks, and what a ray meets first.
+"""Casts rays: the direction of each pixel, and what a ray hits first.
 
-Vectors are stored one coordinate per row, (3, N): numpy is fastest along contiguous rows. The dtype of the rays decides
-the precision of everything that follows. Directions are not normalised: a camera's rays have z = 1 in its own axes, so
-the ray parameter of a hit *is* its depth.
+Vectors are stored with one coordinate per row, (3, N), because numpy is fastest along contiguous rows. The dtype of the
+rays sets the precision of everything that follows. Directions are not normalised: a camera's rays have z = 1 in its own
+axes, so the ray parameter of a hit *is* its depth.
 """
 
 import math
@@ -17,27 +17,28 @@ from phone_host.model import CameraModel
 from phone_host.scene.scene_model import Body, Box, Floats, Plane, Pose, Shape, Sphere, Vector
 
 FACES = 8
-"""Surface numbers per body: surface = body index * FACES + face; a box has six faces, the rest one."""
+"""Surface numbers per body: surface = body index * FACES + face. A box has six faces, every other body has one."""
 
 NOTHING = -1
-"""Surface number of a ray that meets nothing."""
+"""Surface number of a ray that hits nothing."""
 
 BATCH = 16384
-"""Rays handled at a time: the arrays at work then stay in the caches, and products of this size are too small for the
-linear algebra library to wake its threads. Measured best among 8192 to all at once."""
+"""Rays handled at a time. The working arrays then stay in the caches, and products of this size are too small for the
+linear algebra library to wake its threads. Measured as the best choice from 8192 up to all rays at once."""
 
 # OpenCV's fixed-point inversion gains about a digit per step at the edge of a webcam's image; its default of 5 steps
-# leaves tenths of a pixel there. The second number is the distance in px between a pixel and its ray's projection.
+# leaves errors of tenths of a pixel there. The last number is the distance in px between a pixel and its ray's
+# projection.
 _UNDISTORT_UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-9)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hits:
-    """What N rays met.
+    """What N rays hit.
 
     Attributes:
-        depth: (N,) ray parameter of the nearest hit, inf = nothing.
-        surface: (N,) int16 surface number, NOTHING = none.
+        depth: (N,) ray parameter of the nearest hit; inf = nothing.
+        surface: (N,) int16 surface number; NOTHING = none.
     """
 
     depth: Floats
@@ -45,7 +46,7 @@ class Hits:
 
 
 def pixel_rays(model: CameraModel) -> NDArray[np.float64]:
-    """Directions in the camera's axes through all pixel centres, distortion undone.
+    """Return the directions through all pixel centres in the camera's axes, with distortion undone.
 
     Args:
         model: intrinsics of the camera; the distortion must be invertible inside the image.
@@ -58,7 +59,7 @@ def pixel_rays(model: CameraModel) -> NDArray[np.float64]:
 
 
 def rays_through(model: CameraModel, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Directions in the camera's axes through given places of its image.
+    """Return the directions through given image points in the camera's axes.
 
     Args:
         model: intrinsics of the camera.
@@ -78,7 +79,7 @@ def rays_through(model: CameraModel, x: NDArray[np.float64], y: NDArray[np.float
 
 
 def project(points_m: Floats, model: CameraModel, pose: Pose) -> NDArray[np.float64]:
-    """Pixel coordinates of points in the scene's axes, distortion included.
+    """Project points in the scene's axes to pixel coordinates, distortion included.
 
     Args:
         points_m: (3, N) float64.
@@ -101,15 +102,15 @@ def project(points_m: Floats, model: CameraModel, pose: Pose) -> NDArray[np.floa
 
 
 def intersect(shape: Shape, origin: Floats, rays: Floats) -> Floats:
-    """Ray parameter of the first hit from outside, in the body's axes.
+    """Compute the ray parameter of the first hit from outside, in the body's axes.
 
     Args:
-        shape: what to hit.
-        origin: (3,) start of all rays, outside of the shape.
+        shape: the shape to hit.
+        origin: (3,) start of all rays, outside the shape.
         rays: (3, N) directions.
 
     Returns:
-        (N,) parameter > 0, inf = missed. Dtype of `rays`.
+        (N,) parameter > 0, inf = missed; dtype of `rays`.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         match shape:
@@ -130,10 +131,10 @@ def intersect(shape: Shape, origin: Floats, rays: Floats) -> Floats:
 
 
 def _meet_plane(width_m: float, height_m: float, origin: Floats, rays: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Ray parameters (N,) at z = 0 and whether they lie inside the rectangle."""
+    """Return the ray parameters (N,) at z = 0 and whether they lie inside the rectangle."""
     depth = -origin[2] / rays[2]
     hit = depth > 0.0
-    # An infinite side is not compared: infinity times zero is no number.
+    # An infinite side is not compared, because infinity times zero is NaN.
     if math.isfinite(width_m):
         hit &= np.abs(origin[0] + depth * rays[0]) <= width_m / 2.0
     if math.isfinite(height_m):
@@ -142,7 +143,7 @@ def _meet_plane(width_m: float, height_m: float, origin: Floats, rays: Floats) -
 
 
 def box_interval(size_m: tuple[float, float, float], origin: Floats, rays: Floats) -> tuple[Floats, Floats]:
-    """Where rays enter and leave a box (slab method, Kay and Kajiya 1986); entry > exit means missed.
+    """Compute where rays enter and leave a box (slab method, Kay and Kajiya 1986); entry > exit means missed.
 
     Args:
         size_m: edge lengths.
@@ -162,11 +163,11 @@ def box_interval(size_m: tuple[float, float, float], origin: Floats, rays: Float
 
 
 def faces_and_normals(shape: Shape, points: Floats) -> tuple[NDArray[np.int16], Floats]:
-    """Face number and outward normal at surface points, in the body's axes.
+    """Return face number and outward normal at surface points, in the body's axes.
 
     Args:
-        shape: whose surface.
-        points: (3, N) on it.
+        shape: the shape whose surface it is.
+        points: (3, N) points on it.
 
     Returns:
         (N,) int16 and (3, N) unit vectors.
@@ -192,25 +193,25 @@ def faces_and_normals(shape: Shape, points: Floats) -> tuple[NDArray[np.int16], 
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """Inner products (N,) of vectors (3, N); written out, it is three times as fast as einsum."""
+    """Return the inner products (N,) of vectors (3, N); written out, this is three times as fast as einsum."""
     product: Floats = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     return product
 
 
 def column(vector: Vector | NDArray[np.float64], like: Floats) -> Floats:
-    """A vector as a (3, 1) column of another array's dtype."""
+    """Return a vector as a (3, 1) column of another array's dtype."""
     values: Floats = np.array(vector, dtype=np.float64).astype(like.dtype)
     return values[:, None]
 
 
 def to_body(body: Body, points: Floats) -> Floats:
-    """Points (3, N) of the scene's axes in the body's axes, same dtype."""
+    """Convert points (3, N) from the scene's axes to the body's axes, same dtype."""
     local: Floats = body.R_scene_body.T.astype(points.dtype) @ (points - column(body.position_m, points))
     return local
 
 
 def cast(bodies: tuple[Body, ...], origin: Floats, rays: Floats) -> Hits:
-    """First hit of each ray among all bodies.
+    """Find the first hit of each ray among all bodies.
 
     Args:
         bodies: the scene's bodies.
@@ -227,7 +228,7 @@ def cast(bodies: tuple[Body, ...], origin: Floats, rays: Floats) -> Hits:
 
 
 def cast_one(index: int, body: Body, origin: Floats, rays: Floats, hits: Hits) -> None:
-    """Lets one more body win those rays that meet it first; changes `hits` in place.
+    """Update `hits` in place where one more body is hit first.
 
     Args:
         index: the body's number.

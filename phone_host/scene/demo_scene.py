@@ -1,4 +1,4 @@
-"""Ready-made rigs and scenes: two unlike cameras, two alike, planes at a known distance, and the demo's moving still life."""
+"""Ready-made rigs and scenes: two unlike cameras, two identical ones, planes at a known distance, and the demo's moving still life."""
 
 import math
 
@@ -20,28 +20,28 @@ from phone_host.scene.scene_model import (
 )
 
 DEMO_PERIOD_S = 4.0
-"""The demo's scene repeats after this: a film of one period can be shown in a loop."""
+"""The demo's scene repeats after this time, so a film of one period can be shown in a loop."""
 
 BASELINE_M = 0.100
 FOCAL_PX = 525.0
 
 
 def matched_rig() -> Rig:
-    """Two ideal pinhole cameras of 640x480, f = 525 px, 100 mm apart, already rectified: for accuracy tests."""
+    """Return two ideal pinhole cameras of 640x480, f = 525 px, 100 mm apart, already rectified: for accuracy tests."""
     matrix = np.array([[FOCAL_PX, 0.0, 319.5], [0.0, FOCAL_PX, 239.5], [0.0, 0.0, 1.0]])
     model = CameraModel(width_px=640, height_px=480, matrix=matrix, distortion=np.zeros(5))
     return Rig(left=model, right=model, R_right_left=np.eye(3), t_right_left_m=np.array([-BASELINE_M, 0.0, 0.0]))
 
 
 def matched_view() -> RectifiedView:
-    """The rectified view of `matched_rig`: its own left camera."""
+    """Return the rectified view of `matched_rig`: its own left camera."""
     return RectifiedView(StereoGeometry(focal_px=FOCAL_PX, baseline_m=BASELINE_M, cx_px=319.5, cy_px=239.5), 640, 480)
 
 
 def unlike_rig() -> Rig:
-    """The demo's two cameras: a 640x480 webcam with barrel distortion on the left, an 800x600 phone on the right.
+    """Return the demo's two cameras: a 640x480 webcam with barrel distortion on the left, an 800x600 phone on the right.
 
-    The phone is turned by about 1.5 degrees and stands 100 mm to the right, a little higher and farther back.
+    The phone is turned by about 1.5 degrees and stands 100 mm to the right, slightly higher and farther back.
     """
     webcam = CameraModel(
         width_px=640,
@@ -66,12 +66,12 @@ PHONE_LOOK = Look(gain_bgr=(1.06, 1.04, 1.0), offset=0.0, gamma=2.0, vignetting=
 
 
 def plane_scene(depth_m: float, tilt_rad: float = 0.0, seed: int = 0) -> Scene:
-    """One infinite textured plane through (0, 0, depth), turned about the vertical axis by `tilt_rad`.
+    """Return a scene of one infinite textured plane through (0, 0, depth), turned about the vertical axis by `tilt_rad`.
 
     Args:
         depth_m: its distance along the left camera's axis.
         tilt_rad: 0 faces the camera.
-        seed: of the texture.
+        seed: selects the texture.
 
     Returns:
         A still scene.
@@ -81,7 +81,7 @@ def plane_scene(depth_m: float, tilt_rad: float = 0.0, seed: int = 0) -> Scene:
 
 
 def demo_scene() -> Scene:
-    """A still life at 0.7 to 2.5 m that moves: a table before a wall, a ball that rolls round, boxes that turn.
+    """Return a moving still life at 0.7 to 2.5 m: a table before a wall, a ball that rolls in a circle, boxes that turn.
 
     It repeats every `DEMO_PERIOD_S`.
     """

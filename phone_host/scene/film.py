@@ -1,4 +1,4 @@
-"""A rendered scene as two folders of JPEGs, one for each camera of a rig, to be replayed in a loop; it knows which image shows when."""
+"""Renders a scene into two folders of JPEGs, one for each camera of a rig, for replay in a loop; knows which image shows when."""
 
 import errno
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +13,7 @@ from phone_host.output.atomic import write_bytes
 from phone_host.scene.scene import Look, Renderer, Scene, rig_poses
 
 JPEG_QUALITY: Final = 92
-"""Below 90 the matcher pays for the artefacts (study of the stereo core, 3.5b)."""
+"""Below 90, compression artefacts degrade the matcher's result (study of the stereo core, 3.5b)."""
 
 _NS: Final = 1_000_000_000
 
@@ -35,15 +35,15 @@ class Film:
     fps: int
 
     def index_at(self, exposed_ns: int) -> int:
-        """Number of the image that a replay (`loop=1`, `pace=clock`) exposes nearest to a moment of CLOCK_MONOTONIC, ns."""
+        """Return the number of the image that a replay (`loop=1`, `pace=clock`) exposes nearest to a time of CLOCK_MONOTONIC, ns."""
         return round(exposed_ns * self.fps / _NS) % self.frames
 
     def scene_at(self, scene: Scene, index: int) -> Scene:
-        """The scene as that image shows it."""
+        """Return the scene as that image shows it."""
         return scene.at(index / self.fps)
 
     def replay_uri(self, folder: Path) -> str:
-        """Camera URI of one of the folders."""
+        """Return the camera URI of one of the folders."""
         return f"replay:{folder}?fps={self.fps}&loop=1"
 
 
@@ -62,11 +62,11 @@ def render_film(
     Args:
         scene: what to show; it should repeat after `seconds`.
         rig: the two cameras.
-        looks: of the left and right sensor.
-        folder: gets the folders `left` and `right`.
+        looks: the left and the right sensor.
+        folder: receives the folders `left` and `right`.
         fps: images per second.
         seconds: length.
-        advance: called after each image, twice `frames` times in all.
+        advance: called after each image, 2 * `frames` times in all.
 
     Returns:
         The film.
@@ -93,11 +93,11 @@ def render_films(
     Args:
         scene: what to show; it should repeat after `seconds`.
         rig: the two cameras.
-        looks: of the left and right sensor.
-        folders: for each JPEG quality, 1 to 100, the folder that gets `left` and `right`.
+        looks: the left and the right sensor.
+        folders: maps each JPEG quality, 1 to 100, to the folder that receives `left` and `right`.
         fps: images per second.
         seconds: length.
-        advance: called after each rendered image, twice `frames` times in all.
+        advance: called after each rendered image, 2 * `frames` times in all.
 
     Returns:
         The films, in the order of `folders`.

@@ -1,8 +1,8 @@
 """Rendered scenes with exact truth: textured planes, boxes and balls seen by two unlike cameras.
 
-The demo, the tests and the benchmarks measure the product against them. This is the door; behind it, `scene_model` says
-what a scene is, `scene_cast` follows rays, `scene_shade` gives colour, `scene_render` makes images, `scene_truth` gives the
-exact depth and disparity, `scene_demo` holds ready-made rigs and scenes.
+The demo, the tests and the benchmarks measure the product against them. Import from this module. Behind it,
+`scene_model` defines what a scene is, `cast` casts rays, `shade` computes colour, `scene_render` makes images, `truth`
+gives the exact depth and disparity, and `demo_scene` holds ready-made rigs and scenes.
 """
 
 from phone_host.scene.cast import pixel_rays, project

@@ -1,6 +1,6 @@
-"""What a rendered scene is made of: shapes, textures, paths, light, camera poses. No images here.
+"""The parts of a rendered scene: shapes, textures, paths, light, camera poses. No images here.
 
-Scene axes are the axes of the rig's left camera: x right, y down, z forward, metres. Bodies move, cameras stand still.
+Scene axes are the axes of the rig's left camera: x right, y down, z forward, metres. Bodies move; cameras stand still.
 """
 
 import math
@@ -17,14 +17,14 @@ Rotation = NDArray[np.float64]
 """(3, 3) float64 rotation."""
 
 Floats = NDArray[np.floating[Any]]
-"""Real numbers; images are made in float32, truth in float64, by the same code."""
+"""Real numbers. The same code makes images in float32 and truth in float64."""
 
 
 def rotation(axis: Vector, angle_rad: float) -> Rotation:
-    """Rotation about an axis, Rodrigues' formula.
+    """Return the rotation about an axis, by Rodrigues' formula.
 
     Args:
-        axis: direction, any length but zero.
+        axis: direction, of any length except zero.
         angle_rad: right-handed angle.
 
     Returns:
@@ -38,7 +38,7 @@ def rotation(axis: Vector, angle_rad: float) -> Rotation:
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """A flat rectangle at z = 0 of the body's axes, seen from both sides. Infinite sides are allowed."""
+    """A flat rectangle at z = 0 of the body's axes, visible from both sides. Infinite sides are allowed."""
 
     width_m: float = math.inf
     height_m: float = math.inf
@@ -72,7 +72,7 @@ class Texture:
         contrast: how strongly the octaves modulate the brightness, 0..1.
         shortest_m: wavelength of the finest octave.
         longest_m: wavelengths double from `shortest_m` up to this.
-        stretch: at least 1 per axis of the body; 6 along an axis draws a grain along it.
+        stretch: at least 1 per axis of the body; 6 along an axis gives a grain along it.
     """
 
     seed: int = 0
@@ -91,9 +91,9 @@ class Path:
     Attributes:
         amplitude_m: swing along the scene's axes.
         phase_rad: phase per axis; (0, 0, pi / 2) makes a circle over x and z.
-        period_s: one swing.
-        spin_axis: axis of the body's own turning, in the body's axes.
-        spin_rad_s: its rate.
+        period_s: duration of one swing.
+        spin_axis: axis of the body's own rotation, in the body's axes.
+        spin_rad_s: rate of that rotation.
     """
 
     amplitude_m: Vector = (0.0, 0.0, 0.0)
@@ -104,11 +104,11 @@ class Path:
 
     @property
     def moves(self) -> bool:
-        """Whether anything changes with time."""
+        """Return whether anything changes with time."""
         return any(self.amplitude_m) or self.spin_rad_s != 0.0
 
     def shift_m(self, t_s: float) -> NDArray[np.float64]:
-        """Displacement from the rest position at time `t_s`, (3,) m in the scene's axes."""
+        """Return the displacement from the rest position at time `t_s`, (3,) m in the scene's axes."""
         angle = 2.0 * math.pi * t_s / self.period_s + np.asarray(self.phase_rad)
         return np.asarray(self.amplitude_m) * np.sin(angle)
 
@@ -118,14 +118,14 @@ STILL = Path()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """A textured shape at a place.
+    """A textured shape at a position.
 
     Attributes:
         name: for reports and tests.
-        shape: what it is.
+        shape: its shape.
         position_m: its origin in the scene's axes.
         R_scene_body: (3, 3) float64, takes body coordinates to the scene's axes.
-        texture: what covers it.
+        texture: its surface.
         path: how it moves.
     """
 
@@ -138,7 +138,7 @@ class Body:
 
     @property
     def bounding_radius_m(self) -> float:
-        """Radius of a ball around the origin that holds the shape; infinite for an infinite plane."""
+        """Radius of a ball around the origin that contains the shape; infinite for an infinite plane."""
         match self.shape:
             case Plane(width_m, height_m):
                 return math.hypot(width_m, height_m) / 2.0
@@ -150,7 +150,7 @@ class Body:
                 assert_never(self.shape)
 
     def at(self, t_s: float) -> "Body":
-        """The same body where its path has taken it at time `t_s`, standing still."""
+        """Return the same body standing still where its path has taken it at time `t_s`."""
         if not self.path.moves:
             return self
         x, y, z = (np.asarray(self.position_m) + self.path.shift_m(t_s)).tolist()
@@ -163,9 +163,9 @@ class Light:
     """One far lamp and a sky.
 
     Attributes:
-        towards: direction from the scene to the lamp, any length (y down: a lamp above has a negative y).
-        lamp_bgr: its strength per channel on a surface that faces it.
-        sky_bgr: strength of the light from everywhere.
+        towards: direction from the scene to the lamp, of any length (y is down, so a lamp above has a negative y).
+        lamp_bgr: the lamp's strength per channel on a surface that faces it.
+        sky_bgr: strength of the light from all directions.
     """
 
     towards: Vector = (-0.45, -1.0, -0.65)
@@ -180,7 +180,7 @@ class Scene:
     Attributes:
         bodies: in any order; the nearest surface wins.
         light: the lamp and the sky.
-        void_bgr: brightness (0..1, linear) where a ray meets nothing.
+        void_bgr: brightness (0..1, linear) where a ray hits nothing.
     """
 
     bodies: tuple[Body, ...]
@@ -188,13 +188,13 @@ class Scene:
     void_bgr: Vector = (0.02, 0.02, 0.02)
 
     def at(self, t_s: float) -> "Scene":
-        """The scene frozen at time `t_s` (seconds)."""
+        """Return the scene frozen at time `t_s` (seconds)."""
         return replace(self, bodies=tuple(body.at(t_s) for body in self.bodies))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """Where a camera stands.
+    """Position and orientation of a camera.
 
     Attributes:
         R_camera_scene: (3, 3) float64, takes the scene's axes to the camera's.
@@ -206,7 +206,7 @@ class Pose:
 
 
 def rig_poses(rig: Rig) -> tuple[Pose, Pose]:
-    """Poses of a rig's left camera (the scene's origin) and of its right one."""
+    """Return the poses of a rig's left camera (the scene's origin) and of its right one."""
     return Pose(), Pose(rig.R_right_left, -rig.R_right_left.T @ rig.t_right_left_m)
 
 
@@ -215,12 +215,12 @@ class Look:
     """How a sensor turns light into grey levels: 255 * gain * (light * vignette) ** (1 / gamma) + offset + noise.
 
     Attributes:
-        gain_bgr: per channel (exposure and white balance).
+        gain_bgr: gain per channel (exposure and white balance).
         offset: black level, grey levels.
-        gamma: of the transfer curve.
+        gamma: exponent of the transfer curve.
         vignetting: fraction of the light lost in the corners, 0..1.
-        noise_sigma: of the sensor's noise, grey levels.
-        seed: of that noise.
+        noise_sigma: standard deviation of the sensor's noise, grey levels.
+        seed: selects that noise.
     """
 
     gain_bgr: Vector = (1.0, 1.0, 1.0)
@@ -233,7 +233,7 @@ class Look:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RectifiedView:
-    """The rectified left camera that truth is asked for: an ideal pinhole at the left camera's centre.
+    """The rectified left camera for which truth is computed: an ideal pinhole at the left camera's centre.
 
     Attributes:
         geometry: focal length, baseline, principal point, doffs.

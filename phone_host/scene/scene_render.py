@@ -1,8 +1,8 @@
-"""Images of a scene as one camera sees it.
+"""Renders images of a scene as one camera sees it.
 
-A renderer keeps what does not change: the rays of all pixels and the picture of everything that stands still. A frame then
-costs the moving bodies, their shadows and their edges. Inside a surface one sample per pixel is enough, since the texture
-is band-limited; pixels at the border of two surfaces are averaged over 3 x 3 samples.
+A renderer keeps what does not change: the rays of all pixels and the picture of everything that stands still. A frame
+then costs only the moving bodies, their shadows and their edges. Inside a surface one sample per pixel is enough,
+because the texture is band-limited; pixels at the border of two surfaces are averaged over 3 x 3 samples.
 """
 
 import math
@@ -22,13 +22,13 @@ _BLOCK_PX = 16
 _SUB_PIXELS = (-1.0 / 3.0, 0.0, 1.0 / 3.0)
 _NOISE_MARGIN_PX = 64
 _SLANTED = 1.6
-"""A footprint this many times longer than wide is sampled along its length."""
+"""A footprint that is this many times longer than wide is sampled along its length."""
 
 _ALONG_PIXEL = (-0.375, -0.125, 0.125, 0.375)
-"""Where a slanted pixel is sampled along its footprint, px."""
+"""Positions of the samples along a slanted pixel's footprint, px."""
 
 _LEAST_COSINE = 0.04
-"""Surfaces seen more edge-on than this keep the footprint of this cosine: beyond, they cover few pixels."""
+"""Surfaces seen more edge-on than this cosine get the footprint of this cosine; they cover few pixels."""
 
 Window = tuple[slice, slice]
 Flat = NDArray[np.intp]
@@ -69,7 +69,7 @@ class Renderer:
         self._still = self._render_still()
 
     def frame(self, t_s: float = 0.0) -> Image:
-        """The image at time `t_s`.
+        """Render the image at time `t_s`.
 
         Args:
             t_s: seconds on the scene's clock.
@@ -112,7 +112,7 @@ class Renderer:
         return _Still(hits, reflectance, levels)
 
     def _cast_moving(self, bodies: tuple[Body, ...], hits: Hits, touched: NDArray[np.bool_]) -> None:
-        """Puts the moving bodies in front of the still picture and marks their pixels."""
+        """Put the moving bodies in front of the still picture and mark their pixels."""
         for index in self._moving:
             body = bodies[index]
             at = self._inside(np.asarray(body.position_m), body.bounding_radius_m)
@@ -123,7 +123,7 @@ class Renderer:
             touched[at[mine]] = True
 
     def _mark_shadows(self, bodies: tuple[Body, ...], hits: Hits, touched: NDArray[np.bool_]) -> None:
-        """Marks the still pixels whose light a moving body may change."""
+        """Mark the still pixels whose light a moving body may change."""
         for index, body in enumerate(bodies):
             if index in self._moving:
                 continue
@@ -142,7 +142,7 @@ class Renderer:
                     touched[at[hits.surface[at] // FACES == index]] = True
 
     def _paint(self, bodies: tuple[Body, ...], hits: Hits, touched: NDArray[np.bool_], levels: Floats) -> None:
-        """Shades all marked pixels, then the borders among them."""
+        """Shade all marked pixels, then smooth the borders among them."""
         for index, at in _by_body(hits.surface, np.flatnonzero(touched)):
             rays, depth = self._rays[:, at], hits.depth[at]
             points = self._centre[:, None] + depth * rays
@@ -155,7 +155,7 @@ class Renderer:
         self._smooth_edges(bodies, hits.surface, touched, levels)
 
     def _light(self, body: Body, bodies: tuple[Body, ...], points: Floats, normals: Floats) -> Floats:
-        """Light (3, N) on points of a body."""
+        """Compute the light (3, N) on points of a body."""
         solid = (other for other in bodies if other is not body and not isinstance(other.shape, Plane))
         casters = tuple(
             other for other in solid if isinstance(body.shape, Plane) or may_darken(self._scene.light, other, body)
@@ -163,10 +163,11 @@ class Renderer:
         return surface_light(self._scene.light, casters, points, normals)
 
     def _reflectance(self, body: Body, *, depth: Floats, rays: Floats, normals: Floats, pixels: Flat) -> Floats:
-        """Reflectance (3, N) as a pixel averages it.
+        """Compute the reflectance (3, N) as a pixel averages it.
 
-        A pixel's footprint on a slanted surface is long and narrow. A round filter as wide as it is long would wash a table
-        top out; so a slanted pixel takes the mean of several samples along its footprint, each filtered for its share.
+        A pixel's footprint on a slanted surface is long and narrow. A round filter as wide as the footprint is long
+        would blur a table top, so a slanted pixel takes the mean of several samples along its footprint, each filtered
+        for its share of the length.
         """
         across, along = self._footprint_m(depth, rays, normals)
         colour = np.empty_like(rays)
@@ -191,13 +192,13 @@ class Renderer:
         return colour
 
     def _footprint_m(self, depth: Floats, rays: Floats, normals: Floats) -> tuple[Floats, Floats]:
-        """Width and length (N,) of what a pixel covers on a surface, m."""
+        """Return the width and length (N,) of the area that a pixel covers on a surface, m."""
         across = depth / np.float32(self._focal_px)
         cosine = np.abs(dot(normals, rays)) / np.sqrt(dot(rays, rays))
         return across, across / np.maximum(cosine, np.float32(_LEAST_COSINE))
 
     def _steepest_step(self, normals: Floats, pixels: Flat) -> Floats:
-        """Change of the ray (3, N) over one pixel in the image direction in which a surface recedes fastest."""
+        """Return the change of the ray (3, N) over one pixel in the image direction in which a surface recedes fastest."""
         step_x, step_y = (step[:, pixels] for step in self._steps)
         x, y = dot(normals, step_x), dot(normals, step_y)
         length = np.hypot(x, y) + np.float32(1e-12)
@@ -210,7 +211,7 @@ class Renderer:
         touched: NDArray[np.bool_] | None,
         levels: Floats,
     ) -> None:
-        """Replaces pixels at the border of two surfaces by the mean of 3 x 3 samples; `touched` limits where."""
+        """Replace pixels at the border of two surfaces by the mean of 3 x 3 samples; `touched` limits where."""
         border = _borders(surface.reshape(self._size))
         if touched is not None:
             near = cv2.dilate(touched.reshape(self._size).astype(np.uint8), np.ones((3, 3), dtype=np.uint8))
@@ -237,7 +238,7 @@ class Renderer:
         levels[at] = self._develop(colour.reshape(3, -1, at.size).mean(axis=1), at)
 
     def _develop(self, colour: Floats, at: Flat) -> Floats:
-        """Grey levels (N, 3) of light (3, N) on the pixels `at`, without noise and unrounded."""
+        """Return the grey levels (N, 3) of light (3, N) on the pixels `at`, without noise and unrounded."""
         look = self._look
         lit = np.maximum(colour if self._vignette is None else colour * self._vignette[at], 0.0)
         curve = np.sqrt(lit) if look.gamma == 2.0 else np.power(lit, np.float32(1.0 / look.gamma))
@@ -245,7 +246,7 @@ class Renderer:
         return (gain * curve + np.float32(look.offset)).T
 
     def _inside(self, centre: NDArray[np.float64], radius: float) -> Flat:
-        """Flat indices of pixels that may see a ball: those of all 16 x 16 blocks whose cone of rays meets its cone."""
+        """Return flat indices of pixels that may see a ball: all 16 x 16 blocks whose cone of rays meets the ball's cone."""
         to_centre = centre - self._centre
         distance = float(np.linalg.norm(to_centre))
         height, width = self._size
@@ -262,7 +263,7 @@ class Renderer:
         return (y[:, None] * width + x).ravel()
 
     def _noise_at(self, t_s: float) -> Floats:
-        """Noise of the frame at `t_s`: another cut-out of the bank."""
+        """Return the noise of the frame at `t_s`: another section of the bank."""
         assert self._noise is not None
         rng = np.random.default_rng([self._look.seed, 7, round(t_s * 1e6) & 0xFFFFFFFF])
         y, x = rng.integers(0, _NOISE_MARGIN_PX + 1, 2)
@@ -272,13 +273,13 @@ class Renderer:
 def render(
     scene: Scene, model: CameraModel, pose: Pose | None = None, look: Look | None = None, t_s: float = 0.0
 ) -> Image:
-    """One image of a scene; for a film, keep a `Renderer`.
+    """Render one image of a scene. For a film, keep a `Renderer`.
 
     Args:
-        scene: what to see.
+        scene: the scene to render.
         model: intrinsics of the camera, distortion included.
-        pose: where the camera stands; the scene's origin when left out.
-        look: its sensor; a noise-free one when left out.
+        pose: position and orientation of the camera; the scene's origin by default.
+        look: its sensor; a noise-free one by default.
         t_s: seconds on the scene's clock.
 
     Returns:
@@ -288,7 +289,7 @@ def render(
 
 
 def _by_body(surface: NDArray[np.int16], at: Flat) -> Iterator[tuple[int, Flat]]:
-    """Splits flat indices by the body that is seen there, in parts that fit a cache; those that see nothing are left out."""
+    """Split flat indices by the body that is visible there, in parts that fit a cache; indices that see nothing are left out."""
     owner = surface[at] // FACES
     for index in range(int(owner.max(initial=NOTHING)) + 1):
         mine = at[owner == index]
@@ -297,7 +298,7 @@ def _by_body(surface: NDArray[np.int16], at: Flat) -> Iterator[tuple[int, Flat]]
 
 
 def _borders(surface: NDArray[np.int16]) -> NDArray[np.bool_]:
-    """Pixels (H, W) with another surface above, below, left or right of them."""
+    """Return the pixels (H, W) that have another surface above, below, left or right of them."""
     border = np.zeros(surface.shape, dtype=np.bool_)
     beside = surface[:, 1:] != surface[:, :-1]
     above = surface[1:] != surface[:-1]
@@ -309,7 +310,7 @@ def _borders(surface: NDArray[np.int16]) -> NDArray[np.bool_]:
 
 
 def _blocks(rays: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Middle direction (3, h, w) of each 16 x 16 block of pixels and the angle (h, w) to its farthest corner, rad."""
+    """Return the middle direction (3, h, w) of each 16 x 16 block of pixels and the angle (h, w) to its farthest corner, rad."""
     height, width = rays.shape[1:]
     unit = rays / np.linalg.norm(rays, axis=0)
     low = [np.arange(0, size, _BLOCK_PX) for size in (height, width)]
@@ -322,7 +323,7 @@ def _blocks(rays: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
 
 
 def _vignette(size: tuple[int, int], loss: float) -> Floats | None:
-    """Share of the light per pixel (H * W), falling with the square of the distance from the middle."""
+    """Return the share of the light per pixel (H * W), which falls with the square of the distance from the middle."""
     if loss == 0.0:
         return None
     y, x = np.mgrid[-1.0 : 1.0 : size[0] * 1j, -1.0 : 1.0 : size[1] * 1j]
@@ -331,7 +332,7 @@ def _vignette(size: tuple[int, int], loss: float) -> Floats | None:
 
 
 def _noise_bank(size: tuple[int, int], look: Look) -> Floats | None:
-    """Noise of one sensor, somewhat larger than its image; every frame cuts another piece out of it.
+    """Make the noise of one sensor, somewhat larger than its image; every frame takes another section of it.
 
     Fresh noise for each frame would cost more than the frame itself.
     """

@@ -1,12 +1,12 @@
-"""What light leaves a surface point: solid band-limited texture, one lamp with soft shadows, a sky.
+"""Computes the light that leaves a surface point: solid band-limited texture, one lamp with soft shadows, a sky.
 
-All of it is a function of the point on the surface alone (no highlights), so two cameras see the same thing, each within
+All of it depends only on the point on the surface (no highlights), so two cameras see the same thing, each within
 the detail that its own pixels can hold.
 
 The texture is a sum of octaves. Each octave reads one periodic tile of noise whose spectrum is a ring of one octave's
-width, through a projection of the body's coordinates to two (along the normal of flat faces; along slanted directions that differ
-between octaves for a ball, which so has neither seams nor poles). An octave fades out before its wavelength gets near two
-pixels: nothing aliases.
+width. It reaches the tile through a projection of the body's three coordinates to two: along the normal of flat faces;
+for a ball along slanted directions that differ between octaves, so that it has neither seams nor poles. An octave fades
+out before its wavelength gets near two pixels, so nothing aliases.
 """
 
 import functools
@@ -22,28 +22,28 @@ from phone_host.scene.scene_model import Body, Box, Floats, Light, Plane, Sphere
 
 _TILE = 512
 _WAVE_TEXELS = 16
-"""A wavelength in texels: bilinear reading of the tile then errs by about (pi / 16)^2 / 2 = 2 % of the finest detail."""
+"""A wavelength in texels. The error of bilinear reading of the tile is then about (pi / 16)^2 / 2 = 2 % of the finest detail."""
 
-# The ring reaches from 0.7 to 1.4 of an octave's frequency, half of its power within 0.84 to 1.19: at 2.5 px per
+# The ring reaches from 0.7 to 1.4 of an octave's frequency, with half of its power within 0.84 to 1.19. At 2.5 px per
 # wavelength, where an octave starts to count, that half stays above Nyquist's two pixels.
 _FADE_FROM_PX, _FADE_TO_PX = 2.5, 4.0
 
 _REMAP_COLUMNS = 4096
-"""Samples are read by cv2.remap in rows of this length: it takes no side beyond 32767."""
+"""cv2.remap reads samples in rows of this length, because it takes no side beyond 32767."""
 
 _UP_WEIGHT = 0.3
-"""Share of the sky's light that depends on how far a surface looks up."""
+"""Share of the sky's light that depends on how much a surface faces upwards."""
 
 _LEAST_SKY = 0.04
-"""This much of the sky is taken off what a body hides, so that its influence ends somewhere and frames stay cheap."""
+"""This share is subtracted from the sky that a body hides, so that its influence ends somewhere and frames stay cheap."""
 
 _WRAP = 0.15
-"""The lamp reaches this far around a ball: the terminator of a lamp of finite size."""
+"""The lamp reaches this far around a ball, like the terminator of a lamp of finite size."""
 
 
 @functools.cache
 def _noise_tile() -> Floats:
-    """Periodic noise of unit variance with a ring spectrum, (513, 513) float32: last row and column repeat the first."""
+    """Return periodic noise of unit variance with a ring spectrum, (513, 513) float32; last row and column repeat the first."""
     white = np.random.default_rng(20240607).standard_normal((_TILE, _TILE))
     cycles = np.hypot(*np.meshgrid(np.fft.fftfreq(_TILE, 1.0 / _TILE), np.fft.fftfreq(_TILE, 1.0 / _TILE)))
     octaves = np.log2(np.maximum(cycles, 1e-9) * _WAVE_TEXELS / _TILE)
@@ -54,10 +54,10 @@ def _noise_tile() -> Floats:
 
 @functools.cache
 def _projections(seed: int, count: int, *, flat: bool) -> tuple[Floats, Floats]:
-    """Projections of three coordinates to the tile, in wavelengths: (count, 2, 3) and offsets (count, 2).
+    """Return projections of three coordinates to the tile, in wavelengths: (count, 2, 3) and offsets (count, 2).
 
-    `flat` projects nearly along z; otherwise along the four diagonals of a cube in turn, so that a curved surface is
-    nowhere parallel to all of them.
+    `flat` projects nearly along z. Otherwise it projects along the four diagonals of a cube in turn, so that a curved
+    surface is nowhere parallel to all of them.
     """
     rng = np.random.default_rng([seed, 3])
     planes = np.empty((count, 2, 3))
@@ -70,9 +70,9 @@ def _projections(seed: int, count: int, *, flat: bool) -> tuple[Floats, Floats]:
 
 
 def _texture_places(body: Body, points: Floats) -> tuple[Floats, bool]:
-    """Points (3, N) as the texture takes them, and whether their third coordinate is the surface's normal.
+    """Return points (3, N) as the texture takes them, and whether their third coordinate is the surface's normal.
 
-    A box's faces are papered one by one (coordinates in turn), so that none is seen along a slanted projection.
+    Each face of a box is textured separately (coordinates swapped), so that none is seen along a slanted projection.
     """
     places = points / column(body.texture.stretch, points)
     match body.shape:
@@ -83,7 +83,7 @@ def _texture_places(body: Body, points: Floats) -> tuple[Floats, bool]:
         case Box():
             faces = faces_and_normals(body.shape, points)[0]
             places = np.take_along_axis(places, (faces // 2 + np.array([[1], [2], [3]])) % 3, axis=0)
-            # Another piece of the paper, a metre away, for each face.
+            # Each face takes another part of the texture, a metre away.
             places[0] += faces
             return places, True
         case _:
@@ -91,20 +91,20 @@ def _texture_places(body: Body, points: Floats) -> tuple[Floats, bool]:
 
 
 def wavelengths_m(texture: Texture) -> list[float]:
-    """Wavelengths of the texture's octaves, finest first, m."""
+    """Return the wavelengths of the texture's octaves, finest first, m."""
     count = max(1, 1 + math.floor(math.log2(texture.longest_m / texture.shortest_m)))
     return [texture.shortest_m * 2.0**octave for octave in range(count)]
 
 
 def _smooth(low: float, high: float, x: Floats) -> Floats:
-    """0 below `low`, 1 above `high`, a cubic between."""
+    """Return 0 below `low`, 1 above `high`, and a cubic between."""
     unit = np.clip((x - np.float32(low)) * np.float32(1.0 / (high - low)), 0.0, 1.0)
     cubic: Floats = unit * unit * (np.float32(3.0) - np.float32(2.0) * unit)
     return cubic
 
 
 def _read_tile(u: Floats, v: Floats) -> Floats:
-    """Noise at (N,) places given in wavelengths."""
+    """Return the noise at (N,) places given in wavelengths."""
     scale = np.float32(_WAVE_TEXELS)
     period = np.float32(_TILE / _WAVE_TEXELS)
     rows = -(-u.size // _REMAP_COLUMNS)
@@ -117,12 +117,12 @@ def _read_tile(u: Floats, v: Floats) -> Floats:
 
 
 def albedo(body: Body, points: Floats, footprint_m: Floats) -> Floats:
-    """Reflectance of a body's surface.
+    """Compute the reflectance of a body's surface.
 
     Args:
         body: shape and texture.
         points: (3, N) float32 in the body's axes, m.
-        footprint_m: (N,) float32, what a pixel covers on the surface.
+        footprint_m: (N,) float32, size of the area that a pixel covers on the surface.
 
     Returns:
         (3, N) float32 BGR, 0..1.
@@ -150,10 +150,10 @@ def albedo(body: Body, points: Floats, footprint_m: Floats) -> Floats:
 
 
 def lamp_reaching(body: Body, points: Floats, towards: Floats) -> Floats:
-    """Share of the lamp that one body lets through to points in its neighbourhood, (N,) 0..1, with a soft edge.
+    """Return the share of the lamp that one body lets through to nearby points, (N,) 0..1, with a soft edge.
 
     Args:
-        body: what may stand in the way.
+        body: the body that may block the light.
         points: (3, N) float32 in the scene's axes.
         towards: (3,) unit vector to the lamp.
     """
@@ -177,7 +177,7 @@ def lamp_reaching(body: Body, points: Floats, towards: Floats) -> Floats:
 
 
 def _ball_radius_m(body: Body) -> float:
-    """Radius of a ball that hides about as much of the sky as the body does."""
+    """Return the radius of a ball that hides about as much of the sky as the body does."""
     match body.shape:
         case Sphere(radius_m):
             return radius_m
@@ -190,7 +190,7 @@ def _ball_radius_m(body: Body) -> float:
 
 
 def shadow_balls(light: Light, caster: Body, plane: Body) -> tuple[tuple[NDArray[np.float64], float], ...]:
-    """Where on a plane a body changes the light: balls (centre, radius) that hold its shadow and its dimming of the sky.
+    """Find where a body changes the light on a plane: balls (centre, radius) that contain its shadow and its dimming of the sky.
 
     Args:
         light: gives the lamp's direction.
@@ -209,7 +209,8 @@ def shadow_balls(light: Light, caster: Body, plane: Body) -> tuple[tuple[NDArray
     if height * along > 0.0:
         reach = 1.3 * caster.bounding_radius_m / abs(along)
         balls.append((centre - towards * (height / along), reach))
-    # cosine * r^2 / d^2 with cosine = height / d falls below the least share at this distance d from the body's centre.
+    # At this distance d from the body's centre, cosine * r^2 / d^2 with cosine = height / d falls below the least
+    # share.
     distance = (abs(height) * _ball_radius_m(caster) ** 2 / _LEAST_SKY) ** (1.0 / 3.0)
     if distance > abs(height):
         balls.append((centre - normal * height, math.sqrt(distance**2 - height**2)))
@@ -217,7 +218,7 @@ def shadow_balls(light: Light, caster: Body, plane: Body) -> tuple[tuple[NDArray
 
 
 def may_darken(light: Light, caster: Body, other: Body) -> bool:
-    """Whether one solid body may throw its shadow on another or hide sky from it, judged by the balls around them."""
+    """Return whether one solid body may cast its shadow on another or hide sky from it, judged by their bounding balls."""
     apart = np.asarray(other.position_m) - np.asarray(caster.position_m)
     towards = np.asarray(light.towards) / np.linalg.norm(light.towards)
     behind = -float(apart @ towards)
@@ -228,7 +229,7 @@ def may_darken(light: Light, caster: Body, other: Body) -> bool:
 
 
 def sky_blocked(body: Body, points: Floats, normals: Floats) -> Floats:
-    """Share of the sky that one body hides from points, (N,) 0..1: a ball of its size, seen at a cosine, r^2 / d^2."""
+    """Return the share of the sky that a body hides from points, (N,) 0..1: for a ball of its size, cosine * r^2 / d^2."""
     if isinstance(body.shape, Plane):
         return np.zeros(points.shape[1], dtype=np.float32)
     radius = _ball_radius_m(body)
@@ -240,11 +241,11 @@ def sky_blocked(body: Body, points: Floats, normals: Floats) -> Floats:
 
 
 def surface_light(light: Light, casters: tuple[Body, ...], points: Floats, normals: Floats) -> Floats:
-    """Light that falls on surface points.
+    """Compute the light that falls on surface points.
 
     Args:
         light: lamp and sky.
-        casters: bodies that may throw a shadow on them.
+        casters: bodies that may cast a shadow on them.
         points: (3, N) float32, scene axes, m.
         normals: (3, N) float32 outward.
 
@@ -262,10 +263,10 @@ def surface_light(light: Light, casters: tuple[Body, ...], points: Floats, norma
 
 
 def surface_normals(body: Body, points: Floats, towards_eye: Floats) -> Floats:
-    """Outward unit normals in the scene's axes; a plane's looks to the side of the eye.
+    """Return outward unit normals in the scene's axes; a plane's normal points to the side of the camera.
 
     Args:
-        body: whose surface.
+        body: the body whose surface it is.
         points: (3, N) float32, scene axes.
         towards_eye: (3, N) float32 directions to the camera.
 

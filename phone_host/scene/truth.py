@@ -1,6 +1,6 @@
-"""What a perfect stereo matcher would measure in a scene: exact depth, disparity and who sees what.
+"""Computes what a perfect stereo matcher would measure in a scene: exact depth, disparity and which camera sees what.
 
-Everything is float64 and taken at pixel centres, straight from the shapes; no image is involved.
+Everything is float64 and taken at pixel centres, directly from the shapes; no image is involved.
 """
 
 from dataclasses import dataclass
@@ -12,21 +12,21 @@ from phone_host.model import CameraModel
 from phone_host.scene.cast import FACES, cast, pixel_rays, project, rays_through
 from phone_host.scene.scene_model import Floats, Pose, RectifiedView, Scene
 
-# A point seen from the other camera is the nearest hit on its own ray up to rounding: 1e-9 of the distance is nanometres,
-# a million times the rounding and far below any gap between two surfaces.
+# A point seen from the other camera is the nearest hit on its own ray, apart from rounding. 1e-9 of the distance is
+# nanometres: a million times the rounding and far below any gap between two surfaces.
 _SAME_POINT = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Truth:
-    """Truth per pixel of the rectified left image, (H, W) each.
+    """The truth per pixel of the rectified left image, (H, W) each.
 
     Attributes:
-        depth_m: float64 z in the rectified left camera's axes, NaN = the ray meets nothing.
-        disparity_px: float64 left x - right x, NaN = nothing.
-        visible: bool, the surface point is seen by both cameras (not hidden, inside both images).
+        depth_m: float64 z in the rectified left camera's axes; NaN = the ray hits nothing.
+        disparity_px: float64 left x - right x; NaN = nothing.
+        visible: bool, both cameras see the surface point (not hidden, inside both images).
         hidden: bool, there is a surface, but another one hides it from the right camera.
-        body: int16 index of the body in the scene, -1 = nothing.
+        body: int16 index of the body in the scene; -1 = nothing.
     """
 
     depth_m: NDArray[np.float64]
@@ -37,12 +37,12 @@ class Truth:
 
     @property
     def background(self) -> NDArray[np.bool_]:
-        """Pixels whose ray meets nothing, (H, W) bool."""
+        """Pixels whose ray hits nothing, (H, W) bool."""
         return self.body < 0
 
 
 def rectified_cameras(view: RectifiedView) -> tuple[tuple[CameraModel, Pose], tuple[CameraModel, Pose]]:
-    """The two ideal cameras of a rectified geometry; rendering both gives a perfectly rectified pair.
+    """Return the two ideal cameras of a rectified geometry; rendering both gives a perfectly rectified pair.
 
     Args:
         view: the rectified left camera and its geometry.
@@ -68,13 +68,13 @@ def rectified_cameras(view: RectifiedView) -> tuple[tuple[CameraModel, Pose], tu
 
 
 def truth(scene: Scene, view: RectifiedView, sensors: tuple[tuple[CameraModel, Pose], ...] = ()) -> Truth:
-    """Exact depth, disparity and visibility for the rectified left image.
+    """Compute exact depth, disparity and visibility for the rectified left image.
 
     Args:
         scene: frozen at the moment of the image (`Scene.at`).
         view: the rectified left camera.
-        sensors: the real cameras and their poses; where given, a point must also lie inside each of their images to
-            count as visible (a rectified image has corners that no sensor fills).
+        sensors: the real cameras and their poses. If given, a point counts as visible only if it also lies inside each
+            of their images (a rectified image has corners that no sensor fills).
 
     Returns:
         The truth at each pixel centre.
@@ -109,10 +109,10 @@ def truth(scene: Scene, view: RectifiedView, sensors: tuple[tuple[CameraModel, P
 
 
 def _inside(points: Floats, model: CameraModel, pose: Pose) -> NDArray[np.bool_]:
-    """Whether points (3, N) fall on the sensor."""
+    """Return whether points (3, N) fall on the sensor."""
     x, y = project(points, model, pose)
-    # Far outside the image the distortion polynomial folds back into it; no such point is farther from the axis than
-    # the farthest corner.
+    # Far outside the image the distortion polynomial folds back into it. Such points are farther from the axis than the
+    # farthest corner, so leave them out.
     local = pose.R_camera_scene @ (points - pose.centre_m[:, None])
     right, bottom = model.width_px - 1.0, model.height_px - 1.0
     corners = rays_through(model, np.array([0.0, right, 0.0, right]), np.array([0.0, 0.0, bottom, bottom]))

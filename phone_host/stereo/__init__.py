@@ -1,1 +1,1 @@
-"""The stereo core: rectification, matching, reprojection: functions on arrays. Only `images` reads files, and `overheard` listens to image libraries."""
+"""The stereo core: rectification, matching, reprojection on arrays. Only `images` reads files; `overheard` captures libraries' messages."""

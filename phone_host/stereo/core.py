@@ -1,6 +1,6 @@
-"""The stereo core: rectify or pass, match, reproject. One class for files and for live streams: both give the same bits.
+"""The stereo core: rectify (or pass through), match, reproject. Files and live streams use the same class and so get the same bits.
 
-No I/O, and no clock of its own: the caller brings the one by which the stages are timed.
+No I/O and no clock of its own: the caller passes the clock that times the stages.
 """
 
 from collections.abc import Callable
@@ -14,16 +14,16 @@ from phone_host.stereo.reproject import reproject
 
 
 class StereoCore:
-    """From two images to a point cloud image.
+    """Computes a point cloud image from two images.
 
     Attributes:
-        rig: the cameras; None when the images come rectified.
-        geometry: what turns disparity into metres; None when the images come rectified and nobody said.
+        rig: the cameras; None when the images are already rectified.
+        geometry: converts disparity to metres; None when the images are already rectified and no geometry was given.
 
     Args:
         matcher: finds the disparity.
-        rectifier: for unrectified images; None when they come rectified.
-        geometry: for images that come rectified; must be None with a rectifier, which knows its own.
+        rectifier: for unrectified images; None when they are already rectified.
+        geometry: for images that are already rectified; must be None with a rectifier, which has its own.
     """
 
     def __init__(
@@ -37,18 +37,18 @@ class StereoCore:
         self.geometry = geometry if rectifier is None else rectifier.geometry
 
     def compute(self, left: Image, right: Image, clock: Callable[[], int]) -> Processed:
-        """All stages, each timed: rectify or pass, match, and reproject where the geometry is known.
+        """Run and time all stages: rectify or pass through, match, and reproject if the geometry is known.
 
         Args:
             left: (H, W) grey or (H, W, 3) BGR, uint8.
-            right: the same; another size is possible with a rectifier only.
+            right: the same; it may have another size only with a rectifier.
             clock: monotonic, ns.
 
         Returns:
             The rectified pair, its disparity, its cloud (None without geometry), and the times of these three stages.
 
         Raises:
-            DataError: a size that does not fit the rig, or two sizes without a rig.
+            DataError: a size does not fit the rig, or the sizes differ and there is no rig.
         """
         start_ns = clock()
         pair = self._rectify(left, right)
@@ -69,7 +69,7 @@ class StereoCore:
             right_px: width and height of the right image, px.
 
         Raises:
-            DataError: a size that does not fit the rig, or two sizes without a rig.
+            DataError: a size does not fit the rig, or the sizes differ and there is no rig.
         """
         if self._rectifier is not None:
             self._rectifier.require_sizes(left_px, right_px)

@@ -1,7 +1,7 @@
-"""What turns a raw disparity map into a trusted one: checks that take values away, and three steps that better what is left.
+"""Filters that turn a raw disparity map into a reliable one: checks that remove values, and three steps that improve the rest.
 
-Pure functions on (H, W) arrays. Two forms of disparity occur and are never mixed: *steps*, int16 in sixteenths of a pixel with
-NO_STEPS for none (OpenCV's form), and px, float32 with NaN for none (everybody else's).
+Pure functions on (H, W) arrays. Disparity has two forms, which are never mixed: *steps*, int16 in sixteenths of a pixel
+with NO_STEPS for none (OpenCV's form), and px, float32 with NaN for none (everywhere else).
 """
 
 import cv2
@@ -21,14 +21,14 @@ NO_STEPS = -STEPS_PER_PX
 
 
 def confirmed(left: Steps, right: Steps, tolerance_px: float) -> NDArray[np.bool_]:
-    """The left-right check: which left pixels the right pixel they point to points back to.
+    """Left-right check: find the left pixels whose matching right pixel points back to them.
 
-    A left pixel that points out of the right image is not confirmed: nobody can have seen it there.
+    A left pixel that points outside the right image is not confirmed: the right camera cannot have seen it.
 
     Args:
         left: disparities of the left pixels; the pixel at x points to x - d.
         right: disparities of the right pixels; the pixel at x points to x + d.
-        tolerance_px: how far the two may differ, px.
+        tolerance_px: the largest difference allowed between the two, px.
 
     Returns:
         (H, W) bool.
@@ -43,9 +43,10 @@ def confirmed(left: Steps, right: Steps, tolerance_px: float) -> NDArray[np.bool
 
 
 def told_rows(image: Image) -> NDArray[np.bool_]:
-    """The rows of which matching along rows and from above can know anything: they, or one above them, change somewhere from left to right.
+    """Find the rows that matching can say anything about: the row, or one above it, changes somewhere from left to right.
 
-    On any other row every disparity costs the same, and 0 would win for being the first.
+    Matching works along rows and from above. On any other row every disparity costs the same, and 0 would win only
+    because it comes first.
 
     Args:
         image: (H, W) uint8 grey.
@@ -57,7 +58,7 @@ def told_rows(image: Image) -> NDArray[np.bool_]:
 
 
 def without_speckles(steps: Steps, area_px: int, step_px: float) -> Steps:
-    """Drop small islands: connected areas, with less than step_px between neighbours, that are too small to be a thing.
+    """Drop speckles: connected areas, with less than step_px between neighbours, that are too small to be an object.
 
     Args:
         steps: disparities.
@@ -73,7 +74,7 @@ def without_speckles(steps: Steps, area_px: int, step_px: float) -> Steps:
 
 
 def to_px(steps: Steps) -> Disparity:
-    """Steps as px.
+    """Convert steps to px.
 
     Args:
         steps: disparities; every negative value counts as none.
@@ -85,10 +86,10 @@ def to_px(steps: Steps) -> Disparity:
 
 
 def bridged(disparity: Disparity, gap_px: int, step_px: float) -> Disparity:
-    """Close narrow gaps whose two ends agree by the straight line between them, along rows first, then along columns.
+    """Close narrow gaps whose two ends agree with a straight line between them, first along rows, then along columns.
 
-    Ends that agree belong to one surface, and a plane seen in stereo has a disparity linear in x and y. Gaps between a near
-    and a far surface stay open: nothing says which of the two goes on behind the other.
+    Ends that agree belong to one surface, and the disparity of a plane is linear in x and y. Gaps between a near and a
+    far surface stay open: nothing says which of the two continues behind the other.
 
     Args:
         disparity: (H, W) float32, px, NaN = none.
@@ -104,7 +105,8 @@ def bridged(disparity: Disparity, gap_px: int, step_px: float) -> Disparity:
 
 def _bridged_rows(disparity: Disparity, gap_px: int, step_px: float) -> Disparity:
     height, width = disparity.shape
-    # A fence on both sides of each row counts as known but has no value: it ends a gap, and no gap that it ends is bridged.
+    # The fence on both sides of each row counts as known but has no value: it ends a gap, and such a gap is never
+    # bridged.
     fenced = np.full((height, width + 2), np.nan, np.float32)
     fenced[:, 1:-1] = disparity
     known = np.isfinite(fenced)
@@ -126,16 +128,16 @@ def _bridged_rows(disparity: Disparity, gap_px: int, step_px: float) -> Disparit
 def unlocked(disparity: Disparity, amplitude_px: float) -> Disparity:
     """Undo pixel locking: d + amplitude * sin(2 pi d).
 
-    A parabola through costs that are not parabolic pulls every value towards the nearest whole pixel; the error is a wave of
-    one pixel's period, to first order a sine (Shimizu and Okutomi, IJCV 63(3), 2005, figure 4). Whole and half pixels stay
-    where they are.
+    A parabola fitted to costs that are not parabolic pulls every value towards the nearest whole pixel. The error is a
+    wave with a period of one pixel, to first order a sine (Shimizu and Okutomi, IJCV 63(3), 2005, figure 4). Whole and
+    half pixels do not change.
 
     Args:
         disparity: (H, W) float32, px, NaN = none.
-        amplitude_px: 0 to 0.15 px: beyond 1 / (2 pi) the order of values would change.
+        amplitude_px: 0 to 0.15 px; above 1 / (2 pi) the order of values would change.
 
     Returns:
-        A new array of the same order of values.
+        A new array with the same order of values.
     """
     wave = np.sin(disparity * np.float32(2 * np.pi))
     return np.asarray(disparity + np.float32(amplitude_px) * wave, np.float32)
@@ -144,7 +146,7 @@ def unlocked(disparity: Disparity, amplitude_px: float) -> Disparity:
 def smoothed(disparity: Disparity, window_px: int, step_px: float, reach_px: float) -> Disparity:
     """Average each value with its neighbours of similar disparity (bilateral filter: Tomasi and Manduchi, ICCV 1998).
 
-    Pixels without a value neither give nor get one.
+    Pixels without a value neither contribute nor receive one.
 
     Args:
         disparity: (H, W) float32, px, >= 0, NaN = none.
@@ -156,7 +158,8 @@ def smoothed(disparity: Disparity, window_px: int, step_px: float, reach_px: flo
         A new array.
     """
     known = np.isfinite(disparity)
-    # 16 sigma below the least value the weight is exp(-128): none. Not lower, because OpenCV tabulates the weights over the range.
+    # 16 sigma below the least value the weight is exp(-128), practically 0. Not lower, because OpenCV tabulates the
+    # weights over the range.
     outside = np.float32(-16 * step_px)
     averaged = cv2.bilateralFilter(np.where(known, disparity, outside), window_px, step_px, reach_px)
     return np.where(known, averaged, np.float32(np.nan))

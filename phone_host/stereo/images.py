@@ -1,10 +1,12 @@
-"""Images from files and from encoded bytes, decoded by OpenCV and brought to 8-bit grey or BGR.
+"""Images from files and from encoded bytes, decoded by OpenCV and converted to 8-bit grey or BGR.
 
 Rules:
-- one path for files and for streamed frames, so that both give the same bits;
-- nothing is decoded before its header was read: what claims more pixels than the limit is refused (see `common/imagesize`);
+- files and streamed frames take the same path, so that both give the same bits;
+- nothing is decoded before its header was read: an image that claims more pixels than the limit is refused (see
+  `common/imagesize`);
 - EXIF rotation is ignored: a calibration belongs to the sensor's own rows and columns;
-- deeper than 8 bit: both images of a pair get the same scale, or the matcher would see two brightnesses (see `to_8_bit`).
+- images deeper than 8 bit: both images of a pair get the same scale, or the matcher would see two brightnesses (see
+  `to_8_bit`).
 """
 
 import logging
@@ -35,39 +37,41 @@ AnyImage = NDArray[Any]
 _REPLACE: Final = "copy or record the image again"
 
 _CORRUPT: Final = ("Corrupt JPEG data", "Premature end of JPEG file", "Inconsistent progression sequence")
-"""How libjpeg's warnings begin that mean wrong pixels (jerror.h)."""
+"""How those libjpeg warnings begin that mean wrong pixels (jerror.h)."""
 
 _TALK: Final = ("Corrupt JPEG data", "Warning: unknown JFIF", "Unknown Adobe color", "Invalid SOS parameters", "libpng")
-"""How the harmless words of image libraries begin."""
+"""How harmless messages of image libraries begin."""
 
 _EXTRA_BYTES: Final = re.compile(r"(\d+) extraneous bytes before marker 0x([0-9a-f]{2})")
 _BEHIND_DATA: Final = frozenset({0xC4, 0xD9, 0xDA, 0xDD, *range(0xD0, 0xD8)})
 _BYTES_A_PIXEL: Final = 8
 _MORE_BYTES: Final = 64 << 20
-"""No image file is longer than four channels of 16 bit; phones put films and depth maps behind a JPEG."""
+"""No image file is longer than four channels of 16 bit plus this; phones append films and depth maps to a JPEG."""
 
 _END: Final = 0xD9
 _HARMLESS_BYTES: Final = 16
 _HARMLESS_BEFORE_END: Final = 48
-"""Webcams are known for 1 to 10 before restart markers (pupil-labs/pupil, issue 1816) and for padding before the end. Of 1500 images with one flipped
-bit each the decoder was left with 64 bytes and more before the end, with restart markers with at most 8 in 1 of 23 (decision 0021)."""
+"""Webcams are known to leave 1 to 10 bytes before restart markers (pupil-labs/pupil, issue 1816) and padding before the
+end. In 1500 images with one flipped bit each, the decoder was left with 64 bytes or more before the end, and with at
+most 8 before restart markers in 1 of 23 (decision 0021)."""
 
-# Sensors of 10, 12 and 14 bit are stored in 16-bit files with the upper bits 0 as often as shifted up.
+# 16-bit files hold sensor values of 10, 12 and 14 bit with the upper bits 0 about as often as shifted up.
 _SENSOR_BITS = (8, 10, 12, 14, 16)
-# Hot pixels must not set the scale: 1 per mille at each end is left out.
+# Hot pixels must not set the scale: 1 per mille is left out at each end.
 _LOW_PERCENT, _HIGH_PERCENT = 0.1, 99.9
-# Below this share of the range (about 5 of 8 bits) plain scaling leaves too few levels: stretch instead (thermal cameras).
+# If an image uses less than this share of the range (about 5 of 8 bits), plain scaling leaves too few levels: stretch
+# it instead (thermal cameras).
 _NARROW_SHARE = 1 / 8
 
 
 @dataclass(frozen=True, slots=True)
 class EncodedFile:
-    """An image file's bytes, its header read and within the limit.
+    """An image file's bytes, with its header read and its size within the limit.
 
     Attributes:
         payload: all bytes of the file.
-        head: what they say of themselves.
-        name: how errors call it.
+        head: what its header says.
+        name: how error messages call it.
     """
 
     payload: bytes
@@ -85,7 +89,7 @@ def decode(payload: bytes | memoryview, name: str = "the image", most_pixels: in
 
     Args:
         payload: the encoded bytes.
-        name: how errors call it.
+        name: how error messages call it.
         most_pixels: an image that claims more is refused.
 
     Returns:
@@ -110,8 +114,8 @@ def decode_pair(
     Args:
         left: encoded bytes of the left image.
         right: encoded bytes of the right image.
-        left_name: how errors call the left image.
-        right_name: how errors call the right image.
+        left_name: how error messages call the left image.
+        right_name: how error messages call the right image.
         most_pixels: an image that claims more is refused.
 
     Returns:
@@ -125,22 +129,22 @@ def decode_pair(
 
 
 def decode_file(image: EncodedFile) -> Image:
-    """Decode one image that was examined, as `decode`."""
+    """Decode one examined image, like `decode`."""
     return to_8_bit((_decoded(image),))[0]
 
 
 def decode_files(left: EncodedFile, right: EncodedFile) -> tuple[Image, Image]:
-    """Decode the two images of a pair that were examined, as `decode_pair`."""
+    """Decode the two examined images of a pair, like `decode_pair`."""
     first, second = to_8_bit((_decoded(left), _decoded(right)))
     return first, second
 
 
 def examine(payload: bytes | memoryview, name: str, most_pixels: int = MOST_PIXELS) -> EncodedFile:
-    """Read what an encoded image says of itself; nothing is decoded.
+    """Read the header of an encoded image; nothing is decoded.
 
     Args:
         payload: the encoded bytes.
-        name: how errors call it.
+        name: how error messages call it.
         most_pixels: an image that claims more is refused.
 
     Raises:
@@ -209,8 +213,8 @@ def require_same_size(left_px: tuple[int, int], right_px: tuple[int, int], left_
     Args:
         left_px: width and height of the left image, px.
         right_px: width and height of the right image, px.
-        left_name: how errors call the left image.
-        right_name: how errors call the right image.
+        left_name: how error messages call the left image.
+        right_name: how error messages call the right image.
 
     Raises:
         DataError: their sizes differ.
@@ -223,17 +227,17 @@ def require_same_size(left_px: tuple[int, int], right_px: tuple[int, int], left_
 
 
 def size_px(image: AnyImage) -> tuple[int, int]:
-    """Width and height of an image, px."""
+    """Return width and height of an image, px."""
     return image.shape[1], image.shape[0]
 
 
 def size_text(image: AnyImage) -> str:
-    """Width and height of an image as people write it, such as 640x480."""
+    """Return width and height of an image as people write it, such as 640x480."""
     return px_text(size_px(image))
 
 
 def to_grey(image: Image) -> Image:
-    """The grey version of an image.
+    """Convert an image to grey.
 
     Args:
         image: (H, W) grey or (H, W, 3) BGR, uint8.
@@ -247,12 +251,13 @@ def to_grey(image: Image) -> Image:
 
 
 def to_8_bit(images: tuple[AnyImage, ...]) -> tuple[Image, ...]:
-    """Bring images of any depth to 8 bit with one common scale.
+    """Convert images of any depth to 8 bit with one common scale.
 
-    8-bit images pass untouched. 16-bit images are divided so that the smallest usual sensor depth (8, 10, 12, 14 or 16 bit)
-    that holds 99.9 % of the values of all of them together becomes 0..255: an 8-bit picture stored as 16 bit (times 257)
-    comes back exactly, and brightness does not jump between frames. Images that use less than an eighth of that range, and
-    images of other types (float, signed), are stretched between their common 0.1 % and 99.9 % values instead.
+    8-bit images pass unchanged. For 16-bit images, take the smallest usual sensor depth (8, 10, 12, 14 or 16 bit) that
+    holds 99.9 % of the values of all of them together; its range becomes 0..255. So an 8-bit picture stored as 16 bit
+    (times 257) comes back exactly, and brightness does not jump between frames. Images that use less than an eighth of
+    that range, and images of other types (float, signed), are stretched between their common 0.1 % and 99.9 % values
+    instead.
 
     Args:
         images: each (H, W) or (H, W, 3), any depth.
@@ -276,13 +281,13 @@ def to_8_bit(images: tuple[AnyImage, ...]) -> tuple[Image, ...]:
 
 
 def _ends(values: NDArray[np.float32]) -> tuple[float, float]:
-    """Where the darkest and the brightest hot pixels begin; puts the values in another order."""
+    """Return the values beyond which hot pixels lie, dark and bright; reorders `values`."""
     low, high = np.percentile(values, (_LOW_PERCENT, _HIGH_PERCENT), overwrite_input=True)
     return float(low), float(high)
 
 
 def _scaled(image: AnyImage, low: float, scale: float) -> Image:
-    # In place: a copy for each step would take five times the memory of the image.
+    # In place: a copy at each step would take five times the memory of the image.
     values = image.astype(np.float32)
     np.nan_to_num(values, copy=False, nan=low)
     values -= low
@@ -313,16 +318,17 @@ def _decoded(image: EncodedFile) -> AnyImage:
             _REPLACE,
         )
     if decoded.ndim == 3:
-        # One or two channels in three dimensions: grey (and alpha); four: BGR and alpha.
+        # Three dimensions with one or two channels: grey (and alpha). With four: BGR and alpha.
         return decoded[..., 0] if decoded.shape[2] < 3 else np.ascontiguousarray(decoded[..., :3])
     return decoded
 
 
 def _complaint(said: list[str]) -> str:
-    """What a JPEG decoder said that means wrong pixels; empty: nothing, or only what does no harm.
+    """Return the JPEG decoder's message that means wrong pixels; empty if there is none, or only harmless ones.
 
-    libjpeg prints the first warning of an image only. Harmless are odd version numbers and scan parameters, and bytes before a marker that belong to nothing:
-    between segments any number, behind compressed data a few, as webcams leave there. A decoder that has lost its way leaves more.
+    libjpeg prints only the first warning of an image. Harmless are odd version numbers and scan parameters, and
+    extraneous bytes before a marker: any number between segments, and a few after compressed data, as webcams leave
+    there. A decoder that has lost its place leaves more.
     """
     for line in said:
         if line.startswith(_CORRUPT) and not _is_harmless(line):
@@ -341,15 +347,15 @@ def _is_harmless(warning: str) -> bool:
 
 
 def require_same_shape(image_px: tuple[int, int], asked_px: tuple[int, int], name: str) -> None:
-    """Check that a camera's image can be the whole view at the size that was asked for, or the same view with fewer pixels.
+    """Check that a camera's image shows the whole view: it has the size that was asked for, or the same shape with fewer pixels.
 
     Args:
         image_px: its width and height, px.
         asked_px: width and height that the camera was asked for, px.
-        name: how errors call it.
+        name: how error messages call it.
 
     Raises:
-        ImageSizeError: it is larger, or of another shape, so that it can only show a part of the view.
+        ImageSizeError: it is larger, or of another shape and so can show only a part of the view.
     """
     (width, height), (asked_width, asked_height) = image_px, asked_px
     if width > asked_width or height > asked_height:
@@ -367,18 +373,18 @@ def require_same_shape(image_px: tuple[int, int], asked_px: tuple[int, int], nam
 
 
 def enlarged(image: Image, asked_px: tuple[int, int], name: str) -> Image:
-    """Enlarge an image that a camera made smaller: it shows the same view, each of its pixels the mean of some of the larger one.
+    """Enlarge an image that a camera sent smaller. It shows the same view; each of its pixels is the mean of several of the larger image.
 
     Args:
         image: (H, W) or (H, W, 3), uint8.
-        asked_px: (width, height) that it shall have, px; edges of pixels coincide, not centres, as with `cv2.resize`.
-        name: how errors call it.
+        asked_px: the wanted (width, height), px; edges of pixels coincide, not centres, as with `cv2.resize`.
+        name: how error messages call it.
 
     Returns:
-        The image itself if it has that size.
+        The enlarged image, or the image itself if it already has that size.
 
     Raises:
-        ImageSizeError: it is larger or its shape is another one.
+        ImageSizeError: it is larger or has another shape.
     """
     if size_px(image) == asked_px:
         return image

@@ -2,14 +2,16 @@
 
 Rules that every matcher keeps (tests/contract/test_matcher.py):
 
-- disparity d = left x - right x, px, float32, the left image's size; NaN where there is no trust; every value in [0, N);
+- disparity d = left x - right x, px, float32, the left image's size; NaN where it cannot be trusted; every value in [0,
+  N);
 - any N >= 1 and any image size, down to 1 x 1 and narrower than N;
 - the result depends on the pair alone: not on earlier pairs, not on the number of OpenCV's threads.
 
 This module is the registry of matchers: it knows them, they do not know it.
 
-Other packages' matchers are registered as entry points of the group `tandemscan.matchers`; the name is what a user types. The entry point is
-a callable that takes the number of disparities (an int, 1 or more) and gives a `Matcher`, which keeps the rules above.
+Other packages register matchers as entry points of the group `tandemscan.matchers`; the entry point's name is what a
+user types. The entry point is a callable that takes the number of disparities (an int, 1 or more) and returns a
+`Matcher`, which keeps the rules above.
 """
 
 from dataclasses import dataclass
@@ -24,7 +26,7 @@ from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, R
 
 
 class Matcher(Protocol):
-    """What finds, for each pixel of the left image, where the same point stands in the right one."""
+    """Finds, for each pixel of the left image, where the same point appears in the right one."""
 
     def match(self, pair: RectifiedPair) -> Disparity:
         """Match one pair.
@@ -33,21 +35,21 @@ class Matcher(Protocol):
             pair: two uint8 images of one size, grey (H, W) or BGR (H, W, 3), rectified.
 
         Returns:
-            (H, W) float32, px, left x - right x, in [0, N); NaN = no trust.
+            (H, W) float32, px, left x - right x, in [0, N); NaN = not trusted.
 
         Raises:
-            DataError: the two images differ in size, or are no uint8 images.
+            DataError: the two images differ in size, or are not uint8 images.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class MatchSettings:
-    """What a matcher is built from.
+    """Settings from which a matcher is built.
 
     Attributes:
         matcher: the algorithm.
-        disparities: N, px: 0 <= d < N is searched. Any number from 1; far above the image's width it costs nothing more.
+        disparities: N, px: 0 <= d < N is searched. Any number from 1; far above the image's width it costs no more.
 
     Raises:
         SettingsError: disparities below 1.
@@ -65,7 +67,7 @@ class MatchSettings:
 
 
 def create_matcher(settings: MatchSettings) -> Matcher:
-    """Build the matcher that the settings name. It may be used for any number of pairs, of any sizes, by one thread at a time.
+    """Build the matcher that the settings name. It can match any number of pairs of any sizes, in one thread at a time.
 
     Args:
         settings: the algorithm and its search range.

@@ -1,8 +1,9 @@
-"""Brings a pair of unlike cameras closer before it is matched: the right image's brightness, contrast and vertical position.
+"""Aligns the right image of a pair with the left one before matching: brightness, contrast and vertical position.
 
-A rectified pair is never perfect: exposures differ, and a rig that was bumped or warmed up since its calibration shows the
-right image some tenths of a pixel too high or too low. Both are two-number, whole-image effects, measured from the pair itself,
-without memory, and left alone where the evidence is weak. Faults beyond that are the calibration's to mend, not the matcher's.
+A rectified pair is never perfect: exposures differ, and in a rig that was bumped or has warmed up since its calibration
+the right image sits some tenths of a pixel too high or too low. Each effect takes two numbers for the whole image. They
+are measured from the pair itself, without memory, and left alone where the evidence is weak. Larger faults need a new
+calibration; the matcher cannot fix them.
 """
 
 import cv2
@@ -12,39 +13,39 @@ from numpy.typing import NDArray
 from phone_host.model import Disparity, Image
 
 LEAST_CONTRAST = 2.0
-"""Grey levels. An image whose standard deviation is below this holds little but its own rounding; contrast can't be measured."""
+"""Grey levels. An image with a lower standard deviation holds little but its own rounding; its contrast can't be measured."""
 
 WINDOW_PX = 9
-"""Edge of the windows in which the offset is measured: the smallest odd window in which the estimate had stopped changing."""
+"""Edge of the windows in which the offset is measured: the smallest odd window at which the estimate stopped changing."""
 
 LEAST_INFORMATION = 4.0
-"""Mean squared vertical gradient (grey levels^2 per px^2) from which a window counts: a gradient of two levels a pixel."""
+"""A window counts from this mean squared vertical gradient (grey levels^2 per px^2) on: a gradient of two levels a pixel."""
 
 LEAST_WINDOWS = 100
-"""Fewer windows than this are no crowd to take a median of."""
+"""Fewer windows than this are too few for a median."""
 
 GREATEST_OFFSET_PX = 2.0
-"""Beyond this the linearisation no longer holds, and the pair needs a new calibration rather than a nudge."""
+"""Beyond this the linearisation no longer holds, and the pair needs a new calibration, not a correction."""
 
 LEAST_OFFSET_PX = 0.1
 """Below this, interpolating a new right image costs as much as the correction gains."""
 
 NEWTON_STEPS = 2
-"""One brings 0.5 px to within 0.1; the second to where the noise is."""
+"""The first step brings 0.5 px to within 0.1; the second reaches the noise."""
 
 
 def with_levels_of(left: Image, right: Image) -> Image:
     """Give the right image the left one's mean and standard deviation.
 
-    The two see nearly the same scene, so a linear change of levels is the cameras' (exposure, gain, black level). Black pixels
-    of either image are left out of the measure: rectification paints what no camera saw black.
+    Both see nearly the same scene, so a linear change of levels comes from the cameras (exposure, gain, black level).
+    Pixels that are black in either image are not measured: rectification paints black what no camera saw.
 
     Args:
         left: (H, W) uint8 grey.
         right: the same size.
 
     Returns:
-        The right image, (H, W) uint8; unchanged when either image has too little contrast to measure.
+        The right image, (H, W) uint8; unchanged if either image has too little contrast to measure.
     """
     seen = ((left > 0) & (right > 0)).astype(np.uint8)
     (mean_left, spread_left), (mean_right, spread_right) = (
@@ -58,21 +59,21 @@ def with_levels_of(left: Image, right: Image) -> Image:
 
 
 def vertical_offset_px(left: Image, right: Image, disparity: Disparity) -> float:
-    """How far the right image stands too low, measured by comparing it with the left one along a rough disparity.
+    """Measure how far too low the right image sits, by comparing it with the left one along a rough disparity.
 
-    In each window the brightness constancy L(x, y) = R(x - d - u, y + v) is solved for the error u of the rough disparity and
-    the offset v by least squares (Lucas and Kanade, IJCAI 1981). The result is the median of v, weighted by the information on v
-    that is left after u is eliminated, so that slanted edges, which can't tell u from v, have no say.
+    In each window, brightness constancy L(x, y) = R(x - d - u, y + v) is solved by least squares for the error u of the
+    rough disparity and the offset v (Lucas and Kanade, IJCAI 1981). The result is the median of v, weighted by the
+    information on v that remains after u is eliminated. So slanted edges, which can't tell u from v, have no say.
 
     Args:
         left: (H, W) uint8 grey.
-        right: the same size, of the left one's levels.
+        right: the same size, with the left one's levels.
         disparity: (H, W) float32, px, NaN = none; an error of a pixel does no harm.
 
     Returns:
-        Offset v, px: what stands at row y of the left image stands at row y + v of the right one. 0 when fewer than
-        LEAST_WINDOWS windows have texture, or when less than three quarters of the evidence agrees on the direction, or when it
-        is beyond GREATEST_OFFSET_PX.
+        Offset v, px: row y of the left image corresponds to row y + v of the right one. 0 if fewer than LEAST_WINDOWS
+        windows have texture, if less than three quarters of the evidence agrees on the direction, or if the offset
+        exceeds GREATEST_OFFSET_PX.
     """
     height, width = left.shape
     column, row = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
@@ -90,7 +91,7 @@ def vertical_offset_px(left: Image, right: Image, disparity: Disparity) -> float
 def _window_offsets(
     left: Image, right: Image, *, column: NDArray[np.float32], row: NDArray[np.float32], used: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The remaining offset of each window with texture, px, and its weight; the right image is read at (column, row)."""
+    """Return the remaining offset of each window with texture, px, and its weight; the right image is read at (column, row)."""
     there = np.asarray(cv2.remap(right, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
     here = left.astype(np.float32)
     middle = (here + there) / 2
@@ -99,10 +100,10 @@ def _window_offsets(
     across = cv2.Sobel(middle, cv2.CV_32F, 1, 0, scale=1 / 8) * mask
     down = cv2.Sobel(middle, cv2.CV_32F, 0, 1, scale=1 / 8) * mask
     difference = here - there
-    difference -= cv2.blur(difference, (WINDOW_PX, WINDOW_PX))  # what is left of unequal exposure, locally
+    difference -= cv2.blur(difference, (WINDOW_PX, WINDOW_PX))  # removes the local rest of unequal exposure
 
     def window_mean(values: cv2.typing.MatLike) -> NDArray[np.float32]:
-        # Windows overlap; every fourth one in each direction knows what all of them know.
+        # Windows overlap; every fourth one in each direction holds the same information as all of them.
         return np.asarray(cv2.blur(values, (WINDOW_PX, WINDOW_PX))[::4, ::4], np.float32)
 
     xx = (
@@ -117,7 +118,7 @@ def _window_offsets(
 
 
 def _weighted_quartiles(values: NDArray[np.float32], weights: NDArray[np.float32]) -> tuple[float, float, float]:
-    """The three values below which a quarter, half and three quarters of the weight lie."""
+    """Return the three values below which a quarter, half and three quarters of the weight lie."""
     order = np.argsort(values, kind="stable")
     total = np.cumsum(weights[order], dtype=np.float64)
     low, middle, high = values[order][np.searchsorted(total, np.array([0.25, 0.5, 0.75]) * total[-1])]
@@ -125,7 +126,7 @@ def _weighted_quartiles(values: NDArray[np.float32], weights: NDArray[np.float32
 
 
 def moved_up(image: Image, offset_px: float) -> Image:
-    """The image moved up by a part of a pixel, by cubic interpolation; the border rows are continued.
+    """Move the image up by a fraction of a pixel, with cubic interpolation; the border rows are repeated.
 
     Args:
         image: (H, W) uint8.

@@ -1,15 +1,18 @@
 """The paper's matcher: sum of absolute differences over 8 x 8 windows, winner takes all on the scanline, left-right check.
 
-Definition. Let L and R be the grey images, continued beyond their borders by their nearest pixel. For 0 <= d < N and d <= x
+Definition. Let L and R be the grey images, extended beyond their borders by their nearest pixel. For 0 <= d < N and d
+<= x
 
     SAD(x, y, d) = sum over i, j = -4 .. 3 of |L(x + i, y + j) - R(x - d + i, y + j)|
 
-The left pixel's disparity is the d of least SAD, the lowest such d on a tie; the right pixel's the same over SAD(x + d, y, d).
-A left pixel keeps its value only when the right pixel it points to points back to within 1 px, and when its window changes
-somewhere along its rows: a window of even rows looks the same wherever it is put. Else NaN. Then the value is refined below
-one pixel. An image smaller than the window in one direction has no whole window to compare: all NaN.
+The left pixel's disparity is the d of least SAD, the lowest such d on a tie; the right pixel's is the same over SAD(x +
+d, y, d). A left pixel keeps its value only if its matching right pixel points back to within 1 px, and if its window
+changes somewhere along its rows: a window of even rows looks the same wherever it is put. Otherwise it becomes NaN.
+Then the value is refined below one pixel. An image smaller than the window in one direction has no whole window to
+compare: all NaN.
 
-The window is even and so reaches one pixel further left and up than right and down; OpenCV's StereoBM refuses even windows.
+The window has an even size and so reaches one pixel further left and up than right and down; OpenCV's StereoBM refuses
+even windows.
 """
 
 from dataclasses import dataclass
@@ -28,10 +31,10 @@ BEFORE_PX, AFTER_PX = 4, 3
 """How far the window reaches left and up, right and down of its pixel: x - 4 .. x + 3."""
 
 LEFT_RIGHT_TOLERANCE_PX = 1
-"""The two views round the same true disparity on two different grids, so whole-pixel results may honestly differ by one."""
+"""The two views round the same true disparity on different grids, so whole-pixel results may differ by one without being wrong."""
 
 STRIP_ROWS = 32
-"""Rows matched at a time: the costs of a 640 px wide strip at N = 64 are 2.6 MB and stay in cache; a whole image's would not."""
+"""Rows matched at a time: the costs of a 640 px wide strip at N = 64 take 2.6 MB and stay in cache; a whole image's would not."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +53,7 @@ class Winners:
 
 
 def search(left: Image, right: Image, disparities: int) -> Winners:
-    """Winner takes all over 0 <= d < N, both views, by the definition at this module's head.
+    """Winner takes all over 0 <= d < N for both views, as the module docstring defines it.
 
     Args:
         left: (H, W) uint8 grey.
@@ -79,11 +82,11 @@ def search(left: Image, right: Image, disparities: int) -> Winners:
 
 
 def _search_strip(left: Image, right: Image, count: int) -> Winners:
-    """The search in one strip, both images already continued by the window's reach on each side."""
+    """Search one strip; both images are already extended by the window's reach on each side."""
     height, width = left.shape[0] - WINDOW_PX + 1, left.shape[1] - WINDOW_PX + 1
     no_cost = np.iinfo(np.int32).max
-    # A SAD is at most 64 * 255 < 2^14 and d < 2^16, so cost * 2^16 + d fits int32, and one minimum finds the least cost
-    # together with the lowest d that has it.
+    # A SAD is at most 64 * 255 < 2^14 and d < 2^16, so cost * 2^16 + d fits int32. One minimum then finds the least
+    # cost together with the lowest d that has it.
     costs = np.full((count + 2, height, width), no_cost, np.int32)
     best_left = np.full((height, width), no_cost, np.int32)
     best_right = np.full((height, width), no_cost, np.int32)
@@ -100,11 +103,12 @@ def _search_strip(left: Image, right: Image, count: int) -> Winners:
 
 
 def equiangular_offset(costs: NDArray[np.int32], best: NDArray[np.int32]) -> NDArray[np.float32]:
-    """Refine below one pixel: two lines of equal and opposite slope through the costs at d - 1, d, d + 1 (a V, not a parabola).
+    """Refine below one pixel with two lines of equal and opposite slope through the costs at d - 1, d, d + 1 (a V, not a parabola).
 
-    A sum of absolute differences grows linearly, not quadratically, away from its minimum, so the V is the fit whose model
-    holds; a parabola pulls towards whole pixels (Shimizu and Okutomi, "Sub-Pixel Estimation Error Cancellation on Area-Based
-    Matching", IJCV 63(3), 2005). Where a neighbour was not searched (d = 0, d = x, d = N - 1) the value stays whole.
+    A sum of absolute differences grows linearly, not quadratically, away from its minimum, so a V is the model that
+    fits; a parabola pulls towards whole pixels (Shimizu and Okutomi, "Sub-Pixel Estimation Error Cancellation on
+    Area-Based Matching", IJCV 63(3), 2005). Where a neighbour was not searched (d = 0, d = x, d = N - 1) the value
+    stays whole.
 
     Args:
         costs: (N + 2, H, W) int32, cost * 2^16 + d at [d + 1]; int32's maximum where not searched.
@@ -123,7 +127,7 @@ def equiangular_offset(costs: NDArray[np.int32], best: NDArray[np.int32]) -> NDA
 
 
 def points_back(left_px: NDArray[np.int32], right_px: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """The left-right check: which left pixels the right pixel they point to confirms, to within LEFT_RIGHT_TOLERANCE_PX.
+    """Left-right check: find the left pixels whose matching right pixel confirms them to within LEFT_RIGHT_TOLERANCE_PX.
 
     Args:
         left_px: (H, W) int32, px, 0 <= d <= x.
@@ -138,7 +142,7 @@ def points_back(left_px: NDArray[np.int32], right_px: NDArray[np.int32]) -> NDAr
 
 
 def varies(image: Image) -> NDArray[np.bool_]:
-    """Whether a pixel's window tells places along the scanline apart: some row of it changes from left to right.
+    """Find the pixels whose window distinguishes places along the scanline: at least one of its rows changes from left to right.
 
     Args:
         image: (H, W) uint8 grey.
@@ -149,13 +153,13 @@ def varies(image: Image) -> NDArray[np.bool_]:
     border = (BEFORE_PX, AFTER_PX, BEFORE_PX, AFTER_PX)
     padded = np.asarray(cv2.copyMakeBorder(image, *border, cv2.BORDER_REPLICATE), np.uint8)
     steps = (padded[:, 1:] != padded[:, :-1]).astype(np.uint8)
-    # A window of 8 columns has 7 steps between them.
+    # A window of 8 columns has 7 steps between columns.
     counts = cv2.boxFilter(steps, cv2.CV_32S, (WINDOW_PX - 1, WINDOW_PX), anchor=(0, 0), normalize=False)
     return np.asarray(counts[: image.shape[0], : image.shape[1]] > 0, np.bool_)
 
 
 class BlockMatcher:
-    """The paper's 8 x 8 matcher as this module's head defines it, on the grey image.
+    """The paper's 8 x 8 matcher, as the module docstring defines it, on the grey image.
 
     Args:
         disparities: N >= 1, px: 0 <= d < N is searched.

@@ -1,4 +1,4 @@
-"""What every matcher asks of its input, in one place."""
+"""The checks that every matcher makes on its input, in one place."""
 
 import cv2
 import numpy as np
@@ -32,7 +32,7 @@ def check_pair(pair: RectifiedPair) -> None:
 
 
 def grey(image: Image) -> Image:
-    """The image as (H, W) uint8 grey; a grey one is returned as it is.
+    """Return the image as (H, W) uint8 grey; a grey one is returned as it is.
 
     Args:
         image: (H, W) grey or (H, W, 3) BGR, uint8.

@@ -1,12 +1,13 @@
-"""The default matcher: semi-global matching (Hirschmueller, PAMI 30(2), 2008) by OpenCV, with checks and finish of our own.
+"""The default matcher: OpenCV's semi-global matching (Hirschmueller, PAMI 30(2), 2008), with our own checks and finishing steps.
 
-Steps, each with what it gains in docs/decisions/0002-sgbm-tuning.md:
+docs/decisions/0002-sgbm-tuning.md says what each step gains:
 
-1. the right image gets the left one's levels and, when it is measurably too high or low, its vertical position (match_align);
-2. StereoSGBM, 3-way mode, single-pixel cost, once for the left and once for the right view, with OpenCV's own checks off;
-   the left border is continued by N pixels, without which the first N columns would get no value;
-3. median of the left view, left-right check, small islands dropped, rows left out that no texture can tell anything of: what
-   is left is trusted, the rest is NaN;
+1. the right image gets the left one's levels, and is moved vertically if it is measurably too high or low
+   (match_align);
+2. StereoSGBM, 3-way mode, single-pixel cost, once for the left and once for the right view, with OpenCV's own checks
+   off; the left border is extended by N pixels, without which the first N columns would get no value;
+3. median of the left view, left-right check, speckles dropped, rows dropped whose texture says nothing: what is left is
+   trusted, the rest is NaN;
 4. narrow gaps within one surface bridged, pixel locking undone, the rest of the noise averaged (filters).
 """
 
@@ -20,34 +21,34 @@ from phone_host.stereo.match_align import LEAST_OFFSET_PX, moved_up, vertical_of
 from phone_host.stereo.match_input import check_pair, grey
 
 COST_STEP, COST_JUMP = 12, 26
-"""P1 and P2, the cost of a change of disparity by one and by more, for a single pixel's cost of 0 .. 125."""
+"""P1 and P2, the costs of a change of disparity by one and by more, relative to a single pixel's cost of 0 .. 125."""
 
 COST_CAP = 31
-"""preFilterCap: horizontal gradients are cut off at this. 15 to 63 came within 4 % of each other."""
+"""preFilterCap: horizontal gradients are cut off here. Values from 15 to 63 gave results within 4 % of each other."""
 
 MEDIAN_PX = 5
-"""Edge of the median window, px: the largest OpenCV has for int16."""
+"""Edge of the median window, px: the largest that OpenCV has for int16."""
 
 AGREEMENT_PX = 1.5
-"""Left-right check. Both views round and lock to whole pixels on their own; 1 px would drop good slanted surfaces."""
+"""Left-right check. Each view rounds and locks to whole pixels on its own; 1 px would drop good slanted surfaces."""
 
 SPECKLE_AREA_PX, SPECKLE_STEP_PX = 60, 1.0
-"""Islands up to 60 px (about 8 x 8) that stand off by more than 1 px are mismatches more often than things."""
+"""Islands of up to 60 px (about 8 x 8) that differ by more than 1 px from their surroundings are mismatches more often than objects."""
 
 GAP_PX, GAP_STEP_PX = 16, 1.0
-"""Gaps to bridge: at 16 px three of four bridged pixels are right within 2 px; wider ones fall below."""
+"""Gaps to bridge: up to 16 px, three of four bridged pixels are right within 2 px; wider gaps do worse."""
 
 LOCKING_PX = 0.12
 """Amplitude of the pixel locking that this cost and OpenCV's parabola leave: 0.05 to 0.15 on real and rendered surfaces."""
 
 SMOOTH_WINDOW_PX, SMOOTH_STEP_PX, SMOOTH_REACH_PX = 9, 1.0, 4.0
-"""The finishing average: neighbours within about one pixel of disparity."""
+"""The final average takes neighbours within about one pixel of disparity."""
 
 DISPARITY_BLOCK = 16
 """StereoSGBM searches multiples of 16."""
 
 GREATEST_SEARCH = 2032
-"""The largest multiple of 16 whose sixteenths still fit OpenCV's int16."""
+"""The largest multiple of 16 that fits OpenCV's int16 in sixteenths."""
 
 
 def _engine(**checks: int) -> cv2.StereoSGBM:
@@ -64,7 +65,7 @@ def _engine(**checks: int) -> cv2.StereoSGBM:
 
 
 class SgbmMatcher:
-    """Tuned StereoSGBM as this module's head describes it, on the grey images.
+    """Tuned StereoSGBM, as the module docstring describes it, on the grey images.
 
     Args:
         disparities: N >= 1, px: 0 <= d < N is searched.
@@ -73,20 +74,20 @@ class SgbmMatcher:
     def __init__(self, disparities: int) -> None:
         self._disparities = disparities
         self._fine = _engine(disp12MaxDiff=-1, uniquenessRatio=0, speckleWindowSize=0)
-        # The rough pass only has to be right where it has a value, so OpenCV's own cheap checks do.
+        # The rough pass only has to be right where it has a value, so OpenCV's own cheap checks are enough.
         self._rough = _engine(disp12MaxDiff=1, uniquenessRatio=10, speckleWindowSize=100, speckleRange=2)
 
     def match(self, pair: RectifiedPair) -> Disparity:
         """Match one pair; see `Matcher.match`.
 
         Raises:
-            SettingsError: more than 2032 disparities are asked for on an image as wide.
+            SettingsError: more than 2032 disparities are asked for on an image at least that wide.
         """
         check_pair(pair)
         left = grey(pair.left)
         right = self._aligned(left, with_levels_of(left, grey(pair.right)))
         left_steps = np.asarray(cv2.medianBlur(self._compute(self._fine, left, right), MEDIAN_PX), np.int16)
-        # The right view is the left view of the mirrored, exchanged pair.
+        # The right view is the left view of the mirrored and swapped pair.
         right_steps = self._compute(self._fine, _mirrored(right), _mirrored(left))[:, ::-1]
         trusted = filters.confirmed(left_steps, right_steps, AGREEMENT_PX)
         trusted &= left_steps <= (self._disparities - 1) * filters.STEPS_PER_PX
@@ -98,7 +99,7 @@ class SgbmMatcher:
         return filters.smoothed(disparity, SMOOTH_WINDOW_PX, SMOOTH_STEP_PX, SMOOTH_REACH_PX)
 
     def _aligned(self, left: Image, right: Image) -> Image:
-        """The right image, moved vertically when a rough match at half size shows that it has to be."""
+        """Return the right image, moved vertically if a rough match at half size shows that it has to be."""
         height, width = left.shape
         half = (max(width // 2, 1), max(height // 2, 1))
         small_left, small_right = (
@@ -109,8 +110,8 @@ class SgbmMatcher:
         return right if abs(offset_px) < LEAST_OFFSET_PX else moved_up(right, offset_px)
 
     def _compute(self, engine: cv2.StereoSGBM, left: Image, right: Image, scale: int = 1) -> filters.Steps:
-        """Run OpenCV's matcher on images reduced by scale, with the left border continued."""
-        # d <= x < width: a wider search could only find what is not in the right image.
+        """Run OpenCV's matcher on images reduced by scale, with the left border extended."""
+        # d <= x < width: a wider search could only find places outside the right image.
         wanted = min(-(-self._disparities // scale), left.shape[1])
         searched = -(-wanted // DISPARITY_BLOCK) * DISPARITY_BLOCK
         if searched > GREATEST_SEARCH:

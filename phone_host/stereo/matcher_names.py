@@ -1,4 +1,4 @@
-"""The matchers by name, ours and those of other packages. Light: settings and help need the names, not the algorithms."""
+"""The names of the matchers, ours and those of other packages. Light, because settings and help need the names but not the algorithms."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -26,7 +26,7 @@ class RegisteredMatcher:
     """A matcher that an installed package registers.
 
     Attributes:
-        value: the name under which it does.
+        value: the name under which it is registered.
     """
 
     value: str
@@ -42,7 +42,7 @@ def matcher_named(text: str) -> AnyMatcher:
         text: the name.
 
     Raises:
-        SettingsError: there is none of that name.
+        SettingsError: no matcher has that name.
     """
     own = [name.value for name in MatcherName]
     if text in own:

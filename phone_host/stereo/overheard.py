@@ -1,15 +1,17 @@
-"""What image libraries say while they decode: libjpeg and libpng print it to the C library's `stderr`, and nobody else is told.
+"""Captures what image libraries print while they decode: libjpeg and libpng write to the C library's `stderr` and report it nowhere else.
 
-A decoder whose data run out or make no sense fills the rest of the image with something, prints one line and calls it done; OpenCV does not look. So that line
-is the only word of a spoiled image, and it must not reach the terminal past the log.
+When its data run out or make no sense, a decoder fills the rest of the image with something, prints one line and
+reports success; OpenCV does not check. That line is the only sign of a spoiled image, and it must go to the log, not to
+the terminal.
 
-`stderr` is a variable of the C library that holds a stream, not the descriptor 2: "normal variables which you can set just like any others" (GNU C Library manual,
-Standard Streams); Android's Bionic declares it the same way. While an image is decoded it holds a stream in memory. Descriptor 2 stays what it is: Python's own
-stderr, the log, progress bars, child processes, faulthandler and C++'s std::cerr are not concerned. OpenCV's own log is silenced meanwhile: what it has to say
-comes as an exception or as no image.
+`stderr` is a variable of the C library that holds a stream, not descriptor 2: "normal variables which you can set just
+like any others" (GNU C Library manual, Standard Streams); Android's Bionic declares it the same way. While an image is
+decoded, the variable holds a stream in memory. Descriptor 2 does not change, so Python's own stderr, the log, progress
+bars, child processes, faulthandler and C++'s std::cerr are not affected. OpenCV's own log is silenced meanwhile: OpenCV
+reports by an exception or by returning no image.
 
-Rules: one decoding at a time (a lock), since the variable belongs to the process; where the C library is another one, nothing is overheard and the lines go
-where they went before.
+Rules: one decoding at a time (a lock), because the variable belongs to the process. With any other C library nothing is
+captured and the lines go where they went before.
 """
 
 import ctypes
@@ -29,7 +31,7 @@ _FROM_START: Final = 0
 
 
 class _Ear:
-    """A stream in memory that can take the place of `stderr`: open_memstream of POSIX.1-2008. Lives as long as the process: a library may still hold it."""
+    """A stream in memory that can replace `stderr`: open_memstream of POSIX.1-2008. Lives as long as the process, because a library may still hold it."""
 
     def __init__(self, c_library: ctypes.CDLL) -> None:
         self._flush, self._seek = c_library.fflush, c_library.fseek
@@ -43,7 +45,7 @@ class _Ear:
         self._stderr = ctypes.c_void_p.in_dll(c_library, "stderr")
 
     def listen(self, work: Callable[[], object]) -> str:
-        """Do some work; gives what was printed to `stderr` meanwhile."""
+        """Do some work; return what was printed to `stderr` meanwhile."""
         usual = self._stderr.value
         self._stderr.value = self._stream
         try:
@@ -70,7 +72,7 @@ def overhear(work: Callable[[], object]) -> str:
         work: decodes something.
 
     Returns:
-        What C libraries printed to their `stderr` meanwhile; empty where that cannot be known.
+        What C libraries printed to their `stderr` meanwhile; empty where it cannot be captured.
 
     Raises:
         Exception: whatever the work raises.
@@ -89,7 +91,7 @@ def overhear(work: Callable[[], object]) -> str:
 
 @cache
 def _ear() -> _Ear | None:
-    """None where `stderr` may be a constant, as in musl: setting it would end the process."""
+    """Return None where `stderr` may be a constant, as in musl: setting it would crash the process."""
     if platform.libc_ver()[0] != "glibc" and not _is_android():
         return None
     return _Ear(ctypes.CDLL(None))

@@ -1,4 +1,4 @@
-"""Raw camera images (YUYV, grey, NV12) to grey or BGR, and frames of any encoding to images."""
+"""Converts raw camera images (YUYV, grey, NV12) to grey or BGR, and frames of any encoding to images."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,15 +18,16 @@ _LOOK: Final = "check the camera that sends it"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EncodedImage:
-    """A frame's bytes and what its header says of them.
+    """A frame's bytes and what its header says about them.
 
     Attributes:
-        payload: the bytes as they came.
+        payload: the bytes as they arrived.
         pixel_format: their encoding.
         width_px: image width, px.
         height_px: image height, px.
-        name: how errors call it.
-        asked_px: (width, height) that its camera was asked for, px; the image may be smaller. Zeros: as the header says.
+        name: how error messages call it.
+        asked_px: (width, height) that its camera was asked for, px; the image may be smaller. Zeros mean the size in
+            the header.
     """
 
     payload: bytes | memoryview
@@ -38,12 +39,12 @@ class EncodedImage:
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """Width and height as the header says, px."""
+        """Width and height from the header, px."""
         return self.width_px, self.height_px
 
     @property
     def whole_px(self) -> tuple[int, int]:
-        """Width and height that it has at the size that was asked for, px."""
+        """Width and height after enlarging to the size that the camera was asked for, px."""
         return self.asked_px if any(self.asked_px) else self.size_px
 
 
@@ -57,15 +58,15 @@ def decode_frames(
 
     Args:
         first: the frame of one camera.
-        second: that of the other, of the same encoding or another one.
-        most_pixels: what neither a camera nor a frame may exceed.
-        check: told the whole sizes of both, px, before either is decoded; raises where they are of no use.
+        second: the frame of the other, in the same encoding or another one.
+        most_pixels: the limit for both camera and frame.
+        check: called with the whole sizes of both, px, before either is decoded; raises if they are of no use.
 
     Returns:
         Both in that order, each (H, W) grey or (H, W, 3) BGR, uint8.
 
     Raises:
-        SpoiledImageError: one of the two is spoiled, or its size is not believed.
+        SpoiledImageError: one of the two is spoiled, or its size cannot be believed.
     """
     one, other = _examined(first, most_pixels), _examined(second, most_pixels)
     if check is not None:
@@ -80,13 +81,13 @@ def decode_frame(image: EncodedImage, most_pixels: int = MOST_PIXELS) -> Image:
 
     Args:
         image: of any encoding.
-        most_pixels: what neither its camera nor it may exceed.
+        most_pixels: the limit for both its camera and the frame.
 
     Returns:
         (H, W) grey or (H, W, 3) BGR, uint8.
 
     Raises:
-        SpoiledImageError: it is spoiled, or its size is not believed.
+        SpoiledImageError: it is spoiled, or its size cannot be believed.
     """
     return _decoded(_examined(image, most_pixels))
 
@@ -96,12 +97,12 @@ def _decoded(image: EncodedImage | EncodedFile) -> Image:
 
 
 def _examined(image: EncodedImage, most_pixels: int) -> EncodedImage | EncodedFile:
-    """Check a frame's size before anything is done with its bytes; gives a raw frame as it is, another one with its header read.
+    """Check a frame's size before its bytes are used; return a raw frame as it is, any other with its header read.
 
     Raises:
-        ImageSizeError: the camera's or the frame's size is beyond the limit, the frame is larger than its camera or of another shape, or its bytes hold
-            another size than its header says.
-        SpoiledImageError: its bytes are of another encoding, or have no sound header.
+        ImageSizeError: the camera's or the frame's size is beyond the limit, the frame is larger than its camera or has
+            another shape, or its bytes hold another size than its header says.
+        SpoiledImageError: its bytes have another encoding, or no valid header.
     """
     if any(image.asked_px):
         require_pixels(image.asked_px, most_pixels, f"the camera of {image.name}")
@@ -125,16 +126,16 @@ def _examined(image: EncodedImage, most_pixels: int) -> EncodedImage | EncodedFi
 
 
 def decode_raw(image: EncodedImage) -> Image:
-    """Turn a raw image into one that the stereo core takes.
+    """Convert a raw image to one that the stereo core takes.
 
     Args:
         image: a YUYV, grey or NV12 image without row padding.
 
     Returns:
-        (H, W) uint8 for grey; (H, W, 3) BGR, uint8, else (ITU-R BT.601, limited range, as OpenCV converts).
+        (H, W) uint8 for grey; otherwise (H, W, 3) BGR, uint8 (ITU-R BT.601, limited range, as OpenCV converts).
 
     Raises:
-        SpoiledImageError: its length is not that of its size.
+        SpoiledImageError: its length does not match its size.
     """
     width, height = image.width_px, image.height_px
     expected = raw_bytes(image.pixel_format, width, height)
@@ -146,7 +147,7 @@ def decode_raw(image: EncodedImage) -> Image:
         )
     content = np.frombuffer(image.payload, dtype=np.uint8)
     if image.pixel_format is PixelFormat.GREY:
-        return content.reshape(height, width).copy()  # a view of the message could not be written to
+        return content.reshape(height, width).copy()  # a view of the message would not be writable
     if width % 2 or (image.pixel_format is PixelFormat.NV12 and height % 2):
         raise SpoiledImageError(
             FrameFault.OTHER_SIZE,

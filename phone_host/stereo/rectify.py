@@ -1,13 +1,15 @@
-"""Rectification of two unlike cameras: other resolution, focal length, distortion.
+"""Rectification of two unlike cameras, with different resolution, focal length and distortion.
 
-`cv2.stereoRectify` takes one image size for both cameras: it judges both fields of view, both focal lengths and both principal
-points by that one size, so it does not hold for two. Here each camera's field of view is followed through its own model:
+`cv2.stereoRectify` takes one image size for both cameras and uses it for both fields of view, both focal lengths and
+both principal points, so it is wrong for two sizes. Here each camera's field of view is computed with its own model:
 
-- rotation: Bouguet's. Each camera turns by half of the rotation between them, then both together so that the baseline becomes
-  the x axis; neither image is bent more than the other.
-- focal length: that of the coarser camera. The finer camera's extra pixels find no partner, and work grows with the square.
-- window: the largest rectangle that both cameras fill with measured pixels, the same slopes in both. So both images share the
-  principal point (doffs = 0, infinity has disparity 0) and hold no black border that a matcher would take for texture.
+- rotation: Bouguet's. Each camera turns by half of the rotation between them, then both together so that the baseline
+  becomes the x axis; neither image is distorted more than the other.
+- focal length: that of the coarser camera. The finer camera's extra pixels have no partner, and work grows with the
+  square.
+- window: the largest rectangle that both cameras fill with measured pixels, over the same slopes in both. So both
+  images share the principal point (doffs = 0, infinity has disparity 0) and have no black border that a matcher would
+  take for texture.
 
 Source: J.-Y. Bouguet, Camera Calibration Toolbox, 2000; A. Fusiello et al., "A compact algorithm for rectification of stereo
 pairs", 2000; OpenCV's calib3d documentation for P1, P2 and Q.
@@ -30,8 +32,9 @@ _RECALIBRATE = "calibrate the rig again"
 # Undistortion is iterative; 5 iterations (OpenCV's default) leave 0.1 px in the corners of a wide lens.
 _UNDISTORT = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
 _ROUND_TRIP_LIMIT_PX = 0.01
-_SAMPLES_PER_EDGE = 65  # the outline bends slowly: between 65 samples it moves by less than 0.01 px
-# A polynomial fitted to points in the middle may fold back near the corners; the usable field of view then ends before.
+_SAMPLES_PER_EDGE = 65  # the outline bends slowly: between two of 65 samples it moves by less than 0.01 px
+# A polynomial fitted to points in the middle may fold back near the corners; the usable field of view then ends before
+# that.
 _FIELD_SHARES = (1.0, 0.97, 0.94, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5)
 _LEAST_SIZE_PX = 32
 
@@ -46,8 +49,8 @@ def rectify_rig(rig: Rig) -> Rectification:
         The rectification.
 
     Raises:
-        DataError: left and right are swapped, the cameras do not stand side by side, their fields of view do not overlap, or a
-            distortion model cannot be inverted.
+        DataError: left and right are swapped, the cameras do not stand side by side, their fields of view do not
+            overlap, or a distortion model cannot be inverted.
     """
     left_rotation, right_rotation, baseline_m = _rotations(rig)
     focal_px = min(_mean_focal_px(rig.left), _mean_focal_px(rig.right))
@@ -93,7 +96,7 @@ def rectify_rig(rig: Rig) -> Rectification:
 def rectify_points(
     points_px: NDArray[np.floating], model: CameraModel, rotation: Matrix, geometry: StereoGeometry
 ) -> NDArray[np.float64]:
-    """Where measured points of one camera stand in its rectified image.
+    """Map measured points of one camera to its rectified image.
 
     Args:
         points_px: (N, 2), px, in the camera's own image.
@@ -110,7 +113,7 @@ def rectify_points(
 
 
 class Rectifier:
-    """Remaps the images of a rig to a rectified pair; the maps are made once.
+    """Remaps the images of a rig to a rectified pair; the maps are computed once.
 
     Attributes:
         rig: the rig it was made for.
@@ -121,7 +124,7 @@ class Rectifier:
         rig: two calibrated cameras.
 
     Raises:
-        DataError: as `rectify_rig`.
+        DataError: see `rectify_rig`.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -132,14 +135,14 @@ class Rectifier:
         self._right = _Remap(rig.right, self.rectification.R_right, self.rectification)
 
     def require_sizes(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> None:
-        """Check that images have the sizes of their cameras.
+        """Check that the images have their cameras' sizes.
 
         Args:
             left_px: width and height of the left image, px.
             right_px: width and height of the right image, px.
 
         Raises:
-            DataError: an image has another size than its camera in the rig.
+            DataError: an image's size differs from that of its camera in the rig.
         """
         for found_px, model, side in ((left_px, self.rig.left, Side.LEFT), (right_px, self.rig.right, Side.RIGHT)):
             if found_px != (model.width_px, model.height_px):
@@ -150,30 +153,31 @@ class Rectifier:
                 )
 
     def rectify(self, left: Image, right: Image) -> RectifiedPair:
-        """Rectify a pair of images as the cameras gave them.
+        """Rectify a pair of images as the cameras sent them.
 
         Args:
-            left: (H, W) grey or (H, W, 3) BGR, uint8, of the left camera's size.
-            right: the same of the right camera's size.
+            left: (H, W) grey or (H, W, 3) BGR, uint8, the left camera's size.
+            right: the same, the right camera's size.
 
         Returns:
             The pair, both of the rectification's size, every pixel filled.
 
         Raises:
-            DataError: an image has another size than its camera in the rig.
+            DataError: an image's size differs from that of its camera in the rig.
         """
         self.require_sizes(size_px(left), size_px(right))
         return RectifiedPair(self._left.apply(left), self._right.apply(right))
 
 
 class _Remap:
-    """One camera's way from its own image to the rectified one."""
+    """The remapping of one camera's image to the rectified one."""
 
     def __init__(self, model: CameraModel, rotation: Matrix, rectification: Rectification) -> None:
         size = (rectification.width_px, rectification.height_px)
         projection = rectification.P_left[:, :3]  # P_right's first three columns are the same
         x, y = cv2.initUndistortRectifyMap(model.matrix, model.distortion, rotation, projection, size, cv2.CV_32FC1)
-        # Bilinear interpolation reads 2 x 2 pixels; a camera twice as fine as the result would alias: average it down first.
+        # Bilinear interpolation reads 2 x 2 pixels. A camera twice as fine as the result would alias, so average it
+        # down first.
         self._shrink = max(1, int(_mean_focal_px(model) / rectification.geometry.focal_px + 1e-6))
         if self._shrink > 1:
             x, y = ((axis + 0.5) / self._shrink - 0.5 for axis in (x, y))
@@ -186,17 +190,17 @@ class _Remap:
             height, width = (length // self._shrink for length in image.shape[:2])
             whole_blocks = image[: height * self._shrink, : width * self._shrink]
             image = np.asarray(cv2.resize(whole_blocks, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
-        # Replicate: the maps stay inside, but the last half block of a shrunk image may lie 0.5 px outside.
+        # Replicate: the maps stay inside, but the last half block of a reduced image may lie 0.5 px outside.
         remapped = cv2.remap(image, self._whole, self._fraction, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(remapped, dtype=np.uint8)
 
 
 def _rotations(rig: Rig) -> tuple[Matrix, Matrix, float]:
-    """R_left, R_right and the baseline in metres; refuses rigs whose right camera is not to the right."""
+    """Return R_left, R_right and the baseline in metres; refuse rigs whose right camera is not on the right."""
     half = np.asarray(cv2.Rodrigues(rig.R_right_left)[0], dtype=np.float64) / 2
     left_to_middle = np.asarray(cv2.Rodrigues(half)[0], dtype=np.float64)
     right_to_middle = left_to_middle.T
-    # The right camera's centre, seen from the left one, in the middle's axes.
+    # The right camera's centre relative to the left one, in the middle's axes.
     to_right_m = -right_to_middle @ rig.t_right_left_m.reshape(3)
     baseline_m = float(np.linalg.norm(to_right_m))
     if not baseline_m > 0:
@@ -217,7 +221,7 @@ def _rotations(rig: Rig) -> tuple[Matrix, Matrix, float]:
 
 
 def _shortest_turn(source: Matrix, target: Matrix) -> Matrix:
-    """The rotation by the smallest angle that takes unit vector `source` to `target`."""
+    """Return the rotation by the smallest angle that takes unit vector `source` to `target`."""
     axis = np.cross(source, target)
     sine = float(np.linalg.norm(axis))
     angle = math.atan2(sine, float(source @ target))
@@ -230,16 +234,17 @@ def _mean_focal_px(model: CameraModel) -> float:
 
 
 def _rectified_slopes(points_px: NDArray[np.floating], model: CameraModel, rotation: Matrix) -> NDArray[np.float64]:
-    """(N, 2) slopes x / z and y / z in the rectified axes."""
+    """Return (N, 2) slopes x / z and y / z in the rectified axes."""
     points = np.asarray(points_px, dtype=np.float64).reshape(-1, 1, 2)
     slopes = cv2.undistortPointsIter(points, model.matrix, model.distortion, rotation, np.eye(3), _UNDISTORT)
     return np.asarray(slopes, dtype=np.float64).reshape(-1, 2)
 
 
 def _filled_window(model: CameraModel, rotation: Matrix, side: Side) -> tuple[float, float, float, float]:
-    """x0, y0, x1, y1 in slopes: a rectangle in the rectified view that the camera's image fills wholly.
+    """Return x0, y0, x1, y1 in slopes: a rectangle in the rectified view that the camera's image fills completely.
 
-    The four edges of the image, followed through the model, bound the view; the rectangle takes the innermost point of each.
+    The four edges of the image, mapped through the model, bound the view; the rectangle takes the innermost point of
+    each.
     """
     for share in _FIELD_SHARES:
         edges = _edges_px(model, share)
@@ -250,7 +255,7 @@ def _filled_window(model: CameraModel, rotation: Matrix, side: Side) -> tuple[fl
         return (
             float(left[:, 0].max()), float(top[:, 1].max()), float(right[:, 0].min()), float(bottom[:, 1].min())
         )  # fmt: skip
-    if rotation[2, 2] < math.hypot(rotation[0, 2], rotation[1, 2]):  # its axis leads more aside than forward
+    if rotation[2, 2] < math.hypot(rotation[0, 2], rotation[1, 2]):  # its axis points more sideways than forward
         raise DataError(
             f"the {side.value} camera looks too far aside of what both cameras could see",
             f"turn the cameras towards the same scene and {_RECALIBRATE}",
@@ -262,7 +267,7 @@ def _filled_window(model: CameraModel, rotation: Matrix, side: Side) -> tuple[fl
 
 
 def _edges_px(model: CameraModel, share: float) -> NDArray[np.float64]:
-    """(4, N, 2): points along the top, right, bottom and left edge of the image, drawn in to `share` of it."""
+    """Return (4, N, 2): points along the top, right, bottom and left edge of the image, shrunk to `share` of it about the centre."""
     ends = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64) - 0.5
     along = np.linspace(0, 1, _SAMPLES_PER_EDGE)[:, np.newaxis]
     extent = np.array([model.width_px - 1, model.height_px - 1], dtype=np.float64)
@@ -273,7 +278,7 @@ def _edges_px(model: CameraModel, share: float) -> NDArray[np.float64]:
 def _round_trip_error_px(
     slopes: NDArray[np.float64], points_px: NDArray[np.float64], model: CameraModel, rotation: Matrix
 ) -> float:
-    """Largest distance between points and their slopes projected back; NaN-safe (NaN gives infinity)."""
+    """Return the largest distance between points and their slopes projected back; NaN-safe (NaN gives infinity)."""
     rays = np.column_stack([slopes, np.ones(len(slopes))]) @ rotation  # rows: rotation.T @ ray
     if not np.all(rays[:, 2] > 0):
         return math.inf

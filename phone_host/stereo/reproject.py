@@ -1,4 +1,4 @@
-"""Disparity to metres and back, for a rectified pair.
+"""Converts disparity to metres and back, for a rectified pair.
 
 z = f b / (d + doffs), x = (u - cx) z / f, y = (v - cy) z / f: Hartley and Zisserman, "Multiple View Geometry", chapter 11;
 `doffs` as on https://vision.middlebury.edu/stereo/data/scenes2014/. OpenCV's `reprojectImageTo3D` does not mark missing values.
@@ -12,22 +12,22 @@ from numpy.typing import NDArray
 
 from phone_host.model import CloudImage, Disparity, StereoGeometry
 
-_DISPARITY_STEP = 16  # StereoSGBM wants multiples of 16; vector registers of 8-bit costs do as well.
+_DISPARITY_STEP = 16  # StereoSGBM needs multiples of 16; vector registers of 8-bit costs do as well.
 
-# Depths above this would overflow float32 in x and y; no such disparity is a measurement.
+# Greater depths would overflow float32 in x and y; no such disparity is a measurement.
 _FARTHEST_M = 1e30
 
 
 @lru_cache(maxsize=8)
 def _rays(geometry: StereoGeometry, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Slopes (u - cx) / f of the columns, (W,), and (v - cy) / f of the rows, (H, 1)."""
+    """Return the slopes (u - cx) / f of the columns, (W,), and (v - cy) / f of the rows, (H, 1)."""
     columns = (np.arange(width) - geometry.cx_px) / geometry.focal_px
     rows = (np.arange(height) - geometry.cy_px) / geometry.focal_px
     return columns.astype(np.float32), rows.astype(np.float32)[:, np.newaxis]
 
 
 def reproject(disparity: Disparity, geometry: StereoGeometry) -> CloudImage:
-    """Give every pixel its point in the left camera's axes.
+    """Compute the point of every pixel in the left camera's axes.
 
     Args:
         disparity: (H, W) float32, px, NaN = none.
@@ -52,7 +52,7 @@ def reproject(disparity: Disparity, geometry: StereoGeometry) -> CloudImage:
 
 
 def project(points_m: NDArray[np.floating], geometry: StereoGeometry) -> NDArray[np.float64]:
-    """The inverse of `reproject`: where points stand in the left image, and with which disparity.
+    """The inverse of `reproject`: compute where points appear in the left image, and their disparity.
 
     Args:
         points_m: (..., 3), m, z > 0, in the left camera's axes.
@@ -70,13 +70,13 @@ def project(points_m: NDArray[np.floating], geometry: StereoGeometry) -> NDArray
 
 
 def disparities_for_near(geometry: StereoGeometry, near_m: float, width_px: int) -> int:
-    """The number N of disparities 0 <= d < N that reaches from infinity to `near_m`.
+    """Return the number N of disparities 0 <= d < N that covers infinity down to `near_m`.
 
     Args:
         geometry: of the rectified pair.
         near_m: nearest depth wanted, m, > 0.
-        width_px: width of the rectified images; N stays below half of it: nearer than that, less than half of the left
-            image is seen by the right camera at all.
+        width_px: width of the rectified images. N does not exceed half of it: nearer than that, the right camera sees
+            less than half of the left image.
 
     Returns:
         N, a multiple of 16, at least 16.
@@ -88,6 +88,6 @@ def disparities_for_near(geometry: StereoGeometry, near_m: float, width_px: int)
 
 
 def nearest_depth_m(geometry: StereoGeometry, disparities: int) -> float:
-    """The nearest depth that N = `disparities` can give, m; NaN when d + doffs cannot be positive."""
+    """Return the nearest depth that N = `disparities` can give, m; NaN when d + doffs cannot be positive."""
     largest_px = disparities + geometry.doffs_px
     return geometry.focal_px * geometry.baseline_m / largest_px if largest_px > 0 else math.nan

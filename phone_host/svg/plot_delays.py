@@ -1,4 +1,4 @@
-"""Plots of the delay benchmark as inline SVG: delay against bytes with its line, and single pairs' lives. Pure; see `plots` for the rules."""
+"""Plots of the delay benchmark as inline SVG: delay against bytes with its line, and the lives of single pairs. Pure; see `plots` for the rules."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,24 +28,24 @@ _LETTER_PX: Final = 7
 
 
 class FittedLine(Protocol):
-    """A line through delays of frames of different size."""
+    """A line fitted to the delays of frames of different sizes."""
 
     @property
     def ns_per_byte(self) -> float:
-        """Its slope; NaN where there is no line."""
+        """Its slope; NaN if there is no line."""
 
     def delay_ns(self, size_bytes: float) -> float:
-        """Its delay for a frame, ns."""
+        """Return its delay for a frame, ns."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Scatter:
-    """Delays of frames of different size.
+    """Delays of frames of different sizes.
 
     Attributes:
         size_bytes: (N,).
         delay_ns: (N,).
-        number: (N,) 0 and up, which run each frame belongs to.
+        number: (N,) index, 0 and up, of the run to which each frame belongs.
         fit: the line through them.
     """
 
@@ -56,14 +56,15 @@ class Scatter:
 
 
 def against_bytes(scatter: Scatter, width_px: int, height_px: int = 240) -> str:
-    """Delay against bytes as dots, with the fitted line.
+    """Plot delay against bytes as dots, with the fitted line.
 
-    A delay far beyond the rest is cut off and marked by a triangle at the top, so that the line's neighbourhood stays legible.
+    A delay far beyond the rest is cut off and marked by a triangle at the top, so that the region of the line stays
+    legible.
 
     Args:
         scatter: what to draw.
-        width_px: of the picture.
-        height_px: of the picture.
+        width_px: width of the picture.
+        height_px: height of the picture.
 
     Returns:
         An <svg> element.
@@ -101,10 +102,10 @@ class Compared:
     """One figure, measured and predicted.
 
     Attributes:
-        name: of the run.
-        measured_ns: what was.
-        predicted_ns: what the model said.
-        number: 0 and up, what it belongs to.
+        name: name of the run.
+        measured_ns: the measured value.
+        predicted_ns: the value that the model predicted.
+        number: index, 0 and up, of what it belongs to.
     """
 
     name: str
@@ -114,12 +115,12 @@ class Compared:
 
 
 def compared(points: Sequence[Compared], width_px: int, height_px: int = 300) -> str:
-    """Predicted against measured, both logarithmic; on the line they are equal.
+    """Plot predicted against measured, both logarithmic; on the line they are equal.
 
     Args:
         points: at least one.
-        width_px: of the picture.
-        height_px: of the picture.
+        width_px: width of the picture.
+        height_px: height of the picture.
 
     Returns:
         An <svg> element.
@@ -152,7 +153,7 @@ def compared(points: Sequence[Compared], width_px: int, height_px: int = 300) ->
 
 
 def _steps(low: float, high: float) -> list[float]:
-    """1, 2 and 5 of each decade within two values."""
+    """Return 1, 2 and 5 of each decade between two values."""
     decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
     return [step * 10.0**decade for decade in decades for step in (1, 2, 5) if low <= step * 10.0**decade <= high]
 
@@ -162,7 +163,7 @@ class Life:
     """One pair whose life is drawn.
 
     Attributes:
-        heading: which one.
+        heading: text that says which one.
         ledger: its marks.
     """
 
@@ -171,13 +172,13 @@ class Life:
 
 
 def lives(pairs: Sequence[Life], width_px: int) -> str:
-    """Single pairs' lives as bars on three lanes each, board, link and host, on one time axis from the exposure.
+    """Draw the lives of single pairs as bars on three lanes each, board, link and host, on one time axis from the exposure.
 
-    The stages of processing stand below its bar. A bar too short to be seen is drawn two pixels wide.
+    The stages of processing are drawn below its bar. A bar too short to see is drawn two pixels wide.
 
     Args:
         pairs: in order.
-        width_px: of the picture.
+        width_px: width of the picture.
 
     Returns:
         An <svg> element.
@@ -209,9 +210,9 @@ def lives(pairs: Sequence[Life], width_px: int) -> str:
 
 
 def _life(ledger: PairLedger, x: Linear, top: float) -> str:
-    """The three lanes of one pair."""
+    """Draw the three lanes of one pair."""
     board, zero_ns = ledger.board, ledger.board.exposed_ns
-    # Lane, name, from, to, colour as everywhere (report_page.MEANINGS).
+    # Lane, name, from, to, colour as on all pages (report_page.MEANINGS).
     bars = (
         (0, "capture", zero_ns, board.grabbed_ns, 0),
         (0, "outbox", board.grabbed_ns, board.sent_ns, 1),
@@ -242,7 +243,7 @@ def _life(ledger: PairLedger, x: Linear, top: float) -> str:
 def _bar(
     name: str, x: Linear, reach_ns: tuple[float, float], place: tuple[float, float], colour: int, *, words: bool = True
 ) -> str:
-    """One bar; `place` is its top and height, px. Its name stands in it where it fits."""
+    """Draw one bar; `place` is its top and height, px. Its name is written in it if there is room."""
     left, right = (x.px(value) for value in reach_ns)
     top, height = place
     length = duration_text(reach_ns[1] - reach_ns[0])

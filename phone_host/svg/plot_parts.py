@@ -1,6 +1,7 @@
-"""What all plots are drawn with: colours, marks, axes, the frame around them. Pure: values in, SVG out.
+"""The parts of all plots: colours, marks, axes, the frame around them. Pure: values in, SVG out.
 
-There are eight colours. Where more things than that are told apart, further ones take the same colours with another shape of mark, so that the first 32 differ.
+There are eight colours. Where more things than that must differ, further ones take the same colours with another shape
+of mark, so that the first 32 differ.
 """
 
 from collections.abc import Sequence
@@ -9,7 +10,8 @@ from typing import Final
 
 from phone_host.svg.plot_scale import Linear, duration_unit, number_text, ticks
 
-# Okabe and Ito's palette, safe for all common kinds of colour blindness ("Color Universal Design", 2008); the last is grey.
+# Okabe and Ito's palette, safe for all common kinds of colour blindness ("Color Universal Design", 2008); the last
+# colour is grey.
 STYLE: Final = """
 :root{--c0:#56b4e9;--c1:#e69f00;--c2:#009e73;--c3:#cc79a7;--c4:#d55e00;--c5:#0072b2;--c6:#e3d332;--c7:#9aa3ad}
 @media (prefers-color-scheme:dark){:root{--c3:#d88cb6;--c5:#3d9be0;--c4:#e8702a;--c2:#1fb98d;--c7:#77818c}}
@@ -29,25 +31,25 @@ LEFT_PX, RIGHT_PX, TOP_PX, BOTTOM_PX = 52, 10, 24, 34
 """Margins of a plot with axes."""
 
 DARK_COLOURS: Final = (2, 4, 5)
-"""Those on which text is pale in the light."""
+"""The colours on which text is light in light mode."""
 
 _COLOURS: Final = 8
 
 
 def fill(number: int) -> str:
-    """The attribute that gives something the colour of the thing with this number, 0 and up."""
+    """Return the attribute that gives something the colour of the thing with this number, 0 and up."""
     return f'style="fill:var(--c{number % _COLOURS})"'
 
 
 def point(number: int, at_px: tuple[float, float], radius: float, title: str, opacity: str = "1") -> str:
-    """A mark for one of many things: a dot, a square, a diamond or a ring, in its colour.
+    """Draw a mark for one of many things: a dot, a square, a diamond or a ring, in its colour.
 
     Args:
-        number: of the thing, 0 and up.
-        at_px: its middle.
-        radius: of the dot, px; the other shapes have about its area.
+        number: number of the thing, 0 and up.
+        at_px: its centre.
+        radius: radius of the dot, px; the other shapes have about its area.
         title: plain text, shown when the pointer rests on it.
-        opacity: of its inside.
+        opacity: opacity of the fill.
     """
     x, y = at_px
     words, inside = f"<title>{escape(title)}</title>", f'fill-opacity="{opacity}" {fill(number)}'
@@ -66,12 +68,12 @@ def point(number: int, at_px: tuple[float, float], radius: float, title: str, op
 
 
 def triangle(number: int, x: float, y: float, title: str) -> str:
-    """A small triangle that stands on `y` and points up: a value beyond the plot's edge."""
+    """Draw a small triangle that stands on `y` and points up: a value beyond the plot's edge."""
     return f'<path d="M{x - 4:.1f} {y:.1f}l4 -7l4 7z" {fill(number)}><title>{escape(title)}</title></path>'
 
 
 def hit(x: float, y: float, width: float, height: float, title: str) -> str:
-    """An invisible area that shows a text when the pointer rests on it."""
+    """Make an invisible area that shows a text when the pointer rests on it."""
     return (
         f'<rect class="hit" x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}">'
         f"<title>{escape(title)}</title></rect>"
@@ -79,7 +81,7 @@ def hit(x: float, y: float, width: float, height: float, title: str) -> str:
 
 
 def legend(labels: Sequence[tuple[str, int]]) -> str:
-    """A legend as an HTML list: it wraps where the window is narrow.
+    """Make a legend as an HTML list, which wraps in a narrow window.
 
     Args:
         labels: names with their index into the palette, 0..7.
@@ -89,7 +91,7 @@ def legend(labels: Sequence[tuple[str, int]]) -> str:
 
 
 def point_legend(labels: Sequence[tuple[str, int]]) -> str:
-    """The same for points: each name beside its mark.
+    """Make a legend for points: each name beside its mark.
 
     Args:
         labels: names with their numbers, 0 and up.
@@ -102,14 +104,14 @@ def point_legend(labels: Sequence[tuple[str, int]]) -> str:
 
 
 def axes(x: Linear, y: Linear, size_px: tuple[int, int], name: str, unit: float = 1.0) -> str:
-    """Grid, tick labels and names of both axes; the upright one is a duration.
+    """Draw grid, tick labels and names of both axes; the vertical one is a duration.
 
     Args:
-        x: scale of the level axis.
-        y: scale of the upright axis, ns.
+        x: scale of the horizontal axis.
+        y: scale of the vertical axis, ns.
         size_px: width and height of the picture.
-        name: of the level axis, plain text.
-        unit: what its numbers count, in those of `x`.
+        name: name of the horizontal axis, plain text.
+        unit: the unit of its labels, in the unit of `x`.
     """
     width_px, height_px = size_px
     unit_ns, symbol = duration_unit(max(abs(y.low), abs(y.high)))
@@ -129,12 +131,12 @@ def axes(x: Linear, y: Linear, size_px: tuple[int, int], name: str, unit: float 
 
 
 def svg(width_px: int, height_px: float, label: str, parts: Sequence[str]) -> str:
-    """The picture: an <svg> element around its parts.
+    """Make the picture: an <svg> element around its parts.
 
     Args:
-        width_px: of the picture.
-        height_px: of the picture.
-        label: what it shows, for those who do not see it.
+        width_px: width of the picture.
+        height_px: height of the picture.
+        label: what it shows, for screen readers.
         parts: SVG.
     """
     return (
@@ -144,6 +146,6 @@ def svg(width_px: int, height_px: float, label: str, parts: Sequence[str]) -> st
 
 
 def empty(width_px: int, reason: str) -> str:
-    """A picture that says why there is nothing to see."""
+    """Make a picture that says why there is nothing to see."""
     words = f'<text x="{width_px / 2:.0f}" y="34" text-anchor="middle">{escape(reason)}</text>'
     return svg(width_px, 60.0, reason, [words])

@@ -1,4 +1,4 @@
-"""Numbers of a plot: round tick marks, durations in words, scales from values to pixels. Pure."""
+"""The numbers of a plot: round tick marks, durations as text, scales from values to pixels. Pure."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ _UNITS: Final = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"), (1.0, "ns"))
 
 
 def duration_unit(ns: float) -> tuple[float, str]:
-    """The unit in which a duration has one to three digits before its point.
+    """Choose the unit in which a duration has one to three digits before its decimal point.
 
     Args:
         ns: the duration, ns; its sign does not matter.
@@ -26,12 +26,12 @@ def duration_unit(ns: float) -> tuple[float, str]:
 
 
 def duration_text(ns: float) -> str:
-    """A duration with three significant digits and its unit; a dash for NaN, 0 for zero."""
+    """Write a duration with three significant digits and its unit; a dash for NaN, 0 for zero."""
     if math.isnan(ns):
         return "\u2013"
     if ns == 0.0:
         return "0"
-    # 999.6 µs rounds to four digits: it is a millisecond.
+    # 999.6 µs would round to four digits, so it becomes a millisecond.
     unit, name = duration_unit(float(f"{ns:.3g}"))
     value = ns / unit
     digits = max(0, 2 - math.floor(math.log10(max(1.0, abs(float(f"{value:.3g}"))))))
@@ -39,7 +39,7 @@ def duration_text(ns: float) -> str:
 
 
 def ticks(low: float, high: float, count: int) -> list[float]:
-    """Round numbers (1, 2 or 5 times a power of ten apart) inside an interval.
+    """Choose round numbers (1, 2 or 5 times a power of ten apart) inside an interval.
 
     Args:
         low: its lower end.
@@ -47,7 +47,7 @@ def ticks(low: float, high: float, count: int) -> list[float]:
         count: about how many are wanted.
 
     Returns:
-        Ascending; never more than `count` + 2.
+        The numbers, ascending; never more than `count` + 2.
     """
     rough = (high - low) / max(1, count)
     power = 10.0 ** math.floor(math.log10(rough))
@@ -57,13 +57,13 @@ def ticks(low: float, high: float, count: int) -> list[float]:
 
 
 def number_text(value: float) -> str:
-    """A tick's number without needless digits."""
+    """Write a tick's number without needless digits."""
     return f"{value:.6g}".replace("-", "\u2212")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Linear:
-    """A straight scale: `low` stands at `start_px`, `high` at `end_px`."""
+    """A linear scale: `low` maps to `start_px`, `high` to `end_px`."""
 
     low: float
     high: float
@@ -71,14 +71,14 @@ class Linear:
     end_px: float
 
     def px(self, value: float) -> float:
-        """Where a value stands; values outside stand at the nearer end."""
+        """Return a value's position; values outside the scale go to the nearer end."""
         share = (min(max(value, self.low), self.high) - self.low) / (self.high - self.low)
         return self.start_px + share * (self.end_px - self.start_px)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Log:
-    """A logarithmic scale over whole decades of positive numbers; zero and less stand at its start."""
+    """A logarithmic scale of positive numbers; zero and negative values go to its start."""
 
     low: float
     high: float
@@ -86,19 +86,19 @@ class Log:
     end_px: float
 
     def px(self, value: float) -> float:
-        """Where a value stands; values outside stand at the nearer end."""
+        """Return a value's position; values outside the scale go to the nearer end."""
         inside = min(max(value, self.low), self.high)
         share = math.log(inside / self.low) / math.log(self.high / self.low)
         return self.start_px + share * (self.end_px - self.start_px)
 
     def decades(self) -> list[float]:
-        """The powers of ten on the scale."""
+        """Return the powers of ten on the scale, which must consist of whole decades."""
         first, last = round(math.log10(self.low)), round(math.log10(self.high))
         return [10.0**power for power in range(first, last + 1)]
 
 
 def log_scale(values: Values, start_px: float, end_px: float) -> Log:
-    """A logarithmic scale that holds all positive values, in whole decades; 1 µs to 1 ms where there are none.
+    """Make a logarithmic scale in whole decades that holds all positive values; 1 µs to 1 ms if there are none.
 
     Args:
         values: ns.
@@ -114,7 +114,7 @@ def log_scale(values: Values, start_px: float, end_px: float) -> Log:
 
 
 def span(values: Values) -> tuple[float, float]:
-    """Least and greatest finite value; (0, 1) where there is none, one apart where all are equal."""
+    """Return the least and the greatest finite value; (0, 1) if there is none, one apart if all are equal."""
     finite = values[np.isfinite(values)]
     if not finite.size:
         return 0.0, 1.0

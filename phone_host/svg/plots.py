@@ -1,8 +1,8 @@
 """Plots as inline SVG: delays over time, their distributions, their shares. Pure: values in, text out.
 
-Every plot is drawn for a given width in CSS pixels and is not meant to be scaled much, so that its text stays legible; colours
-are the CSS variables --c0 to --c7 and a few of the page's own (see `plot_parts.STYLE`), so that one SVG serves light and dark. What a mark
-means is in its <title>, which browsers show when the pointer rests on it.
+Every plot is drawn for a given width in CSS pixels and is not meant to be scaled much, so that its text stays legible.
+Colours are the CSS variables --c0 to --c7 and a few of the page's own (see `plot_parts.STYLE`), so that one SVG serves
+light and dark mode. What a mark means is in its <title>, which browsers show when the pointer rests on it.
 
 All values are durations in ns, float64, NaN = no measurement. The x axis is time in s.
 """
@@ -20,10 +20,10 @@ from phone_host.svg.plot_scale import Linear, Values, duration_text, duration_un
 _LEAST_COLUMN_PX = 3
 _ROOM_FOR_MAX_PX = 440
 _LETTER_PX = 8
-"""Room for a letter of 12 px text, generously."""
+"""Space for a letter of 12 px text, generous."""
 
 _OUTLIER = 2.5
-"""A total this many times above the 98th percentile would flatten all others: it is cut off and marked."""
+"""A total this many times above the 98th percentile would flatten all others, so it is cut off and marked."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -59,7 +59,7 @@ class Share:
 
 
 def mean_share(quantity: Quantity) -> Share:
-    """A quantity's mean as a piece of a budget."""
+    """Return a quantity's mean as a share of a budget."""
     return Share(quantity.label, float(quantity.values_ns.mean()), quantity.colour)
 
 
@@ -68,7 +68,7 @@ class Budget:
     """One bar made of shares that add up.
 
     Attributes:
-        label: what it is the sum of, for example an interface.
+        label: the name of the sum, for example an interface.
         shares: in order.
     """
 
@@ -90,16 +90,16 @@ class Strips:
 
 
 def stacked_over_time(time_s: Values, layers: Sequence[Quantity], width_px: int, height_px: int = 260) -> str:
-    """Columns over time whose parts stack up to their sum.
+    """Plot columns over time whose parts stack up to their sum.
 
-    Each pair is a column; where there are more pairs than room, a column is the mean of the pairs of its slice of time (means
-    add up as the parts do). A sum far beyond the rest is cut off and marked by a triangle.
+    Each pair is a column. If there are more pairs than room, a column is the mean of the pairs in its slice of time
+    (means add up as the parts do). A sum far beyond the rest is cut off and marked by a triangle.
 
     Args:
         time_s: (N,) when each pair was done, ascending, s.
-        layers: what adds up, lowest first, N values each.
-        width_px: of the picture.
-        height_px: of the picture.
+        layers: the quantities that add up, lowest first, N values each.
+        width_px: width of the picture.
+        height_px: height of the picture.
 
     Returns:
         An <svg> element.
@@ -147,14 +147,14 @@ def stacked_over_time(time_s: Values, layers: Sequence[Quantity], width_px: int,
 def over_time(
     time_s: Values, quantity: Quantity, width_px: int, height_px: int = 190, band_ns: Values | None = None
 ) -> str:
-    """One quantity of every pair as dots over time, about zero where it has a sign.
+    """Plot one quantity of every pair as dots over time; the axis includes zero.
 
     Args:
         time_s: (N,) s, ascending.
         quantity: N values.
-        width_px: of the picture.
-        height_px: of the picture.
-        band_ns: (N,) half width of a band about zero drawn behind the dots, ns.
+        width_px: width of the picture.
+        height_px: height of the picture.
+        band_ns: (N,) half-width of a band around zero, drawn behind the dots, ns.
 
     Returns:
         An <svg> element.
@@ -172,7 +172,7 @@ def over_time(
     parts = [axes(x, y, (width_px, height_px), "time, s")]
     if band_ns is not None:
         parts.append(_band(time_s=time_s, half_ns=band_ns, x=x, y=y, colour=quantity.colour))
-    # More dots than three for every pixel add ink, not knowledge; extremes stay.
+    # More than three dots per pixel add ink, not information; extremes are kept.
     keep = np.flatnonzero(known)
     if keep.size > 3 * width_px:
         ends = [int(keep[np.argmin(values[keep])]), int(keep[np.argmax(values[keep])])]
@@ -191,13 +191,14 @@ def over_time(
 
 
 def distributions(groups: Sequence[Strips], width_px: int) -> str:
-    """Strips on one logarithmic axis, one for each quantity.
+    """Plot strips on one logarithmic axis, one for each quantity.
 
-    A bar reaches from p5 to p95, with a line at p50 and a tick at p99; a thin line from the least to a dot at the greatest.
+    A bar reaches from p5 to p95, with a line at p50 and a tick at p99. A thin line reaches from the least value to a
+    dot at the greatest.
 
     Args:
         groups: one or several (interfaces side by side), each with its quantities.
-        width_px: of the picture.
+        width_px: width of the picture.
 
     Returns:
         An <svg> element.
@@ -216,7 +217,7 @@ def distributions(groups: Sequence[Strips], width_px: int) -> str:
             rows.append(_strip(quantity, x.px, height, width_px))
             height += 36.0
     marks = x.decades()
-    # Where the window is narrow, every other decade has its name.
+    # In a narrow picture only some of the decades are labelled.
     every = max(1, math.ceil(len(marks) * 52 / width_px))
     axis = "".join(f'<path class="grid" d="M{x.px(mark):.1f} 0V{height:.0f}"/>' for mark in marks)
     axis += "".join(
@@ -228,11 +229,11 @@ def distributions(groups: Sequence[Strips], width_px: int) -> str:
 
 
 def budgets(rows: Sequence[Budget], width_px: int) -> str:
-    """Horizontal bars whose shares add up, all on one axis from zero.
+    """Plot horizontal bars whose shares add up, all on one axis from zero.
 
     Args:
         rows: one or several (interfaces side by side).
-        width_px: of the picture.
+        width_px: width of the picture.
 
     Returns:
         An <svg> element.
@@ -266,7 +267,7 @@ def budgets(rows: Sequence[Budget], width_px: int) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Column:
-    """One column of a stacked plot: when, what it stands for, and the mean of each layer, ns."""
+    """One column of a stacked plot: its time, what it shows, and the mean of each layer, ns."""
 
     start_s: float
     end_s: float
@@ -275,7 +276,7 @@ class _Column:
 
 
 def _columns(time_s: Values, layers: Sequence[Quantity], room_px: int) -> Iterator[_Column]:
-    """Pairs as columns, or slices of time where there are too many pairs; empty slices give none, so that a gap shows."""
+    """Yield pairs as columns, or slices of time if there are too many pairs; empty slices yield none, so that a gap shows."""
     count = time_s.size
     if not count:
         return
@@ -303,7 +304,7 @@ def _columns(time_s: Values, layers: Sequence[Quantity], room_px: int) -> Iterat
 
 
 def _strip(quantity: Quantity, px: Callable[[float], float], top: float, width_px: int) -> str:
-    """One row of `distributions`."""
+    """Draw one row of `distributions`."""
     values = quantity.values_ns[np.isfinite(quantity.values_ns)]
     name = f'<text class="strong" x="0" y="{top + 12:.0f}">{escape(quantity.label)}<title>{escape(quantity.meaning)}</title></text>'
     if not values.size:

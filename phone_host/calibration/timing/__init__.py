@@ -1,1 +1,1 @@
-"""What a stamp means: the constant between the stamps of two cameras, measured from what both of them filmed. Pure: images and stamps in, figures out."""
+"""Measures the time offset, the constant between two cameras' stamps, from what both filmed. Pure: images and stamps in, figures out."""

@@ -1,9 +1,10 @@
-"""The time offset from a lamp or LED that is switched on and off in view of both cameras.
+"""Measures the time offset with a lamp or LED that is switched on and off in view of both cameras.
 
-Each change of brightness gives one moment in each camera: where the straight line between the samples before and after it crosses the middle
-between dark and bright. With samples a period apart such a moment is off by up to half a period, but as often early as late if the lamp
-does not keep step with the camera: the mean over many changes has no bias, whatever the exposure time. A lamp that blinks regularly may keep step,
-which no image would show: it is refused.
+Each change of brightness gives one moment per camera: where the straight line between the samples before and after it
+crosses the middle between dark and bright. With samples one period apart, such a moment is off by up to half a period.
+If the lamp does not keep step with the camera, it is off as often early as late, so the mean over many changes has no
+bias, whatever the exposure time. A lamp that blinks regularly may keep step, and no image would show it; such a lamp is
+refused.
 """
 
 import math
@@ -19,20 +20,20 @@ from phone_host.calibration.timing.shots import SIGMAS, Measured, Method, Times,
 from phone_host.model import Image, TimeOffset
 
 CELLS: Final = (12, 9)
-"""The image is looked at in so many columns and rows: a lamp in a corner would drown in the mean of a whole image."""
+"""Columns and rows of cells into which the image is divided: a lamp in a corner would be lost in the mean of a whole image."""
 
 _LEAST_STEP: Final = 4.0
-"""Grey levels between dark and bright in the brightest cell: less is flicker of the mains or automatic exposure."""
+"""Grey levels between dark and bright in the brightest cell. Less may be mains flicker or automatic exposure."""
 
 _LEAST_EDGES: Final = 8
 _IRREGULAR: Final = 3.0
-"""Pauses between changes must differ by so many periods: seen a period more or less exactly, even equal ones differ by two."""
+"""Pauses between changes must differ by this many periods. Each end is seen to within a period, so even equal pauses differ by up to two."""
 
 _MOST_PAUSES: Final = (10, 90)
-"""Percent of the pauses that are compared: those around a change that fell into a gap of the frames are longer, also of a regular lamp."""
+"""Percentiles of the pauses that are compared. Pauses around a change that fell into a gap of the frames are longer, even with a regular lamp."""
 
 _SEARCH_S: Final = 0.5
-"""No camera with its driver is later than another one by more."""
+"""No camera with its driver is later than another by more than this."""
 
 _LOW, _HIGH = 0.35, 0.65
 _REMEDY: Final = "switch a lamp in view of both cameras on and off some twenty times, at irregular moments"
@@ -53,7 +54,7 @@ class Brightness:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Signal:
-    """The lamp alone: 0 dark, 1 bright; and the row of the image where it is seen."""
+    """The lamp alone: 0 dark, 1 bright; and the row of the image in which it is seen."""
 
     times_s: Times
     values: NDArray[np.float64]
@@ -61,7 +62,7 @@ class _Signal:
 
 
 def brightness(image: Image) -> NDArray[np.float64]:
-    """Mean grey levels of the cells of an image, (C,) float64.
+    """Return the mean grey levels of the cells of an image, (C,) float64.
 
     Args:
         image: (H, W) or (H, W, 3), uint8.
@@ -78,7 +79,7 @@ def measure_lamp(board: Brightness, host: Brightness) -> Measured:
         host: what the host's camera saw.
 
     Raises:
-        DataError: too short, no lamp seen, or too few changes.
+        DataError: the recording is too short, no lamp was seen, or there were too few changes.
     """
     require_shots(len(board.times_s), len(host.times_s))
     left, right = _lamp(board, "board"), _lamp(host, "host")
@@ -100,7 +101,7 @@ def measure_lamp(board: Brightness, host: Brightness) -> Measured:
 
 
 def _lamp(seen: Brightness, whose: str) -> _Signal:
-    """The common course of all cells (first principal component), scaled to 0 and 1."""
+    """Return the course that all cells share (first principal component), scaled to 0 and 1."""
     centred = seen.cells - np.median(seen.cells, axis=0)
     _, _, ways = np.linalg.svd(centred, full_matrices=False)
     way = ways[0] * (1.0 if ways[0].sum() >= 0 else -1.0)
@@ -126,7 +127,7 @@ def _misfit(left: _Signal, right: _Signal, offset_s: float) -> float:
 
 
 def _edges(signal: _Signal) -> list[tuple[float, bool]]:
-    """Moments of the changes, and whether it became bright. One across a gap in the frames is left out: it could be anywhere."""
+    """Return the moments of the changes, and whether it became bright. A change across a gap in the frames is left out: it could be anywhere."""
     longest_s = 1.7 * period_s(signal.times_s)
     edges: list[tuple[float, bool]] = []
     times, values = signal.times_s, signal.values
@@ -147,7 +148,7 @@ def _edges(signal: _Signal) -> list[tuple[float, bool]]:
 
 
 def _match(left: list[tuple[float, bool]], right: list[tuple[float, bool]], coarse_s: float, period: float) -> Times:
-    """Differences of the changes that both cameras saw, right minus left."""
+    """Return the differences of the changes that both cameras saw, right minus left."""
     pairs = []
     for moment, brighter in left:
         near = [other for other, its in right if its is brighter and abs(other - moment - coarse_s) < 1.6 * period]

@@ -1,10 +1,11 @@
-"""The time offset from a screen that counts its own refreshes in a pattern that both cameras film.
+"""Measures the time offset with a screen that counts its own refreshes in a pattern that both cameras film.
 
-The pattern: four ArUco markers in the corners to find it by, and twelve cells between them: the Gray code of the number of the refresh, so that a
-frame whose exposure sees two refreshes shows one number or the other. The screen's clock need not be known: both cameras' stamps are
-compared with the same count. A number stands for a whole refresh (16.7 ms at 60 Hz), so where within it a frame falls is found from the
-extremes: a camera that drifts against the screen sees each number from its first to its last moment. One that keeps step
-does not; then the uncertainty is what remains open.
+The pattern has four ArUco markers in the corners, by which it is found, and twelve cells between them: the Gray code of
+the refresh number. A frame whose exposure sees two refreshes therefore shows one number or the other. The screen's
+clock need not be known, because both cameras' stamps are compared with the same count. A number stands for a whole
+refresh (16.7 ms at 60 Hz). The extremes show where within it a frame falls: a camera that drifts against the screen
+sees each number from its first to its last moment. A camera that keeps step does not; the uncertainty then covers what
+remains open.
 """
 
 from dataclasses import dataclass
@@ -35,14 +36,14 @@ _LEAST_CONTRAST: Final = 20.0
 _LEAST_SEEN: Final = 30
 _SLOWEST_HZ: Final = 5.0
 _RATE_OFF: Final = 0.002
-"""How far the screen's rate as first fitted may be off: a refresh in eight seconds at 60 Hz is 0.2 %."""
+"""How far the first fit of the screen's rate may be off: one refresh in eight seconds at 60 Hz is 0.2 %."""
 
 _FITS: Final = 4
 _FAR_OFF: Final = 3.0
-"""A time is left out of the fit of the rate if it is off by so many medians, or refreshes: the two cameras' may lie to either side of the line."""
+"""A time is left out of the fit of the rate if it is off by this many medians, or refreshes: the two cameras' times may lie on either side of the line."""
 
 _SLACKS_S: Final = (0.0003, 0.001, 0.002, 0.004, 0.008)
-"""How far stamps may be off by themselves: the least that makes all frames agree is taken."""
+"""How far stamps may be off by themselves. The smallest value with which all frames agree is used."""
 
 _Read = tuple[Times, Times]
 """Stamps, s, and numbers of one camera's frames."""
@@ -52,11 +53,11 @@ _REMEDY: Final = "show the page of --pattern full screen, near enough that its m
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A pattern as found in an image.
+    """A pattern found in an image.
 
     Attributes:
         number: the count, 0 to COUNT - 1.
-        row: where the middle of the cells stands, 0 top to 1 bottom of the image.
+        row: position of the middle of the cells, 0 top to 1 bottom of the image.
     """
 
     number: int
@@ -68,11 +69,11 @@ class Counted:
     """What one camera read.
 
     Attributes:
-        shots: frames that were looked at.
-        times_s: (N,) stamps of those in which the pattern was found.
-        numbers: (N,) its numbers.
+        shots: number of frames examined.
+        times_s: (N,) stamps of the frames in which the pattern was found.
+        numbers: (N,) the numbers read in them.
         row: mean row of the pattern.
-        period: between frames, s.
+        period: time between frames, s.
     """
 
     shots: int
@@ -83,12 +84,12 @@ class Counted:
 
 
 def marker_bits(number: int) -> NDArray[np.uint8]:
-    """A marker as (6, 6) uint8, 0 black, 255 white."""
+    """Return a marker as (6, 6) uint8, 0 black, 255 white."""
     return np.asarray(cv2.aruco.generateImageMarker(_DICTIONARY, number, MARKER), dtype=np.uint8)
 
 
 def draw(number: int, unit_px: int) -> Image:
-    """The pattern of a number as a grey image, `unit_px` pixels a unit: what the page shows."""
+    """Draw the pattern of a number as a grey image, `unit_px` pixels per unit, as the page shows it."""
     image = np.full((HEIGHT * unit_px, WIDTH * unit_px), 255, dtype=np.uint8)
     for index, (x, y) in enumerate(MARKERS):
         bits = np.kron(marker_bits(index), np.ones((unit_px, unit_px), dtype=np.uint8))
@@ -116,7 +117,7 @@ class PatternReader:
             image: (H, W) or (H, W, 3), uint8.
 
         Returns:
-            None where it is not seen well enough.
+            The reading; None if the pattern is not seen well enough.
         """
         grey = image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
         corners, found, _ = self._detector.detectMarkers(grey)
@@ -150,7 +151,7 @@ def measure_screen(board: Counted, host: Counted) -> Measured:
         host: what the host's camera read.
 
     Raises:
-        DataError: too short, or the pattern was not seen, or did not count.
+        DataError: the recording is too short, the pattern was not seen, or it did not count.
     """
     require_shots(board.shots, host.shots)
     for whose, seen in (("board", board), ("host", host)):
@@ -178,9 +179,10 @@ def measure_screen(board: Counted, host: Counted) -> Measured:
 
 
 def _interval(left: _Read, right: _Read, refresh_s: float) -> tuple[float, float, float]:
-    """The offsets that contradict no frame, s, and the refresh time in the middle of those that do not either.
+    """Return the lowest and the highest offset that contradict no frame, s, and the middle of the refresh times that contradict none either.
 
-    A frame at t that shows number n says: number 0 came between t - (n + 1) T and t - n T. For each T that leaves an interval in either camera.
+    A frame at t that shows number n says that number 0 came between t - (n + 1) T and t - n T. Each T is used for which
+    both cameras leave an interval.
     """
     ticks_s = refresh_s * np.linspace(1 - _RATE_OFF, 1 + _RATE_OFF, 1201)
     for slack_s in _SLACKS_S:
@@ -196,7 +198,7 @@ def _interval(left: _Read, right: _Read, refresh_s: float) -> tuple[float, float
 
 
 def _begins(side: _Read, ticks_s: Times, slack_s: float) -> tuple[Times, Times]:
-    """For each refresh time the earliest and the latest moment of number 0; one contradiction in a hundred frames is a misreading."""
+    """Return, for each refresh time, the earliest and latest moment of number 0; one contradiction in a hundred frames counts as a misreading."""
     times, numbers = side
     spared = len(times) // 100
     latest = times[:, None] - numbers[:, None] * ticks_s
@@ -210,7 +212,7 @@ def counted(times_s: Times, readings: list[Reading | None]) -> Counted:
 
     Args:
         times_s: (N,) stamps of all frames.
-        readings: of each frame.
+        readings: the reading of each frame.
     """
     found = [(t, reading) for t, reading in zip(times_s, readings, strict=True) if reading is not None]
     return Counted(
@@ -223,7 +225,7 @@ def counted(times_s: Times, readings: list[Reading | None]) -> Counted:
 
 
 def _unwrap(board: Counted, host: Counted) -> tuple[float, Times, Times]:
-    """The time of a refresh, nearly, and the numbers of both cameras without the count's turning over."""
+    """Return the approximate time of a refresh, and both cameras' numbers with the count's wrap-around undone."""
     rates = []
     for seen in (board, host):
         steps = np.diff(seen.numbers) % COUNT
@@ -250,7 +252,7 @@ def _unwrap(board: Counted, host: Counted) -> tuple[float, Times, Times]:
 
 
 def _refresh_s(times: Times, numbers: Times) -> float:
-    """The slope of the times over the numbers, but for those far off their line: a misread cell may change a number by thousands."""
+    """Fit the slope of the times over the numbers, without those far off their line: a misread cell may change a number by thousands."""
     line, use = np.zeros(2), np.ones(len(times), dtype=np.bool_)
     for _ in range(_FITS):
         line = np.polyfit(numbers[use], times[use], 1)
@@ -260,7 +262,7 @@ def _refresh_s(times: Times, numbers: Times) -> float:
 
 
 def _spread_ms(left: Times, right: Times, offset_s: float) -> float:
-    """Within what time both cameras' refreshes begin, if the offset were this: one refresh at best."""
+    """Return the time within which both cameras' refreshes would begin at this offset: one refresh at best."""
     low, high = np.percentile(np.concatenate([left, right - offset_s]), (1, 99))
     return float(high - low) * 1e3
 

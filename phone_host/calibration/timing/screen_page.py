@@ -1,4 +1,4 @@
-"""The pattern as a page for any browser: it needs nothing but itself, fills the screen and counts the screen's refreshes. Pure: text out."""
+"""The pattern as a page for any browser: self-contained, fills the screen and counts the screen's refreshes. Pure: text out."""
 
 import json
 
@@ -18,7 +18,7 @@ from phone_host.calibration.timing.screen import (
 def pattern_page() -> str:
     """Make the page.
 
-    A refresh that the browser left out is counted by its time, so that the number keeps step with the screen.
+    The page counts a refresh that the browser skipped by its time, so that the number keeps step with the screen.
     """
     values = {
         "width": WIDTH,

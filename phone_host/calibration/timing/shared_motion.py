@@ -1,9 +1,9 @@
-"""The time offset from a moving scene that a calibrated rig films: the offset at which both cameras see every point in one row.
+"""Measures the time offset from a moving scene that a calibrated rig films: the offset at which both cameras see every point in one row.
 
-In rectified images a point stands in one row of both. Where it moves up or down with velocity w, images taken dt apart differ in the row by w dt,
-and the stamps say only s of it: row difference = w (s - offset) + c, with c what the rig's calibration leaves. A straight line through the
-row differences of many features over their velocities has the offset as its slope; no image is interpolated. Motion along
-the rows says nothing, since it looks like depth.
+In rectified images a point has the same row in both. Where it moves up or down with velocity w, images taken dt apart
+differ in the row by w dt. The stamps account only for s of dt: row difference = w (s - offset) + c, where c is what the
+rig's calibration leaves. So a straight line through the row differences of many features over their velocities has the
+offset as its slope; no image is interpolated. Motion along the rows says nothing, because it looks like depth.
 """
 
 import math
@@ -24,15 +24,15 @@ from phone_host.stereo.reproject import disparities_for_near
 
 _FEATURES: Final = 500
 _MOVING, _STILL = 60, 10
-"""Features of an image that are looked for in the other camera's: those at rest only say how well the rig's rows agree."""
+"""Features per image that are searched in the other camera's; those at rest only say how well the rig's rows agree."""
 
 _NEAR_M: Final = 0.4
 _HALF: Final = 8
 _ROWS: Final = 15
-"""Half of a patch's side, and the largest difference of rows, px: a metre a second at a metre and 500 px, seen 30 ms late."""
+"""Half of a patch's side, and the largest difference of rows, px: 1 m/s at 1 m and 500 px focal length, seen 30 ms late."""
 
 _MATCH_PX: Final = 0.05
-"""A patch's place is biased by so much towards whole pixels, whatever the number of patches (Shimizu and Okutomi, 2001)."""
+"""A patch's position is biased by this much towards whole pixels, whatever the number of patches (Shimizu and Okutomi, 2001)."""
 
 _ALIKE: Final = 0.85
 _BEND_PX: Final = 2.0
@@ -40,7 +40,7 @@ _DRAWS: Final = 400
 _WINDOW: Final = (21, 21)
 _LEVELS: Final = 3
 _BACK_PX: Final = 0.5
-"""A feature that is followed there and back again and does not come home was lost."""
+"""A feature is lost if tracking it there and back ends farther than this from its start."""
 
 _LARGEST_ROW_PX: Final = 15.0
 
@@ -49,7 +49,7 @@ _MOVES_PX_S: Final = 25.0
 
 _LEAST_MOVING: Final = 60
 _LEAST_INSTANTS: Final = 8
-"""Moments at which something moves up or down: neighbours in one image share their errors, so that moments count, not features."""
+"""Least number of moments at which something moves up or down. Features in one image share their errors, so moments count, not features."""
 
 _MOST_INSTANTS: Final = 150
 _SEARCH_S: Final = 0.1
@@ -65,8 +65,8 @@ class Rows:
         velocity_px_s: (N,) how fast each moves down the left rectified image.
         difference_px: (N,) its row in the right image minus its row in the left.
         stamps_s: (N,) stamp of the right image minus that of the left.
-        instant: (N,) which left image it was found in.
-        row: (N,) where it stands in that image, 0 top to 1 bottom.
+        instant: (N,) the left image in which it was found.
+        row: (N,) its position in that image, 0 top to 1 bottom.
     """
 
     velocity_px_s: NDArray[np.float64]
@@ -85,14 +85,14 @@ def measure_shared_motion(
     """Measure the time offset.
 
     Args:
-        board: what the board's camera took, in order.
-        host: what the host's camera took, in order.
+        board: shots of the board's camera, in order.
+        host: shots of the host's camera, in order.
         rectifier: of the rig.
         look: decodes a shot.
-        advance: told the share that is done, 0 to 1.
+        advance: called with the share that is done, 0 to 1.
 
     Raises:
-        DataError: too short, or nothing moved up or down.
+        DataError: the recording is too short, or nothing moved up or down.
     """
     require_shots(len(board), len(host))
     board_is_left = rectifier.rig.board_side is Side.LEFT
@@ -101,7 +101,7 @@ def measure_shared_motion(
         left=left, right=right, offset_s=0.0, rectifier=rectifier, look=look, advance=lambda share: advance(share / 2)
     )
     coarse_s, _ = _slope(first)
-    # With the first answer the right neighbours in time are compared.
+    # With the first answer, compare the images that really are nearest in time.
     rows = _rows(
         left=left,
         right=right,
@@ -113,7 +113,8 @@ def measure_shared_motion(
     offset_s, uncertainty_s = _slope(rows)
     weights = rows.velocity_px_s**2
     period = (left[-1].exposed_ns - left[0].exposed_ns) / 1e9 / (len(left) - 1)
-    # Equal rows of unlike sensors are read at other times: what that adds up to where the motion was not in the middle of the image.
+    # Unlike sensors read equal rows at different times: add what that comes to if the motion was not in the middle of
+    # the image.
     uncertainty_s += rolling_s(float((rows.row * weights).sum() / weights.sum()), period)
     uncertainty_s += _MATCH_PX / math.sqrt(float(weights.mean()))
     if uncertainty_s * 1e9 > UNMEASURED_NS / 2:
@@ -139,7 +140,7 @@ def _rows(
     look: Look,
     advance: Callable[[float], None],
 ) -> Rows:
-    """Follow features through three left images, and find them in the right image nearest in time to the middle one."""
+    """Track features through three left images, and find them in the right image nearest in time to the middle one."""
     left_s, right_s, _ = to_seconds([shot.exposed_ns for shot in left], [shot.exposed_ns for shot in right])
     step = max(1, (len(left) - 2) // _MOST_INSTANTS)
     middles = range(1, len(left) - 1, step)
@@ -181,14 +182,14 @@ def _grey(image: Image) -> Image:
 def _compare(
     before: Image, now: Image, after: Image, right: Image, *, seconds: float, reach_px: int
 ) -> NDArray[np.float64]:
-    """(N, 3): how fast each feature moves down, px/s, its row in `right` minus that in `now`, px, and its row, 0 to 1."""
+    """Return (N, 3): each feature's downward velocity, px/s, its row in `right` minus that in `now`, px, and its row, 0 to 1."""
     corners: Any = cv2.goodFeaturesToTrack(now, _FEATURES, 0.01, 6)  # the stubs do not know that it may be None
     if corners is None:
         return np.empty((0, 3))
     points = np.asarray(corners, dtype=np.float32).reshape(-1, 2)
     (back, was_there), (on, is_there) = _follow(now, before, points), _follow(now, after, points)
     velocity = (on - back)[:, 1] / seconds
-    steady = np.abs(on + back - 2 * points).max(axis=1) < _BEND_PX  # else its velocity in the middle is another one
+    steady = np.abs(on + back - 2 * points).max(axis=1) < _BEND_PX  # else its velocity in the middle differs
     usable = was_there & is_there & steady
     moving = usable & (np.abs(velocity) > _MOVES_PX_S)
     chosen = np.concatenate([np.flatnonzero(moving)[:_MOVING], np.flatnonzero(usable & ~moving)[:_STILL]])
@@ -198,7 +199,7 @@ def _compare(
 
 
 def _follow(source: Image, target: Image, points: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Where features of one image are in another one, (N, 2), and whether that can be believed."""
+    """Return where features of one image are in another one, (N, 2), and whether that can be believed."""
     there, found = _tracked(source, target, points)
     home, found_home = _tracked(target, source, there)
     return there, found & found_home & (np.abs(home - points).max(axis=1) < _BACK_PX)
@@ -212,7 +213,7 @@ def _tracked(
 
 
 def _row_difference(left: Image, right: Image, point: NDArray[np.float32], reach_px: int) -> float:
-    """A feature's row in the right image minus that in the left, by normalised correlation of its surroundings; NaN: not found."""
+    """Return a feature's row in the right image minus that in the left, by normalised correlation of its surroundings; NaN: not found."""
     x, y = round(float(point[0])), round(float(point[1]))
     height, width = left.shape
     if not (_HALF + _ROWS <= y < height - _HALF - _ROWS and _HALF <= x < width - _HALF):
@@ -230,7 +231,7 @@ def _row_difference(left: Image, right: Image, point: NDArray[np.float32], reach
 
 
 def _slope(rows: Rows) -> tuple[float, float]:
-    """The offset and its uncertainty, s: Huber's regression, and the scatter of the answers when whole instants are drawn anew."""
+    """Return the offset and its uncertainty, s: Huber's regression, and the scatter of its results when whole instants are resampled."""
     design = np.column_stack([-rows.velocity_px_s, np.ones(len(rows.velocity_px_s))])
     target = rows.difference_px - rows.velocity_px_s * rows.stamps_s
     weights = np.ones(len(target))
@@ -240,7 +241,8 @@ def _slope(rows: Rows) -> tuple[float, float]:
             np.linalg.lstsq(design * weights[:, None], target * weights, rcond=None)[0], dtype=np.float64
         )
         weights = np.sqrt(np.minimum(1.0, _HUBER_PX / np.maximum(np.abs(target - design @ answer), 1e-9)))
-    # With the weights held, an instant's part of the normal equations is a 2 x 2 matrix: drawing instants anew is adding those up.
+    # With fixed weights, an instant's part of the normal equations is a 2 x 2 matrix, so resampling instants means
+    # adding those up.
     instants = np.unique(rows.instant)
     weighted, wanted = design * weights[:, None], target * weights
     parts = [
@@ -254,7 +256,7 @@ def _slope(rows: Rows) -> tuple[float, float]:
 
 
 def _error_px(rows: Rows, offset_s: float) -> float:
-    """Row difference that is left at an offset, RMS with large ones cut off, px."""
+    """Return the RMS row difference that is left at an offset, with large ones cut off, px."""
     left = rows.difference_px - rows.velocity_px_s * (rows.stamps_s - offset_s)
     left = left - np.median(left)
     return float(np.sqrt(np.mean(np.minimum(np.abs(left), _LARGEST_ROW_PX) ** 2)))

@@ -1,8 +1,8 @@
-"""What all measurements of a time offset take and give.
+"""The inputs and outputs of all measurements of a time offset.
 
-The time offset is the stamp of the host's camera minus the stamp of the board's camera for one and the same moment, both on the host's clock;
-it is added to the board's stamps before frames are paired. A stamp means the exposure mid-point of the middle row: with a rolling shutter a
-row at y is exposed (y / height - 1/2) readouts later.
+The time offset is the stamp of the host's camera minus the stamp of the board's camera for one and the same moment,
+both on the host's clock. It is added to the board's stamps before frames are paired. A stamp means the exposure
+mid-point of the middle row: with a rolling shutter a row at y is exposed (y / height - 1/2) readouts later.
 """
 
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from phone_host.model import TimeOffset
 from phone_host.stereo.raw_images import EncodedImage
 
 Times = NDArray[np.float64]
-"""(N,) float64, s, from the first shot of either camera on: ns as float64 would lose digits of a clock that counts days."""
+"""(N,) float64, s, from the first shot of either camera on: ns as float64 would lose digits on a clock that counts days."""
 
 SIGMAS: Final = 3.3
 """Half-width that holds 99.9 % of a normal distribution."""
 
 LEAST_SHOTS: Final = 30
-"""Below a second of video nothing can be said."""
+"""Less than a second of video is not enough to measure anything."""
 
 
 class Method(Enum):
@@ -49,15 +49,15 @@ class Shot:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """A time offset, and how well each other one would fit.
+    """A time offset, and how well each other offset would fit.
 
     Attributes:
         offset: with its uncertainty (99.9 %).
         method: how it was measured.
-        samples: edges, decoded frames or features that it rests on.
+        samples: number of edges, decoded frames or features behind it.
         offsets_s: (M,) offsets that were tried.
-        misfits: (M,) how badly each fits; what it is says `misfit`.
-        misfit: name and unit of that figure.
+        misfits: (M,) how badly each fits, in the measure that `misfit` names.
+        misfit: name and unit of that measure.
     """
 
     offset: TimeOffset
@@ -72,7 +72,7 @@ def require_shots(board: int, host: int) -> None:
     """Refuse recordings that are too short.
 
     Raises:
-        DataError: names the camera.
+        DataError: a recording is too short; names the camera.
     """
     for whose, count in (("board", board), ("host", host)):
         if count < LEAST_SHOTS:
@@ -83,22 +83,22 @@ def require_shots(board: int, host: int) -> None:
 
 
 def to_seconds(board_ns: list[int], host_ns: list[int]) -> tuple[Times, Times, int]:
-    """Turn stamps into seconds from the first one on; also gives that one, ns."""
+    """Convert stamps to seconds from the first one on; also return the first one, ns."""
     start_ns = min(board_ns[0], host_ns[0])
     board, host = (np.array([ns - start_ns for ns in stamps]) / 1e9 for stamps in (board_ns, host_ns))
     return board, host, start_ns
 
 
 def period_s(times: Times) -> float:
-    """Median time between shots."""
+    """Return the median time between shots."""
     return float(np.median(np.diff(times)))
 
 
 def rolling_s(row: float, period: float) -> float:
-    """How much later than the middle row another row may have been exposed: the readout is unknown, half a period is what cameras are taken to have.
+    """Return how much later than the middle row another row may have been exposed. The readout time is unknown; cameras are taken to have half a period.
 
     Args:
         row: 0 at the top, 1 at the bottom.
-        period: between frames, s.
+        period: time between frames, s.
     """
     return abs(row - 0.5) * period / 2
