@@ -37,11 +37,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Import the verb, and run it. The only place that imports by a verb's name."""
+    """Import the verb and run it. Only here are modules imported by a verb's name."""
     if options.verb is None:
         parser().print_help()
         return 0
-    gc.disable()  # what is imported stays: to look for garbage in it, now and later, only costs a board time
+    gc.disable()  # imported objects stay: looking for garbage among them only costs a board time
     try:
         verb = importlib.import_module(f"board_agent.verbs.{options.verb}")
     finally:
