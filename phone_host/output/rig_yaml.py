@@ -123,6 +123,15 @@ def read_rig(path: Path) -> Rig:
     )
 
 
+def is_rig(path: Path) -> bool:
+    """Return whether a file begins like FileStorage YAML. False also for a file that cannot be read."""
+    try:
+        with path.open("rb") as file:
+            return file.read(16).removeprefix(b"\xef\xbb\xbf").startswith(b"%YAML")
+    except OSError:
+        return False
+
+
 _MOST_BYTES = 1 << 20
 """Limit for a rig.yaml, which is about two pages long."""
 

@@ -123,8 +123,8 @@ def test_the_table_names_every_pair(few: Path, tmp_path: Path) -> None:
 
 
 def test_swapped_sides_are_exit_4_with_the_remedy_and_a_report(few: Path, tmp_path: Path) -> None:
-    """LEFT and RIGHT swapped: verdict reject, the remedy says so, no rig.yaml that could be used by mistake, not even an old one."""
-    (tmp_path / "rig.yaml").write_text("of an earlier run")
+    """LEFT and RIGHT swapped: verdict reject, the remedy says so, no rig.yaml that could be used by mistake; the old one is moved aside."""
+    (tmp_path / "rig.yaml").write_text("%YAML:1.0\n# of an earlier run")
     done = _phone_host(
         "calibrate", few / "right", few / "left", "--board", "9x6", "--square", "25mm",
         "--out", tmp_path / "rig.yaml", "--json",
@@ -135,11 +135,13 @@ def test_swapped_sides_are_exit_4_with_the_remedy_and_a_report(few: Path, tmp_pa
     assert "swap LEFT and RIGHT" in report["remedy"]
     assert (tmp_path / "report.json").exists()
     assert not (tmp_path / "rig.yaml").exists()
+    assert report["earlier_rig"] == "rig.yaml.old"
+    assert "of an earlier run" in (tmp_path / "rig.yaml.old").read_text()
 
 
 def test_too_few_pairs_are_exit_4_with_a_report(small: Path, tmp_path: Path) -> None:
-    """A wrong --board finds nothing: one line on stderr, the reasons as JSON on stdout and in report.json, an old rig is gone."""
-    (tmp_path / "rig.yaml").write_text("of an earlier run")
+    """A wrong --board finds nothing: one line on stderr, the reasons as JSON on stdout and in report.json, an old rig is moved aside."""
+    (tmp_path / "rig.yaml").write_text("%YAML:1.0\n# of an earlier run")
     done = _phone_host(
         "calibrate", small / "left", small / "right", "--board", "12x9", "--square", "25mm",
         "--out", tmp_path / "rig.yaml", "--json",
@@ -153,6 +155,8 @@ def test_too_few_pairs_are_exit_4_with_a_report(small: Path, tmp_path: Path) -> 
     assert len(report["pairs"]["rejected"]) == 6
     assert report == json.loads((tmp_path / "report.json").read_text())
     assert not (tmp_path / "rig.yaml").exists()
+    assert report["earlier_rig"] == "rig.yaml.old"
+    assert "of an earlier run" in (tmp_path / "rig.yaml.old").read_text()
 
 
 def test_views_that_contradict_each_other_are_rejected_with_files(boards: Path, tmp_path: Path) -> None:
@@ -180,6 +184,18 @@ def test_usage_errors_are_exit_2(boards: Path, tmp_path: Path) -> None:
         assert done.returncode == 2, done.stderr
         assert word in done.stderr
         assert "Traceback" not in done.stderr
+
+
+def test_a_photograph_is_not_replaced(boards: Path, tmp_path: Path) -> None:
+    """--out that names a file which is no calibration, such as a picture, is exit 3 at once; the file stays."""
+    picture = tmp_path / "left0.png"
+    picture.write_bytes((boards / "left" / "left0.png").read_bytes())
+    done = _phone_host(
+        "calibrate", boards / "left", boards / "right", "--board", "9x6", "--square", "25mm", "--out", picture
+    )
+    assert done.returncode == 3
+    assert "left0.png is not a calibration" in done.stderr
+    assert picture.read_bytes() == (boards / "left" / "left0.png").read_bytes()
 
 
 def test_what_is_no_file_is_not_replaced(boards: Path, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from common.errors import DataError
+from common.errors import DataError, UnavailableError
 from common.versions import REPORT_FORMAT
 from phone_host.calibration.board_pairs import Calibration, Rejected
 from phone_host.calibration.board_views import BoardViews, look_for_boards
@@ -20,7 +20,7 @@ from phone_host.calibration.view_files import ViewFiles, pair_files
 from phone_host.model import Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
-from phone_host.output.rig_yaml import write_rig
+from phone_host.output.rig_yaml import is_rig, write_rig
 from phone_host.settings import most_pixels
 from phone_host.verbs.output_folders import claim_names, require_file, unwritable
 
@@ -31,19 +31,21 @@ def run(options: argparse.Namespace) -> int:
     """Find the board in all pairs, calibrate, judge, write."""
     board = parse_board(options.board, options.square)
     require_file(options.out)
+    if options.out.exists() and not is_rig(options.out):
+        raise UnavailableError(f"{options.out} is not a calibration, and would be replaced", "name another --out")
     files = pair_files(options.left, options.right)
     claim_names(options.out.parent, options.out, "report.json")
     views = _look(files, board, most_pixels(None, options.max_megapixels))
     try:
         calibration = calibrate(list(views.pairs), board, views.sizes_px, Side(options.board_side))
     except DataError as error:
-        report = _failed(files, views, error)
-        _write_rig(options.out, None)
+        report = _failed(files, views, error) | _write_rig(options.out, None)
         _write_report(options.out, report)
-        if options.json:
-            print(json_text(report))
-        else:
-            print(_rejections(views.rejected))
+        print(
+            json_text(report)
+            if options.json
+            else "\n".join([_rejections(views.rejected), *_unwritten(report, options.out)])
+        )
         raise
     rejected = (*views.rejected, *calibration.rejected)
     judgement = judge(calibration, rejected)
@@ -53,8 +55,8 @@ def run(options: argparse.Namespace) -> int:
         **_figures(calibration),
         "verdict": judgement.verdict.value,
         "remedy": "; ".join(judgement.remedies),
+        **_write_rig(options.out, calibration),
     }
-    _write_rig(options.out, calibration)
     _write_report(options.out, report)
     print(json_text(report) if options.json else _summary(report, calibration, rejected, options.out))
     return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
@@ -133,16 +135,29 @@ def _figures(calibration: Calibration) -> dict[str, Any]:
     }
 
 
-def _write_rig(out: Path, calibration: Calibration | None) -> None:
-    """Write rig.yaml; where there is no rig, or none that can be rectified, one of an earlier run must not be taken for it."""
+def _write_rig(out: Path, calibration: Calibration | None) -> dict[str, str]:
+    """Write rig.yaml. If there is no usable rig, move the rig of an earlier run aside, so that nobody takes it for this run's.
+
+    Returns:
+        For the report: where the earlier rig is now, if it was moved.
+    """
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        if calibration is None or calibration.rectification is None:
-            out.unlink(missing_ok=True)
-        else:
+        if calibration is not None and calibration.rectification is not None:
             write_rig(out, calibration.rig, calibration.rectification)
+        elif out.exists():
+            aside = out.with_name(f"{out.name}.old")
+            out.replace(aside)
+            return {"earlier_rig": aside.name}
     except OSError as error:
         raise unwritable(out, error) from error
+    return {}
+
+
+def _unwritten(report: dict[str, Any], out: Path) -> list[str]:
+    """Say that there is no new rig, and where the earlier one is."""
+    earlier = f"; the earlier one is now {report['earlier_rig']}" if "earlier_rig" in report else ""
+    return [f"{out} was not written{earlier}"]
 
 
 def _write_report(out: Path, report: dict[str, Any]) -> None:
@@ -175,4 +190,6 @@ def _summary(report: dict[str, Any], calibration: Calibration, rejected: tuple[R
     ]
     if calibration.rectification is not None:
         rows.append(f"written to {out} and {out.with_name('report.json')}")
+    else:
+        rows += _unwritten(report, out)
     return "\n".join(rows)
