@@ -1,6 +1,7 @@
 """The types that the host's stages pass to each other. No behaviour, no I/O.
 
-Conventions: camera axes x right, y down, z forward; pixel centres are integers (OpenCV); metres inside; NaN = no measurement.
+Conventions: camera axes x right, y down, z forward; pixel centres are integers (OpenCV); metres inside; NaN = no
+    measurement.
 """
 
 from dataclasses import dataclass

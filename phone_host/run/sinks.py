@@ -27,7 +27,10 @@ class NotWrittenError(Exception):
 
 
 class Sink(Protocol):
-    """Takes results. The worker's thread calls it, except `finish`: the run's root calls that after the worker ended."""
+    """Takes results.
+
+    The worker's thread calls it, except `finish`: the run's root calls that after the worker ended.
+    """
 
     def await_place(self, number: int) -> None:
         """Wait until there is a place for the result with this number. A sink that does not wait returns at once."""

@@ -76,8 +76,8 @@ class DemandClock:
     def stamp_ns(self, exposed_ns: int, offset_ns: int) -> int:
         """Return the stamp by which a board frame is paired.
 
-        All labels use the clock offset of the first one, from which the host camera's labels continue. A better estimate
-        could move later labels by more than a fast film's period.
+        All labels use the clock offset of the first one, from which the host camera's labels continue. A better
+        estimate could move later labels by more than a fast film's period.
 
         Args:
             exposed_ns: exposure on the host's clock, computed with the frame's own offset, ns.
@@ -102,7 +102,9 @@ class DemandClock:
             self._wants.put(_Want(self._life, stamp_ns, number if self.labels_board else None))
 
     def show_next(self, anchor: Callable[[int, int], None], show: Callable[[], None]) -> None:
-        """Wait until an image is wanted, then show it. `wake` or a want of an earlier session ends the wait without one.
+        """Wait until an image is wanted, then show it.
+
+        `wake`, or a want of an earlier session, ends the wait and nothing is shown.
 
         Args:
             anchor: called with a label and a number if the wanted image does not follow the last one shown.

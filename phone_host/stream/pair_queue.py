@@ -2,7 +2,8 @@
 
 This module adds a lock and an account to the pure cores.
 
-Conservation: received = paired + orphaned(by reason) + held; paired = taken + dropped(overflow) + waiting. Both hold after every call.
+Conservation: received = paired + orphaned(by reason) + held; paired = taken + dropped(overflow) + waiting. Both hold
+    after every call.
 """
 
 import threading
@@ -139,7 +140,7 @@ class PairQueue:
 
         If the new session's stamps are labels, old host frames find no partner either.
         """
-        self._demand.begin(camera.pacing)  # without the lock, which the delivery of the host image that it waits for needs
+        self._demand.begin(camera.pacing)  # without the lock: it waits for a host image, whose delivery needs it
         board_period_ns = camera.period_ns
         with self._changed:
             self._meter = PhaseMeter(board_period_ns, self._host_period_ns)
