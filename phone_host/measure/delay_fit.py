@@ -127,7 +127,7 @@ def fit_delay(size_bytes: Values, delay_ns: Values, draws: int = _DRAWS) -> Dela
 def _line(x: Values, y: Values) -> tuple[float, float]:
     """Return intercept and slope of least absolute deviations, neither below zero."""
     latency, slope = _free_line(x, y)
-    # The sum of deviations is convex: if its minimum is outside the allowed region, the allowed minimum is on the border.
+    # The sum of deviations is convex: if its minimum is not allowed, the best allowed line is on the border.
     if slope < 0.0:
         return max(0.0, float(np.median(y))), 0.0
     if latency < 0.0:
