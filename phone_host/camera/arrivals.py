@@ -25,7 +25,7 @@ class Arrivals:
 
     @property
     def jitter_ns(self) -> int | None:
-        """How much later than the fastest image 95 % of them arrived at most, ns; None before 16 images.
+        """The images' 95th percentile of lateness relative to the fastest one, ns; None before 16 images.
 
         Lateness is measured against the least-squares line.
         """
