@@ -6,9 +6,9 @@ round trip: trying it costs one frame, but not trying it could cost on every fra
 credit and the board goes on grabbing but nothing comes. The carrier's age then grows with the wait, so a link whose
 frames are stuck is replaced like a slow one.
 
-To avoid flapping, the links have an order of preference. A preferred link takes over if it is about as good (within 20
-% and 8 ms), any other only if it is better by 30 % and 12 ms. In between, nothing changes. The condition must hold for
-one second; this time doubles each time that a link fails while it is the carrier.
+To avoid flapping, the links have an order of preference. A preferred link takes over if it is about as good (within
+20 % and 8 ms), any other only if it is better by 30 % and 12 ms. In between, nothing changes. The condition must hold
+for one second; this time doubles each time that a link fails while it is the carrier.
 """
 
 from collections import deque

@@ -3,7 +3,7 @@
 Pure: echoes in, estimate out; the present is the time of the newest echo.
 
 An echo gives two hard facts: the board's t1 lies after the host's t0, and the board's t2 before the host's t3. Let
-H(b) = b + offset(b) be the host time of board time b. Then    t0 - t1 <= offset(t1)    and    offset(t2) <= t3 - t2.
+H(b) = b + offset(b) be the host time of board time b. Then t0 - t1 <= offset(t1) and offset(t2) <= t3 - t2.
 Averages are useless when frames fill the link (study of links, 3d), but extremes are not. `hull` keeps the extremes.
 `allowed_lines` finds and weighs the lines between them. This module feeds both, detects clock jumps, and provides two
 figures, `bound` and `uncertainty`.

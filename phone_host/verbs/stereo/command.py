@@ -26,8 +26,8 @@ from phone_host.verbs.output_folders import require_folder, unwritable
 from phone_host.verbs.stereo_options import build_core
 
 _DEFAULT_MATCHER = "sgbm"
-# In a textured scene that both cameras see, more than 90 % of the pixels are matched. Below a third, a wrong pair is far
-# more likely than a scene without texture.
+# In a textured scene that both cameras see, more than 90 % of the pixels are matched. Below a third, a wrong pair is
+# far more likely than a scene without texture.
 _LOW_DENSITY = 0.33
 
 
