@@ -1,4 +1,4 @@
-"""tandemscan for other people's programs: two cameras, and an iterator of what they see.
+"""The Python API of tandemscan: open two cameras and iterate over the results.
 
     from phone_host.api import open_scanner
 
@@ -6,11 +6,12 @@
         for result in scanner:
             print(result.number, result.ledger.end_to_end_ns, result.processed.cloud.shape)
 
-A result holds the rectified images, the disparity, the cloud in metres and the pair's delays (`phone_host.model.Result`). A program that is slower
-than the cameras gets the newest results; what it missed is counted in `scanner.snapshot()`. With `lossless=True`, and where the own camera shows
-stills, it gets every one, and the scanner waits for it.
+A result holds the rectified images, the disparity, the point cloud in metres and the pair's delays
+(`phone_host.model.Result`). A program that is slower than the cameras gets the newest results; `scanner.snapshot()`
+counts those it missed. With `lossless=True`, or if the host camera gives images on demand, the scanner waits for the
+program and skips no result.
 
-What is here stays compatible; what lies below may move.
+This module stays backward compatible. The modules below it may change.
 """
 
 import math
@@ -71,33 +72,34 @@ def open_scanner(
     save_every: int = 0,
     keys: str | Path | None = None,
 ) -> "Scanner":
-    """Open both cameras; the scan begins when the scanner is entered (`with`).
+    """Open both cameras. The scan begins when the scanner is entered with `with`.
 
     Args:
-        link: where the board is (`tcp://HOST:5555`, `serial:DEVICE` …); several: the best one that is up is used.
-        camera: the own camera (`v4l2:/dev/video0?size=640x480`, `http://…/video`, `replay:FOLDER` …).
-        rig: rig.yaml, or a rig; None: the images come rectified if `disparities` is given, else there is no depth, only pairs and delays.
-        geometry: of images that come rectified; None: disparities without metres.
+        link: address of the board (`tcp://HOST:5555`, `serial:DEVICE` …), or several. The best link that is up is used.
+        camera: the host camera (`v4l2:/dev/video0?size=640x480`, `http://…/video`, `replay:FOLDER` …).
+        rig: a rig, or the path of a rig.yaml. None: if `disparities` is given, the images are taken as rectified;
+            otherwise no depth is computed, only pairs and delays.
+        geometry: geometry of images that arrive rectified. None: disparities are not converted to metres.
         matcher: name of a matcher, or any object with `match(pair) -> disparity` (`phone_host.stereo.match.Matcher`).
-        disparities: 0 <= d < this is searched, px; None with a rig: as `near_m` asks.
-        near_m: nearest depth that is searched, m.
-        board_side: `left` or `right`: which view the board's camera is; None: as the rig says, else left.
+        disparities: the matcher searches 0 <= d < disparities, px. None with a rig: computed from `near_m`.
+        near_m: nearest depth to search for, m.
+        board_side: which view the board's camera is, `left` or `right`. None: as in the rig; without a rig, left.
         fifo: depth and overflow policy of the queue before the matcher.
-        tolerance_ms: greatest time skew of a pair, ms; None: half of the longer frame period.
-        pairs: end after so many; 0: go on.
-        wait_s: an absent board is waited for so long, s; None: for ever.
-        lossless: give every result, and wait for the program where it is slower.
-        out: folder for delays.jsonl, report.json and saved pairs; None: nothing is written.
-        save_every: every which pair is saved in `out`; 0: none.
-        keys: folder of keys; None: the usual one.
+        tolerance_ms: greatest time skew of a pair, ms. None: half of the longer frame period.
+        pairs: end after this many pairs. 0: no limit.
+        wait_s: how long to wait for an absent board, s. None: for ever.
+        lossless: give every result, and wait if the program is slower than the cameras.
+        out: folder for delays.jsonl, report.json and saved pairs. None: nothing is written.
+        save_every: save every Nth pair in `out`. 0: none.
+        keys: folder of keys. None: the default folder.
 
     Returns:
         The scanner.
 
     Raises:
-        SettingsError: arguments that make no sense, or contradict each other.
-        DataError: a bad rig.yaml.
-        UnavailableError: a camera, link or folder that cannot be had.
+        SettingsError: the arguments are invalid or contradict each other.
+        DataError: rig.yaml is invalid.
+        UnavailableError: a camera, link or folder cannot be opened.
     """
     given = dict(locals())
     _check_numbers(pairs=pairs, save_every=save_every, tolerance_ms=tolerance_ms, wait_s=wait_s, near_m=near_m)
@@ -123,7 +125,7 @@ def open_scanner(
     )
     for uri in uris:
         tell_insecure(uri)
-    with ExitStack() as opened:  # what was opened is closed again where something else cannot be
+    with ExitStack() as opened:  # if one part cannot be opened, close those that were
         own = opened.enter_context(closing(open_camera(camera, HOST_CLOCK, now.monotonic_ns())))
         links = open_links(uris, key_folder("" if keys is None else str(keys)))
         for item in links:
@@ -134,14 +136,14 @@ def open_scanner(
 
 
 class Scanner:
-    """A running scan: a context manager, and an iterator of its results, in the order of the pairs. Made by `open_scanner`.
+    """A running scan: a context manager and an iterable of results, in the order of the pairs. Made by `open_scanner`.
 
     Args:
-        settings: of the run.
-        camera: the own camera, open.
-        links: to the board, open.
-        core: computes the depth; None: pairs and delays only.
-        lossless: whether every result is given.
+        settings: settings of the run.
+        camera: the host camera, open.
+        links: links to the board, open.
+        core: computes the depth. None: pairs and delays only.
+        lossless: whether the program gets every result.
     """
 
     def __init__(
@@ -163,7 +165,7 @@ class Scanner:
         self._is_failure_told = False
         self.ended: EndReason | None = None
         self.is_complete = True
-        """Whether everything that was asked for is in the folder of results, once the run has ended."""
+        """After the run: whether the results folder holds everything that was asked for."""
 
     def __enter__(self) -> Self:
         if self._was_entered:
@@ -182,13 +184,13 @@ class Scanner:
             self._tell_failure()
 
     def _tell_failure(self) -> None:
-        """Raise what ended the run, once."""
+        """Raise the error that ended the run, but only once."""
         if self._failure is not None and not self._is_failure_told:
             self._is_failure_told = True
             raise self._failure
 
     def close(self) -> None:
-        """Let go of camera, links and folder of a scanner that was never entered; one that was does so by itself."""
+        """Release camera, links and folder of a scanner that was never entered. An entered one releases them itself."""
         if not self._was_entered:
             self._was_entered = True
             self._host.abandon()
@@ -196,11 +198,11 @@ class Scanner:
                 item.close()
 
     def __iter__(self) -> Iterator[Result]:
-        """Give results until the run ends.
+        """Yield results until the run ends.
 
         Raises:
-            TandemError: as `phone-host run` would end with: no board, images that do not fit the rig, a link that is gone.
-            RuntimeError: outside of `with`.
+            TandemError: as in `phone-host run`: no board, images that do not fit the rig, or a lost link.
+            RuntimeError: called outside `with`.
         """
         if not self._was_entered:
             raise RuntimeError("the scan has not begun: use `with open_scanner(…) as scanner`")
@@ -210,7 +212,7 @@ class Scanner:
         self._tell_failure()
 
     def snapshot(self) -> RunSnapshot:
-        """Delays, accounts, clock, doubts and drops as they are now, or were at the end."""
+        """Return delays, accounts, clock, doubts and drops as of now, or as of the end of the run."""
         if self._failure is not None:
             return self._host.snapshot("failed")
         return self._host.snapshot("running" if self.ended is None else self.ended.value)
@@ -229,7 +231,7 @@ class Scanner:
 
 
 class _ResultQueue:
-    """The sink that the program itself works off; when it is full the oldest result gives way, unless it is one that waits."""
+    """The sink that the calling program reads. When full, it drops the oldest result, or waits if `waits` is set."""
 
     def __init__(self, *, waits: bool) -> None:
         self._waits = waits
@@ -258,7 +260,7 @@ class _ResultQueue:
             self._changed.notify_all()
 
     def take(self) -> Result | None:
-        """Give the oldest result, or wait for one; None at the end."""
+        """Return the oldest result; wait if there is none. Return None at the end of the run."""
         with self._changed:
             self._changed.wait_for(lambda: bool(self._items) or self._ended)
             if not self._items:
@@ -270,7 +272,7 @@ class _ResultQueue:
             return result
 
     def leave(self) -> None:
-        """Take nothing more: the program has left."""
+        """Accept no more results: the program has left the `with` block."""
         with self._changed:
             self._left = True
             self._changed.notify_all()
@@ -296,10 +298,10 @@ class _ResultQueue:
 
 
 def _check_numbers(**numbers: float | None) -> None:
-    """Refuse numbers of no use.
+    """Reject invalid numbers.
 
     Raises:
-        SettingsError: one is below 0, not finite, or 0 where it must be more.
+        SettingsError: a number is below 0 or not finite, or `near_m` is 0.
     """
     for name, value in numbers.items():
         if value is not None and not (math.isfinite(value) and value >= 0 and (value > 0 or name != "near_m")):
@@ -309,7 +311,7 @@ def _check_numbers(**numbers: float | None) -> None:
 
 
 def _shown(arguments: Mapping[str, object]) -> dict[str, object]:
-    """Arguments as settings.json has them; objects by their kind."""
+    """Return the arguments as settings.json stores them. An object is stored as its type name."""
     plain = (str, int, float, bool, type(None))
     told = {name: str(value) if isinstance(value, Path) else value for name, value in arguments.items()}
     told["camera"] = without_password(str(told["camera"]))

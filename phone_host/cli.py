@@ -1,4 +1,7 @@
-"""phone-host: the host's command. Every start knows the options of all verbs, which are light; what a verb does is imported when it runs."""
+"""phone-host: the host's command.
+
+Every start imports the options of all verbs, which are light. A verb's code is imported only when the verb runs.
+"""
 
 import argparse
 import importlib
@@ -19,7 +22,7 @@ from phone_host.verbs.stereo import arguments as stereo
 
 
 class Arguments(Protocol):
-    """The light half of a verb: what help and the parser need."""
+    """The light half of a verb: what the help and the parser need."""
 
     SUMMARY: str
     EXAMPLES: str
@@ -52,10 +55,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Args:
-        arguments: without the program's name; None for those of the process.
+        arguments: without the program's name. None: the arguments of the process.
 
     Returns:
-        The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout not to be had, 4 bad data, 130 interrupted.
+        The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout is unavailable, 4 bad data, 130 interrupted.
     """
     return run_command(parser(), arguments, _run)
 
@@ -71,7 +74,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def parser() -> argparse.ArgumentParser:
-    """All verbs with their options."""
+    """Return the parser with all verbs and their options."""
     made = ExamplesFirstParser("phone-host", description=_EXAMPLES)
     add_version_option(made)
     verbs = made.add_subparsers(dest="verb", metavar="VERB")

@@ -1,6 +1,6 @@
-"""What the host's owner may set once for all runs: names, defaults, a sentence for each; every one is an option of `phone-host run` too.
+"""The host's settings: names, defaults and a help sentence each. Each is also an option of `phone-host run`.
 
-Light: help is made of it. What the values must be is checked in `settings`.
+This module is light because the help text is generated from it. `settings` validates the values.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ MAX_MEGAPIXELS_HELP: Final = f"refuse larger images before decoding them, in meg
 
 
 NEAR_M: Final = 0.3
-"""Nearest depth that is searched where nobody says another, m."""
+"""Default nearest depth to search for, m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,5 +47,5 @@ class PhoneHostSettings:
 
     @property
     def most_pixels(self) -> int:
-        """The limit in pixels."""
+        """The image size limit in pixels."""
         return self.max_megapixels * MEGAPIXEL

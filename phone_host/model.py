@@ -1,6 +1,7 @@
-"""Types that the host's stages hand to each other. No behaviour, no I/O.
+"""The types that the host's stages pass to each other. No behaviour, no I/O.
 
-Conventions: camera axes x right, y down, z forward; pixel centres are integers (OpenCV); metres inside; NaN = no measurement.
+Conventions: camera axes x right, y down, z forward; pixel centres are integers (OpenCV); metres inside; NaN = no
+    measurement.
 """
 
 from dataclasses import dataclass
@@ -26,7 +27,7 @@ CloudImage = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoGeometry:
-    """What turns a disparity into metres for a rectified pair: z = focal_px * baseline_m / (disparity + doffs_px).
+    """Converts the disparity of a rectified pair to metres: z = focal_px * baseline_m / (disparity + doffs_px).
 
     Attributes:
         focal_px: focal length of both rectified images, px.
@@ -45,14 +46,14 @@ class StereoGeometry:
 
 @dataclass(frozen=True, slots=True)
 class RectifiedPair:
-    """Two images of one size whose epipolar lines are the scanlines: a point at (x, y) left stands at (x - d, y) right."""
+    """Two images of equal size whose epipolar lines are their rows: a point at (x, y) left lies at (x - d, y) right."""
 
     left: Image
     right: Image
 
 
 class Side(Enum):
-    """Which of the two views; the left camera is the reference whose pixels get a depth."""
+    """One of the two views. The left camera is the reference: the pixels of its image get a depth."""
 
     LEFT = "left"
     RIGHT = "right"
@@ -65,7 +66,9 @@ class Side(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CameraModel:
-    """How one camera projects: OpenCV's pinhole model with its distortion polynomial. The device itself is `common.camera.base.Camera`.
+    """How one camera projects: OpenCV's pinhole model with its distortion polynomial.
+
+    The device itself is `common.camera.base.Camera`.
 
     Attributes:
         width_px: image width, px.
@@ -81,16 +84,16 @@ class CameraModel:
 
 
 UNMEASURED_NS: Final = 16_700_000
-"""How far two cameras' stamps may differ while nobody has measured it: one readout, taken as half of the period of 30 frames a second."""
+"""Assumed limit of the time offset until it is measured: one readout, taken as half the period of 30 frames/s."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimeOffset:
-    """The stamp of the host's camera minus that of the board's camera for one and the same moment, both on the host's clock.
+    """The host camera's stamp minus the board camera's stamp for the same moment, both on the host's clock.
 
     Attributes:
         offset_ns: added to the board's stamps before frames are paired.
-        uncertainty_ns: contains the truth in 99.9 %.
+        uncertainty_ns: half-width around `offset_ns` that contains the true value in 99.9 % of cases.
     """
 
     offset_ns: int = 0
@@ -99,21 +102,21 @@ class TimeOffset:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Rig:
-    """Two calibrated cameras, possibly of different size, and how they stand to each other.
+    """Two calibrated cameras, possibly of different image size, and their relative pose.
 
     A point p_left in the left camera's axes is p_right = R_right_left @ p_left + t_right_left_m in the right camera's
     (OpenCV's R and T of stereoCalibrate).
 
     Attributes:
         left: model of the reference camera.
-        right: of the other one.
+        right: model of the other camera.
         R_right_left: (3, 3) float64 rotation.
-        t_right_left_m: (3,) float64 translation, m; its x is negative when the right camera stands to the right.
-        board_side: which of the two hangs on the board.
+        t_right_left_m: (3,) float64 translation, m; its x is negative when the right camera is on the right.
+        board_side: which of the two is the board's camera.
         rms_left_px: reprojection RMS of the left camera alone, px; NaN = not measured.
         rms_right_px: the same for the right camera.
         rms_stereo_px: reprojection RMS of the stereo calibration, px; NaN = not measured.
-        time_offset: between the two cameras' stamps.
+        time_offset: time offset between the two cameras' stamps.
     """
 
     left: CameraModel
@@ -129,17 +132,17 @@ class Rig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rectification:
-    """How both cameras are turned and cut; the values `rig.yaml` holds beside the rig itself.
+    """How both images are rotated and cropped. `rig.yaml` holds these values beside the rig itself.
 
     Attributes:
-        geometry: what turns disparity into metres; its axes are those of the *rectified* left camera.
+        geometry: converts disparity to metres; its axes are those of the *rectified* left camera.
         width_px: width of both rectified images, px.
         height_px: height of both rectified images, px.
         R_left: (3, 3) float64, takes the left camera's axes to the rectified ones (OpenCV's R1).
         R_right: (3, 3) float64, the same for the right camera (R2).
         P_left: (3, 4) float64 projection of rectified points into the left rectified image (P1).
-        P_right: (3, 4) float64 into the right rectified image (P2), metres.
-        Q: (4, 4) float64, takes (u, v, d, 1) to homogeneous metres.
+        P_right: (3, 4) float64, the same for the right rectified image (P2), metres.
+        Q: (4, 4) float64, maps (u, v, d, 1) to homogeneous metres.
     """
 
     geometry: StereoGeometry
@@ -157,13 +160,14 @@ class BoardFrame:
     """A frame that came over a link, with its marks on the host's clock.
 
     Attributes:
-        message: what came.
-        link: kind of the link.
-        marks: exposed, grabbed and sent, on the host's clock; frozen on receipt.
-        received_ns: last byte arrived.
-        offset_ns: host clock minus board clock as estimated then.
-        uncertainty_ns: of that offset.
-        asked_px: (width, height) that the camera was asked for, px; the frame itself may be smaller. Zeros: as it is.
+        message: the frame's message.
+        link: name of the link.
+        marks: exposed, grabbed and sent, on the host's clock; fixed on receipt.
+        received_ns: when the last byte arrived.
+        offset_ns: host clock minus board clock, as estimated then.
+        uncertainty_ns: uncertainty of that offset.
+        asked_px: (width, height) that the camera was asked for, px. The frame itself may be smaller. Zeros: use the
+            frame's own size.
     """
 
     message: FrameMessage
@@ -181,11 +185,11 @@ class FramePair:
 
     Attributes:
         board: the board's frame.
-        host: the host's own frame.
-        time_skew_ns: exposure of the board's frame minus that of the host's.
+        host: the host's frame.
+        time_skew_ns: exposure of the board's frame minus exposure of the host's frame.
         paired_ns: when the partner was found.
         queued_ns: when the pair entered the FIFO.
-        before: the board's frame before that one, if it is at hand.
+        before: the board's previous frame, if available.
     """
 
     board: BoardFrame
@@ -198,13 +202,13 @@ class FramePair:
 
 @dataclass(frozen=True, slots=True)
 class Processed:
-    """What became of a pair.
+    """The outcome of processing a pair.
 
     Attributes:
-        pair: the rectified images (as they came when there is no core).
+        pair: the rectified images; without a core, the images as received.
         disparity: px; None without a core.
         cloud: metres; None without a core or geometry.
-        stages: time of each stage, `write` still 0.
+        stages: time of each stage; `write` is still 0.
     """
 
     pair: RectifiedPair
@@ -215,11 +219,11 @@ class Processed:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What the worker hands to the sinks of a run.
+    """What the worker passes to the sinks of a run.
 
     Attributes:
-        number: of the processed pair in this run, from 0.
-        pair: its two frames as they came.
+        number: index of the processed pair in this run, from 0.
+        pair: its two frames as received.
         processed: its images and depth.
         ledger: its marks and delays.
     """
@@ -236,15 +240,15 @@ class PairCounts:
 
     Attributes:
         received: board frames.
-        host_frames: own frames.
+        host_frames: host frames.
         paired: pairs formed.
-        dropped: pairs that gave way in a full FIFO.
+        dropped: pairs that a full FIFO dropped.
         taken: pairs given to the worker.
         waiting: pairs in the FIFO now.
-        held_board: board frames without partner yet.
-        held_host: own frames without partner yet.
-        board_orphans: board frames that found none, by reason.
-        host_orphans: own frames that found none, by reason.
+        held_board: board frames still waiting for a partner.
+        held_host: host frames still waiting for a partner.
+        board_orphans: board frames that found no partner, by reason.
+        host_orphans: host frames that found no partner, by reason.
     """
 
     received: int = 0
@@ -264,9 +268,9 @@ class Unwritten:
     """What could not be written.
 
     Attributes:
-        lines: lines of delays.jsonl that are lost.
-        pairs: pair folders that were due and could not be written.
-        cause: the operating system's word for it; empty when all was written.
+        lines: lines of delays.jsonl that are lost or still wait to be written.
+        pairs: pair folders that were due but could not be written.
+        cause: the operating system's error message; empty when everything was written.
     """
 
     lines: int = 0

@@ -1,4 +1,4 @@
-"""The settings as they are meant: worked out from file, environment and options, and refused where `run` could not use them."""
+"""Resolve the host's settings from file, environment and options, and reject those that `run` could not use."""
 
 import argparse
 import math
@@ -20,17 +20,17 @@ ENVIRONMENT_PREFIX: Final = "PHONE_HOST"
 
 
 def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
-    """Work out the settings from file, environment and a verb's options, of which those count that bear a setting's name."""
+    """Resolve the settings from file, environment and a verb's options. Options named like a setting are used."""
     given = {item.name: getattr(options, item.name, None) for item in fields(PhoneHostSettings)}
     given["link"] = tuple(given["link"]) if given["link"] else None
     return resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given)
 
 
 def check(settings: PhoneHostSettings) -> None:
-    """Refuse values that `run` could not use, as far as that can be said without opening anything.
+    """Reject values that `run` could not use, as far as that can be checked without opening anything.
 
     Raises:
-        SettingsError: one makes no sense.
+        SettingsError: a value is invalid.
     """
     log_level(settings.log_level)
     if settings.camera:
@@ -49,36 +49,36 @@ def check(settings: PhoneHostSettings) -> None:
 
 
 def key_folder(keys: str) -> KeyFolder:
-    """Give the folder of keys that a setting means.
+    """Return the folder of keys for the setting `keys`.
 
     Args:
-        keys: the setting; empty for the usual place.
+        keys: the setting; empty for the default folder.
     """
     return KeyFolder(Path(keys).expanduser() if keys else default_folder(os.environ, service=False))
 
 
 def chosen_keys(file: Path | None, option: str | None) -> KeyFolder:
-    """Give the folder of keys for a verb that needs no other setting.
+    """Return the folder of keys, for a verb that needs no other setting.
 
     Args:
         file: settings file, or None.
-        option: what --keys says, or None.
+        option: value of --keys, or None.
 
     Raises:
-        SettingsError: the file or the environment makes no sense.
+        SettingsError: the file or the environment is invalid.
     """
     return key_folder(resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, {"keys": option}).values.keys)
 
 
 def most_pixels(file: Path | None, option: int | None) -> int:
-    """Give the most pixels of an image, for a verb that needs no other setting.
+    """Return the largest accepted image size in pixels, for a verb that needs no other setting.
 
     Args:
         file: settings file, or None.
-        option: what --max-megapixels says, or None.
+        option: value of --max-megapixels, or None.
 
     Raises:
-        SettingsError: it makes no sense.
+        SettingsError: a setting is invalid.
     """
     values = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, {"max_megapixels": option}).values
     _check_megapixels(values)

@@ -1,1 +1,1 @@
-"""The host's boards: how one is found, and how the two come to know each other."""
+"""The host's boards: discovery and enrolment."""

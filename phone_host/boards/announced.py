@@ -1,4 +1,7 @@
-"""Boards that announce themselves on the network (mDNS). Needs zeroconf, which is optional: `discovery` does without this module."""
+"""Boards that announce themselves on the network (mDNS).
+
+This module needs zeroconf, which is optional: `discovery` works without this module.
+"""
 
 import ipaddress
 import threading
@@ -10,7 +13,7 @@ from phone_host.boards.found import LISTEN_S, SERVICE, Found
 
 
 def announced() -> list[Found]:
-    """Listen for boards that announce themselves; gives them by name."""
+    """Listen for boards that announce themselves. Return them sorted by name."""
     names: set[str] = set()
 
     def heard(*, name: str, state_change: ServiceStateChange, **_: object) -> None:
@@ -37,6 +40,6 @@ def announced() -> list[Found]:
 
 
 def _needs_scope(address: str) -> bool:
-    """Whether an address means nothing without the name of a network card, which a link cannot give."""
+    """Return whether an address needs the name of a network card, which a link cannot give."""
     read = ipaddress.ip_address(address.partition("%")[0])
     return read.version == 6 and read.is_link_local

@@ -1,6 +1,8 @@
-"""Which board `phone-host run` means when nobody said: the last one, the one on the USB cable, one on this machine, else one that the network knows.
+"""Finds a board for `phone-host run` without --link.
 
-Only what greets as ZeroMQ does counts as a board's port; whether it is the right board its key decides, not an answer on the network.
+It tries the last board, the board on the USB cable, one on this machine, and then one that announces itself on the
+network. Only a port with ZeroMQ's greeting counts as a board's port. The key, not an answer on the network, decides
+whether it is the right board.
 """
 
 import socket
@@ -26,24 +28,26 @@ THIS_MACHINE: Final = "tcp://127.0.0.1:5555"
 _LAST_FILE: Final = "last-board"
 _MOST_BYTES: Final = 4096
 _ANSWER_S: Final = 0.7
-"""A board on a cable or in the same house answers within a few ms; a lost first packet of TCP is repeated after a second, and met next time."""
+"""A board on a cable or in the same house answers within a few ms.
+
+TCP repeats a lost first packet after a second; the next round then finds the board."""
 
 _GREETING_BYTES: Final = 10
 
 
 def find_board(state: Path, now_s: Callable[[], float], wait_s: float | None) -> str:
-    """Find a board, however long it takes until there is one.
+    """Look for a board until there is one.
 
     Args:
         state: the folder in which the last board is remembered.
         now_s: a steady clock, s.
-        wait_s: for so long; None: for ever.
+        wait_s: how long to look; None: for ever.
 
     Returns:
-        Its link.
+        The board's link.
 
     Raises:
-        UnavailableError: there is none in time, or there are several.
+        UnavailableError: no board was found in time, or there are several.
     """
     deadline_s = float("inf") if wait_s is None else now_s() + wait_s
     near = tuple(dict.fromkeys((*_last(state), GADGET, THIS_MACHINE)))
@@ -64,7 +68,7 @@ def find_board(state: Path, now_s: Callable[[], float], wait_s: float | None) ->
 
 
 def find_board_and_say(state: Path, wait_s: float | None) -> str:
-    """As `find_board`, telling on stderr that it looks and what it has found."""
+    """Call `find_board`, and report the search and the result on stderr."""
     sys.stderr.write("phone-host: looking for a board (--link names one)\n")
     link = find_board(state, lambda: now.monotonic_ns() / 1e9, wait_s)
     sys.stderr.write(f"phone-host: found {link}\n")
@@ -72,7 +76,7 @@ def find_board_and_say(state: Path, wait_s: float | None) -> str:
 
 
 def remember(state: Path, link: str) -> None:
-    """Remember a board for the next time; a disk that does not take it is no matter."""
+    """Remember a board for the next time. Write errors are ignored."""
     with (
         suppress(OSError, UnavailableError),
         opened_folder(state, make=True) as folder,
@@ -82,7 +86,7 @@ def remember(state: Path, link: str) -> None:
 
 
 def answering(links: Sequence[str]) -> list[str]:
-    """Give those of some tcp links behind which somebody greets as ZeroMQ does, in their order."""
+    """Return those of the tcp links that answer with ZeroMQ's greeting, in the same order."""
     if not links:
         return []
     with ThreadPoolExecutor(min(16, len(links))) as pool:
@@ -100,7 +104,7 @@ def _last(state: Path) -> list[str]:
 
 
 def _greets(link: str) -> bool:
-    """Whether ZMTP's signature comes (RFC 23: ff, eight bytes, 7f), which both sides send unasked."""
+    """Return whether ZMTP's signature comes (RFC 23: ff, eight bytes, 7f), which both sides send unasked."""
     host, _, port = link.removeprefix("tcp://").rpartition(":")
     greeting = b""
     with suppress(OSError, OverflowError), socket.create_connection((host.strip("[]"), int(port)), _ANSWER_S) as probe:
@@ -114,9 +118,9 @@ def _why_not() -> str:
 
 
 def _announced() -> list[Found]:
-    """Listen for boards that announce themselves; without zeroconf they get the time all the same, and are not heard."""
+    """Listen for boards that announce themselves. Without zeroconf, wait as long and return none."""
     try:
-        from phone_host.boards.announced import announced  # noqa: PLC0415 - zeroconf is optional and slow to load, and seldom asked
+        from phone_host.boards.announced import announced  # noqa: PLC0415 - zeroconf is optional, slow to load and seldom needed
     except ImportError:
         threading.Event().wait(LISTEN_S)
         return []

@@ -1,6 +1,7 @@
-"""The host's calls at a board's door: exchange the words of pairing, keep the board's key. A core of its own decides (pairing_code).
+"""The host's calls at a board's door: exchange the words of enrolment and keep the board's key.
 
-A call ends before the code is typed, and another one proves it: nobody holds a connection while a person walks.
+The core in `common/protocol/enrolment_code.py` decides. The first call ends before the code is typed, and another call
+proves it, so no connection stays open while a person walks between the machines.
 """
 
 import os
@@ -21,7 +22,8 @@ from common.protocol.enrolment_wire import MAX_WORD_BYTES, WordReader, frame_wor
 from common.protocol.enrolment_words import Denial, Identity, Open, Refuse, Word
 
 _ANSWER_S: Final = 10.0
-"""A word takes a round trip and one round of the board's loop; a board that is busy elsewhere, or opens its door only now, gets this long."""
+"""Time limit for an answer. It takes a round trip and one round of the board's loop, but the board may be busy or open
+its door only now."""
 
 _AGAIN_S: Final = 0.2
 
@@ -30,8 +32,8 @@ class PairingCall:
     """One attempt to be trusted.
 
     Args:
-        door: the board's, host and port.
-        keys: this host's key; the board's is added when it has proved the code.
+        door: host and port of the board's door.
+        keys: this host's keys. The board's key is added once the board has proved the code.
     """
 
     def __init__(self, door: tuple[str, int], keys: KeyFolder) -> None:
@@ -40,11 +42,11 @@ class PairingCall:
         self._asking = Asking(me, os.urandom)
 
     def ask(self) -> str:
-        """Ask the board to show a code; gives the board's name.
+        """Ask the board to show a code. Return the board's name.
 
         Raises:
-            UnavailableError: the board takes in nobody, or not now.
-            DataError: what answers is no board.
+            UnavailableError: the board takes in no new host, or not now.
+            DataError: the answer is not from a board.
         """
         deadline_ns = now.monotonic_ns() + round(_ANSWER_S * 1e9)
         while True:
@@ -65,17 +67,17 @@ class PairingCall:
         """Prove the code, have the board prove it, and keep the board's key.
 
         Args:
-            code: what was typed.
-            link: where the board is to be found from now on.
+            code: the code that was typed.
+            link: the board's address from now on.
             progress: called once a round.
 
         Returns:
-            The board as it is known from now on.
+            The board as a known peer.
 
         Raises:
             SettingsError: this code was typed before.
             DataError: one of the two does not know the code.
-            UnavailableError: the board has fallen silent.
+            UnavailableError: the board does not answer any more.
         """
         if code_text(code) in self._keys.spent_codes():
             raise SettingsError(
@@ -85,7 +87,7 @@ class PairingCall:
         word: Word | None = self._asking.begin(code)
         with self._line() as line:
             while word is not None:
-                if isinstance(word, Open) and not is_spent:  # from now on somebody may learn of it
+                if isinstance(word, Open) and not is_spent:  # from now on somebody may learn the code
                     self._keys.spend(code_text(code))
                     is_spent = True
                 line.say(word)
@@ -113,7 +115,7 @@ class PairingCall:
 
 
 class _HungUpError(UnavailableError):
-    """Nobody answers at the door; it may open in a moment."""
+    """Nobody answers at the door, but it may open in a moment."""
 
 
 class _Line:
@@ -124,14 +126,14 @@ class _Line:
         self._reader = WordReader()
 
     def say(self, word: Word) -> None:
-        with suppress(OSError):  # the answer that does not come tells it
+        with suppress(OSError):  # the missing answer reveals it
             self._socket.sendall(frame_word(word))
 
     def hear(self) -> Word:
         deadline_ns = now.monotonic_ns() + round(_ANSWER_S * 1e9)
         while True:
             try:
-                # Not per read: what answers may be no board and say a byte now and then. 0 would mean not to wait at all.
+                # The limit is not per read: a stranger might send a byte now and then. 0 would mean not to wait at all.
                 self._socket.settimeout(max(1e-3, (deadline_ns - now.monotonic_ns()) / 1e9))
                 received = self._socket.recv(1 + MAX_WORD_BYTES)
                 words = self._reader.feed(received)

@@ -1,13 +1,13 @@
-"""What `discovery` and `announced` have in common: the service that boards announce, and what is said of one that was found."""
+"""What `discovery` and `announced` share: the service that boards announce, and the type of a found board."""
 
 from dataclasses import dataclass
 from typing import Final
 
 SERVICE: Final = "_tandemscan._tcp.local."
-"""As deploy/board/tandemscan.service.xml announces it."""
+"""The service that deploy/board/tandemscan.service.xml announces."""
 
 LISTEN_S: Final = 2.5
-"""A second question follows the first one after a second, and answers are delayed by up to 120 ms (RFC 6762, sections 5.2 and 6)."""
+"""A second query follows after one second, and answers may take up to 120 ms (RFC 6762, sections 5.2 and 6)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +15,7 @@ class Found:
     """A board that answers.
 
     Attributes:
-        name: for people; empty where nobody told it.
+        name: its name for people; empty if unknown.
         link: its link.
     """
 

@@ -1,7 +1,8 @@
-"""The host's udev rule for one board on a USB cable: made of what the kernel knows of the board that is plugged in now.
+"""The host's udev rule for one board on a USB cable, made from what the kernel knows of the board plugged in now.
 
-The rule gives names (/dev/tandemscan-board, tandemscan0) to the device of one vendor, product and serial number. It authenticates nobody: any
-device can claim these three. They come from the device, so they go into the rule only as plain letters and digits.
+The rule gives names (/dev/tandemscan-board, tandemscan0) to the device with a given vendor, product and serial number.
+It authenticates nobody: any device can claim these three. They come from the device, so the rule accepts only a plain
+set of characters.
 """
 
 import re
@@ -19,7 +20,7 @@ _OURS: Final = "tandemscan"
 
 _ID: Final = re.compile(r"[0-9a-f]{4}")
 _SERIAL: Final = re.compile(r"[0-9A-Za-z._:-]{1,126}")
-"""126 characters are the most that a USB string descriptor holds. Without `*?[|"\\` and blanks, which udev understands in its own way (udev(7))."""
+"""A USB string descriptor holds at most 126 characters. `*?[|"\\` and blanks have a meaning for udev (udev(7))."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +32,7 @@ class UsbBoard:
         vendor: four hexadecimal digits.
         product: four hexadecimal digits.
         serial: its serial number.
-        manufacturer: what it calls its maker.
+        manufacturer: its manufacturer's name.
     """
 
     device: str
@@ -45,13 +46,13 @@ def find_usb_board(port: Path | None, sysfs: Path = Path("/sys")) -> UsbBoard:
     """Find the board that is plugged in.
 
     Args:
-        port: its serial port; None: the only one that calls itself ours.
-        sysfs: where the kernel shows its devices.
+        port: its serial port; None: the only device with our manufacturer's name.
+        sysfs: where the kernel lists its devices.
 
     Raises:
-        MissingDeviceError: there is none, or no USB device behind this port.
-        SettingsError: there are several to choose from.
-        DataError: what it says of itself cannot stand in a rule.
+        MissingDeviceError: there is no board, or no USB device behind this port.
+        SettingsError: there are several boards to choose from.
+        DataError: its ids or serial number cannot be used in a rule.
     """
     if port is not None:
         found = _usb_device(sysfs / "class" / "tty" / port.resolve().name)
@@ -76,10 +77,10 @@ def find_usb_board(port: Path | None, sysfs: Path = Path("/sys")) -> UsbBoard:
 
 
 def rule_text(board: UsbBoard) -> str:
-    """Write the rule.
+    """Return the text of the rule.
 
     Args:
-        board: as `find_usb_board` gives it.
+        board: the board, from `find_usb_board`.
     """
     known = (("idVendor", board.vendor), ("idProduct", board.product), ("serial", board.serial))
     own, above = (", ".join(f'{key}{{{name}}}=="{value}"' for name, value in known) for key in ("ATTR", "ATTRS"))
@@ -92,14 +93,14 @@ SUBSYSTEM=="net", ACTION=="add", SUBSYSTEMS=="usb", {above}, NAME="tandemscan0"
 
 
 def write_rule(board: UsbBoard, rules: Path = RULES) -> None:
-    """Put the rule in place, whole; it takes the place of an earlier one.
+    """Write the rule atomically. It replaces an earlier one.
 
     Args:
-        board: as `find_usb_board` gives it.
+        board: the board, from `find_usb_board`.
         rules: the file.
 
     Raises:
-        UnavailableError: it cannot be written.
+        UnavailableError: the file cannot be written.
     """
     try:
         with opened_folder(rules.parent) as folder, replacing_in(folder, rules.name, mode=0o644) as file:
@@ -113,7 +114,7 @@ def write_rule(board: UsbBoard, rules: Path = RULES) -> None:
 
 
 def _usb_device(port: Path) -> UsbBoard | None:
-    """The USB device to which a port belongs; None where it belongs to none."""
+    """Return the USB device of a port; None if the port has none."""
     for folder in (port / "device").resolve().parents:
         if (folder / "idVendor").is_file():
             return UsbBoard(

@@ -1,1 +1,1 @@
-"""The host's own camera where it is none of the kernel's: opened by the same kind of URI, read by the same protocol."""
+"""Host cameras that are not kernel devices. They are opened by the same kind of URI and read by the same protocol."""

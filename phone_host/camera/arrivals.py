@@ -1,22 +1,22 @@
-"""How irregularly images arrive: the spread of their arrivals around a steady pace. Pure."""
+"""Measures how irregularly images arrive: the spread of arrival times around a steady pace. Pure."""
 
 from collections import deque
 from typing import Final
 
 _WINDOW: Final = 61
-"""Two seconds at 30 frames a second: short enough that a camera's clock is steady."""
+"""Two seconds at 30 frames a second, short enough for a camera's clock to be steady."""
 
 _LEAST: Final = 16
 
 
 class Arrivals:
-    """The arrivals of late."""
+    """The recent arrivals."""
 
     def __init__(self) -> None:
         self._seen: deque[tuple[int, int]] = deque(maxlen=_WINDOW)
 
     def add(self, sequence: int, arrived_ns: int) -> None:
-        """Take note of an image with its number in the stream."""
+        """Take note of an image's arrival and its number in the stream."""
         self._seen.append((sequence, arrived_ns))
 
     def restart(self) -> None:
@@ -25,7 +25,10 @@ class Arrivals:
 
     @property
     def jitter_ns(self) -> int | None:
-        """How much later than the swiftest one 95 % of the images arrived, against the line of least squares, ns; None before 16 images."""
+        """The images' 95th percentile of lateness relative to the fastest one, ns; None before 16 images.
+
+        Lateness is measured against the least-squares line.
+        """
         if len(self._seen) < _LEAST:
             return None
         count = len(self._seen)

@@ -1,4 +1,4 @@
-"""How the URI of an own camera looks, for help and for errors. Light: no camera is imported."""
+"""Example URIs of host cameras, for help and errors. Light: imports no camera."""
 
 from typing import Final
 

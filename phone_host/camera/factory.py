@@ -1,4 +1,4 @@
-"""Camera URI to camera, for the host: what `common` knows, and servers."""
+"""Opens the host's cameras by URI: those that `common` knows, and servers."""
 
 from typing import Final
 
@@ -10,7 +10,7 @@ from common.program.extensions import named
 from phone_host.camera.http_uri import http_settings, is_http
 
 _HTTP: Final = "phone_host.camera.mjpeg_http:HttpCamera"
-"""TLS and all that comes with it are imported only where a server is asked for."""
+"""Named, not imported: TLS and its dependencies are loaded only if a server is asked for."""
 
 
 def open_camera(uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXELS) -> Camera:
@@ -20,13 +20,13 @@ def open_camera(uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXEL
         uri: as in `examples.EXAMPLE`.
         clock: name of this machine's clock, for the stamps.
         now_ns: CLOCK_MONOTONIC now, ns.
-        most_pixels: a camera whose images have more is refused.
+        most_pixels: largest accepted image size, pixels.
 
     Returns:
         The open camera.
 
     Raises:
-        SettingsError: the URI makes no sense.
+        SettingsError: the URI is invalid.
         UnavailableError: there is no such device, folder or server.
         DataError: a replay's images are bad, or the images are too large.
     """
@@ -48,10 +48,10 @@ def _open(uri: str, clock: str, now_ns: int) -> Camera:
 
 
 def check_camera(uri: str) -> None:
-    """Read a camera URI without opening anything.
+    """Check a camera URI without opening anything.
 
     Raises:
-        SettingsError: the URI makes no sense.
+        SettingsError: the URI is invalid.
     """
     if is_http(uri):
         http_settings(uri, "")

@@ -1,4 +1,7 @@
-"""One connection to an MJPEG server: opened, its answer judged, its bytes read. Every refusal is one line with its remedy."""
+"""One connection to an MJPEG server: opens it, judges the answer and reads the bytes.
+
+Every refusal is one line with its remedy.
+"""
 
 import base64
 import http.client
@@ -12,10 +15,10 @@ from common.errors import UnavailableError
 from phone_host.camera.http_uri import HttpSettings
 
 _READ_BYTES: Final = 65_536
-"""More than a JPEG of a phone at 720p: one read takes what has come."""
+"""More than a phone's JPEG at 720p, so one read takes everything that has come."""
 
 _ANSWER_S: Final = 8.0
-"""For the head of an answer: less than a camera's start is waited for."""
+"""Time limit for the head of an answer, less than the time limit for a camera's start."""
 
 _NO_STREAM: Final = (
     "text/",
@@ -26,7 +29,7 @@ _NO_STREAM: Final = (
     "audio/",
     "video/mp4",
 )
-"""What is told to be something else; any other type is looked into: servers call MJPEG many names, or none."""
+"""Content types that are certainly no stream. Any other is examined, since servers give MJPEG many names or none."""
 
 _FAILURES: Final[tuple[tuple[type[Exception], str, str], ...]] = (
     (ssl.SSLCertVerificationError, "has a certificate that this machine does not trust", "give ?verify=0 to accept it"),
@@ -37,18 +40,18 @@ _FAILURES: Final[tuple[tuple[type[Exception], str, str], ...]] = (
     (ConnectionResetError, "hangs up without an answer", "check the port, and whether it needs https://"),
     (http.client.HTTPException, "does not speak HTTP", "check the port"),
 )
-"""What a failure means, the special ones first."""
+"""What each failure means, the most specific ones first."""
 
 
 class Connection:
     """An open stream of bytes.
 
     Args:
-        settings: which server.
-        patience_s: for connecting, and for each word of the answer.
+        settings: the server.
+        patience_s: time limit for connecting and for each read of the answer.
 
     Raises:
-        UnavailableError: it cannot be had, or it answers with something else than a stream.
+        UnavailableError: the server cannot be reached, or its answer is not a stream.
     """
 
     def __init__(self, settings: HttpSettings, patience_s: float) -> None:
@@ -57,7 +60,7 @@ class Connection:
         self._response: http.client.HTTPResponse | None = None
         try:
             self._client.connect()
-            self._sock: socket.socket = self._client.sock  # the client forgets it when it has read the answer's head
+            self._sock: socket.socket = self._client.sock  # the client drops it after reading the answer's head
             self._client.request("GET", settings.target, headers=_headers(settings))
             self._response = self._answer()
             self._judge(self._response)
@@ -69,11 +72,11 @@ class Connection:
             raise self._failed(error) from None
 
     def _answer(self) -> http.client.HTTPResponse:
-        """The head of the server's answer; each of its bytes may be in time and the whole never come."""
+        """Return the head of the answer, within a total time limit: single bytes could come in time without an end."""
         late = threading.Event()
 
         def give_up() -> None:
-            late.set()  # first: an interrupted head reads like one that has ended
+            late.set()  # first, because an interrupted head reads like a complete one
             self.interrupt()
 
         timer = threading.Timer(_ANSWER_S, give_up)
@@ -90,10 +93,10 @@ class Connection:
         """Wait for bytes.
 
         Args:
-            patience_s: so long.
+            patience_s: how long to wait, s.
 
         Returns:
-            What has come; empty at the end of the stream.
+            The bytes that have come; empty at the end of the stream.
 
         Raises:
             OSError: nothing came within the patience, or the connection broke.
@@ -102,16 +105,16 @@ class Connection:
         self._sock.settimeout(patience_s)
         try:
             return self._response.read1(_READ_BYTES)
-        except (http.client.HTTPException, ValueError):  # chunks that are none; TLS that was shut down
+        except (http.client.HTTPException, ValueError):  # invalid chunks; TLS that was shut down
             return b""
 
     def interrupt(self) -> None:
-        """Let a thread that waits in `read` find the stream at its end; safe from any thread."""
-        with suppress(OSError):  # broken already
+        """Make a thread that waits in `read` see the end of the stream. Safe from any thread."""
+        with suppress(OSError):  # already broken
             self._sock.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
-        """Let go of it; for the thread that reads."""
+        """Close the connection. Only for the thread that reads."""
         with suppress(OSError):
             if self._response is not None:
                 self._response.close()

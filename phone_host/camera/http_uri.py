@@ -1,6 +1,6 @@
 """The address of an MJPEG server as the user gives it: `http://USER:PASSWORD@HOST:8080/video?latency_ms=120`.
 
-Our own options are taken out of the query; what else stands there is the server's.
+Our own options are removed from the query. The rest belongs to the server.
 """
 
 import re
@@ -19,19 +19,19 @@ _OURS: Final = ("latency_ms", "latency_uncertainty_ms", "verify")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HttpSettings:
-    """Which server, and what is known of its delay.
+    """The server and what is known of its latency.
 
     Attributes:
-        secure: whether it is https.
+        secure: whether to use https.
         host: name or address.
         port: TCP port.
-        target: path and query as the server gets them.
-        user: for basic authentication; empty: none.
-        password: the same.
-        latency_ns: from exposure mid-point to the arrival of an image's first byte; None: not calibrated, taken for 0.
-        latency_uncertainty_ns: of that; None: not stated.
-        verify: whether the certificate of an https server is checked.
-        clock: name of the clock of the stamps.
+        target: path and query as sent to the server.
+        user: user for basic authentication; empty: none.
+        password: password for basic authentication.
+        latency_ns: from exposure mid-point to the arrival of an image's first byte; None: not calibrated, taken as 0.
+        latency_uncertainty_ns: uncertainty of the latency; None: not stated.
+        verify: whether to check the certificate of an https server.
+        clock: name of the stamps' clock.
     """
 
     secure: bool
@@ -47,13 +47,13 @@ class HttpSettings:
 
     @property
     def shown(self) -> str:
-        """The address for logs and errors: without the password."""
+        """The address for logs and errors, without user and password."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{'https' if self.secure else 'http'}://{host}:{self.port}{self.target}"
 
 
 def without_password(uri: str) -> str:
-    """A camera URI for logs and files: without user and password, where it is a server's."""
+    """Return a camera URI for logs and files. The URI of a server loses its user and password."""
     if not is_http(uri):
         return uri
     scheme, _, rest = uri.partition("://")
@@ -62,22 +62,22 @@ def without_password(uri: str) -> str:
 
 
 def is_http(uri: str) -> bool:
-    """Whether a camera URI names a server."""
+    """Return whether a camera URI names a server."""
     return uri.lower().startswith(("http://", "https://"))
 
 
 def http_settings(uri: str, clock: str) -> HttpSettings:
-    """Read the address of a server.
+    """Parse the address of a server.
 
     Args:
         uri: see EXAMPLE.
-        clock: name of the clock of the stamps.
+        clock: name of the stamps' clock.
 
     Returns:
         The settings.
 
     Raises:
-        SettingsError: it makes no sense.
+        SettingsError: the address or an option is invalid.
     """
     try:
         parts = urlsplit(uri)
@@ -86,7 +86,7 @@ def http_settings(uri: str, clock: str) -> HttpSettings:
     except ValueError:
         raise SettingsError(f"camera {_hidden(uri)!r} is not a valid address", f"give {EXAMPLE}") from None
     secure = parts.scheme.lower() == "https"
-    # Blanks and control characters would end the request's line early.
+    # Blanks and control characters would end the request line early.
     target = parts.path or "/"
     if not host or port == 0 or re.search(r"[^\x21-\x7e]", host + target + parts.query):
         raise SettingsError(f"camera {_hidden(uri)!r} is not a valid address", f"give {EXAMPLE}")
@@ -111,7 +111,7 @@ def http_settings(uri: str, clock: str) -> HttpSettings:
 
 
 def _split(query: str) -> tuple[dict[str, str], str]:
-    """Our options, and the server's query; that stays as it is where none of ours stands in it."""
+    """Split a query into our options and the server's query, which stays unchanged if it has none of ours."""
     items = parse_qsl(query, keep_blank_values=True, max_num_fields=100) if query.count("&") < 100 else []
     ours = {name: value for name, value in items if name in _OURS}
     return ours, urlencode([item for item in items if item[0] not in _OURS]) if ours else query
@@ -135,5 +135,5 @@ def _truth(uri: str, text: str) -> bool:
 
 
 def _hidden(uri: str) -> str:
-    """The address without its password."""
+    """Return the address with its password hidden."""
     return re.sub(r"(//[^/@]*?:)[^/@]*@", r"\1…@", uri)

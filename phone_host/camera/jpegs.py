@@ -1,12 +1,13 @@
-"""JPEG images in a byte stream, found by their own structure. Sans-I/O: bytes in, images out, `now_ns` passed in.
+"""Finds JPEG images in a byte stream by their own structure. Sans-I/O: bytes in, images out, `now_ns` passed in.
 
-What a server writes between them (multipart boundaries, part headers) is passed over: servers leave out dashes, lengths and line ends, announce
-one boundary and write another, and write the next boundary together with the image before it. A JPEG says by itself where it begins and ends: its
-segments carry their lengths, and in the entropy-coded data 0xFF is always followed by 0 or a restart marker (ITU-T T.81, B.1.1.2 to B.1.1.5). So an
-image is given with its last byte, not when the next part begins a period later.
+What a server writes between images (multipart boundaries, part headers) is ignored: servers omit dashes, lengths and
+line ends, announce one boundary and write another, and write the next boundary together with the image before it. A
+JPEG itself says where it begins and ends: its segments carry their lengths, and in the entropy-coded data 0xFF is
+always followed by 0 or a restart marker (ITU-T T.81, B.1.1.2 to B.1.1.5). So an image is returned with its last byte,
+not one period later when the next part begins.
 
-Rules: an image is given only whole; what breaks off is told of once and the search goes on behind the place that was wrong, so every byte is
-looked at once; never more than MAX_IMAGE_BYTES are kept.
+Rules: only whole images are returned. A broken image is reported once, and the search continues behind the fault, so
+every byte is examined once. At most MAX_IMAGE_BYTES are kept.
 """
 
 import re
@@ -22,10 +23,10 @@ from common.protocol.wire_fields import MAX_SIZE_PX
 MAX_IMAGE_BYTES: Final = MAX_PAYLOAD_BYTES
 
 _BEGIN: Final = b"\xff\xd8\xff"
-"""SOI and the first byte of the segment behind it."""
+"""SOI and the first byte of the next segment."""
 
 _MARKER: Final = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]", re.DOTALL)
-"""What ends entropy-coded data: neither a stuffed byte nor a restart marker nor a fill byte."""
+"""Ends entropy-coded data: not a stuffed byte, a restart marker or a fill byte."""
 
 _SOI, _EOI, _SOS = 0xD8, 0xD9, 0xDA
 _LEAST_CODE: Final = 0xC0
@@ -34,12 +35,12 @@ _LEAST_CODE: Final = 0xC0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Whole:
-    """An image that came in whole.
+    """A whole image.
 
     Attributes:
-        payload: from SOI to EOI.
-        width_px: from its frame header.
-        height_px: from its frame header.
+        payload: bytes from SOI to EOI.
+        width_px: width from its frame header, px.
+        height_px: height from its frame header, px.
         began_ns: when its first byte came.
         ended_ns: when its last byte came.
     """
@@ -53,7 +54,7 @@ class Whole:
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """An image that had begun and is none."""
+    """An image that began but is invalid."""
 
     fault: FrameFault
 
@@ -79,20 +80,20 @@ class JpegStream:
 
     @property
     def held_bytes(self) -> int:
-        """Bytes that are kept now."""
+        """Number of bytes kept now."""
         return len(self._data)
 
     @property
     def passed_bytes(self) -> int:
-        """Bytes that belonged to no whole image, so far: headers, boundaries, broken images."""
+        """Number of bytes so far that belonged to no whole image: headers, boundaries, broken images."""
         return self._passed_bytes
 
     def feed(self, data: bytes, now_ns: int) -> list[Whole | Broken]:
-        """Take bytes as they come, chopped in any way.
+        """Take bytes as they come, in pieces of any size.
 
         Args:
-            data: what was read.
-            now_ns: when, any steady clock, ns.
+            data: the bytes read.
+            now_ns: when they were read, any steady clock, ns.
 
         Returns:
             Whole images and broken ones, in order.
@@ -108,7 +109,7 @@ class JpegStream:
         return events
 
     def _step(self, now_ns: int, events: list[Whole | Broken]) -> bool:
-        """Go on by one marker; gives whether there may be more to do."""
+        """Advance by one marker. Return whether there may be more to do."""
         match self._phase:
             case _Phase.BETWEEN:
                 return self._seek(now_ns)
@@ -129,8 +130,8 @@ class JpegStream:
         self._phase, self._at, self._size_px = _Phase.SEGMENTS, 2, (0, 0)
         return True
 
-    def _segment(self, now_ns: int, events: list[Whole | Broken]) -> bool:  # noqa: PLR0911 - one for each kind of marker
-        """Look at the marker at `_at`."""
+    def _segment(self, now_ns: int, events: list[Whole | Broken]) -> bool:  # noqa: PLR0911 - one return for each kind of marker
+        """Handle the marker at `_at`."""
         data, at = self._data, self._at
         if len(data) < at + 4:
             return self._short(now_ns, events)
@@ -157,7 +158,7 @@ class JpegStream:
         return True
 
     def _short(self, now_ns: int, events: list[Whole | Broken]) -> bool:
-        """Fewer than four bytes are there: enough for an end, and for what is no marker."""
+        """Handle fewer than four bytes: enough to recognise an end or an invalid marker."""
         data, at = self._data, self._at
         if len(data) > at and data[at] != 0xFF:
             return self._give_up(at, events)
@@ -193,7 +194,7 @@ class JpegStream:
         return True
 
     def _give_up(self, at: int, events: list[Whole | Broken], fault: FrameFault = FrameFault.NO_END) -> bool:
-        """What has begun is no image: go on behind the place that was wrong."""
+        """Report the broken image and continue behind the fault."""
         events.append(Broken(fault))
         self._drop(at)
         self._phase = _Phase.BETWEEN

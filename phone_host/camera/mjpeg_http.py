@@ -1,8 +1,10 @@
-"""An MJPEG server, such as a phone's camera app, as a camera: a thread reads all that comes, the newest image waits for whoever reads.
+"""An MJPEG server, such as a phone's camera app, as a camera.
 
-Stamp: the arrival of an image's first byte minus the calibrated latency. The first byte of the image, not of its part's header: some servers write
-the next boundary together with the image before it, a period early. A slow consumer never builds up a backlog: an image that a newer one replaces
-before it was read is told of as skipped. When the server is called, given up and tried again, `common/camera/life.py` says; the thread does it.
+A thread reads everything that comes; the newest image waits for the reader. The stamp is the arrival of an image's
+first byte minus the calibrated latency. It is the first byte of the image, not of its part's header, because some
+servers write the next boundary together with the image before it, a period early. A slow reader never builds up a
+backlog: an image that a newer one replaces before it was read is reported as skipped. `common/camera/life.py` decides
+when to connect, give up and try again; the thread carries it out.
 """
 
 import logging
@@ -32,18 +34,18 @@ _S: Final = 1_000_000_000
 
 _MEASURE_FRAMES: Final = 9
 _MEASURE_NS: Final = 3 * _S
-"""The period is the median of eight distances; a camera so slow that these take longer is measured by what came until then."""
+"""The period is the median of eight intervals. If these take longer, the images that came until then are used."""
 
 _PATIENCE_S: Final = 5.0
 
 _LIFE: Final = LifeSettings(
-    # A phone whose camera has to wake up takes some seconds until its first image.
+    # If a phone's camera must wake up, the first image takes some seconds.
     start_ns=10 * _S,
-    # Wi-Fi holds packets up for a second now and then; after ten periods, two seconds at least, without an image the connection is made anew.
+    # Wi-Fi occasionally delays packets by a second. Without an image for ten periods, at least two seconds, reconnect.
     first_frame_ns=2 * _S,
     silence_ns=2 * _S,
     silence_periods=10,
-    # Between two attempts: doubled each time; a phone that is back is found within a second (DESIGN, section 7).
+    # Between two attempts, doubled each time: a phone that is back is found within a second (DESIGN, section 7).
     lost_rest_ns=_S // 10,
     rest_ns=_S // 10,
     longest_rest_ns=_S,
@@ -52,7 +54,7 @@ _LIFE: Final = LifeSettings(
 )
 
 _LONGEST_WAIT_S: Final = 3600.0
-"""A lock's time-out has a limit; the far future lies beyond it."""
+"""A lock's timeout has a limit, and the far future is beyond it."""
 
 _MOST_PENDING: Final = 64
 
@@ -61,10 +63,10 @@ class HttpCamera:
     """The images of one server.
 
     Args:
-        settings: which server.
+        settings: the server.
 
     Raises:
-        UnavailableError: it cannot be reached, refuses, or sends no JPEG images.
+        UnavailableError: the server cannot be reached, refuses, or sends no JPEG images.
     """
 
     def __init__(self, settings: HttpSettings) -> None:
@@ -113,17 +115,17 @@ class HttpCamera:
 
     @property
     def offers(self) -> Offers:
-        """None: a server gives what it gives."""
+        """No modes: a server's images cannot be changed."""
         return Offers()
 
     def due_ns(self, now_ns: int) -> int:
-        """Never by time alone."""
+        """Return NEVER_NS: nothing is due by time alone."""
         del now_ns
         return NEVER_NS
 
     def read(self, now_ns: int) -> list[Grab]:
-        """Give what has come: at most one frame, the newest."""
-        del now_ns  # an image is grabbed when its last byte has come
+        """Return what has come: at most one frame, the newest."""
+        del now_ns  # an image is grabbed when its last byte arrives
         with self._lock:
             with suppress(BlockingIOError):
                 os.read(self._wake_read, 4096)
@@ -133,17 +135,17 @@ class HttpCamera:
         return grabs
 
     def anchor(self, exposed_ns: int, index: int) -> None:
-        """Takes no notice: a server has a clock of its own."""
+        """Do nothing: a server has its own clock."""
 
     def steer(self, later_ns: int, now_ns: int) -> None:
-        """Takes no notice: a server cannot be steered."""
+        """Do nothing: a server cannot be steered."""
 
     def adapt(self, mode: Mode, now_ns: int) -> None:
-        """Takes no notice: it offers none."""
+        """Do nothing: it offers no modes."""
 
     @property
     def health(self) -> CameraHealth:
-        """How it has fared; `failures`: connections that broke, were refused or held no stream."""
+        """The camera's health; `failures` counts connections that broke, were refused or had no stream."""
         with self._lock:
             counts = self._life.counts
             return CameraHealth(
@@ -160,12 +162,12 @@ class HttpCamera:
 
     @property
     def newest_sequence(self) -> int:
-        """Number of the newest grab; -1 before one."""
+        """Number of the newest grab; -1 before the first."""
         with self._lock:
             return self._sequence - 1
 
     def pause(self) -> None:
-        """Close the connection: the phone may rest."""
+        """Close the connection, so that the phone may rest."""
         with self._lock:
             if self._life.pause() is Step.CLOSE:
                 self._drop()
@@ -177,13 +179,13 @@ class HttpCamera:
             self._lock.notify_all()
 
     def close(self) -> None:
-        """Close the connection and end the thread; again is harmless."""
+        """Close the connection and end the thread. May be called again."""
         with self._lock:
             was_open = not self._life.is_ended
             self._life.end()
             self._drop()
             self._lock.notify_all()
-        # Looking up a name cannot be cut short: then the thread ends by itself later, and touches nothing that was closed.
+        # A name lookup cannot be interrupted. Then the thread ends later by itself and touches nothing that was closed.
         self._thread.join(1.0)
         if was_open:
             with self._lock:
@@ -195,7 +197,7 @@ class HttpCamera:
             self._connection.interrupt()
 
     def _measure(self) -> int:
-        """Wait for the first images; gives their period, ns. What came meanwhile is forgotten."""
+        """Wait for the first images and return their period, ns. Forget what came meanwhile."""
         with self._lock:
             while True:
                 now_ns = now.monotonic_ns()
@@ -234,13 +236,13 @@ class HttpCamera:
         try:
             while self._is_to_open():
                 self._visit()
-        except Exception as error:  # noqa: BLE001 - a thread's root: whoever reads is told
+        except Exception as error:  # noqa: BLE001 - a thread's root: `read` raises it
             with self._lock:
                 self._failure = error
                 self._tell()
 
     def _is_to_open(self) -> bool:
-        """Wait until a connection is to be made; gives whether one is, else all is over."""
+        """Wait until it is time to connect and return True. Return False if the camera's life has ended."""
         with self._lock:
             while not self._life.is_ended:
                 now_ns = now.monotonic_ns()
@@ -250,7 +252,7 @@ class HttpCamera:
             return False
 
     def _visit(self) -> None:
-        """One connection from its beginning to its end."""
+        """Handle one connection from beginning to end."""
         try:
             connection = Connection(self._settings, _PATIENCE_S)
         except TandemError as error:
@@ -270,7 +272,7 @@ class HttpCamera:
             self._life.closed()
 
     def _take_over(self, connection: Connection) -> bool:
-        """Begin to listen; gives whether anybody still wants it."""
+        """Start to use a connection. Return whether it is still wanted."""
         with self._lock:
             if self._life.opened(now.monotonic_ns(), self._rate.period_ns or 0) is Step.CLOSE:
                 return False
@@ -280,7 +282,7 @@ class HttpCamera:
             return True
 
     def _stream(self, connection: Connection) -> None:
-        """Read one connection until it is lost, or to be closed."""
+        """Read one connection until it is lost or must be closed."""
         stream = JpegStream()
         while (patience_s := self._patience_s()) > 0:
             try:
@@ -301,7 +303,7 @@ class HttpCamera:
                     self._spoil(found.fault)
 
     def _patience_s(self) -> float:
-        """How long the next bytes may take; 0: the camera is given up."""
+        """Return how long the next bytes may take, s; 0: give the connection up."""
         with self._lock:
             now_ns = now.monotonic_ns()
             if self._life.due(now_ns) is Step.CLOSE:
@@ -353,7 +355,10 @@ class HttpCamera:
             self._add(frame)
 
     def _note_size(self, size_px: tuple[int, int]) -> None:
-        """Tell of a phone that was turned: what is paired and calibrated has the size of the beginning, and comes again when it is turned back."""
+        """Warn if the phone was turned.
+
+        Pairs and calibration have the first size. Images of that size come again when the phone is turned back.
+        """
         self._turns += self._size_px not in {size_px, (0, 0)}
         if self._size_px not in {size_px, (0, 0)} and self._turns.bit_count() == 1:  # the 1st, 2nd, 4th …
             sizes = {"size": size_text(size_px), "first": size_text(self._asked_px)}
@@ -369,7 +374,7 @@ class HttpCamera:
             self._add(Spoiled(sequence, fault))
 
     def _replace_waiting(self) -> None:
-        """A newer frame is there: the one that waits becomes word of a skipped one, together with those just before it."""
+        """A newer frame is here: turn the waiting one into Skipped, merged with any Skipped just before it."""
         if not (self._pending and isinstance(waiting := self._pending[-1], Frame)):
             return
         self._pending.pop()
@@ -381,7 +386,7 @@ class HttpCamera:
 
     def _add(self, grab: Grab) -> None:
         self._pending.append(grab)
-        if len(self._pending) > _MOST_PENDING:  # nobody reads: what is old becomes one word
+        if len(self._pending) > _MOST_PENDING:  # nobody reads: merge the old grabs into one Skipped
             *old, newest = self._pending
             passed = sum(item.frames if isinstance(item, Skipped) else 1 for item in old)
             self._pending = [Skipped(self._sequence - 1 - passed, passed), newest]

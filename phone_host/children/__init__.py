@@ -1,1 +1,1 @@
-"""Programs of ours that the host starts, and that are gone when it has done with them."""
+"""Our programs that the host starts as child processes and always ends."""

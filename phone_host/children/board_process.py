@@ -18,12 +18,12 @@ from phone_host.children.child_process import GOODBYE_S, child_process
 
 @dataclass(frozen=True, slots=True)
 class BoardAccount:
-    """What the board process said of its frames at its end: grabbed = sent + all dropped.
+    """The board process's final count of its frames: grabbed = sent + all dropped.
 
     Attributes:
-        grabbed: frames in all.
-        sent: given to the link.
-        dropped: those that were not, by reason.
+        grabbed: all frames.
+        sent: frames given to the link.
+        dropped: frames not sent, by reason.
     """
 
     grabbed: int
@@ -38,7 +38,7 @@ class BoardProcess:
         self._process = process
 
     def check(self) -> None:
-        """Raise UnavailableError with the process's own last word if it is gone."""
+        """If the process has ended, raise UnavailableError with the last line of its stderr."""
         if self._process.poll() is not None:
             words = self._process.communicate()[1].decode(errors="replace").strip().splitlines()
             raise UnavailableError(
@@ -47,8 +47,8 @@ class BoardProcess:
             )
 
     def stop(self) -> BoardAccount:
-        """Ask it to end; gives its account."""
-        # Ctrl-C in a terminal reaches every process of it: then the board has ended by itself, and has given its account.
+        """Ask the process to end. Return its account."""
+        # Ctrl-C reaches every process of a terminal: then the board has ended by itself and has written its account.
         if self._process.poll() != INTERRUPTED:
             self.check()
         self._process.terminate()
@@ -63,7 +63,7 @@ class BoardProcess:
 
 @contextmanager
 def board_process(camera: str, address: str) -> Iterator[BoardProcess]:
-    """A board-agent process for the length of a block; whatever happens, it is gone afterwards."""
+    """Run a board-agent process for the length of a block. It always ends with the block."""
     arguments = ["run", "--camera", camera, "--link", address, "--log-level", "warning", "--json"]
     with child_process("board_agent.cli", arguments, errors=True) as process:
         yield BoardProcess(process)
@@ -71,10 +71,10 @@ def board_process(camera: str, address: str) -> Iterator[BoardProcess]:
 
 @contextmanager
 def socket_folder() -> Iterator[Path]:
-    """A folder of this user's alone for sockets, for the length of a block.
+    """Create a private folder for sockets, for the length of a block.
 
     Raises:
-        UnavailableError: it cannot be made.
+        UnavailableError: the folder cannot be created.
     """
     parent = runtime_folder(os.environ)
     try:
@@ -88,7 +88,7 @@ def socket_folder() -> Iterator[Path]:
 
 
 def free_port() -> int:
-    """A TCP port of the loopback interface that nobody has now."""
+    """Return a TCP port of the loopback interface that is free now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -1,4 +1,4 @@
-"""A program of ours as a child process that is gone when its block ends, whatever happens."""
+"""Runs one of our programs as a child process that always ends with its block."""
 
 import subprocess
 import sys
@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Final
 
 GOODBYE_S: Final = 10.0
-"""One that was asked to end gets this long; our programs need 0.3 s at most on an idle machine."""
+"""How long a child may take to end when asked. Our programs need at most 0.3 s on an idle machine."""
 
 
 @contextmanager
@@ -15,11 +15,11 @@ def child_process(module: str, arguments: Sequence[str], *, errors: bool = False
     """Run `python -m MODULE` for the length of a block, with a pipe from its stdout.
 
     Args:
-        module: of ours, runnable.
-        arguments: of its command line.
-        errors: whether its stderr comes through a pipe, too; else it goes where ours goes.
+        module: one of our runnable modules.
+        arguments: its command line.
+        errors: whether its stderr is a pipe, too. Otherwise it goes where ours goes.
     """
-    # -P: a folder named `common` where the user happens to stand must not be taken for ours.
+    # -P: do not import a folder named `common` from the user's current folder.
     process = subprocess.Popen(
         [sys.executable, "-P", "-m", module, *arguments],
         stdin=subprocess.DEVNULL,

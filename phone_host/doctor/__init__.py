@@ -1,1 +1,1 @@
-"""phone-host doctor: what keeps this machine from a good run."""
+"""phone-host doctor: finds what prevents a good run on this machine."""

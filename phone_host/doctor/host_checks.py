@@ -1,4 +1,4 @@
-"""What a host needs beside camera and link, judged from readings: Python, its packages, the rig, the board's answer. Pure."""
+"""Judges from readings what a host needs besides camera and link: Python, packages, rig, the board's answer. Pure."""
 
 import re
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ OPENCV_WHEELS: Final = (
     "opencv-contrib-python",
     "opencv-contrib-python-headless",
 )
-"""All of them own the one folder `cv2`: side by side they overwrite each other's files, and removing one breaks the other."""
+"""All of them install the same folder `cv2`: they overwrite each other's files, and removing one breaks the others."""
 
 _USABLE_PX: Final = 1.0
-"""A stereo RMS above a pixel leaves rows that do not meet: no matcher finds much then."""
+"""With a stereo RMS above one pixel, the rows of the two images do not match, and no matcher finds much."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,12 +24,12 @@ class Package:
     """A Python package that the host imports.
 
     Attributes:
-        name: of the module.
-        version: as the module says; empty when it cannot be imported.
-        problem: why it cannot.
-        least: lowest version.
-        below: first version that is too new; empty: none is.
-        wheels: distributions that brought it.
+        name: name of the module.
+        version: version that the module states; empty if it cannot be imported.
+        problem: why it cannot be imported.
+        least: lowest tested version.
+        below: first version that is too new; empty: no limit.
+        wheels: installed distributions that provide it.
     """
 
     name: str
@@ -42,16 +42,16 @@ class Package:
 
 @dataclass(frozen=True, slots=True)
 class RigReadings:
-    """A rig file.
+    """Readings of a rig file.
 
     Attributes:
         path: the file.
-        problem: what is wrong with it; empty when it could be read and rectified.
+        problem: what is wrong with it; empty if it could be read and rectified.
         remedy: what to do about that.
-        rms_px: stereo RMS; NaN = unknown.
-        baseline_m: distance of the cameras, m.
-        host_size_px: size of the own camera's images in the rig.
-        asked_size_px: size that the own camera is asked for; None where the URI does not say.
+        rms_px: stereo RMS, px; NaN = unknown.
+        baseline_m: baseline, m.
+        host_size_px: image size of the host camera in the rig, px.
+        asked_size_px: image size that the host camera is asked for, px; None if the URI does not say.
     """
 
     path: str
@@ -64,7 +64,7 @@ class RigReadings:
 
 
 class Answer(Enum):
-    """What became of the question to the board."""
+    """The outcome of asking the board."""
 
     BOARD = "board"
     BUSY = "busy"
@@ -77,15 +77,15 @@ class Answer(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardReadings:
-    """What a board has answered.
+    """A board's answer.
 
     Attributes:
         uri: the link.
-        answer: what became of it.
-        waited_s: how long it was waited for, s.
+        answer: outcome of asking.
+        waited_s: how long the doctor waited for the board, s.
         camera: the board's camera.
-        round_trip_ns: shortest round trip; 0 where unknown.
-        uncertainty_ns: of its clock; 0 where unknown.
+        round_trip_ns: shortest round trip; 0 if unknown.
+        uncertainty_ns: uncertainty of its clock; 0 if unknown.
         problem: why a board of another version does not talk to this host.
         remedy: what to do about that.
     """
@@ -101,7 +101,7 @@ class BoardReadings:
 
 
 def check_python(version: tuple[int, int, int], platform: str) -> Finding:
-    """Judge the interpreter."""
+    """Judge the Python version."""
     text = f"Python {'.'.join(map(str, version))} on {platform}"
     if version < (3, 11, 0):
         return fail("python", text, "install Python 3.11 or newer")
@@ -109,7 +109,7 @@ def check_python(version: tuple[int, int, int], platform: str) -> Finding:
 
 
 def check_package(package: Package) -> Finding:
-    """Judge a package: can it be imported, is it of the range, is there one of it only."""
+    """Judge a package: can it be imported, is its version in range, and is it installed only once?"""
     if len(package.wheels) > 1:
         keep = package.wheels[0]
         remove = " ".join(wheel for wheel in package.wheels if wheel != keep)
@@ -143,7 +143,7 @@ def check_rig(rig: RigReadings) -> Finding:
     return ok("rig", text)
 
 
-def check_board(board: BoardReadings) -> Finding:  # noqa: PLR0911 - one for each answer
+def check_board(board: BoardReadings) -> Finding:  # noqa: PLR0911 - one return for each answer
     """Judge the board's answer."""
     match board.answer:
         case Answer.BOARD:
@@ -171,8 +171,8 @@ def check_ports(ports: tuple[str, ...], problem: str) -> Finding:
     """List the serial ports.
 
     Args:
-        ports: names with what hangs there.
-        problem: why they could not be listed; empty when they could.
+        ports: names of the ports, with what is attached.
+        problem: why they could not be listed; empty if they could.
     """
     if problem:
         return warn("serial", f"no serial links ({problem})", "pip install pyserial, or use another link")
@@ -180,7 +180,7 @@ def check_ports(ports: tuple[str, ...], problem: str) -> Finding:
 
 
 def check_out(folder: str, *, writable: bool) -> list[Finding]:
-    """Judge whether results can be written to a folder; nothing is said where they can, the disk's line names it."""
+    """Judge whether results can be written to a folder. If so, return nothing: the disk's finding names the folder."""
     return [] if writable else [fail("out", f"{folder} cannot be written to", "choose another folder with --out")]
 
 

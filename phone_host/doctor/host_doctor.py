@@ -1,6 +1,7 @@
-"""phone-host doctor: everything that keeps a host from pairing, each with its remedy. What both sides share lives in common/doctor.
+"""phone-host doctor: everything that prevents a run of the host, each with its remedy.
 
-Python's own packages are under suspicion here, so nothing that needs numpy or OpenCV is imported before both were seen to work.
+What board and host share is in common/doctor. The installed packages may be broken, so nothing that needs numpy or
+OpenCV is imported before both are known to work.
 """
 
 import importlib
@@ -48,11 +49,11 @@ class Question:
     """What a run would use.
 
     Attributes:
-        camera: URI of the own camera; empty: none is given.
-        links: URIs of the links to the board; none: none is given.
-        calibration: rig.yaml; empty: none is given.
+        camera: URI of the host camera; empty: none given.
+        links: URIs of the links to the board; empty: none given.
+        calibration: rig.yaml; empty: none given.
         out: folder of the results.
-        wait_s: how long the board is waited for, s.
+        wait_s: how long to wait for the board, s.
         keys: folder of this host's key and the boards that it knows.
     """
 
@@ -68,13 +69,13 @@ def examine(question: Question) -> list[Finding]:
     """Check this machine for a run.
 
     Args:
-        question: what it would use.
+        question: what the run would use.
 
     Returns:
-        The findings, in the order in which things go wrong.
+        The findings, in the order in which problems arise.
 
     Raises:
-        SettingsError: a URI makes no sense.
+        SettingsError: a URI is invalid.
     """
     account = machine.own_account()
     findings = [check_python(sys.version_info[:3], sys.platform)]
@@ -164,7 +165,7 @@ def _ports() -> Finding:
 
 
 def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> list[Finding]:
-    """Check the way to the board and, where the packages allow it, ask the board itself."""
+    """Check the way to the board and, if the packages work, ask the board itself."""
     address = parse_link(uri, listens_by_default=False).address
     findings = []
     if address.startswith("serial:") and (node := machine.read_node(Path(address.removeprefix("serial:")))) is not None:
@@ -183,7 +184,7 @@ def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> 
 
 
 def _way(address: str) -> Answer:
-    """Why a board is silent, as far as the network knows."""
+    """Return why a board is silent, as far as the network can tell."""
     if not address.startswith("tcp:"):
         return Answer.SILENT
     parts = urlsplit(address)

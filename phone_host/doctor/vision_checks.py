@@ -1,4 +1,7 @@
-"""What the doctor can only ask with numpy and OpenCV: a board, as a run does, and a rig. Imported when both were seen to work."""
+"""The doctor's checks that need numpy and OpenCV: ask a board as a run does, and read a rig.
+
+Imported only once both packages are known to work.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,18 +25,18 @@ from phone_host.stream.receiver import Receiver
 
 
 def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
-    """Say hello as a host does, and leave again.
+    """Say hello to a board as a host does, and leave again.
 
     Args:
-        uri: of the link to the board.
-        wait_s: how long it is waited for, s.
+        uri: URI of the link to the board.
+        wait_s: how long to wait for the board, s.
         keys: folder of this host's key and the boards that it knows.
 
     Returns:
-        What it answered.
+        The board's answer.
 
     Raises:
-        TandemError: the link cannot be opened, or failed.
+        TandemError: the link cannot be opened, or it failed.
     """
     link = open_link(parse_link(uri, listens_by_default=False), keys)
     receiver = Receiver([link], now.random_id(), NoFrames())
@@ -67,17 +70,17 @@ def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
 
 
 def read_rig_readings(calibration: str, camera: str) -> RigReadings:
-    """Read a rig and make its rectification.
+    """Read a rig and compute its rectification.
 
     Args:
         calibration: rig.yaml.
-        camera: URI of the own camera; empty: none is given.
+        camera: URI of the host camera; empty: none given.
 
     Returns:
-        What it says, or what is wrong with it.
+        The rig's readings, or what is wrong with it.
 
     Raises:
-        SettingsError: the URI makes no sense.
+        SettingsError: the URI is invalid.
     """
     try:
         rig = read_rig(Path(calibration))

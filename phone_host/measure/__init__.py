@@ -1,1 +1,1 @@
-"""What a run was, in figures, and what may be claimed of it. Pure, but for the corners that image motion follows."""
+"""A run in figures, and what may be concluded from them. Pure, except that image motion tracks corners."""

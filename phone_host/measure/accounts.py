@@ -1,4 +1,4 @@
-"""What the host saw of a board and its links, in figures. Written by the receiver's thread only; others read copies."""
+"""The host's counts of a board and its links. Only the receiver's thread writes them; others read copies."""
 
 from collections import Counter, deque
 from collections.abc import Sequence
@@ -11,26 +11,26 @@ from phone_host.measure.delays import Series
 from phone_host.sync.quarantine import Disbelief, Suspects
 
 _MOST_SUSPECTS: Final = 64
-"""Steps whose frames are remembered by number; all are counted."""
+"""Number of steps whose suspect frames are remembered. All steps are counted."""
 
 
 @dataclass(slots=True)
 class SessionAccount:
-    """One life of a board as the host saw it; closed accounts are kept for the report.
+    """One board session as the host saw it. Accounts of closed sessions are kept for the report.
 
     Attributes:
         session: the board's session id.
         first: the board's account when this host was accepted.
         latest: the board's newest account.
         received: frames that came.
-        lost: frames that were sent and never came (gaps).
-        duplicate: frames that a transport delivered again, dropped.
-        late: how many of the lost came after all, behind a newer one over another link, and were dropped.
-        old_session: frames of an older life of the board, dropped.
-        rung: how far the board has lowered what its camera gives.
-        disbelieved: frames that came and were not believed, by reason.
-        ended: whether the board said that no frame follows.
-        vanished: whether the board went without a word: what it sent after `latest` is unknown.
+        lost: frames that were sent but never came (gaps).
+        duplicate: frames that a transport delivered again; dropped.
+        late: how many of the lost frames came after all, behind a newer one over another link; dropped.
+        old_session: frames of an earlier session; dropped.
+        rung: the rung that the board's camera is on.
+        disbelieved: frames that came but were not believed, by reason.
+        ended: whether the board said that no more frames follow.
+        vanished: whether the board left without a goodbye. Then what it sent after `latest` is unknown.
     """
 
     session: str
@@ -47,7 +47,7 @@ class SessionAccount:
     vanished: bool = False
 
     def copy(self) -> "SessionAccount":
-        """The same, as it is now."""
+        """Return a copy of the present state."""
         return replace(self, disbelieved=Counter(dict(self.disbelieved)))
 
     def count_stale(self, reason: StaleReason) -> None:
@@ -67,16 +67,16 @@ class SessionAccount:
 
 @dataclass(slots=True)
 class LinkTally:
-    """What one link did.
+    """The counts of one link.
 
     Attributes:
-        name: as it stands in delays.jsonl: its kind, with a number where there are more of that kind.
-        frames: that came over it.
-        bytes: of their images.
-        carried: how often the stream came to it.
-        lost: how often it was lost, or stuck, after it had been up.
+        name: its name in delays.jsonl: its kind, with a number if there are several of that kind.
+        frames: frames that came over it.
+        bytes: bytes of their images.
+        carried: how often it became the carrier.
+        lost: how often it was lost, or got stuck, after it had been up.
         is_up: whether the board answers there now.
-        age: how old the frames were when they came, ns.
+        age: age of the frames on arrival, ns.
     """
 
     name: str
@@ -88,24 +88,24 @@ class LinkTally:
     age: Series = field(default_factory=Series)
 
     def copy(self) -> "LinkTally":
-        """The same, as it is now."""
+        """Return a copy of the present state."""
         return replace(self, age=self.age.copy())
 
 
 @dataclass(slots=True)
 class LinkAccount:
-    """What the receiver has seen so far; written by its thread only; others read copies.
+    """What the receiver has seen so far. Only its thread writes; others read copies.
 
     Attributes:
-        sessions: lives of the board.
-        links: in the order of the command line.
+        sessions: the board's sessions.
+        links: the links in the order of the command line.
         connects: how often the board was found.
-        switches: how often the stream went from one link to another.
-        garbage: packets that were none of ours.
+        switches: how often the stream switched from one link to another.
+        garbage: packets that were not ours.
         no_clock: frames that came before the clock was known.
-        clock_doubts: how often what was known of the clocks was contradicted, or void.
+        clock_doubts: how often the knowledge of the clocks was contradicted or void.
         clock_steps: how often one of the clocks had stepped.
-        suspects: frames that were believed between a step and the echo that told of it, newest last.
+        suspects: frames that were believed between a step and the echo that revealed it, newest last.
     """
 
     sessions: list[SessionAccount] = field(default_factory=list)
@@ -119,7 +119,7 @@ class LinkAccount:
     suspects: deque[Suspects] = field(default_factory=lambda: deque(maxlen=_MOST_SUSPECTS))
 
     def copy(self) -> "LinkAccount":
-        """The same, as it is now; may be called while the receiver's thread writes."""
+        """Return a copy of the present state. Safe while the receiver's thread writes."""
         return replace(
             self,
             sessions=[account.copy() for account in tuple(self.sessions)],
@@ -129,7 +129,7 @@ class LinkAccount:
 
     @property
     def disbelieved(self) -> Counter[Disbelief]:
-        """Frames that came and were not believed, over all sessions, by reason."""
+        """Frames that came but were not believed, over all sessions, by reason."""
         total: Counter[Disbelief] = Counter()
         for account in tuple(self.sessions):
             total.update(account.disbelieved)
@@ -137,13 +137,13 @@ class LinkAccount:
 
 
 def link_names(kinds: Sequence[str]) -> list[str]:
-    """Name links so that each name is there once.
+    """Give each link a unique name.
 
     Args:
-        kinds: of the links, in order.
+        kinds: the links' kinds, in order.
 
     Returns:
-        The kind for the first of each, `kind-2` for the second and so on.
+        The kind for the first link of a kind, `kind-2` for the second and so on.
     """
     seen: Counter[str] = Counter()
     names = []
@@ -154,7 +154,7 @@ def link_names(kinds: Sequence[str]) -> list[str]:
 
 
 def rung_values(rung: Rung) -> dict[str, object]:
-    """How far the board has lowered what its camera gives, as a JSON object; None for what cannot be set."""
+    """Return a rung as a JSON object; None for what cannot be set."""
     return {
         "rung": rung.index,
         "lowest_rung": rung.last,
@@ -166,7 +166,7 @@ def rung_values(rung: Rung) -> dict[str, object]:
 
 
 def rung_lines(link: LinkAccount) -> list[str]:
-    """The same in one line for people; nothing where the board never lowered anything."""
+    """Return the latest session's rung as one line for people; empty if the board never changed the rung."""
     if not link.sessions or not link.sessions[-1].rung.changes:
         return []
     rung = link.sessions[-1].rung

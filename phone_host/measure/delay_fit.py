@@ -1,10 +1,11 @@
-"""Propagation as latency + bytes / rate: a line through frames of different size. Pure.
+"""Models propagation as latency + bytes / rate: a line fitted to frames of different size. Pure.
 
-The line is the one of least absolute deviations, the median of the delay for each size (Koenker and Bassett, "Regression Quantiles", Econometrica 46,
-1978): a frame that the machine held up for a hundred times the usual weighs no more than one held up a little. Intervals come from the moving-block
-bootstrap (Künsch, "The jackknife and the bootstrap for general stationary observations", Annals of Statistics 17, 1989): neighbours in
-time share their luck, and drawing frames one by one would claim too much. Neither latency nor time for a byte is below zero: where noise tilts the line
-beyond that, it is the best one that begins at zero, or the level one.
+The line has least absolute deviations, i.e. it estimates the median delay for each size (Koenker and Bassett,
+"Regression Quantiles", Econometrica 46, 1978). A frame delayed by a hundred times the usual weighs no more than one
+delayed a little. Intervals come from the moving-block bootstrap (Künsch, "The jackknife and the bootstrap for general
+stationary observations", Annals of Statistics 17, 1989): delays of neighbouring frames are correlated, so drawing
+single frames would give intervals that are too narrow. Neither the latency nor the time per byte may be negative. If
+noise tilts the line that far, the result is the best line through the origin, or the best horizontal line.
 """
 
 from dataclasses import dataclass
@@ -16,36 +17,36 @@ from numpy.typing import NDArray
 Values = NDArray[np.float64]
 
 LIKE_SIZES: Final = 1.2
-"""Frames within this factor of each other are of one size: a line through them would be carried far beyond what was measured, to no bytes at all."""
+"""Frames within this factor count as one size: a line through them would be extrapolated too far, down to 0 bytes."""
 
 _STEPS: Final = 60
 _DRAWS: Final = 200
 _MOST: Final = 1200
-"""More points are thinned evenly: they would not change the line, and the bootstrap draws them 200 times."""
+"""Beyond this, points are thinned evenly: more do not change the line, and the bootstrap draws them 200 times."""
 
 _BLOCK: Final = 15
-"""Neighbours drawn together: half a second at 30 frames a second, longer than a hitch of the machine ..."""
+"""Neighbours drawn together: half a second at 30 frames a second, longer than a hitch of the machine."""
 
 _TRIES: Final = 20
-"""A series in which this is not enough to meet both sizes has one frame that is unlike all others: no interval can be drawn from that."""
+"""Tries per draw. If these do not find two sizes, only one frame differs from the rest and no interval is possible."""
 
 _LEAST_BLOCKS: Final = 8
-"""... but of a short series fewer, else every draw would be the same and the interval would claim to know all."""
+"""A short series has smaller blocks, so that it has this many. Else all draws would be equal and the interval empty."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DelayFit:
-    """delay = latency + ns_per_byte * bytes, with intervals that hold the true line in 95 % of like measurements.
+    """delay = latency + ns_per_byte * bytes, with intervals that contain the true line in 95 % of such measurements.
 
     Attributes:
-        latency_ns: delay of no bytes at all, 0 at least; NaN where all frames were of about one size.
-        latency_low_ns: lower end of its interval; NaN where too few frames were of another size.
-        latency_high_ns: upper end.
-        ns_per_byte: slope, 0 at least; NaN where all frames were of about one size.
-        slope_low: lower end of its interval, ns a byte.
-        slope_high: upper end, ns a byte.
-        points: frames that were looked at.
-        typical_error_ns: median of what the line leaves over, without its sign.
+        latency_ns: delay of 0 bytes, at least 0; NaN if all frames were of about one size.
+        latency_low_ns: lower end of its interval; NaN if too few frames were of another size.
+        latency_high_ns: upper end of its interval.
+        ns_per_byte: slope, at least 0; NaN if all frames were of about one size.
+        slope_low: lower end of its interval, ns per byte.
+        slope_high: upper end of its interval, ns per byte.
+        points: number of frames given.
+        typical_error_ns: median absolute residual.
     """
 
     latency_ns: float
@@ -59,7 +60,7 @@ class DelayFit:
 
     @property
     def bytes_per_s(self) -> float:
-        """The rate; infinite where larger frames were not slower, NaN where it is not known."""
+        """The rate; infinite if larger frames were not slower, NaN if unknown."""
         return _rate(self.ns_per_byte)
 
     @property
@@ -69,11 +70,11 @@ class DelayFit:
 
     @property
     def most_bytes_per_s(self) -> float:
-        """Upper end of the rate's interval; infinite where sizes made no sure difference."""
+        """Upper end of the rate's interval; infinite if the size made no certain difference."""
         return _rate(self.slope_low)
 
     def delay_ns(self, size_bytes: float) -> float:
-        """The line's delay for a frame, ns."""
+        """Return the line's delay for a frame of this size, ns."""
         return self.latency_ns + self.ns_per_byte * size_bytes
 
 
@@ -81,12 +82,12 @@ def fit_delay(size_bytes: Values, delay_ns: Values, draws: int = _DRAWS) -> Dela
     """Fit the line.
 
     Args:
-        size_bytes: (N,) of the frames, in the order in which they came.
+        size_bytes: (N,) sizes of the frames, in order of arrival.
         delay_ns: (N,) their delays, ns.
-        draws: of the bootstrap; 0: no intervals (NaN).
+        draws: number of bootstrap draws; 0: no intervals (NaN).
 
     Returns:
-        The fit; NaN throughout where all frames are of about one size (LIKE_SIZES).
+        The fit; all NaN if the frames are of about one size (LIKE_SIZES).
     """
     every = max(1, -(-size_bytes.size // _MOST))
     x, y = size_bytes[::every], delay_ns[::every]
@@ -124,9 +125,9 @@ def fit_delay(size_bytes: Values, delay_ns: Values, draws: int = _DRAWS) -> Dela
 
 
 def _line(x: Values, y: Values) -> tuple[float, float]:
-    """Intercept and slope of least absolute deviations, neither below zero."""
+    """Return intercept and slope of least absolute deviations, neither below zero."""
     latency, slope = _free_line(x, y)
-    # The sum of deviations is convex: where its least lies outside, the least inside lies on the border that is crossed.
+    # The sum of deviations is convex: if its minimum is not allowed, the best allowed line is on the border.
     if slope < 0.0:
         return max(0.0, float(np.median(y))), 0.0
     if latency < 0.0:
@@ -141,7 +142,7 @@ def _weighted_median(values: Values, weights: Values) -> float:
 
 
 def _free_line(x: Values, y: Values) -> tuple[float, float]:
-    """Intercept and slope of least absolute deviations, by reweighted least squares."""
+    """Return intercept and slope of least absolute deviations, by iteratively reweighted least squares."""
     middle, width = float(x.mean()), float(x.std()) or 1.0
     design = np.stack([np.ones_like(x), (x - middle) / width])
     weights = np.ones_like(y)
@@ -160,12 +161,12 @@ def _free_line(x: Values, y: Values) -> tuple[float, float]:
 
 
 def neighbours(size: int, count: int, generator: np.random.Generator) -> NDArray[np.int64]:
-    """Draw from a series with its neighbours together (moving blocks), so that what comes in spells still does.
+    """Draw from a series in moving blocks of neighbours, so that the correlation between neighbours is kept.
 
     Args:
-        size: of the series, 1 at least.
-        count: how many are wanted.
-        generator: for the draws.
+        size: length of the series, at least 1.
+        count: number of indices to draw.
+        generator: random generator for the draws.
 
     Returns:
         (count,) indices into the series.
@@ -177,7 +178,7 @@ def neighbours(size: int, count: int, generator: np.random.Generator) -> NDArray
 
 
 def _blocks(x: Values, draws: int, generator: np.random.Generator) -> list[NDArray[np.int64]]:
-    """Indices of resampled series that have more than one size."""
+    """Return indices of resampled series that contain more than one size."""
     chosen: list[NDArray[np.int64]] = []
     for _ in range(_TRIES * draws):
         if len(chosen) == draws:

@@ -1,4 +1,4 @@
-"""Ledgers to percentiles: what a run's delays were, in bounded memory. Pure."""
+"""Turns ledgers into percentiles of a run's delays, in bounded memory. Pure."""
 
 from dataclasses import dataclass, fields
 from typing import Final
@@ -8,10 +8,10 @@ import numpy as np
 from common.ledger import PairLedger, StageTimes
 
 EXACT: Final = 65536
-"""Up to this many pairs (36 minutes at 30 per second) percentiles are exact; beyond, every 2nd, 4th, … pair is kept."""
+"""Percentiles are exact up to this many pairs (36 minutes at 30/s). Beyond, every 2nd, 4th, … pair is kept."""
 
 SAMPLE: Final = 4096
-"""More points than a plot has pixels; some 3 MB."""
+"""More points than a plot has pixels; about 3 MB."""
 
 DELAYS: Final = ("capture", "outbox", "propagation", "pairing", "queuing", "processing", "end_to_end", "starvation")
 STAGES: Final = tuple(stage.name for stage in fields(StageTimes))
@@ -20,10 +20,10 @@ OTHERS: Final = ("time_skew", "uncertainty")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
-    """How a quantity was distributed; all in ns, NaN where nothing was measured.
+    """The distribution of a quantity, in ns; NaN if nothing was measured.
 
     Attributes:
-        count: values seen.
+        count: number of values.
         p50_ns: median.
         p95_ns: 95th percentile.
         p99_ns: 99th percentile.
@@ -40,10 +40,13 @@ class Spread:
 
 
 class Series:
-    """Integers, thinned evenly when they get many; all the memory that they will ever need is taken at once, so that a long run stays flat."""
+    """A series of integers, thinned evenly when there are many.
+
+    All memory is allocated at once, so memory use stays flat in a long run.
+    """
 
     def __init__(self) -> None:
-        # Not zeros: the kernel would hand out their pages only when they are first written.
+        # Not zeros: the kernel would provide their pages only on the first write.
         self._values = np.ones(EXACT, np.int64)
         self._kept = 0
         self._stride = 1
@@ -52,12 +55,12 @@ class Series:
         self._max: int | None = None
 
     def add(self, value: int) -> None:
-        """Take one value."""
+        """Add one value."""
         if self._count % self._stride == 0:
             if self._kept == EXACT:
                 self._kept //= 2
                 self._stride *= 2
-                thinned = np.ones(EXACT, np.int64)  # anew: copies look at the old ones
+                thinned = np.ones(EXACT, np.int64)  # a new array: copies still use the old one
                 thinned[: self._kept] = self._values[::2]
                 self._values = thinned
             self._values[self._kept] = value
@@ -67,16 +70,19 @@ class Series:
         self._max = value if self._max is None else max(self._max, value)
 
     def copy(self) -> "Series":
-        """The same values, which stay as they are now; nothing can be added to it. Costs nothing: a value is never changed where it stands."""
+        """Return a frozen copy, to which nothing can be added.
+
+        It costs nothing, because values never change in place.
+        """
         copied = Series.__new__(Series)
         copied.__dict__ |= self.__dict__ | {"_values": self._values[: self._kept]}
         return copied
 
     def spread(self, last: int | None = None) -> Spread:
-        """Summarise all values, or the percentiles of the last ones only.
+        """Summarise all values, or restrict percentiles and maximum to the newest ones.
 
         Args:
-            last: how many of the newest values; None for all.
+            last: number of newest values to use; None for all.
         """
         wanted = self._kept if last is None else -(-last // self._stride)
         values = self._values[max(0, self._kept - wanted) : self._kept]
@@ -91,7 +97,7 @@ class Series:
 
 
 class Sample:
-    """Ledgers of a run for its plots: all of them up to SAMPLE, then every 2nd, 4th, … one."""
+    """Ledgers of a run for its plots: all up to SAMPLE, then every 2nd, 4th, … one."""
 
     def __init__(self) -> None:
         self.ledgers: list[PairLedger] = []
@@ -116,7 +122,7 @@ class DelayStatistics:
         self._bytes = 0
 
     def copy(self) -> "DelayStatistics":
-        """The delays so far, which stay as they are now."""
+        """Return a frozen copy of the delays so far."""
         copied = DelayStatistics.__new__(DelayStatistics)
         series = {name: series.copy() for name, series in self._series.items()}
         copied.__dict__ |= self.__dict__ | {"_series": series}
@@ -139,5 +145,5 @@ class DelayStatistics:
         return self._bytes / pairs if pairs else float("nan")
 
     def spread(self, name: str, last: int | None = None) -> Spread:
-        """Summarise one of DELAYS, STAGES or OTHERS (time skews without their sign)."""
+        """Summarise one of DELAYS, STAGES or OTHERS (time skews as absolute values)."""
         return self._series[name].spread(last)

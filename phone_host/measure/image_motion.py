@@ -1,6 +1,7 @@
-"""How fast a camera's image moves: a few corners, followed from one frame to the next, twice a second. Some ms each time.
+"""Measures how fast a camera's image moves by tracking a few corners between two frames, twice a second.
 
-Only speeds come out. Corners are followed there and back (Kalal et al., Forward-Backward Error, ICPR 2010): those that do not return are dropped.
+Each measurement takes a few ms and yields only speeds. Corners are tracked forward and backward (Kalal et al.,
+Forward-Backward Error, ICPR 2010). Those that do not return are dropped.
 """
 
 from typing import Any, Final
@@ -12,21 +13,21 @@ from numpy.typing import NDArray
 from phone_host.model import Image
 
 _WIDTH_PX: Final = 320
-"""Images are scaled to this width: there half a pixel is seen and 40 px a frame can be followed with 3 levels of a pyramid."""
+"""Images are scaled down to this width: half a pixel is visible, and 3 pyramid levels can track 40 px per frame."""
 
 _CORNERS: Final = 80
 _FEWEST: Final = 8
 _RETURN_PX: Final = 0.5
 _PERIOD_NS: Final = 500_000_000
 _LONGEST_NS: Final = 300_000_000
-"""Frames further apart than this show too much else; nothing is measured then."""
+"""Frames further apart than this differ too much in content and are not measured."""
 
 _RECENT: Final = 4
 _FAST_PERCENTILE: Final = 90
 
 
 class MotionMeter:
-    """Measures the speed of the fastest tenth of one camera's image; used by one thread, read by any."""
+    """Measures the speed of the fastest tenth of one camera's image. One thread adds frames; any thread may read."""
 
     def __init__(self) -> None:
         self._before: tuple[Image, int] | None = None
@@ -36,7 +37,7 @@ class MotionMeter:
 
     @property
     def px_s(self) -> float:
-        """Median of the last measurements, px/s of the image as it is; NaN before there is one."""
+        """Median of the last measurements, px/s at full image size; NaN before the first one."""
         recent = self._recent
         return float(np.median(recent)) if recent else float("nan")
 
@@ -44,8 +45,8 @@ class MotionMeter:
         """Take a frame of the camera.
 
         Args:
-            image: (H, W) or (H, W, 3), uint8; not kept longer than until the next one, and never changed.
-            exposed_ns: its exposure mid-point, on any one clock.
+            image: (H, W) or (H, W, 3), uint8; kept until the next one at most, and never changed.
+            exposed_ns: its exposure mid-point; always on the same clock.
             now_ns: CLOCK_MONOTONIC now, ns.
         """
         before, self._before = self._before, None
@@ -65,19 +66,19 @@ class MotionMeter:
 
 
 def fast_shift_px(first: Image, second: Image) -> float:
-    """How far the fastest tenth of the image has moved between two frames.
+    """Measure how far the fastest tenth of the image has moved between two frames.
 
     Args:
         first: (H, W) or (H, W, 3), uint8.
-        second: of the same shape.
+        second: (H, W) or (H, W, 3), uint8, of the same shape.
 
     Returns:
-        The 90th percentile of the corners' shifts, px; NaN where too few can be followed (a blank wall).
+        The 90th percentile of the corners' shifts, px; NaN if too few corners can be tracked (a blank wall).
     """
     scale: float = min(1.0, _WIDTH_PX / first.shape[1])
     before, after = _small(first, scale), _small(second, scale)
     seen: NDArray[Any] | None = cv2.goodFeaturesToTrack(before, _CORNERS, 0.02, 6)
-    if seen is None or len(seen) < _FEWEST:  # None where there is no corner at all, whatever its type says
+    if seen is None or len(seen) < _FEWEST:  # None if there is no corner, whatever its type says
         return float("nan")
     corners = np.asarray(seen, np.float32)
     ahead, found, _ = cv2.calcOpticalFlowPyrLK(before, after, corners, np.empty_like(corners), maxLevel=3)

@@ -1,8 +1,8 @@
-"""Which of the two queueing regimes holds, and what would help: the processor starves, or a backlog waits for it. Pure.
+"""Which of the two queueing regimes holds, starvation of the processor or a backlog, and what would help. Pure.
 
-The paper (chapter 4) names both: where propagation takes longer than processing the processor waits for input; where it takes less, input waits
-in a FIFO. Stages overlap here, so what is compared are the times between pairs, not the delays themselves: how often pairs arrive, and how long
-each keeps the processor busy.
+The paper (chapter 4) names both: if propagation takes longer than processing, the processor waits for input; if it
+takes less, input waits in a FIFO. The stages overlap here, so the comparison uses the times between pairs, not the
+delays themselves: how often pairs arrive, and how long each keeps the processor busy.
 """
 
 import math
@@ -13,16 +13,18 @@ from typing import Final
 from phone_host.sync.fifo import Overflow
 
 _BUSY: Final = 0.9
-"""From this share of its time on the processor counts as the bottleneck: with random arrivals a queue's length grows as 1 / (1 - share)."""
+"""The processor is the bottleneck if it is busy for this share of the time or more.
+
+With random arrivals a queue's length grows as 1 / (1 - share)."""
 
 _SLOWER: Final = 1.15
-"""Arrivals are slower than the cameras from this factor on: a run of 30 pairs may lack one or two at its ends."""
+"""Arrivals count as slower than the cameras above this factor. A run of 30 pairs may lack one or two at its ends."""
 
 _FEW: Final = 10
 
 
 class Regime(Enum):
-    """Which regime holds, and for starvation what keeps the processor waiting."""
+    """The regime; for starvation, also what the processor waits for."""
 
     UNKNOWN = "unknown"
     STARVED_BY_CAMERAS = "starved by the cameras"
@@ -33,20 +35,21 @@ class Regime(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFigures:
-    """What the regime is judged by; means over a run or over its last pairs, ns; NaN = not measured.
+    """The figures that determine the regime: means over a run or over its last pairs, ns; NaN = not measured.
 
     Attributes:
-        pairs: processed.
-        interval_ns: between two results.
-        processing_ns: of a pair.
+        pairs: number of processed pairs.
+        interval_ns: time between two results.
+        processing_ns: processing time of a pair.
         match_ns: the matcher's share of it.
         starvation_ns: how long the processor had nothing to do before a pair.
-        period_ns: of the slower camera; 0 where images come on demand.
-        received: board frames that reached the host, for each that was paired.
-        offered: pairs formed, for each that was processed.
-        frame_bytes: length of a board frame.
-        propagation_ns: of a board frame.
-        overflow: of the FIFO; with `block` the board is held back, so what is offered says nothing about what could be.
+        period_ns: period of the slower camera; 0 if images come on demand.
+        received: board frames that reached the host, per paired frame.
+        offered: pairs formed, per processed pair.
+        frame_bytes: size of a board frame.
+        propagation_ns: propagation of a board frame.
+        overflow: the FIFO's overflow policy. With `block` the board is held back, so the pairs offered do not show how
+            many there could be.
     """
 
     pairs: int
@@ -63,12 +66,12 @@ class RunFigures:
 
     @property
     def busy(self) -> float:
-        """Share of the time in which the processor has work."""
+        """Share of the time during which the processor has work."""
         return self.processing_ns / (self.processing_ns + self.starvation_ns)
 
     @property
     def arrival_ns(self) -> float:
-        """Time between two pairs that are offered to the processor."""
+        """Time between two pairs offered to the processor, ns."""
         return self.interval_ns / max(1.0, self.offered)
 
 
@@ -77,8 +80,8 @@ class Judgement:
     """The regime in words.
 
     Attributes:
-        regime: which.
-        sentence: what holds, with figures.
+        regime: the regime.
+        sentence: a description with figures.
         remedies: what would help, each with an estimate from the measured figures.
     """
 
@@ -88,7 +91,7 @@ class Judgement:
 
 
 def judge(figures: RunFigures) -> Judgement:
-    """Say which regime holds and what would help."""
+    """Determine which regime holds and what would help."""
     if figures.pairs < _FEW or not math.isfinite(figures.interval_ns) or not figures.processing_ns > 0:
         return Judgement(Regime.UNKNOWN, f"too few pairs ({figures.pairs}) to tell whether the processor starves")
     if figures.busy >= _BUSY:
@@ -107,7 +110,7 @@ def judge(figures: RunFigures) -> Judgement:
 
 
 def _starved_by_link(figures: RunFigures, waits: str) -> Judgement:
-    """Propagation is slower than processing."""
+    """Describe starvation by the link: propagation is slower than processing."""
     rate_bytes = figures.frame_bytes * 1e9 / figures.arrival_ns
     wanted_bytes = figures.frame_bytes * 1e9 / figures.period_ns
     fitting_bytes = figures.frame_bytes * figures.period_ns / figures.arrival_ns
@@ -126,8 +129,8 @@ def _starved_by_link(figures: RunFigures, waits: str) -> Judgement:
 
 
 def _backlog(figures: RunFigures) -> Judgement:
-    """Processing is slower than arrival."""
-    # Never more often than the cameras show images: the ends of a short run make it seem so.
+    """Describe a backlog: processing is slower than arrival."""
+    # Pairs cannot arrive more often than the cameras give images; the ends of a short run only make it seem so.
     arrival_ns = max(figures.arrival_ns, figures.period_ns)
     if figures.overflow is Overflow.BLOCK and figures.period_ns:
         arrival_ns = figures.period_ns
@@ -154,7 +157,7 @@ def _backlog(figures: RunFigures) -> Judgement:
 
 
 def _room(figures: RunFigures) -> tuple[str, ...]:
-    """What the processor's spare time would allow."""
+    """Describe what the processor's spare time would allow."""
     factor = figures.arrival_ns / figures.processing_ns
     if factor < 1.5:
         return ()
@@ -162,7 +165,10 @@ def _room(figures: RunFigures) -> tuple[str, ...]:
 
 
 def _fitting_scale(figures: RunFigures, arrival_ns: float) -> float:
-    """Share of width and height with which a pair's work fits between two arrivals; matching goes with its cube, the rest with its square."""
+    """Return the share of width and height at which a pair's processing fits between two arrivals.
+
+    Matching scales with its cube, the rest with its square.
+    """
     rest_ns = figures.processing_ns - figures.match_ns
     low, high = 0.0, 1.0
     if figures.processing_ns <= arrival_ns:

@@ -1,4 +1,4 @@
-"""What a run is at one moment, in one object of copied values: terminal, page and JSON show this and nothing else. Pure."""
+"""A run at one moment, in one object of copied values. Terminal, page and JSON show this and nothing else. Pure."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -29,34 +29,22 @@ from phone_host.sync.quarantine import Disbelief
 class RunSnapshot:
     """Everything that presenters show. Nothing in it changes afterwards.
 
-    Attributes:
-        ended: why the run ended, or `running`.
-        processed: pairs whose results were handed to the sinks.
-        undecodable: pairs whose bytes were no images.
-        seconds: from the first to the last result, s.
-        delays: of the processed pairs, a copy.
-        counts: of frames and pairs on the host.
-        link: the link's account, a copy.
-        carrier: name of the link that frames come over now; empty while there is none.
-        estimate: the last clock estimate, if there was one.
-        tolerance_ns: greatest time skew of a pair.
-        fifo: depth and policy.
-        sinks: how each sink has fared.
-        unwritten: what the disk did not take.
-        spoiled: own frames that were no whole images.
-        skipped: own frames that a newer one had replaced before they were looked at.
-        own_future: own frames whose stamps lay in the future, dropped.
-        time_offset: between the two cameras' stamps, as it was applied.
-        phase: of the two cameras at the end; None: not known, or there is none.
-        alignment: how the steering of a camera came out; None: not asked for.
-        camera: how the own camera has fared.
-        period_ns: of the slower camera, ns; 0 where images come on demand.
-        motion_px_s: how fast the own camera's image moves, px/s; NaN where not measured.
-        width_px: of that image; 0 where not measured.
-        interpolated: whether the board's images were taken to the moment of the host's, so that their time skew did no harm.
-        spoiled_images: pairs one of whose images was not the whole image that it claimed to be, by reason; part of `undecodable`.
-        stamps_exact: whether both cameras' stamps say by definition when their images were exposed.
-        judged_pairs: over how many of the newest pairs time and motion are judged; None: over all.
+    Attributes: ended: why the run ended, or `running`. processed: pairs whose results were handed to the sinks.
+        undecodable: pairs that could not be processed. seconds: time from the first to the last result, s. delays:
+        delays of the processed pairs, a copy. counts: counts of frames and pairs on the host. link: the links' account,
+        a copy. carrier: name of the link that carries frames now; empty while there is none. estimate: the present
+        clock estimate, if there is one. tolerance_ns: greatest time skew of a pair. fifo: depth and policy. sinks: the
+        account of each sink. unwritten: what could not be written to disk. spoiled: host frames that were not whole
+        images. skipped: host frames that a newer one replaced before they were read. own_future: host frames dropped
+        because their stamps were in the future. time_offset: time offset between the two cameras' stamps, as applied.
+        phase: phase of the two cameras now or at the end; None: unknown, or there is none. alignment: outcome of
+        steering a camera; None: not asked for. camera: health of the host camera. period_ns: period of the slower
+        camera, ns; 0 if images come on demand. motion_px_s: how fast the host camera's image moves, px/s; NaN if not
+        measured. width_px: width of that image; 0 if not measured. interpolated: whether the board's images were
+        interpolated to the moment of the host's. If so, their time skew does not matter.
+        spoiled_images: pairs with a spoiled image, by reason; part of `undecodable`.
+        stamps_exact: whether both cameras' stamps are the times of exposure by definition.
+        judged_pairs: number of newest pairs over which time and motion are judged; None: all.
     """
 
     ended: str
@@ -89,17 +77,17 @@ class RunSnapshot:
 
     @property
     def stopped(self) -> int:
-        """Pairs that still waited when the run was ended."""
+        """Pairs that were still waiting when the run ended."""
         return self.counts.paired - self.processed - self.undecodable - self.counts.dropped
 
     @property
     def pairs_per_second(self) -> float:
-        """Rate of results, 1/s; NaN with fewer than two."""
+        """Rate of results, 1/s; NaN with fewer than two results."""
         return (self.processed - 1) / self.seconds if self.processed > 1 and self.seconds > 0 else float("nan")
 
 
 def figures(run: RunSnapshot) -> RunFigures:
-    """What the queueing regime is judged by, over the whole run."""
+    """Return the figures that determine the regime, over the whole run."""
     processed = run.processed
     interval_ns = run.seconds * 1e9 / (processed - 1) if processed > 1 else float("nan")
     return figures_of(
@@ -121,15 +109,15 @@ def figures_of(
     period_ns: int,
     overflow: Overflow,
 ) -> RunFigures:
-    """What the queueing regime is judged by.
+    """Return the figures that determine the regime.
 
     Args:
-        delays: of the pairs that are looked at.
-        counts: of frames and pairs over the whole run.
-        processed: pairs over the whole run.
-        interval_ns: between two results; NaN where there are not two.
-        period_ns: of the slower camera; 0 where images come on demand.
-        overflow: of the FIFO.
+        delays: delays of the pairs to use.
+        counts: counts of frames and pairs over the whole run.
+        processed: number of processed pairs over the whole run.
+        interval_ns: time between two results; NaN with fewer than two.
+        period_ns: period of the slower camera; 0 if images come on demand.
+        overflow: the FIFO's overflow policy.
     """
     return RunFigures(
         pairs=delays.spread("processing").count,
@@ -147,7 +135,7 @@ def figures_of(
 
 
 def time_and_motion(run: RunSnapshot) -> Timing:
-    """What time and motion are, over the pairs that are to be judged."""
+    """Return time and motion over the pairs to be judged."""
     last = run.judged_pairs
     return Timing(
         time_skew_ns=float("nan") if run.interpolated else run.delays.spread("time_skew", last).p95_ns,
@@ -160,7 +148,7 @@ def time_and_motion(run: RunSnapshot) -> Timing:
 
 
 def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
-    """What makes the depth of a run wrong or its figures doubtful, the gravest first."""
+    """Return what makes the depth of a run wrong or its figures doubtful, most serious first."""
     link = run.link
     unbelieved = Unbelieved(
         clock_steps=link.clock_steps,
@@ -173,13 +161,16 @@ def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
 
 
 def spoiled(run: RunSnapshot) -> dict[str, int]:
-    """Images of either camera that were not what their headers said, by what was wrong; those that a camera drops as cut short are told with it."""
+    """Count images of either camera that were not what their headers said, by what was wrong.
+
+    Images that a camera drops as cut short are reported with the camera instead.
+    """
     found = Counter(dict(run.spoiled_images))
     found.update({fault.value: count for fault, count in run.camera.faults if fault in NOT_AS_SAID})
     return {reason: count for reason, count in found.items() if count}
 
 
 def disbelieved(run: RunSnapshot) -> dict[str, int]:
-    """Frames that came and were not believed, by reason, the own camera's last."""
+    """Count frames that came but were not believed, by reason, the host camera's last."""
     found = {reason.value: count for reason, count in run.link.disbelieved.items()}
     return found | ({"own_from_the_future": run.own_future} if run.own_future else {})

@@ -1,4 +1,4 @@
-"""How a sink of a run has fared. Pure."""
+"""The account of a sink of a run. Pure."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,12 @@ class SinkAccount:
     """What became of the results that were handed to one sink.
 
     Attributes:
-        name: the sink's.
-        written: results that it has done with.
+        name: name of the sink.
+        written: results that it has finished.
         dropped: results that it had no place for.
-        failed: results that it had a place for and could not write.
+        failed: results that it took but could not write.
         waiting: results in its queue now.
-        delay: from a result's hand-over to when the sink had done with it, over all of them, ns.
+        delay: time from a result's hand-over until the sink finished it, over all finished results, ns.
     """
 
     name: str

@@ -1,9 +1,11 @@
-"""Says in words when time makes depth wrong: frames of a pair apart, clocks or stamps uncertain, results old, while the image moves. Pure.
+"""Says in words when timing makes depth wrong. Pure.
 
-Also when what arrived was not believed: then clocks had stepped, or a board, a driver or a stranger says what cannot be.
+While the image moves, depth is wrong if the frames of a pair are apart in time, clocks or stamps are uncertain, or
+results are old. There is also a concern if frames were not believed: then clocks had stepped, or a board, a driver or a
+stranger sent something impossible.
 
-A point that moves v px a second stands t * v px elsewhere in a frame that is t s late, and a matcher takes that for disparity: beyond half a pixel
-depth is wrong by more than a good matcher's own error.
+In a frame that is t s late, a point that moves at v px/s is displaced by t * v px, and a matcher takes that for
+disparity. Beyond half a pixel, the depth error exceeds a good matcher's own error.
 """
 
 import math
@@ -15,17 +17,17 @@ from common.camera.base import CameraHealth
 from phone_host.model import TimeOffset
 
 MOST_ERROR_PX: Final = 0.5
-"""DESIGN's limit of time skew x image motion; the matchers' own median error on real images lies at a third of it."""
+"""DESIGN's limit of time skew x image motion. The matchers' own median error on real images is a third of it."""
 
 _MOST_LAG: Final = 0.05
-"""A result that lies this share of the image's width behind the scene no longer shows where things are."""
+"""If the scene has moved by this share of the image's width since, a result no longer shows where things are."""
 
 _LEAST_LATENCY_NS: Final = 50_000_000
-"""What a phone takes from exposure to the first byte at least while nobody has measured it (decision 0016)."""
+"""Assumed least latency of a phone camera, exposure to first byte, until it is measured (decision 0016)."""
 
 
 class Doubt(Enum):
-    """Why depth or its place is not to be trusted."""
+    """Why not to trust the depth or where it is."""
 
     TIME_SKEW = "time_skew"
     CLOCK = "clock"
@@ -38,11 +40,11 @@ class Doubt(Enum):
 
 @dataclass(frozen=True, slots=True)
 class StampDoubt:
-    """How far the two cameras' stamps may differ for one and the same moment.
+    """How far the two cameras' stamps may differ for the same moment.
 
     Attributes:
-        half_width_ns: so far; 0: they cannot.
-        why: half a sentence with the figure.
+        half_width_ns: greatest difference; 0: none.
+        why: part of a sentence, with the figure.
         remedy: what helps.
     """
 
@@ -52,18 +54,19 @@ class StampDoubt:
 
 
 NO_DOUBT: Final = StampDoubt(0, "", "")
-"""Of cameras whose stamps say by definition when their images were exposed."""
+"""For cameras whose stamps are the times of exposure by definition."""
 
 
 def stamp_doubt(offset: TimeOffset, own: CameraHealth) -> StampDoubt:
-    """Say how well the two cameras' stamps are known to agree.
+    """Determine how well the two cameras' stamps are known to agree.
 
     Args:
-        offset: between them, as it is taken out; the default one was never measured.
-        own: of the own camera; its stamps may be arrivals, less a latency.
+        offset: the time offset, as applied. The default one was never measured.
+        own: health of the host camera. Its stamps may be arrival times minus a latency.
 
     Returns:
-        What is left. A latency's uncertainty counts only where the time offset was not measured: the measurement took the latency along.
+        The remaining doubt. The latency's uncertainty counts only if the time offset was not measured, because that
+        measurement includes the latency.
     """
     late_ns = own.jitter_ns or 0
     late = "" if own.jitter_ns is None else f", and this machine's images arrive up to {late_ns / 1e6:.1f} ms late"
@@ -91,14 +94,14 @@ def stamp_doubt(offset: TimeOffset, own: CameraHealth) -> StampDoubt:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Timing:
-    """What time and motion are, over the last pairs or a run; NaN = not measured.
+    """Time and motion over the last pairs or a run; NaN = not measured.
 
     Attributes:
-        time_skew_ns: what 95 % of the pairs stay below.
-        uncertainty_ns: of the clocks' offset.
+        time_skew_ns: 95th percentile of the pairs' absolute time skews.
+        uncertainty_ns: median uncertainty of the clocks' offset.
         end_to_end_ns: median age of a result.
         motion_px_s: speed of the fastest tenth of the image, px/s.
-        width_px: of the image.
+        width_px: width of the image.
         stamps: how well the two cameras' stamps agree.
     """
 
@@ -115,8 +118,8 @@ class Concern:
     """One reason not to trust the depth.
 
     Attributes:
-        doubt: why.
-        sentence: with figures.
+        doubt: the kind of reason.
+        sentence: the reason in words, with figures.
         remedy: what helps.
     """
 
@@ -127,12 +130,12 @@ class Concern:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unbelieved:
-    """What was not believed of what arrived.
+    """The arrivals that were not believed.
 
     Attributes:
         clock_steps: how often a clock was found to have stepped.
-        suspect_frames: frames that had passed between a step and the echo that told of it.
-        disbelieved: frames that came and were dropped, by reason.
+        suspect_frames: frames that passed between a step and the echo that revealed it.
+        disbelieved: frames that came but were dropped, by reason.
         received: frames that came.
         spoiled_images: images of either camera that were not what their headers said, by what was wrong.
     """
@@ -150,7 +153,7 @@ _LIES: Final = "none of them was used; if this goes on, update the board's softw
 
 
 def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
-    """Say what was not believed, and what that means; nothing where all was."""
+    """Say what was not believed and what that means; empty if everything was believed."""
     found = []
     if unbelieved.clock_steps:
         suspect = (
@@ -190,7 +193,7 @@ def _reasons(counts: dict[str, int]) -> str:
 
 
 def timing_concerns(timing: Timing) -> tuple[Concern, ...]:
-    """Say what makes depth wrong; nothing where it is right or motion is not known."""
+    """Say what makes depth wrong; empty if it is right or the motion is unknown."""
     motion = timing.motion_px_s
     if not math.isfinite(motion):
         return ()

@@ -1,4 +1,7 @@
-"""Everything that came and was not used, by place and reason, in the order of its way: counted here once, for every presenter. Pure."""
+"""Counts everything that came but was not used, by place and reason, in the order of its path. Pure.
+
+All presenters use these counts.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,8 +15,8 @@ class Unused:
     """One place and reason.
 
     Attributes:
-        place: where they ended, with what they are, for example `frames dropped on the board`.
-        reason: why, in the words of its account; empty where the place says it.
+        place: what they are and where they ended, for example `frames dropped on the board`.
+        reason: the reason in the words of its account; empty if the place says it.
         count: how many, at least 1.
     """
 
@@ -28,7 +31,7 @@ class Unused:
 
 
 def unused(run: RunSnapshot) -> tuple[Unused, ...]:
-    """What was not used, as far as it is known; nothing is told twice."""
+    """Return what was not used, as far as known. Nothing is counted twice."""
     return tuple(item for item in (*_on_the_way(run), *_on_the_host(run)) if item.count)
 
 
@@ -68,7 +71,7 @@ def _on_the_host(run: RunSnapshot) -> Iterator[Unused]:
 
 
 def board_drops(link: LinkAccount) -> dict[str, int]:
-    """Frames that the board dropped while this host was connected, by reason."""
+    """Return the frames that the board dropped while this host was connected, by reason."""
     drops: dict[str, int] = {}
     for account in link.sessions:
         before = dict(account.first.dropped)

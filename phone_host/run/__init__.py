@@ -1,1 +1,1 @@
-"""One run of the host: its threads, what it does with a pair, what it leaves on disk and shows in a terminal."""
+"""One run of the host: its threads, the processing of pairs, the results on disk and the terminal view."""

@@ -1,11 +1,13 @@
-"""A run's results on disk: settings.json, delays.jsonl, pair folders, report.json, the page. A full disk loses nothing that memory can keep, and never stops the run.
+"""A run's results on disk: settings.json, delays.jsonl, pair folders, report.json and the page.
 
-While writing fails, lines of delays.jsonl wait in memory (bounded) and pairs are counted as unsaved; when there is room again the lines
-follow in order. What is still missing at the end is said with the exit code. A disk that is only slower than the pairs costs saved pairs, each
-counted as a drop of the sink `pairs`, and never a line.
+A full disk never stops the run and loses nothing that memory can hold. While writing fails, lines of delays.jsonl wait
+in memory (bounded) and pairs are counted as unsaved. Once there is room again, the waiting lines are written in order.
+The exit code tells if anything is still missing at the end. If the disk is merely slower than the pairs, saved pairs
+are dropped, each counted as a drop of the sink `pairs`; lines are never dropped.
 
-Of an earlier run in the same folder what it listed there as its own is removed (`output/listed.py`); anything else in the way ends the run
-before it begins. Each saved pair survives a power cut once it is there, lines and report do from the end on.
+Files that an earlier run listed as its own in the same folder are removed (`output/listed.py`). Anything else in the
+way ends the run before it begins. A saved pair survives a power cut as soon as it is there; lines and report do once
+the run has ended.
 """
 
 import errno
@@ -31,27 +33,27 @@ from phone_host.run.sinks import NotWrittenError, SinkQueue
 _LOG = logging.getLogger(__name__)
 
 _RETRY_NS: Final = 1_000_000_000
-"""While the disk is full it is tried again this often, not at every pair."""
+"""While the disk is full, writing is retried at this interval, not at every pair."""
 
 _PENDING_BYTES: Final = 16 * 1024 * 1024
-"""Lines kept while the disk is full: about ten minutes at 30 pairs per second."""
+"""Memory for lines while the disk is full: about ten minutes at 30 pairs per second."""
 
 _LINES: Final = 16384
-"""Lines that wait for a disk that hangs: some 16 MB of ledgers, nine minutes at 30 pairs per second."""
+"""Most lines that wait while the disk hangs: about 16 MB of ledgers, nine minutes at 30 pairs per second."""
 
 NAMES: Final = r"delays\.jsonl|report\.json|settings\.json|index\.html|pair-[0-9]{6,}"
-"""What a run writes into its folder."""
+"""The names that a run writes into its folder."""
 
 PAIR_FILES: Final = r"(left|right)\.png|disparity\.pfm|cloud\.ply"
-"""What it writes into the folder of a saved pair."""
+"""The names that a run writes into the folder of a saved pair."""
 
 
 class _Trouble:
-    """Whether writing fails now: said when it begins, and when it has ended. Used by one thread at a time.
+    """Tracks whether writing fails now, and logs when that begins and ends. Used by one thread at a time.
 
     Args:
-        folder: for the log.
-        what: is not written then.
+        folder: the folder, for the log.
+        what: what cannot be written, for the log.
     """
 
     def __init__(self, folder: Path, what: str) -> None:
@@ -74,11 +76,11 @@ class _Trouble:
 
 
 class _Lines:
-    """delays.jsonl: what the disk does not take waits in memory, and follows in order.
+    """delays.jsonl. Lines that cannot be written wait in memory and follow in order.
 
     Args:
-        descriptor: of the file, empty; closed by its owner.
-        trouble: is told of.
+        descriptor: descriptor of the empty file; its owner closes it.
+        trouble: is told when writing fails and when it succeeds.
     """
 
     def __init__(self, descriptor: int, trouble: _Trouble) -> None:
@@ -91,7 +93,7 @@ class _Lines:
 
     @property
     def unwritten(self) -> int:
-        """Lines that are lost, or wait."""
+        """The number of lines that are lost or still wait."""
         return self.lost + len(self._pending)
 
     def append(self, ledger: PairLedger) -> None:
@@ -106,14 +108,14 @@ class _Lines:
             self.lost += 1
 
     def flush(self) -> None:
-        """Write the lines that wait; what cannot be written goes on waiting."""
+        """Write the waiting lines. Lines that cannot be written keep waiting."""
         if not self._pending:
             return
         self._tried_ns = now.monotonic_ns()
         data = b"".join(self._pending)
         try:
             done = os.pwrite(self._file, data, self._written_bytes)
-            if done < len(data):  # the disk filled up in the middle of a line: the next try writes over the torn one
+            if done < len(data):  # the disk filled up in mid-line: the next attempt overwrites the torn line
                 os.ftruncate(self._file, self._written_bytes)
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
@@ -126,16 +128,16 @@ class _Lines:
 
 
 class FileSink:
-    """Writes into one folder, or nowhere: lines in one queue, pairs in another, so that neither waits for the other.
+    """Writes into one folder, or nowhere. Lines and pairs have separate queues, so that neither waits for the other.
 
     Args:
-        folder: made if missing; None to write nothing.
-        save_every: every which pair is saved, from the first on; 0 for none.
-        waits: whether a pair that is due to be saved may make the worker wait, so that none is missing.
-        settings: of the run, each with its value and its origin; None: not saved.
+        folder: created if missing; None to write nothing.
+        save_every: save every Nth pair, starting with the first; 0 for none.
+        waits: whether the worker waits for room for a pair that is due to be saved, so that none is missing.
+        settings: settings of the run, each with its value and origin; None: not saved.
 
     Raises:
-        UnavailableError: the folder cannot be made or written to, or something that is not ours is in the way.
+        UnavailableError: the folder cannot be created or written to, or something that is not ours is in the way.
     """
 
     def __init__(
@@ -200,17 +202,17 @@ class FileSink:
 
     @property
     def accounts(self) -> tuple[SinkAccount, ...]:
-        """See Sink. Lines that wait in memory for the disk count as written here; `unwritten` has them."""
+        """See Sink. Lines that wait in memory for the disk count as written here; `unwritten` counts them."""
         return () if self._file < 0 else (self._line_queue.account, self._pair_queue.account)
 
     @property
     def complete(self) -> bool:
-        """Whether everything has been written so far."""
+        """Whether everything so far has been written."""
         return self._file < 0 or not (self.unwritten.lines or self.unwritten.pairs or self._of_report.now)
 
     @property
     def unwritten(self) -> Unwritten:
-        """What has not been written so far."""
+        """What could not be written so far."""
         if self._file < 0:
             return Unwritten()
         cause = self._of_lines.last or self._of_pairs.last or self._of_report.last
@@ -220,11 +222,11 @@ class FileSink:
         )
 
     def close(self, report: dict[str, object], page: str = "") -> None:
-        """Work off what was taken, write report.json and let go of the folder; may be called again.
+        """Finish the queued work, write report.json and release the folder. May be called again.
 
         Args:
             report: the JSON object to write.
-            page: the HTML document to write beside it as index.html; empty: none.
+            page: the HTML document to write as index.html beside it; empty: none.
         """
         if self._own is None:
             return
@@ -253,7 +255,7 @@ class FileSink:
         return self._save_every > 0 and number % self._save_every == 0
 
     def _save(self, result: Result) -> None:
-        """Write a pair's folder; all of it or nothing."""
+        """Write a pair's folder, completely or not at all."""
         assert self._own is not None
         try:
             with self._own.new_folder(f"pair-{result.number:06d}") as folder:

@@ -1,4 +1,4 @@
-"""The host's composition root: receiver and own camera -> pair queue -> worker -> sinks, each in its thread."""
+"""The host's composition root: receiver and host camera -> pair queue -> worker -> sinks, each in its own thread."""
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
@@ -38,11 +38,11 @@ _LOG = logging.getLogger(__name__)
 
 _STEP_S: Final = 0.05
 _LAST_PARTNER_NS: Final = 1_000_000_000
-"""After a stream's end the other one gets this long to deliver the last partners."""
+"""After one stream has ended, the other gets this long to deliver the last partners."""
 
 _TRUST_NS: Final = 1_000_000_000
 _RECENT: Final = 60
-"""Once a second the last 60 pairs are judged: two seconds at 30 per second."""
+"""Once a second the latest 60 pairs are judged: two seconds at 30 pairs per second."""
 
 
 class EndReason(Enum):
@@ -55,20 +55,20 @@ class EndReason(Enum):
 
 @dataclass(frozen=True, slots=True)
 class HostSettings:
-    """What a run does, beside its camera, link and core.
+    """The settings of a run, apart from its camera, links and core.
 
     Attributes:
         board_side: which view the board's camera is.
         tolerance_ns: greatest time skew of a pair; None for half of the longer frame period.
         fifo: depth and overflow policy.
         pairs: end after this many processed pairs; 0 for no limit.
-        wait_ns: an absent board is waited for this long; None for ever.
+        wait_ns: how long to wait for an absent board; None for ever.
         out: folder for results; None to write none.
-        save_every: every which pair is saved; 0 for none.
-        time_offset: between the two cameras' stamps.
-        interpolate: whether the board's image is taken to the moment of the host's before anything else is done with it.
-        steered: the cameras that may be steered until both expose together; none: the phase stays as it is.
-        most_pixels: neither camera may have more.
+        save_every: save every Nth pair; 0 for none.
+        time_offset: time offset between the two cameras' stamps.
+        interpolate: whether the decoded board image is first interpolated to the moment of the host's.
+        steered: the cameras that may be steered until both expose together; empty: the phase stays as it is.
+        most_pixels: largest accepted image size of either camera, pixels.
         resolved: the settings of the run with their origins, for settings.json; None: not saved.
     """
 
@@ -90,11 +90,11 @@ class Host:
     """One run of the host.
 
     Args:
-        settings: what to do.
-        camera: the own camera, open.
+        settings: settings of the run.
+        camera: the host camera, open.
         links: open links to the board, the preferred one first.
         core: the stereo core; None to measure pairs and delays only.
-        sinks: take the results, beside those on disk.
+        sinks: take the results, in addition to the sink that writes to disk.
     """
 
     def __init__(
@@ -143,17 +143,17 @@ class Host:
         self._steered_session = ""
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
-        """Run until the pairs are reached, a stream ends or `stop` says so.
+        """Run until the number of pairs is reached, a stream ends or `stop` returns True.
 
         Args:
-            stop: asked several times a second.
+            stop: called several times a second.
             watch: called as often, for a live view.
 
         Returns:
-            Why it ended.
+            Why the run ended.
 
         Raises:
-            UnavailableError: no board within the time, or it does not talk to this host.
+            UnavailableError: no board came in time, or it does not talk to this host.
             DataError: the streams' images do not fit the rig.
         """
         try:
@@ -162,41 +162,41 @@ class Host:
             self._camera.start()
             ended = self._watch(stop, watch)
         except BaseException:
-            with suppress(Exception):  # what ended the run is told, not what followed from it
+            with suppress(Exception):  # report what ended the run, not its consequences
                 self._end()
             raise
         self._end()
         return ended
 
     def _end(self) -> None:
-        """Finish the pair in hand, not those that still wait, and let the sinks work off what they have; all of it, whatever part fails.
+        """Finish the current pair but not the waiting ones, and let the sinks finish. No failure skips a later step.
 
         Raises:
-            Exception: what failed, the last of several.
+            Exception: the failure; the last one if there are several.
         """
         self._worker.finished.set()
-        with ExitStack() as ending:  # the other way round
+        with ExitStack() as ending:  # callbacks run in reverse order
             ending.callback(self._raise_failures)
             for sink in reversed(self._sinks):
                 ending.callback(sink.finish)
-            ending.callback(self._receiver.stop)  # behind the worker, which wakes it
+            ending.callback(self._receiver.stop)  # after the worker, because the worker wakes the receiver
             ending.callback(self._worker.stop)
             ending.callback(self._queue.finish)
             ending.callback(self._camera.stop)
 
     def abandon(self) -> None:
-        """Let go of the folder of results, instead of `run`."""
+        """Release the results folder of a host that will not `run`."""
         self._files.close({})
 
     def write_report(self, report: dict[str, object], page: str = "") -> bool:
-        """Write what is said of the whole run into the folder of its results, after `run`; nothing where there is none.
+        """Write the report of the run into its results folder, if there is one. Call this after `run`.
 
         Args:
-            report: for report.json.
-            page: for index.html; empty: none.
+            report: content of report.json.
+            page: content of index.html; empty: none.
 
         Returns:
-            Whether everything of the run was written.
+            Whether all results of the run were written.
         """
         self._files.close(report, page)
         return self._files.complete
@@ -208,7 +208,7 @@ class Host:
 
     @property
     def first_done_ns(self) -> int:
-        """When the first pair was done, CLOCK_MONOTONIC, ns; 0: none was yet."""
+        """When the first pair was done, CLOCK_MONOTONIC, ns; 0: none yet."""
         return self._ledgerer.first_done_ns
 
     @property
@@ -217,14 +217,14 @@ class Host:
         return self._receiver.hello is not None
 
     def sample(self) -> Sequence[PairLedger]:
-        """Ledgers for plots: of all pairs, or of evenly chosen ones, in order."""
+        """Return ledgers for plots, in order: those of all pairs, or an evenly spaced sample."""
         return self._ledgerer.sample()
 
     def snapshot(self, ended: str = "running") -> RunSnapshot:
-        """Give everything that presenters show, as it is now.
+        """Return everything that presenters show, as of now.
 
         Args:
-            ended: why the run ended; while it runs, time and motion are judged over the newest pairs only.
+            ended: why the run ended. While it is running, time and motion are judged over the newest pairs only.
         """
         books, receiver = self._ledgerer.books(), self._receiver
         return RunSnapshot(
@@ -259,30 +259,30 @@ class Host:
 
     @property
     def _alignment(self) -> Alignment | None:
-        """How the steering of a camera stands; None where it was not asked for."""
+        """The state of the phase alignment; None if no camera is being steered."""
         return None if self._controller is None else self._controller.alignment
 
     @property
     def _stamps_are_exact(self) -> bool:
-        """Whether both cameras' stamps are right by definition; an absent board's are not doubted."""
+        """Whether both cameras' stamps are exact by definition. Those of an absent board are assumed to be."""
         hello = self._receiver.hello
         return self._own.has_exact_stamps and (hello is None or hello.camera.has_exact_stamps)
 
     @property
     def _period_ns(self) -> int:
-        """Of the slower camera, ns; 0 where one gives images on demand, or before the board is known."""
+        """The slower camera's period, ns; 0 if a camera gives images on demand or the board is not known yet."""
         hello = self._receiver.hello
         if hello is None or Pacing.DEMAND in {hello.camera.pacing, self._own.pacing}:
             return 0
         return max(hello.camera.period_ns, self._own.period_ns)
 
     def _measure_motion(self, result: Result) -> None:
-        # The host's own image: the board's may have been interpolated to another moment.
+        # Use the host's image: the board's may have been interpolated to another moment.
         seen = result.processed.pair.right if self._settings.board_side is Side.LEFT else result.processed.pair.left
         self._motion.add(seen, result.ledger.host.exposed_ns, result.ledger.done_ns)
 
     def _watch_trust(self, now_ns: int) -> None:
-        """Log each reason not to trust the depth when it comes, and when it has gone."""
+        """Log each reason not to trust the depth when it appears and when it has gone."""
         if now_ns < self._trust_due_ns:
             return
         self._trust_due_ns = now_ns + _TRUST_NS
@@ -316,7 +316,7 @@ class Host:
         return EndReason.PAIRS_REACHED
 
     def _align(self, now_ns: int) -> None:
-        """Steer a camera where that was asked for and is due; another life of the board is steered anew."""
+        """Steer a camera if that was asked for and is due. A new board session starts the alignment anew."""
         hello = self._receiver.hello
         if not self._settings.steered or hello is None or not self._receiver.connected:
             return
@@ -336,7 +336,7 @@ class Host:
             _LOG.info(event("phase", state=alignment.state.value, words=alignment.words))
 
     def _drain(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
-        """Let the worker finish the pairs that wait; no frame will follow."""
+        """Let the worker finish the waiting pairs. No frame will follow."""
         self._queue.finish()
         while not self._worker.has_ended(_STEP_S):
             if watch is not None:

@@ -1,4 +1,4 @@
-"""The books of a run: a ledger for each pair, and what all of them come to."""
+"""The books of a run: one ledger for each pair, and the totals."""
 
 import threading
 from collections import Counter
@@ -12,12 +12,12 @@ from phone_host.model import FramePair, Processed
 
 @dataclass(frozen=True, slots=True)
 class WorkerMarks:
-    """When the worker did what with a pair, CLOCK_MONOTONIC, ns.
+    """The worker's marks for one pair, CLOCK_MONOTONIC, ns.
 
     Attributes:
-        dequeued_ns: it took the pair.
-        computed_ns: the depth was there; from then on the result was handed over.
-        done_ns: it was handed over.
+        dequeued_ns: the worker took the pair.
+        computed_ns: the depth was ready, and the worker began to hand the result over.
+        done_ns: every sink had a place for the result.
     """
 
     dequeued_ns: int
@@ -27,15 +27,15 @@ class WorkerMarks:
 
 @dataclass(frozen=True, slots=True)
 class Books:
-    """What the ledgers of a run come to so far: copies.
+    """The totals of a run so far, as copies.
 
     Attributes:
         processed: pairs that were handed over.
         undecodable: pairs that could not be processed.
-        spoiled_images: those of them one of whose images was not the whole image that it claimed to be, by reason.
-        first_done_ns: when the first pair was done; 0: none was.
-        last_done_ns: the same of the last one.
-        delays: of all pairs.
+        spoiled_images: undecodable pairs with a spoiled image, by reason.
+        first_done_ns: when the first pair was done; 0: none yet.
+        last_done_ns: when the last pair was done; 0: none yet.
+        delays: delays of all pairs.
     """
 
     processed: int
@@ -47,7 +47,7 @@ class Books:
 
 
 class Ledgerer:
-    """Keeps the books. Written by the worker's thread, read by any."""
+    """Keeps the books. The worker's thread writes; any thread may read."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -59,7 +59,7 @@ class Ledgerer:
 
     @property
     def spoiled(self) -> int:
-        """Pairs that could not be processed for a spoiled image."""
+        """The number of pairs that could not be processed because of a spoiled image."""
         return self._spoiled.total()
 
     def enter(self, pair: FramePair, processed: Processed, marks: WorkerMarks) -> PairLedger:
@@ -67,11 +67,11 @@ class Ledgerer:
 
         Args:
             pair: its frames.
-            processed: what became of them.
-            marks: when.
+            processed: the outcome of processing.
+            marks: the worker's marks.
 
         Returns:
-            The ledger, whose delays add up to end-to-end exactly.
+            The ledger. Its delays add up exactly to end-to-end.
         """
         board = pair.board
         ledger = PairLedger(
@@ -110,7 +110,7 @@ class Ledgerer:
                 self._spoiled[error.fault] += 1
 
     def books(self) -> Books:
-        """What there is so far."""
+        """Return the totals so far."""
         with self._lock:
             return Books(
                 processed=self.processed,
@@ -122,6 +122,6 @@ class Ledgerer:
             )
 
     def sample(self) -> tuple[PairLedger, ...]:
-        """Ledgers for plots: all of them, or evenly chosen ones, in order."""
+        """Return ledgers for plots, in order: all of them, or an evenly spaced sample."""
         with self._lock:
             return tuple(self._sample.ledgers)

@@ -1,4 +1,7 @@
-"""What the worker does with a pair: decode, interpolate if asked for, rectify or pass, match, reproject; each stage timed. The order of the stages lives here."""
+"""The processing of a pair: decode, optionally interpolate and rectify, match, reproject. Each stage is timed.
+
+This module alone defines the order of the stages.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -24,9 +27,9 @@ class Pipeline:
     Args:
         core: rectification, matching and reprojection; None to decode only (delays without depth).
         board_side: which view the board's frame is.
-        clock: gives ns of CLOCK_MONOTONIC.
-        interpolator: takes the board's image to the moment of the host's; None to leave it as it is.
-        most_pixels: neither camera may have more.
+        clock: returns CLOCK_MONOTONIC, ns.
+        interpolator: interpolates the board's image to the moment of the host's; None to leave it unchanged.
+        most_pixels: largest accepted image size of either camera, pixels.
     """
 
     def __init__(
@@ -53,8 +56,8 @@ class Pipeline:
             Images, disparity, cloud and stage times.
 
         Raises:
-            SpoiledImageError: a frame's bytes are no whole image, or its size is not believed.
-            DataError: the cameras' sizes do not fit the rig.
+            SpoiledImageError: a frame's bytes are not a whole image, or its size is not believed.
+            DataError: the cameras' image sizes do not fit the rig.
         """
         board, host = _encoded(pair.board.message, "board", pair.board.asked_px), _encoded(pair.host, "host")
         start_ns = self._clock()
@@ -72,7 +75,7 @@ class Pipeline:
         return replace(processed, stages=stages)
 
     def _in_sides(self, board: T, host: T) -> tuple[T, T]:
-        """Left and right: the only place that knows which camera is which."""
+        """Return (left, right). Only this function knows which camera is which."""
         return (board, host) if self._board_side is Side.LEFT else (host, board)
 
     def _check_sizes(self, board_px: tuple[int, int], host_px: tuple[int, int]) -> None:
@@ -80,7 +83,10 @@ class Pipeline:
             self._core.require_sizes(*self._in_sides(board_px, host_px))
 
     def _at_host_time(self, pair: FramePair, image: Image) -> Image:
-        """The board's image as it would have been at the host's exposure; as it is where the frame before is missing, far away or spoiled."""
+        """Return the board's image as it would look at the host's exposure.
+
+        If the previous frame is missing, too far away in time or spoiled, return the image unchanged.
+        """
         if self._interpolator is None or pair.before is None:
             return image
         fraction = pair.time_skew_ns / (pair.board.marks.exposed_ns - pair.before.marks.exposed_ns)
@@ -95,7 +101,7 @@ class Pipeline:
 
 
 def _at_asked_size(image: Image, frame: BoardFrame) -> Image:
-    """The image as large as the board's camera was asked for: rig, matcher and geometry are of that size."""
+    """Return the image at the size that the board's camera was asked for. Rig, matcher and geometry need that size."""
     if not any(frame.asked_px):
         return image
     return enlarged(image, frame.asked_px, f"board frame {frame.message.sequence}")

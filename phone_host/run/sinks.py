@@ -1,7 +1,8 @@
-"""Sinks: whatever takes the results of a run, each behind a bounded queue and in a thread of its own, so that a slow one never delays a pair.
+"""Sinks take the results of a run. Each has a bounded queue and its own thread, so a slow sink never delays a pair.
 
-Rules: a sink is handed a result once its pair is done. When its queue is full the result is dropped there and counted under the sink's name. A sink
-that `waits` loses nothing: the worker waits for a place before it calls the pair done, and the time counts as the pair's stage `write`.
+Rules: a sink gets a result once its pair is done. If its queue is full, the result is dropped and counted under the
+sink's name. A sink that `waits` loses nothing: the worker waits for a place before it marks the pair as done, and this
+time counts as the pair's stage `write`.
 """
 
 import threading
@@ -18,32 +19,35 @@ from phone_host.model import Result
 T = TypeVar("T")
 
 DEPTH: Final = 2
-"""Results that wait for a sink: one to go on with, and one that comes meanwhile. Each holds its images and its cloud, 7 MB at 640x480."""
+"""Results queued for a sink: the one in progress and one more. Each holds its images and cloud, 7 MB at 640x480."""
 
 
 class NotWrittenError(Exception):
-    """Raised by what works off a queue: this one item could not be written, which is counted; the next one is tried."""
+    """Raised by a queue's `take` function: this item could not be written. It is counted, and the next one is tried."""
 
 
 class Sink(Protocol):
-    """Takes results. Used by the worker's thread, but for `finish`, which the run's root calls when the worker has ended."""
+    """Takes results.
+
+    The worker's thread calls it, except `finish`: the run's root calls that after the worker ended.
+    """
 
     def await_place(self, number: int) -> None:
-        """Wait until there is a place for the result of this number, if this sink is one that waits; else nothing."""
+        """Wait until there is a place for the result with this number. A sink that does not wait returns at once."""
 
     def offer(self, result: Result) -> None:
-        """Take a result, or drop and count it; never waits."""
+        """Take a result, or drop and count it. Never waits."""
 
     def finish(self) -> None:
-        """Work off what was taken, then end."""
+        """Finish the results taken so far, then end."""
 
     @property
     def failure(self) -> Exception | None:
-        """What it failed with; from then on it drops everything."""
+        """The error that the sink failed with. From then on it drops everything."""
 
     @property
     def accounts(self) -> tuple[SinkAccount, ...]:
-        """How it has fared, under the name of each of its queues; copies."""
+        """The account of each of its queues, as copies."""
 
 
 @dataclass(slots=True)
@@ -53,12 +57,12 @@ class _Waiting(Generic[T]):
 
 
 class SinkQueue(Generic[T]):
-    """A bounded queue with a thread that works it off.
+    """A bounded queue and the thread that empties it.
 
     Args:
-        name: as it stands in report.json.
-        take: called with each item, in the queue's thread. After any exception but NotWrittenError nothing is taken any more.
-        depth: most items that wait.
+        name: its name in report.json.
+        take: called with each item in the queue's thread. After any exception but NotWrittenError the queue stops.
+        depth: greatest number of items in the queue.
         waits: whether `await_place` waits.
         clock: monotonic, ns.
     """
@@ -83,16 +87,16 @@ class SinkQueue(Generic[T]):
         self._started = False
 
     def await_place(self) -> None:
-        """Wait until there is a place, where this queue is one that waits. It stays free for whoever is alone in offering."""
+        """Wait until there is a place, if this queue waits. With a single thread that offers, the place stays free."""
         if self._waits:
             with self._changed:
                 self._changed.wait_for(lambda: len(self._items) < self._depth or self._failure is not None)
 
     def offer(self, item: T) -> bool:
-        """Take an item; never waits.
+        """Take an item. Never waits.
 
         Returns:
-            Whether it was taken; False: it was dropped and counted.
+            Whether the item was taken. If not, it was dropped and counted.
         """
         with self._changed:
             if len(self._items) >= self._depth or self._failure is not None or self._finishing:
@@ -106,7 +110,7 @@ class SinkQueue(Generic[T]):
             return True
 
     def finish(self) -> None:
-        """Work off what waits, then end; may be called again."""
+        """Finish the queued items, then end. May be called again."""
         with self._changed:
             self._finishing = True
             self._changed.notify_all()
@@ -115,16 +119,16 @@ class SinkQueue(Generic[T]):
 
     @property
     def failure(self) -> Exception | None:
-        """What `take` failed with; from then on everything is dropped."""
+        """The error that `take` raised. From then on everything is dropped."""
         return self._failure
 
     @property
     def account(self) -> SinkAccount:
-        """How it has fared so far, a copy."""
+        """The account so far, as a copy."""
         with self._changed:
             written, dropped, failed, waiting = self._written, self._dropped, self._failed, len(self._items)
             delay = self._delay.copy()
-        spread = delay.spread()  # percentiles take ms, in which nobody is to wait
+        spread = delay.spread()  # outside the lock: percentiles take milliseconds
         return SinkAccount(
             name=self._name, written=written, dropped=dropped, failed=failed, waiting=waiting, delay=spread
         )
@@ -135,7 +139,7 @@ class SinkQueue(Generic[T]):
                 self._changed.wait_for(lambda: bool(self._items) or self._finishing)
                 if not self._items:
                     return
-                waiting = self._items[0]  # it keeps its place until it is done: the bound is one of memory
+                waiting = self._items[0]  # it keeps its place until it is done, because the bound limits memory
             has_failed = False
             try:
                 self._take(waiting.item)
@@ -158,13 +162,13 @@ class SinkQueue(Generic[T]):
 
 
 class FunctionSink:
-    """A function that is told of each result.
+    """A sink that calls a function with each result.
 
     Args:
-        name: as it stands in report.json.
+        name: its name in report.json.
         take: the function, called in the sink's thread.
-        depth: most results that wait.
-        waits: whether it must miss none.
+        depth: greatest number of results in the queue.
+        waits: whether it must not miss any result.
     """
 
     def __init__(self, name: str, take: Callable[[Result], None], *, depth: int = DEPTH, waits: bool = False) -> None:

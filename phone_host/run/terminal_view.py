@@ -1,4 +1,4 @@
-"""The live table of a run in a terminal."""
+"""The live table that a terminal shows during a run."""
 
 from collections.abc import Callable
 from types import TracebackType
@@ -20,17 +20,17 @@ from phone_host.report.summary import camera_troubles, phase_lines
 
 _REFRESH_S: Final = 0.25
 _RECENT: Final = 300
-"""Percentiles are over this many newest pairs: ten seconds at 30 per second."""
+"""Percentiles cover this many newest pairs: ten seconds at 30 pairs per second."""
 
 
 class LiveTable:
-    """Shows a run's delays while it goes on; a context manager.
+    """Shows a run's delays while it is running; a context manager.
 
     Args:
-        snapshot: gives the run as it is now.
-        console: where; stderr by default, so that stdout stays for results.
-        seconds: the run's planned length for the progress bar, s; 0 when it is counted in pairs or open.
-        pairs: the same in pairs.
+        snapshot: returns the run's present state.
+        console: where to draw; stderr by default, so that stdout is free for results.
+        seconds: planned length of the run for the progress bar, s; 0 if it is given in pairs or open.
+        pairs: the same, in pairs.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class LiveTable:
         if self._task is not None:
             self._progress.update(self._task, completed=now_s - self._started_s if self._seconds else run.processed)
         bar = [self._progress] if self._task is not None else []
-        # What is wrong comes first: a small terminal cuts off what is below.
+        # Problems come first, because a small terminal cuts off the bottom.
         shown = Group(*_judgement(run), _table(run, self._rate), _stages(run), _state(run), *bar)
         self._live.update(shown, refresh=True)
 
@@ -93,14 +93,14 @@ def _table(run: RunSnapshot, rate: float) -> Table:
 
 
 def _stages(run: RunSnapshot) -> Text:
-    """Processing's shares in one line: with a row for each the warnings would leave a terminal of 24 lines."""
+    """Return the stages' shares in one line. With a row each, warnings would not fit a terminal of 24 lines."""
     medians = [(name, run.delays.spread(name, _RECENT).p50_ns) for name in STAGES]
-    shares = [f"{name} {value_ns / 1e6:.1f}" for name, value_ns in medians if value_ns == value_ns]  # noqa: PLR0124 - NaN is the only value unlike itself
+    shares = [f"{name} {value_ns / 1e6:.1f}" for name, value_ns in medians if value_ns == value_ns]  # noqa: PLR0124 - only NaN differs from itself
     return Text(f"processing, p50 in ms: {', '.join(shares) or 'not yet'}", style="dim")
 
 
 def _judgement(run: RunSnapshot) -> list[Text]:
-    """The queueing regime, what has befallen the two cameras, and what makes depth wrong."""
+    """Return the regime, the two cameras' troubles and the concerns about the depth."""
     warnings = [Text(f"warning: {item.sentence}: {item.remedy}", style="bold red") for item in concerns(run)]
     lines = (*camera_troubles(run.camera), *rung_lines(run.link))
     camera = [Text(line, style="yellow") for line in lines]

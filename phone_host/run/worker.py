@@ -1,4 +1,4 @@
-"""The worker: takes pairs from the queue, has their depth computed, and hands the results to the sinks."""
+"""The worker: takes pairs from the queue, has their depth computed and passes the results to the sinks."""
 
 import logging
 import threading
@@ -18,19 +18,19 @@ from phone_host.stream.pair_queue import PairQueue
 _LOG = logging.getLogger(__name__)
 
 _HOPELESS: Final = 10
-"""This many pairs in a row that cannot be processed, and none that could: it is not a spoiled frame now and then."""
+"""If this many pairs fail before the first success, the cause is not an occasional spoiled frame."""
 
 
 class Worker:
-    """One thread.
+    """The worker thread.
 
     Args:
-        queue: gives the pairs.
+        queue: source of the pairs.
         pipeline: computes their depth.
         ledgerer: keeps the books.
         sinks: take the results.
-        most_pairs: after so many the worker ends; 0 for no limit.
-        taken: called when a place in the queue has become free.
+        most_pairs: the worker ends after this many pairs; 0 for no limit.
+        taken: called when a place in the queue becomes free.
     """
 
     def __init__(
@@ -50,16 +50,16 @@ class Worker:
         self.failure: Exception | None = None
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Finish the pair in hand, begin none of those that wait, and end; the queue must be closed."""
+        """Finish the current pair, start none of the waiting ones, and end. The queue must be closed."""
         self.finished.set()
         self._thread.join()
 
     def has_ended(self, wait_s: float) -> bool:
-        """Wait a while for the end of a closed queue's last pair."""
+        """Wait up to `wait_s` for the worker to end after a closed queue's last pair. Return whether it has ended."""
         self._thread.join(wait_s)
         return not self._thread.is_alive()
 
@@ -92,13 +92,16 @@ class Worker:
             self.finished.set()
 
     def _note_failed(self, error: DataError) -> None:
-        """Count a pair that could not be processed. Spoiled images never end a run: whoever sends them must not be able to; a rig that fits no pair does."""
+        """Count a pair that could not be processed.
+
+        Spoiled images never end a run, because their sender must not be able to end it. A rig that fits no pair does.
+        """
         books = self._ledgerer
         books.enter_failed(error)
         if isinstance(error, SpoiledImageError):
             if books.processed == 0 and books.spoiled == _HOPELESS:
                 _LOG.error(event("no_sound_image", count=_HOPELESS, problem=error.problem, remedy=error.remedy))
         elif books.processed == 0 and books.undecodable - books.spoiled > _HOPELESS:
-            raise error  # not one pair fits: wrong rig, wrong camera
+            raise error  # no pair fits: wrong rig or wrong camera
         if books.undecodable.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: one bad camera must not fill the log
             _LOG.warning(event("pair_failed", count=books.undecodable, problem=error.problem))

@@ -1,1 +1,1 @@
-"""Frames arrive: what comes from the board, what the own camera gives, and where the two meet."""
+"""The arrival of frames: from the board, from the host camera, and where the two meet."""

@@ -1,7 +1,7 @@
-"""How long a board that is absent, or does not talk to this host, is put up with; one set of errors for all who wait for one.
+"""How long to wait for a board that is absent or refuses this host. All callers that wait raise the same errors.
 
-`BoardPatience` judges and has no clock; `await_board` waits with it in the caller's thread. Boards that are only looked for, with no
-receiver, are `boards/discovery`'s.
+`BoardPatience` decides and has no clock. `await_board` uses it to wait in the caller's thread. `boards/discovery` looks
+for boards without a receiver.
 """
 
 import threading
@@ -17,20 +17,20 @@ from phone_host.stream.refusals import BoardRefusal, refusal_text
 _STEP_S: Final = 0.05
 
 _BUSY_NS: Final = 4_000_000_000
-"""A board may take a host that crashed for alive for a moment; only after this long `busy` is believed."""
+"""A board may briefly believe that a crashed host is alive. `busy` is believed only after this long."""
 
 _REMEDY: Final = "start board-agent there, check --link, or give --wait more seconds"
 
 
 class BoardPatience:
-    """Whether a board has been away for too long.
+    """Decides whether a board has been away for too long.
 
-    Another protocol version is put up with not at all: no waiting mends it.
+    Another protocol version is an error at once, because waiting does not help.
 
     Args:
-        patience_ns: an absent board is waited for this long; None for ever.
-        began_ns: since when, ns.
-        where: where it should be, for the error; empty: that is known.
+        patience_ns: how long to wait for an absent board; None for ever.
+        began_ns: when the wait began, ns.
+        where: where the board should be, for the error; empty: leave it out.
         remedy: what to do about an absent board.
     """
 
@@ -41,17 +41,17 @@ class BoardPatience:
         self._remedy = remedy
 
     def look(self, now_ns: int, refused: BoardRefusal | None, *, present: bool) -> None:
-        """See whether there is still reason to wait.
+        """Check whether to wait any longer.
 
         Args:
             now_ns: now, ns.
-            refused: why the board that was last heard does not talk to this host; None when it does, or is silent.
-            present: whether it is there; patience begins anew when it goes.
+            refused: why the last board heard refuses this host; None if it does not, or is silent.
+            present: whether the board is there. The wait starts again when it leaves.
 
         Raises:
-            AbsentBoardError: it has been away for too long.
-            BusyBoardError: it talks to another host.
-            OtherVersionError: it speaks another protocol version.
+            AbsentBoardError: the board has been away for too long.
+            BusyBoardError: the board talks to another host.
+            OtherVersionError: the board speaks another protocol version.
         """
         if present:
             self._seen_ns = now_ns
@@ -71,21 +71,21 @@ def await_board(
     ready: Callable[[], bool],
     stop: Callable[[], bool] = lambda: False,
 ) -> bool:
-    """Wait until a board has given what the caller needs of it.
+    """Wait until a board has delivered what the caller needs.
 
     Args:
-        receiver: has been started.
-        patience: for how long.
-        ready: whether it has; asked several times a second.
-        stop: asked as often; ends the wait.
+        receiver: a started receiver.
+        patience: how long to wait.
+        ready: whether the board has delivered; called several times a second.
+        stop: whether to end the wait; called as often.
 
     Returns:
-        Whether it has; False: `stop` ended the wait.
+        True if the board has delivered, False if `stop` ended the wait.
 
     Raises:
-        AbsentBoardError: there is no board, or it does not give it in time.
-        BusyBoardError: it talks to another host.
-        OtherVersionError: it speaks another protocol version.
+        AbsentBoardError: there is no board, or it does not deliver in time.
+        BusyBoardError: the board talks to another host.
+        OtherVersionError: the board speaks another protocol version.
         Exception: the receiver's failure, or what `ready` raises.
     """
     pause = threading.Event()
@@ -94,7 +94,7 @@ def await_board(
             raise receiver.failure
         if ready():
             return True
-        refused = None if receiver.connected else receiver.refused  # a second link's refusal ends nothing
+        refused = None if receiver.connected else receiver.refused  # a refusal on a second link does not end the wait
         patience.look(now.monotonic_ns(), refused, present=False)
         pause.wait(_STEP_S)
     return False

@@ -1,7 +1,7 @@
-"""The border of the host: which frames of the board are believed, by which clock. What cannot be is dropped here and counted by its reason.
+"""The host's border: decides which board frames to believe, and by which clock. It drops and counts the others.
 
-Rules: no frame from before a doubt of the clock meets one from after it; while the clock is in doubt none is believed. What passes needs no
-check of its stamps any more. Belongs to the receiver's thread.
+Rules: a frame from before a doubt of the clock never meets one from after it. While the clock is in doubt, no frame is
+believed. The stamps of a frame that has passed need no further check. Used by the receiver's thread only.
 """
 
 import logging
@@ -21,12 +21,12 @@ from phone_host.sync.quarantine import Disbelief, Quarantine, Unproven, disbelie
 _LOG = logging.getLogger(__name__)
 
 _MOST_HELD: Final = 4
-"""While so many frames wait for an echo no more are asked for."""
+"""While this many frames wait for an echo, the board gets no further credit."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrival:
-    """A frame that came, with what was known of it at that moment: link, session's account, camera, and its last byte's arrival, ns."""
+    """A frame that came, with its link, session account and camera at that time, and the last byte's arrival, ns."""
 
     frame: FrameMessage
     link: int
@@ -36,21 +36,21 @@ class Arrival:
 
 
 _TIGHT_NS: Final = 10_000_000
-"""An echo is tight that takes no longer than twice the least of late and this."""
+"""An echo is tight if it takes at most twice the least recent round trip plus this."""
 
 _WAIT_NS: Final = 500_000_000
-"""So long a frame waits for a tight echo, several of which are asked for in that time; where a queue keeps all echoes slow there are none."""
+"""A frame waits this long for a tight echo. Several are asked for meanwhile; none is tight if a queue slows all."""
 
 Admitted = tuple[int, BoardFrame]
-"""A frame that may pass, and the link that it came over."""
+"""A frame that may pass, after the number of the link that it came over."""
 
 
 class Border:
     """Clock and quarantine of one board.
 
     Args:
-        account: of the links; doubts, steps and what was not believed are counted there.
-        on_doubt: told when nothing from before this moment may be paired any more.
+        account: the links' account, which counts doubts, steps and disbelieved frames.
+        on_doubt: called when no frame from before this moment may be paired any more.
     """
 
     def __init__(self, account: LinkAccount, on_doubt: Callable[[], None]) -> None:
@@ -76,11 +76,11 @@ class Border:
         return self._clock.estimate is not None and self._quarantine.held < _MOST_HELD
 
     def round_trip_ns(self, link: int) -> int | None:
-        """Least round trip of late over one link; None before its first echo."""
+        """Return the least recent round trip over one link, ns; None before its first echo."""
         return self._clock.round_trip_ns(link)
 
     def other_clock(self) -> None:
-        """The board has booted anew, or slept: another clock. A doubt of the old one is never decided."""
+        """The board has rebooted or slept, so its clock is another one. A doubt about the old clock stays undecided."""
         if self._clock.in_doubt:
             self._note_suspects()
         self._clock = LinkClocks(len(self._account.links))
@@ -88,33 +88,33 @@ class Border:
         self.close()
 
     def void(self, why: str) -> None:
-        """Forget what was learnt of the clock; the next echo tells whether it has stepped."""
+        """Forget what is known of the clock. The next echo tells whether it has stepped."""
         self._clock.void()
         self._begin_doubt(why)
 
     def slept(self, slept_ns: int) -> None:
-        """This machine has slept: its clock stood still, the board's and the cameras' went on."""
+        """This machine has slept: its clock stood still while the board's and the cameras' went on."""
         self._clock.void(stepped=True)
         self._begin_doubt(f"this machine slept for {slept_ns / 1e9:.1f} s")
         self._note_step()
 
     def link_down(self, link: int) -> None:
-        """A link is lost, and with it what its echoes left open."""
+        """A link is lost, and with it the questions that its echoes left open."""
         self._clock.down(link)
 
     def close(self) -> None:
-        """Give up the frames that wait for an echo: none will come for them."""
+        """Give up the frames that wait for an echo, because none will come."""
         for arrival in self._quarantine.void():
             arrival.account.disbelieved[Disbelief.CLOCK] += 1
 
     def learn(self, echo: Echo) -> list[Admitted]:
-        """Take an echo to the clock.
+        """Give an echo to the clock.
 
         Args:
-            echo: its four times.
+            echo: the echo with its four stamps.
 
         Returns:
-            Frames that it has proven.
+            The frames that it has proven.
         """
         was_in_doubt = self._clock.in_doubt
         match self._clock.add(echo):
@@ -131,7 +131,11 @@ class Border:
         return []
 
     def _confirm(self, echo: Echo) -> list[Admitted]:
-        """Take an echo that agreed. One that took long leaves room for a step: it proves nothing, and lets only those pass that have waited for a better one."""
+        """Handle an echo that agreed with the clock.
+
+        A slow echo leaves room for a step and proves nothing. It only lets frames pass that have waited long enough for
+        a better one.
+        """
         estimate = self._clock.estimate
         if estimate is None:
             return []
@@ -150,7 +154,8 @@ class Border:
             arrival: what came.
 
         Returns:
-            The frame with its marks on the host's clock, if it may pass now; none where it was dropped or has to wait for an echo.
+            The frame with its marks on the host's clock, if it may pass now. Empty if it was dropped or must wait for
+            an echo.
         """
         if self._clock.estimate is None and not self._clock.in_doubt:
             self._account.no_clock += 1
@@ -164,7 +169,7 @@ class Border:
         return known if passes else []
 
     def tick(self, now_ns: int) -> None:
-        """Let time pass: frames that no echo proves are given up by name."""
+        """Let time pass: drop and count frames that no echo has proven in time."""
         for arrival in self._quarantine.expired(now_ns):
             arrival.account.disbelieved[Disbelief.UNPROVEN] += 1
             self._warn(
@@ -172,13 +177,14 @@ class Border:
             )
 
     def _examine(self, arrival: Arrival) -> list[Admitted]:
-        """Map a frame's marks to the host's clock; nothing where they cannot be, which is counted."""
+        """Map a frame's marks to the host's clock. If that is impossible, count the reason and return nothing."""
         frame, estimate = arrival.frame, self._clock.estimate
         reason = Disbelief.CLOCK if estimate is None else self._doubts(arrival, estimate)
         if estimate is None or reason is not None:
             arrival.account.disbelieved[reason or Disbelief.CLOCK] += 1
             return []
-        # Only `sent` is mapped to the host's clock, once, when the frame is believed; the other marks keep their distance to it.
+        # Only `sent` is mapped to the host's clock, once, when the frame is believed. The other marks keep their
+        # distance from it.
         sent_ns = frame.marks.sent_ns
         offset_ns, uncertainty_ns = estimate.offset_at(sent_ns), estimate.uncertainty_at(sent_ns)
         name, asked_px = self._account.links[arrival.link].name, (arrival.camera.width_px, arrival.camera.height_px)
@@ -202,13 +208,14 @@ class Border:
         if since_ns is not None and frame.marks.exposed_ns < since_ns and not labelled:
             return Disbelief.CLOCK
         arrived_ns = arrival.received_ns - estimate.offset_at(arrival.received_ns - estimate.offset_ns)
-        # The bound costs some us and is asked for only where it decides: a frame that came after it was sent is within any.
+        # Computing the bound takes some us, so do it only if it decides: a frame that arrived after it was sent is
+        # within any bound.
         newest_ns = max(frame.marks.exposed_ns, frame.marks.grabbed_ns, frame.marks.sent_ns)
         bound_ns = 0 if newest_ns <= arrived_ns else estimate.bound_at(arrived_ns)
         return disbelief(frame.marks, arrived_ns, bound_ns, labelled=labelled)
 
     def passed(self, frame: FrameMessage) -> None:
-        """Take note of a frame that was given on: until an echo proves it, it counts as suspect."""
+        """Take note of a frame that was passed on. Until an echo proves it, a clock step makes it suspect."""
         self._unproven.passed(frame.marks.sent_ns, frame.session, frame.sequence)
 
     def _begin_doubt(self, why: str) -> None:
@@ -218,13 +225,13 @@ class Border:
         self._warn("clock_in_doubt", self._account.clock_doubts, why=why)
 
     def _note_step(self) -> None:
-        """A clock has stepped: what passed since the last echo before may be paired wrongly."""
+        """A clock has stepped: frames that passed since the last echo before the step may be paired wrongly."""
         self._account.clock_steps += 1
         frames = self._note_suspects()
         self._warn("clock_stepped", self._account.clock_steps, suspect_frames=frames)
 
     def _note_suspects(self) -> int:
-        """Name the frames that no echo has proven since; gives how many."""
+        """Record the frames that no echo has proven since. Return their number."""
         suspects = self._unproven.stepped()
         if suspects is None:
             return 0
@@ -233,5 +240,5 @@ class Border:
 
     @staticmethod
     def _warn(name: str, count: int, **facts: object) -> None:
-        if count.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: a board that steps on purpose must not fill the log
+        if count.bit_count() == 1:  # log the 1st, 2nd, 4th, 8th …: a board that steps on purpose must not fill the log
             _LOG.warning(event(name, count=count, **facts))

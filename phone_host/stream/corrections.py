@@ -1,13 +1,13 @@
-"""Corrections of a camera's phase on their way from the thread that orders them to the one that has them carried out."""
+"""Corrections of a camera's phase on their way from the thread that orders them to the thread that applies them."""
 
 import threading
 
 
 class Corrections:
-    """The sum of what was ordered and is not carried out yet.
+    """The sum of the corrections that are ordered but not yet applied.
 
-    Each correction is relative to where the camera stands, so that two of them are one of their sum: none is lost, and one number holds
-    any amount of them.
+    Each correction is relative to the camera's present phase, so two corrections equal one of their sum. One number
+    therefore holds any number of corrections and loses none.
     """
 
     def __init__(self) -> None:
@@ -15,17 +15,17 @@ class Corrections:
         self._later_ns = 0
 
     def add(self, later_ns: int) -> None:
-        """Let the camera expose later by so much, beside what is due already."""
+        """Let the camera expose later by `later_ns`, in addition to what is already due."""
         with self._lock:
             self._later_ns += later_ns
 
     @property
     def is_due(self) -> bool:
-        """Whether there is something to carry out; a look without the lock."""
+        """Whether there is a correction to apply. Reads without the lock."""
         return self._later_ns != 0
 
     def take(self) -> int:
-        """Give what is due, ns, and forget it: the caller carries it out. 0: nothing is due."""
+        """Return the sum that is due, ns, and reset it: the caller applies it. 0: nothing is due."""
         with self._lock:
             later_ns, self._later_ns = self._later_ns, 0
             return later_ns

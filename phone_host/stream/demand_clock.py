@@ -1,11 +1,11 @@
-"""Time where a camera shows an image only when it is asked for one (pacing by demand): who is asked when, and what stamps mean then.
+"""Time for cameras that show an image only on demand: which camera is asked when, and what the stamps then mean.
 
-A demand-paced board shows its next image when there is room for it; a demand-paced own camera shows one for each frame of the board. So every
-image meets its partner however slow the machine is. The stamps of such images are labels: first + number x period (decision 0004), which may
-be compared with each other and with nothing that a clock says.
+A demand-paced board shows its next image when there is room for it. A demand-paced host camera shows one image for each
+board frame. So every image meets its partner, however slow the machine is. The stamps of such images are labels:
+first + number x period (decision 0004). Labels may be compared with each other but not with any clock.
 
-This class alone knows the rules. The pair queue tells it of the board's lives and frames and asks it what their stamps mean; the own camera
-lets it say when to show an image.
+Only this class knows the rules. The pair queue tells it of the board's sessions and frames and asks what their stamps
+mean. The host camera asks it when to show an image.
 """
 
 import queue
@@ -17,13 +17,13 @@ from common.protocol.message import Pacing
 
 
 def has_own_time(pacing: Pacing) -> bool:
-    """Whether the stamps of a camera that is paced so are times, no labels."""
+    """Return whether the stamps of a camera with this pacing are times rather than labels."""
     return pacing is not Pacing.DEMAND
 
 
 @dataclass(frozen=True, slots=True)
 class _Want:
-    """An image that is wanted of the own camera: in which life of the board, its label (host's clock, ns), and its number if it must be that one."""
+    """An image wanted from the host camera: its board session, label (host's clock, ns), and number if that matters."""
 
     life: int
     label_ns: int
@@ -31,21 +31,21 @@ class _Want:
 
 
 class DemandClock:
-    """The time of one run.
+    """The demand clock of one run.
 
-    Where neither camera is paced by demand nothing is ever asked for, and stamps mean what they say.
+    If neither camera is paced by demand, no image is ever asked for, and stamps are times.
 
     Args:
-        own: how the own camera is paced.
+        own: the host camera's pacing.
     """
 
     def __init__(self, own: Pacing) -> None:
         self.paces_own_camera = not has_own_time(own)
-        """Whether the own camera shows an image only when one is wanted."""
+        """Whether the host camera shows an image only when one is wanted."""
         self.is_timeless = self.paces_own_camera
-        """Whether stamps of this run are labels, or were since it began: how long ago one was, no clock can say."""
+        """Whether stamps of this run are labels, or ever were. No clock can tell the age of a label."""
         self.labels_board = False
-        """Whether the stamps of the board's present life are labels."""
+        """Whether the stamps of the present board session are labels."""
         self._label_offset_ns: int | None = None
         # Bounded by the credit: the board sends no frame for which the pair queue has no room.
         self._wants: queue.SimpleQueue[_Want | None] = queue.SimpleQueue()
@@ -55,16 +55,16 @@ class DemandClock:
 
     @property
     def is_one_sided(self) -> bool:
-        """Whether the board's labels stand beside an own camera with a clock: then nothing of the board can be paired."""
+        """Whether the board has labels but the host camera has a clock. Then no board frame can be paired."""
         return self.labels_board and not self.paces_own_camera
 
     def begin(self, board: Pacing) -> None:
-        """Another life of the board begins, whose labels begin anew. No image asked for before comes after this.
+        """Begin a board session, with new labels. No image that was asked for earlier comes after this call.
 
-        Waits for an image that is being shown: not to be called with a lock held that its delivery needs.
+        Waits for an image that is being shown. Do not call this with a lock held that the image's delivery needs.
 
         Args:
-            board: how its camera is paced.
+            board: the board camera's pacing.
         """
         with self._showing:
             self._life += 1
@@ -74,14 +74,14 @@ class DemandClock:
         self._label_offset_ns = None
 
     def stamp_ns(self, exposed_ns: int, offset_ns: int) -> int:
-        """Give the stamp by which a frame of the board is paired.
+        """Return the stamp by which a board frame is paired.
 
-        Labels, which the own camera's continue from the first one on, all go by the first one's clock offset: a better estimate may move
-        the others by more than a fast film's period.
+        All labels use the clock offset of the first one, from which the host camera's labels continue. A better
+        estimate could move later labels by more than a fast film's period.
 
         Args:
-            exposed_ns: its exposure on the host's clock by the offset of its own, ns.
-            offset_ns: host's clock minus board's by which that was found, ns.
+            exposed_ns: exposure on the host's clock, computed with the frame's own offset, ns.
+            offset_ns: that offset, host's clock minus board's clock, ns.
         """
         if not self.labels_board:
             return exposed_ns
@@ -90,22 +90,25 @@ class DemandClock:
         return exposed_ns + self._label_offset_ns - offset_ns
 
     def frame_came(self, stamp_ns: int, number: int) -> None:
-        """Ask the own camera for the image that belongs to a frame of the board; does not wait for it.
+        """Ask the host camera for the partner of a board frame, without waiting for it.
 
         Args:
-            stamp_ns: by which that frame is paired.
-            number: its place in the board's life. Images of one number belong together if both cameras show labels; beside a board with a
-                clock the own camera shows its images in their order, with labels from the first frame's stamp on.
+            stamp_ns: the stamp by which that frame is paired.
+            number: the frame's number in the board session. If both cameras have labels, images of the same number
+                belong together. If the board has a clock, the host camera shows its images in order, with labels that
+                start at the first frame's stamp.
         """
         if self.paces_own_camera:
             self._wants.put(_Want(self._life, stamp_ns, number if self.labels_board else None))
 
     def show_next(self, anchor: Callable[[int, int], None], show: Callable[[], None]) -> None:
-        """Wait until an image is wanted and let it be shown; `wake` and a want of an earlier life end the wait with nothing shown.
+        """Wait until an image is wanted, then show it.
+
+        `wake`, or a want of an earlier session, ends the wait and nothing is shown.
 
         Args:
-            anchor: called with a label and a number where the image after the last one shown is not the one that is wanted.
-            show: reads the camera once and delivers what it gives.
+            anchor: called with a label and a number if the wanted image does not follow the last one shown.
+            show: reads the camera once and delivers its frames.
         """
         want = self._wants.get()
         with self._showing:
@@ -117,5 +120,5 @@ class DemandClock:
             show()
 
     def wake(self) -> None:
-        """Let `show_next` return; safe from any thread."""
+        """Let `show_next` return. Safe from any thread."""
         self._wants.put(None)

@@ -1,6 +1,6 @@
-"""Where a board's frames go once the border has believed them: into pairs, a recording, or a count.
+"""Where a board's frames go once the border believes them: into pairs, a recording or a count.
 
-A sink is told by the receiver's thread alone and must not make it wait: echoes of the clock would come late.
+Only the receiver's thread calls a frame sink. The sink must not make it wait, or the clock's echoes would be late.
 """
 
 from typing import Protocol
@@ -14,33 +14,33 @@ class FrameSink(Protocol):
     """Takes the frames of one board."""
 
     def begin(self, camera: CameraDescription) -> None:
-        """A life of the board begins; nothing of the one before will follow.
+        """Begin a board session. No frame of the previous one will follow.
 
         Args:
-            camera: the board's, as it is at this moment.
+            camera: the board's camera as it is now.
         """
 
     def change_period(self, board_period_ns: int) -> None:
-        """The board's camera has this time between two frames from now on, ns; often the one that it had."""
+        """Take note of the board camera's frame period from now on, ns. It is often the same as before."""
 
     def void(self) -> None:
-        """One of the two clocks may have stood still: stamps from before this moment and from after it must not be compared."""
+        """One of the two clocks may have stood still: do not compare stamps from before and after this moment."""
 
     def room(self) -> int | None:
-        """How many more frames the board may send, at least 0; None: as many as the link carries, the sink finds place for each."""
+        """Return how many more frames the board may send, 0 or more. None: there is room for all the link carries."""
 
     def objection(self, frame: BoardFrame) -> Disbelief | None:
-        """Why a frame is of no use here, by which it is dropped and counted; None: it is wanted, and `add_board` follows."""
+        """Return the reason to drop and count a frame. None: the frame is wanted, and `add_board` follows."""
 
     def add_board(self, frame: BoardFrame) -> None:
         """Take a frame of the board."""
 
     def tick(self) -> None:
-        """Let time pass; called several times a second, also while no frame comes."""
+        """Let time pass. Called several times a second, even while no frame comes."""
 
 
 class NoFrames:
-    """The sink of a host that only asks the board something: the board is given no leave to send frames."""
+    """The frame sink of a host that only queries the board. The board gets no credit to send frames."""
 
     def begin(self, camera: CameraDescription) -> None:
         """See FrameSink."""
@@ -52,14 +52,14 @@ class NoFrames:
         """See FrameSink."""
 
     def room(self) -> int:
-        """There is no place for any."""
+        """Return 0: there is no room for frames."""
         return 0
 
     def objection(self, frame: BoardFrame) -> None:
         """See FrameSink."""
 
     def add_board(self, frame: BoardFrame) -> None:
-        """A frame that comes without leave is let go."""
+        """Ignore a frame that comes without credit."""
 
     def tick(self) -> None:
         """See FrameSink."""

@@ -1,4 +1,4 @@
-"""The host's own camera in a thread of its own; its frames are delivered as they come, or as the demand clock asks for them."""
+"""The host camera in its own thread. Frames are delivered as they come, or as the demand clock asks for them."""
 
 import threading
 from collections.abc import Callable
@@ -14,16 +14,16 @@ from phone_host.stream.corrections import Corrections
 from phone_host.stream.demand_clock import DemandClock
 
 _LONGEST_WAIT_MS: Final = 100
-"""What the end of a run waits for this thread at most, and how late a stall may be noticed."""
+"""Longest time that the end of a run waits for this thread, and by which a stall may be noticed late."""
 
 
 class OwnCamera:
-    """Reads the own camera.
+    """Reads the host camera.
 
     Args:
-        camera: open camera; closed by this.
+        camera: the open camera; this class closes it.
         deliver: takes each frame.
-        demand: says when a camera that is paced by demand shows an image; made for that camera's pacing.
+        demand: says when a demand-paced camera shows an image. It must have been created for this camera's pacing.
     """
 
     def __init__(self, camera: Camera, deliver: Callable[[Frame], None], demand: DemandClock) -> None:
@@ -42,11 +42,11 @@ class OwnCamera:
 
     @property
     def health(self) -> CameraHealth:
-        """How the camera has fared, up to the moment before it was closed."""
+        """The camera's health; after `stop`, as it was just before closing."""
         return self._last_health or self._camera.health
 
     def start(self) -> None:
-        """Begin to read."""
+        """Start to read."""
         self._thread.start()
 
     @property
@@ -55,11 +55,11 @@ class OwnCamera:
         return self._camera.description.steering
 
     def steer(self, later_ns: int) -> None:
-        """Let the camera expose later from its next reading on; safe from any thread."""
+        """Let the camera expose later from its next read on. Safe from any thread."""
         self._corrections.add(later_ns)
 
     def stop(self) -> None:
-        """End the thread and let go of the camera."""
+        """End the thread and close the camera."""
         self._stop.set()
         self._demand.wake()
         self._thread.join()
@@ -96,7 +96,7 @@ class OwnCamera:
     def _take(self, grab: Grab) -> None:
         match grab:
             case Frame() if grab.exposed.ns > now.monotonic_ns() and not self._demand.paces_own_camera:
-                self.from_the_future += 1  # no frame after it could be paired; on demand, stamps are labels
+                self.from_the_future += 1  # later frames could not be paired after it; on demand, stamps are labels
             case Frame():
                 self._deliver(grab)
             case Spoiled():

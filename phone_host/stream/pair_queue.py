@@ -1,6 +1,9 @@
-"""Where the threads meet: frames of both cameras go in, pairs come out for the worker. Adds a lock and an account to the pure cores.
+"""Where the threads meet: frames of both cameras go in, and pairs come out for the worker.
 
-Conservation: received = paired + orphaned(by reason) + held; paired = taken + dropped(overflow) + waiting. Both hold after every call.
+This module adds a lock and an account to the pure cores.
+
+Conservation: received = paired + orphaned(by reason) + held; paired = taken + dropped(overflow) + waiting. Both hold
+    after every call.
 """
 
 import threading
@@ -19,30 +22,32 @@ from phone_host.sync.phase import Phase, PhaseMeter
 from phone_host.sync.quarantine import Disbelief
 
 _SIDE_BYTES: Final = 64 * 1024 * 1024
-"""Frames of each side wait for their partners, still encoded, in at most this much memory: 40 s of 50 KB JPEGs at 30 fps, more than any link delays."""
+"""Memory limit of each side's held frames, still encoded: 40 s of 50 KB JPEGs at 30 fps, more than any link's delay."""
 
 _SIDE_FRAMES: Final = 4096
-"""The same in number: over a minute at 60 fps. Of the smallest frames 64 MB would be a million objects."""
+"""Limit for the number of each side's held frames: over a minute at 60 fps. 64 MB of tiny frames would be a million."""
 
 _NEWEST: Final = 4
-"""Board frames kept beside those that wait: a pair is nearly always formed before its frame has three successors."""
+"""Newest board frames kept besides the held ones: a pair nearly always forms before its frame has three successors."""
 
 _LEAST_WAIT_NS: Final = 2_000_000_000
-"""A host frame waits at least this long for its partner, also on a swift link: that may become slow from one frame to the next, whose partner then would
-have gone and a worse one be taken. Two seconds of 50 KB JPEGs at 30 fps are 3 MB."""
+"""A host frame waits at least this long for its partner, even on a fast link.
+
+A link may become slow from one frame to the next. If the right host frame had been evicted by then, the board frame
+would get a worse partner. Two seconds of 50 KB JPEGs at 30 fps are 3 MB."""
 
 _SLOWEST_NS: Final = 60_000_000_000
-"""No link is waited for longer than this."""
+"""Longest link delay for which host frames are kept."""
 
 
 class PairQueue:
-    """Pairing and FIFO behind one lock: the sink of a board's frames (FrameSink) in a run.
+    """Pairing and FIFO behind one lock. In a run, this is the frame sink (FrameSink).
 
     Args:
         fifo: depth and overflow policy.
         tolerance_ns: greatest time skew; None for half of the longer frame period.
-        host_period_ns: time between two frames of the own camera.
-        demand: what stamps mean, and whom to tell of each board frame; None: the own camera has a clock.
+        host_period_ns: frame period of the host camera.
+        demand: says what stamps mean, and is told of each board frame; None: the host camera has a clock.
         time_offset_ns: added to the board's stamps before they are compared with the host's.
         clock: monotonic, ns.
     """
@@ -101,7 +106,7 @@ class PairQueue:
 
     @property
     def phase(self) -> Phase | None:
-        """The two cameras' phase now; None while it is not known, and for images shown on demand."""
+        """The two cameras' phase now; None while it is unknown, and for images shown on demand."""
         with self._changed:
             return None if self._meter is None or self._demand.is_timeless else self._meter.phase
 
@@ -112,24 +117,30 @@ class PairQueue:
             return self._meter is not None and self._meter.has_phase and not self._demand.is_timeless
 
     def restart_phase(self) -> None:
-        """Measure the phase anew: a camera was steered."""
+        """Measure the phase anew, because a camera was steered."""
         with self._changed:
             if self._meter is not None:
                 self._meter.restart()
 
     def free_slots(self) -> int:
-        """How many more board frames have a place, counting those that wait for their partner."""
+        """Return how many more board frames have room in the FIFO. Held board frames count as occupying a place."""
         with self._changed:
             return max(0, self._fifo.free - (self._pairing.held_board if self._pairing else 0))
 
     def room(self) -> int | None:
-        """See FrameSink: a queue that blocks, and a camera that waits for room, are held back; else pairs that find no place are dropped."""
+        """See FrameSink. A limit applies if the FIFO blocks or the board's camera shows images on demand.
+
+        Otherwise None: pairs that find no place are dropped.
+        """
         held_back = self._demand.labels_board or self._settings.overflow is Overflow.BLOCK
         return self.free_slots() if held_back else None
 
     def begin(self, camera: CameraDescription) -> None:
-        """A board session begins: frames of an earlier one find no partner any more; beside labels, not even the own camera's old ones do."""
-        self._demand.begin(camera.pacing)  # without the lock: it waits for an own image, which is delivered here
+        """Begin a board session. Board frames of an earlier session find no partner any more.
+
+        If the new session's stamps are labels, old host frames find no partner either.
+        """
+        self._demand.begin(camera.pacing)  # without the lock: it waits for a host image, whose delivery needs it
         board_period_ns = camera.period_ns
         with self._changed:
             self._meter = PhaseMeter(board_period_ns, self._host_period_ns)
@@ -142,7 +153,7 @@ class PairQueue:
                 self._pairing = Pairing(PairingSettings(self.tolerance_ns, board_period_ns, self._host_period_ns))
 
     def void(self) -> None:
-        """One of the two clocks may have stood still: no frame from before is paired with one from after it."""
+        """One of the two clocks may have stood still: pair no frame from before with a frame from after this moment."""
         with self._changed:
             self._newest.clear()
             self._delay_ns = _LEAST_WAIT_NS
@@ -152,10 +163,10 @@ class PairQueue:
                 self._settle(self._pairing.void())
 
     def change_period(self, board_period_ns: int) -> None:
-        """The board's camera has another rate from now on; frames that wait for their partners go on waiting.
+        """Take note of the board camera's new frame period. Held frames stay held.
 
         Args:
-            board_period_ns: time between two of its frames.
+            board_period_ns: time between two of its frames, from now on.
         """
         with self._changed:
             if self._pairing is None or board_period_ns == self._board_period_ns:
@@ -168,28 +179,29 @@ class PairQueue:
 
     @property
     def history_ns(self) -> int:
-        """How far back own frames are kept now, ns: an older board frame finds no partner."""
+        """How far back host frames are kept now, ns. An older board frame finds no partner."""
         return max(_LEAST_WAIT_NS, self._delay_ns) + 2 * max(self._board_period_ns, self._host_period_ns)
 
     def note_age(self, age_ns: int) -> None:
-        """Keep own frames for as long as a board frame of this age needs.
+        """Keep host frames for as long as a board frame of this age needs.
 
-        Where bytes take the time a frame that is a fifth larger comes as much later; the slow decay follows a link that gets faster.
+        The age is raised by a quarter as a margin for larger frames, which take longer where the link's rate is the
+        limit. The slow decay follows a link that gets faster.
         """
         self._delay_ns = min(_SLOWEST_NS, max(age_ns * 5 // 4, self._delay_ns * 63 // 64))
 
     def objection(self, frame: BoardFrame) -> Disbelief | None:
-        """See FrameSink: labels have no partner beside a camera with a clock, and no own frame is kept for one that is too old."""
+        """See FrameSink. Labels cannot be paired with a clock's stamps, and a frame too old has no host frame left."""
         if self._demand.is_one_sided:
             return Disbelief.PACING
         age_ns = frame.received_ns - frame.marks.exposed_ns
         if self._demand.labels_board or age_ns <= self.history_ns:
             return None
-        self.note_age(age_ns)  # if the link has become so slow the next one finds its partner
+        self.note_age(age_ns)  # if the link has become this slow, the next frame finds its partner
         return Disbelief.PAST
 
     def add_board(self, frame: BoardFrame) -> None:
-        """Take a frame of the board, and ask for its partner where the own camera waits for that."""
+        """Take a frame of the board. If the host camera shows images on demand, ask it for the partner."""
         stamp_ns = self._demand.stamp_ns(frame.marks.exposed_ns + self._time_offset_ns, frame.offset_ns)
         self._add_board(frame, stamp_ns)
         self._demand.frame_came(stamp_ns, frame.message.sequence)
@@ -201,7 +213,7 @@ class PairQueue:
             if self._closed:
                 self._count(self._board_orphans, OrphanReason.STREAM_ENDED.value)
                 return
-            self.note_age(self._clock() - frame.marks.exposed_ns)  # the wait for an echo included
+            self.note_age(self._clock() - frame.marks.exposed_ns)  # includes the wait for an echo
             self._board_bytes += len(frame.message.payload)
             self._newest.append(frame)
             if self._meter is not None:
@@ -211,7 +223,7 @@ class PairQueue:
                 self._settle(self._pairing.evict_oldest_board())
 
     def add_host(self, frame: Frame) -> None:
-        """Take a frame of the own camera."""
+        """Take a frame of the host camera."""
         with self._changed:
             self._host_frames += 1
             if self._pairing is None or self._closed:
@@ -227,7 +239,7 @@ class PairQueue:
                 self._settle(self._pairing.evict_oldest_host())
 
     def tick(self) -> None:
-        """Let time pass: settle what has waited long enough."""
+        """Let time pass: settle frames that have waited long enough."""
         with self._changed:
             if self._pairing is not None and not self._closed:
                 now_ns = self._clock()
@@ -235,7 +247,7 @@ class PairQueue:
                 self._evict(now_ns)
 
     def finish(self) -> None:
-        """No frame will follow: settle all, let the worker take what waits, then tell it to end."""
+        """No frame will follow: settle all held frames, let the worker take the waiting pairs, then let it end."""
         with self._changed:
             if self._pairing is not None:
                 self._settle(self._pairing.finish())
@@ -243,7 +255,7 @@ class PairQueue:
             self._changed.notify_all()
 
     def take(self) -> FramePair | None:
-        """Wait for the oldest pair; None when there will be none any more."""
+        """Wait for the oldest pair and return it. Return None when no more will come."""
         with self._changed:
             while not len(self._fifo) and not self._closed:
                 self._changed.wait()
@@ -258,7 +270,7 @@ class PairQueue:
             return
         longer_ns = max(self._board_period_ns, self._host_period_ns)
         self._settle(self._pairing.evict_host(now_ns - max(_LEAST_WAIT_NS, self._delay_ns) - 2 * longer_ns))
-        # A host frame is here as soon as its camera gave it; a board frame without one after this time never gets one.
+        # Host frames arrive as soon as their camera gives them: a board frame without a partner by now never gets one.
         self._settle(self._pairing.evict_board(now_ns - self._delay_ns - 2 * longer_ns - self.tolerance_ns))
 
     def _settle(self, outcomes: Iterable[Outcome[BoardFrame, Frame]]) -> None:
@@ -289,7 +301,7 @@ class PairQueue:
                     assert_never(outcome)
 
     def _before(self, frame: BoardFrame) -> BoardFrame | None:
-        """The newest board frame of the same session that was exposed before this one."""
+        """Return the newest board frame of the same session that was exposed before this one."""
         session, exposed_ns = frame.message.session, frame.marks.exposed_ns
         older = (f for f in self._newest if f.message.session == session and f.marks.exposed_ns < exposed_ns)
         return max(older, key=lambda f: f.marks.exposed_ns, default=None)

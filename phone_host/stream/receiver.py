@@ -1,4 +1,4 @@
-"""The host's end of all links, in a thread of its own: bytes become messages for the reception, what that says goes out."""
+"""The host's end of all links, in its own thread: turns bytes into messages for the reception and sends its answers."""
 
 import os
 import threading
@@ -22,20 +22,20 @@ from phone_host.stream.refusals import BoardRefusal
 from phone_host.sync.clock import ClockEstimate
 
 _LONGEST_WAIT_MS: Final = 50
-"""Time passes for the sink at least this often."""
+"""Longest time between two ticks of the sink."""
 
 _FAREWELL_NS: Final = 300_000_000
-"""How long a leaving host waits for the board's last account: a few round trips of any usable link."""
+"""How long a leaving host waits for the board's last account: a few round trips on any usable link."""
 
 
 class Receiver:
     """Owns the links and speaks the host's role over them.
 
     Args:
-        links: open links to one board, the preferred one first; closed by this.
-        host_id: random id of this process's life.
-        sink: where frames go.
-        listener: told of sessions and frames beside the sink; None: nobody is.
+        links: open links to one board, the preferred one first; this class closes them.
+        host_id: random id of this process.
+        sink: takes the frames.
+        listener: is also told of sessions and frames; None: no listener.
     """
 
     def __init__(
@@ -63,12 +63,12 @@ class Receiver:
 
     @property
     def account(self) -> LinkAccount:
-        """What was seen so far."""
+        """The links' account so far."""
         return self._reception.account
 
     @property
     def refused(self) -> BoardRefusal | None:
-        """Why the board that was last heard does not talk to us; None when it does, or is silent now."""
+        """Why the last board heard refuses this host; None if it does not, or is silent now."""
         return self._reception.refused(now.monotonic_ns())
 
     @property
@@ -78,12 +78,12 @@ class Receiver:
 
     @property
     def carrier(self) -> str:
-        """Name of the link that frames come over now; empty while there is none."""
+        """Name of the link that carries frames now; empty while there is none."""
         return self._reception.carrier
 
     @property
     def hello(self) -> BoardHello | None:
-        """What the board said of itself; None before the first contact."""
+        """The board's description of itself; None before the first contact."""
         return self._reception.hello
 
     @property
@@ -93,27 +93,27 @@ class Receiver:
 
     @property
     def ended(self) -> bool:
-        """Whether the board's camera has come to its end."""
+        """Whether the board's camera has reached the end of its images."""
         return self._reception.ended
 
     def start(self) -> None:
-        """Begin to look for the board."""
+        """Start to look for the board."""
         self._thread.start()
 
     def wake(self) -> None:
-        """Let the thread look at the sink's room now; safe from any thread."""
-        with suppress(BlockingIOError):  # then it has been told often enough
+        """Let the thread check the sink's room now. Safe from any thread."""
+        with suppress(BlockingIOError):  # the pipe is full: the thread will wake anyway
             os.write(self._wake_write, b"\0")
 
     def steer(self, later_ns: int) -> None:
-        """Ask the board's camera to expose later, beside what it is asked already; safe from any thread."""
+        """Ask the board's camera to expose later, in addition to earlier corrections. Safe from any thread."""
         hello = self._reception.hello
         self._steered_session = "" if hello is None else hello.session
         self._corrections.add(later_ns)
         self.wake()
 
     def stop(self) -> None:
-        """Say goodbye and close the link."""
+        """Say goodbye and close the links."""
         self._stopping = True
         self.wake()
         self._thread.join()
@@ -133,7 +133,7 @@ class Receiver:
                 link.close()
 
     def _take_leave(self) -> None:
-        """Say goodbye and wait a moment for the board's last account: it comes behind the last frame."""
+        """Say goodbye and wait briefly for the board's last account, which follows the last frame."""
         reception = self._reception
         heard = reception.leave(now.monotonic_ns())
         deadline_ns = now.monotonic_ns() + _FAREWELL_NS
@@ -144,7 +144,7 @@ class Receiver:
             reception.lose_tail()
 
     def _receive(self) -> None:
-        """Take all that has come."""
+        """Take everything that has come."""
         for number, incoming in self._several.receive():
             self._take(number, incoming, now.monotonic_ns())
 
@@ -165,7 +165,7 @@ class Receiver:
             self._hand_on_corrections(now_ns)
 
     def _hand_on_corrections(self, now_ns: int) -> None:
-        """Steer the board as was ordered, as soon as a link carries it; what was ordered for an earlier session is void."""
+        """Send due corrections to the board once a link is up. Discard corrections for an earlier session."""
         hello = self._reception.hello
         if hello is None or not self._reception.carrier:
             return
@@ -173,7 +173,7 @@ class Receiver:
             self._reception.steer(later_ns, now_ns)
 
     def _watch_clock(self) -> None:
-        """Notice that this machine's clock has, or may have, stood still, before anything is taken that came meanwhile."""
+        """Notice that this machine's clock stood still, or may have, before taking anything that came meanwhile."""
         slept_ns, jumped = self._standstill.look()
         if slept_ns:
             self._reception.slept(slept_ns, now.monotonic_ns())

@@ -1,6 +1,7 @@
-"""The host's side of all that comes from a board: session, choice of the link, credit, border. Frames that are believed go to a sink.
+"""The host's handling of everything that comes from a board: session, link choice, credit and border.
 
-No thread, no link and no clock of its own: messages and `now_ns` come in, what is to be said goes to `send`, so that it runs on simulated time, too.
+Believed frames go to a frame sink. This module has no thread, link or clock of its own, so it also runs on simulated
+time: messages and `now_ns` come in, and outgoing messages go to `send`.
 """
 
 import logging
@@ -43,12 +44,12 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class LinkFacts:
-    """What must be known of a link.
+    """What the reception must know of a link.
 
     Attributes:
         kind: the transport's name.
-        dialled: the connections that this side opened, named uniquely over all links; empty where the board dials.
-        self_paced: whether it holds the next frame back by itself until the one before has left.
+        dialled: the connections that this side opened, with names unique over all links; empty if the board dials.
+        self_paced: whether the link itself holds the next frame back until the previous one has left.
     """
 
     kind: str
@@ -57,24 +58,24 @@ class LinkFacts:
 
 
 class BoardListener(Protocol):
-    """Who is told of the board by the receiver's thread."""
+    """Is told of the board's sessions and frames by the receiver's thread."""
 
     def session_began(self) -> None:
-        """A life of the board begins; nothing of the one before will follow."""
+        """Take note that a board session has begun. Nothing of the previous one will follow."""
 
     def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """A frame has come that the sink took: its exposure on the host's clock, and its number in the session."""
+        """Take note of a frame that the sink took: its exposure on the host's clock, and its number in the session."""
 
 
 class Reception:
     """The board as this host knows it.
 
     Args:
-        links: what they are, the preferred one first.
-        host_id: random id of this process's life.
-        sink: where frames go.
-        send: takes what is to be said.
-        listener: told of sessions and frames beside the sink; None: nobody is.
+        links: the links' facts, the preferred link first.
+        host_id: random id of this process.
+        sink: takes the frames.
+        send: takes outgoing messages.
+        listener: is also told of sessions and frames; None: no listener.
     """
 
     def __init__(
@@ -101,7 +102,7 @@ class Reception:
         self._border = Border(self.account, sink.void)
 
     def refused(self, now_ns: int) -> BoardRefusal | None:
-        """Why the board that was last heard does not talk to us; None when it does, or is silent now."""
+        """Return why the last board heard refuses this host; None if it does not, or is silent now."""
         return self._refusals.last(now_ns)
 
     @property
@@ -111,13 +112,13 @@ class Reception:
 
     @property
     def carrier(self) -> str:
-        """Name of the link that frames come over now; empty while there is none."""
+        """Name of the link that carries frames now; empty while there is none."""
         link = self._session.carrier
         return "" if link is None else self.account.links[link].name
 
     @property
     def hello(self) -> BoardHello | None:
-        """What the board said of itself; None before the first contact."""
+        """The board's description of itself; None before the first contact."""
         return self._hello
 
     @property
@@ -127,20 +128,20 @@ class Reception:
 
     @property
     def ended(self) -> bool:
-        """Whether the board's camera has come to its end."""
+        """Whether the board's camera has reached the end of its images."""
         return bool(self.account.sessions) and self.account.sessions[-1].ended
 
     @property
     def due_ns(self) -> int:
-        """When `tick` wants to be called next even if nothing comes, ns."""
+        """When to call `tick` next even if nothing comes, ns."""
         return self._session.due_ns
 
     def receive(self, connection: bytes, message: Message, now_ns: int) -> None:
         """Take a message.
 
         Args:
-            connection: where it came from, named uniquely over all links.
-            message: what came.
+            connection: where it came from, with a name unique over all links.
+            message: the message.
             now_ns: arrival of its last byte, ns.
         """
         self._handle(self._session.receive(connection, message, now_ns), now_ns)
@@ -148,7 +149,8 @@ class Reception:
     def refuse_version(self, connection: bytes, theirs: int, now_ns: int) -> None:
         """Take note of a message of another protocol version.
 
-        On a link that is up it is somebody else's noise; whoever called here, not being called, may be anybody.
+        On a link that is up, it is noise from somebody else. On a connection that this host did not dial, it may come
+        from anybody, so it does not count as the board's refusal.
         """
         refusal, link = BoardRefusal(RefusalReason.VERSION, theirs), connection[0]
         if self.account.links[link].is_up:
@@ -156,7 +158,7 @@ class Reception:
             return
         self.account.garbage += 1
         if not self._session.is_open and connection in self._links[link].dialled.values():
-            self._refusals.note(refusal, now_ns)  # whoever waits for the board tells it
+            self._refusals.note(refusal, now_ns)  # the code that waits for the board reports it
         else:
             self._tell_refusal(link, refusal)
 
@@ -165,7 +167,7 @@ class Reception:
         self._handle(self._session.interrupted(connection, now_ns), now_ns)
 
     def tick(self, now_ns: int) -> None:
-        """Do what time demands, and let frames come where there is room for them."""
+        """Do what is due, and grant credit if there is room for frames."""
         self._border.tick(now_ns)
         if self._border.waits_for_echo:
             self._session.probe(now_ns)
@@ -177,44 +179,44 @@ class Reception:
         self._grant(now_ns)
 
     def steer(self, later_ns: int, now_ns: int) -> None:
-        """Ask the board's camera to expose later; what exceeds its period says nothing more. Without a board nobody is asked."""
+        """Ask the board's camera to expose later, by `later_ns` modulo its period. Without a board, do nothing."""
         if self._hello is not None:
             self._handle(self._session.steer(later_ns % self._hello.camera.period_ns), now_ns)
 
     def slept(self, slept_ns: int, now_ns: int) -> None:
-        """Take note that this machine has slept: its clock stood still, the board's and the cameras' went on."""
+        """Take note that this machine has slept: its clock stood still while the board's and the cameras' went on."""
         self._border.slept(slept_ns)
         self._handle(self._session.begin_clock(now_ns), now_ns)
 
     def doubt_clock(self, why: str, now_ns: int) -> None:
-        """Take note that this machine's clock may have stood still; an echo that is asked for from now on tells."""
+        """Take note that this machine's clock may have stood still. An echo asked for from now on will tell."""
         self._border.void(why)
         self._handle(self._session.begin_clock(now_ns), now_ns)
 
     def leave(self, now_ns: int) -> bool:
-        """Say goodbye; gives whether anybody hears it, who will answer with the last account (`tail_known`)."""
+        """Say goodbye. Return whether a board hears it; it will answer with its last account (`tail_known`)."""
         farewell = self._session.leave()
         self._handle(farewell, now_ns)
         return bool(farewell)
 
     def close(self) -> None:
-        """Take note that nothing comes any more."""
+        """Take note that nothing more will come."""
         self._border.close()
 
     def lose_tail(self) -> None:
-        """Take note that the last account did not come: what the board sent since its newest one is not known."""
+        """Take note that the last account did not come: what the board sent since the newest account is unknown."""
         self._current.vanished = True
 
     def count_garbage(self, problem: str) -> None:
-        """Take note of something that is no message of ours."""
+        """Count something that is not a message of ours."""
         self.account.garbage += 1
-        if self.account.garbage.bit_count() == 1:  # the 1st, 2nd, 4th, 8th …: a hostile peer must not fill the log
+        if self.account.garbage.bit_count() == 1:  # log the 1st, 2nd, 4th, 8th …: a hostile peer must not fill the log
             _LOG.warning(event("garbage", count=self.account.garbage, problem=problem))
 
     def _grant(self, now_ns: int) -> None:
         carrier, hello = self._session.carrier, self._hello
         if carrier is None or hello is None or not self._border.takes_frames:
-            return  # without a clock a frame could not be paired
+            return  # without a clock, frames could not be paired
         if (room := self._sink.room()) is not None:
             self._handle(self._session.grant(room), now_ns)
             return
@@ -248,7 +250,7 @@ class Reception:
                     self._note_gone(orderly=orderly, now_ns=now_ns)
 
     def _note_clock(self, echo: Echo | ClockVoid, now_ns: int) -> None:
-        """Take an echo to the clock, and let frames pass that it has proven; or begin anew."""
+        """Give an echo to the clock and pass the frames that it has proven; or restart the clock if it is void."""
         if isinstance(echo, ClockVoid):
             self._border.void("the board had not heard this host for a while")
             return
@@ -257,8 +259,8 @@ class Reception:
         self._choice.echo(echo.link, (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns), now_ns)
 
     def _note_account(self, counted: Counted, now_ns: int) -> None:
-        """Take the board's account of the running session."""
-        self.tail_known |= counted.last  # an older account on the other lane may come behind it
+        """Take note of the board's account of the present session."""
+        self.tail_known |= counted.last  # an older account may still follow on the other lane
         account = self._current
         account.lost += counted.lost
         account.latest = max(counted.counts, account.latest, key=lambda counts: (counts.grabbed, counts.sent))
@@ -266,7 +268,10 @@ class Reception:
         self._choice.account(counted.counts.grabbed, now_ns, has_credit=self._session.outstanding > 0)
 
     def _note_refusal(self, refused: Refused | Unbelievable, now_ns: int) -> None:
-        """A board does not talk to us, which is told once where another link is up, because then the run goes on; or it talks nonsense."""
+        """Note that a board refuses this host, or sends nonsense.
+
+        If another link is up, the run goes on, so the refusal is logged once.
+        """
         if isinstance(refused, Unbelievable):
             self.count_garbage(refused.problem)
             return
@@ -281,7 +286,7 @@ class Reception:
             _LOG.warning(event("link_refused", link=self.account.links[link].name, problem=problem, remedy=remedy))
 
     def _note_gone(self, *, orderly: bool, now_ns: int) -> None:
-        """The board is not there any more, on no link."""
+        """Take note that the board has gone from all links."""
         self._border.close()
         self._current.vanished = not orderly
         for number, tally in enumerate(self.account.links):
@@ -290,7 +295,7 @@ class Reception:
         _LOG.info(event("board_gone", session=self._current.session, orderly=orderly))
 
     def _note_link(self, news: LinkUp | LinkDown | OtherBoard, now_ns: int) -> None:
-        """Take note of a link that came up, went down, or leads astray."""
+        """Take note of a link that came up, went down, or leads to a different board."""
         tally = self.account.links[news.link]
         match news:
             case LinkUp(link, hello):
@@ -359,7 +364,7 @@ class Reception:
         _LOG.info(event("board_found", **found, camera=camera.name, size=size))
 
     def _note_rung(self, rung: Rung) -> None:
-        """Go by another rate of the board's camera."""
+        """Adopt the new rung of the board's camera."""
         assert self._hello is not None
         self._hello = replace(self._hello, camera=replace(self._hello.camera, period_ns=rung.period_ns), rung=rung)
         self._current.rung = rung
@@ -368,7 +373,7 @@ class Reception:
         _LOG.info(event("board_camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality))
 
     def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
-        """Take a frame of the running session to the border."""
+        """Count a frame of the present session and give it to the border."""
         account, tally = self._current, self.account.links[link]
         account.received += 1
         account.lost += lost
@@ -381,7 +386,7 @@ class Reception:
             self._pass(*passed)
 
     def _pass(self, link: int, frame: BoardFrame) -> None:
-        """Give a frame that is believed to the sink, if that wants it."""
+        """Pass a believed frame to the sink, if the sink wants it."""
         assert self._hello is not None
         if (objection := self._sink.objection(frame)) is not None:
             self._current.disbelieved[objection] += 1

@@ -1,4 +1,4 @@
-"""Boards that do not talk to this host: which refusal counts now, what was told of them, what they mean. Pure."""
+"""Boards that refuse this host: which refusal counts now, which were reported, and what they mean. Pure."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -7,16 +7,16 @@ from common.protocol.message import RefusalReason
 from common.versions import PROTOCOL_VERSION
 
 _REFUSAL_NS: Final = 1_000_000_000
-"""A board that refuses does so at every hello, five times a second; one that has not done so for this long is gone."""
+"""A board refuses at every hello, five times a second. If it has not refused for this long, it is gone."""
 
 
 @dataclass(frozen=True, slots=True)
 class BoardRefusal:
-    """Why a board does not talk to us.
+    """Why a board refuses this host.
 
     Attributes:
-        reason: its own, or that it speaks another protocol version.
-        protocol: that version, where the board has told it; boards of 0.1 refuse in our own version's words and tell none.
+        reason: the board's reason, or that it speaks another protocol version.
+        protocol: that version, if the board told it. Boards of 0.1 refuse in our own version's format and tell none.
     """
 
     reason: RefusalReason
@@ -24,26 +24,28 @@ class BoardRefusal:
 
 
 class Refusals:
-    """What boards have refused of late."""
+    """The recent refusals by boards."""
 
     def __init__(self) -> None:
         self._last: tuple[BoardRefusal, int] | None = None
         self._told: set[int] = set()
 
     def last(self, now_ns: int) -> BoardRefusal | None:
-        """Why the board that was last heard does not talk to us; None when it does, or is silent now. Any thread may ask.
+        """Return why the last board heard refuses this host; None if it does not, or is silent now.
+
+        Safe from any thread.
 
         Args:
             now_ns: host's clock, ns.
         """
-        last = self._last  # read once: another thread may be writing
+        last = self._last  # read once, because another thread may write
         return None if last is None or now_ns - last[1] > _REFUSAL_NS else last[0]
 
     def note(self, refusal: BoardRefusal, now_ns: int) -> None:
-        """Take note of a refusal. One that tells no version follows one that does.
+        """Take note of a refusal. If it tells no version, a recent one for the same reason is kept instead.
 
         Args:
-            refusal: the board's.
+            refusal: the board's refusal.
             now_ns: its arrival, host's clock, ns.
         """
         before = self.last(now_ns)
@@ -52,14 +54,14 @@ class Refusals:
         self._last = (refusal, now_ns)
 
     def accepted(self) -> None:
-        """Take note that a board talks to us."""
+        """Take note that a board has accepted this host."""
         self._last = None
 
     def is_news(self, link: int) -> bool:
-        """Whether a refusal on a link is to be told: once, until the link has come up.
+        """Return whether to report a refusal on a link. It is reported once, until the link comes up again.
 
         Args:
-            link: its number.
+            link: number of the link.
         """
         if link in self._told:
             return False
@@ -67,19 +69,19 @@ class Refusals:
         return True
 
     def link_up(self, link: int) -> None:
-        """Take note that a link came up: a refusal there is news again.
+        """Take note that a link came up: report its next refusal again.
 
         Args:
-            link: its number.
+            link: number of the link.
         """
         self._told.discard(link)
 
 
 def refusal_text(refusal: BoardRefusal) -> tuple[str, str]:
-    """What a refusal means, and its remedy.
+    """Describe a refusal and its remedy.
 
     Args:
-        refusal: the board's.
+        refusal: the board's refusal.
 
     Returns:
         Problem and remedy, in words for the user.
@@ -88,9 +90,9 @@ def refusal_text(refusal: BoardRefusal) -> tuple[str, str]:
         case RefusalReason.BUSY:
             return "the board is busy with another host", "stop the other one first"
         case RefusalReason.VERSION:
-            # The words of `other_protocol`, in full: docs/troubleshooting.md is made from them.
+            # The same words as in `other_protocol`, written out: docs/troubleshooting.md is generated from them.
             theirs, ours = refusal.protocol, PROTOCOL_VERSION
-            if theirs is None:  # told by no board of 0.1, whose newest was 3: ours is newer, or it would talk to us
+            if theirs is None:  # a board of 0.1, at most protocol 3: ours is newer, or it would accept us
                 return (
                     f"the board speaks an older protocol than {ours}, which this host speaks",
                     "update the board's tandemscan",

@@ -1,1 +1,1 @@
-"""One notion of time: clock estimate, pairing, FIFO. Pure cores, `now` passed in."""
+"""One notion of time: clock estimate, pairing and FIFO. Pure cores; `now` is passed in."""

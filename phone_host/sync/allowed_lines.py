@@ -1,16 +1,18 @@
-"""Which lines fit between the two families of facts about a clock's offset, and which of them to believe. Pure arithmetic.
+"""Which lines fit between the two families of facts about a clock's offset, and which to believe. Pure arithmetic.
 
-All lines are told by their skew and their value at one moment, the reference; times are relative to it. For each skew s the facts leave
-an interval [low(s), high(s)] for the value; low is convex and high concave, both piecewise linear, bending at the hulls' slopes. `allowed_lines` walks
-along all bends: exact linear programming in two variables, in the number of hull points.
+A line is given by its skew and its value at one moment, the reference. Times are relative to the reference. For each
+skew s the facts leave an interval [low(s), high(s)] for the value. low is convex and high concave; both are piecewise
+linear and bend at the hulls' slopes. `allowed_lines` visits all bends: exact linear programming in two variables,
+linear in the number of hull points.
 
-`believe` weighs: one-way delays above their least behave near it like exponential ones, of which the mean spacing b of the smallest is
-measured in each direction. If the least delays are the same in both directions, the likelihood of a lower line l and an upper line u
-with common skew s is exp((u - U)/b_back + (L - l)/b_there) beyond the touching lines U(s), L(s), times a prior for s. With the skew fixed that is
-an exponential each, so the rest is a sum over the straight pieces of an exponential of s: the posterior mean has a closed form and, being a
-mean and no corner of a hull, moves less from wave to wave.
-Source of the likelihood: Jeske, "On maximum-likelihood estimation of clock offset", IEEE Trans. Communications 53(1), 2005 (exponential
-delays, two-way exchange: the middle of the two minima is the maximum).
+`believe` weighs the lines. Near their minimum, one-way delays are distributed about exponentially. The mean spacing b
+of the smallest delays is measured in each direction. If the least delays of both directions are equal, the likelihood
+of a lower line l and an upper line u with common skew s is exp((u - U)/b_back + (L - l)/b_there) beyond the touching
+lines U(s), L(s), times a prior for s. For a fixed skew, each factor is an exponential. What remains is a sum over the
+straight pieces of an exponential of s, so the posterior mean has a closed form. As a mean rather than a corner of a
+hull, it moves less from wave to wave. Source of the likelihood: Jeske, "On maximum-likelihood estimation of clock
+offset", IEEE Trans. Communications 53(1), 2005 (exponential delays, two-way exchange: the middle of the two minima is
+the maximum).
 """
 
 import math
@@ -19,23 +21,27 @@ from itertools import pairwise
 from typing import Final, NamedTuple
 
 MAX_SKEW: Final = 500e-6
-"""Linux steers no clock further than this (adjtimex); crystals left alone differ by less (100 ppm each)."""
+"""Linux slews no clock faster than this (adjtimex). Free-running crystals differ by less (100 ppm each)."""
 
 SKEW_SCALE: Final = 20e-6
-"""Mean of |skew - what it was| before anything is known: data sheets of ordinary crystals promise 20 to 50 ppm. Its tail (Laplace) admits 100 ppm."""
+"""Prior mean of |skew - prior skew|. Data sheets of ordinary crystals promise 20 to 50 ppm.
+
+The tail of this (Laplace) prior allows 100 ppm."""
 
 LIKELIHOOD_DROP: Final = 11.23
-"""The region that holds three parameters at ends of exponential distributions in 99.9 %: P(Gamma(3) > 11.23) = 0.001. With a scale that is itself
-the mean of n spacings the quantile is 3 F(6, 2 n); 11.23 (1 + 6 / n) is within 7 % of its values from n = 7 on (22.3, 17.3 at 11, 14.2 at 20)."""
+"""Log-likelihood drop of the 99.9 % region of three parameters at the ends of exponential distributions.
+
+P(Gamma(3) > 11.23) = 0.001. If the scale itself is the mean of n spacings, the quantile is 3 F(6, 2 n).
+11.23 (1 + 6 / n) is within 7 % of it from n = 7 on (22.3, 17.3 at 11, 14.2 at 20)."""
 
 _NEGLIGIBLE: Final = 20.0
-"""A fraction of the posterior below exp(-20) of its maximum adds nothing."""
+"""Parts of the posterior below exp(-20) of its maximum are negligible."""
 
 Points = list[tuple[float, float]]
 
 
 class Allowed(NamedTuple):
-    """What the facts leave for one skew: lowest and highest value at the reference, ns."""
+    """What the facts allow for one skew: lowest and highest value at the reference, ns."""
 
     skew: float
     low_ns: float
@@ -44,12 +50,12 @@ class Allowed(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Spacing:
-    """Mean distance of the smallest delays of each direction from one another, ns; > 0.
+    """Mean distance between neighbours among the smallest delays of each direction, ns; > 0.
 
     Attributes:
         there_ns: on the way to the board.
         back_ns: on the way back.
-        count: of how many distances it is the mean.
+        count: number of distances in the mean.
     """
 
     there_ns: float
@@ -59,14 +65,14 @@ class Spacing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Belief:
-    """What is believed of the offset at the reference, ns, and of the skew.
+    """The estimate of the offset at the reference, ns, and of the skew.
 
     Attributes:
-        offset_ns: posterior mean.
-        skew: posterior mean.
-        offset_error_ns: half-width that holds the truth in 99.9 %.
+        offset_ns: posterior mean of the offset.
+        skew: posterior mean of the skew.
+        offset_error_ns: half-width that contains the true offset in 99.9 % of cases.
         skew_error: the same for the skew.
-        best: the most likely line's row.
+        best: the row of the most likely line.
     """
 
     offset_ns: float
@@ -77,15 +83,15 @@ class Belief:
 
 
 def allowed_lines(lower: Points, upper: Points, prior_skew: float) -> list[Allowed]:
-    """Find all lines that respect all facts.
+    """Find all lines that agree with all facts.
 
     Args:
         lower: hull points (age <= 0, least value), oldest first.
-        upper: the same of the negated other family.
-        prior_skew: an additional skew to be looked at.
+        upper: the same for the other family, negated.
+        prior_skew: an additional skew to include.
 
-    Returns:
-        Rows at every bend, rising in skew, the first and the last at the ends of what is possible; empty if the facts contradict each other.
+    Returns: A row at every bend, with rising skew. The first and last rows are at the ends of the possible range. Empty
+        if the facts contradict each other.
     """
     falling = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(lower)]
     rising = [(a[1] - b[1]) / (b[0] - a[0]) for a, b in pairwise(upper)]
@@ -114,10 +120,10 @@ def believe(rows: list[Allowed], spacing: Spacing, middle_ns: float, prior_skew:
     """Weigh the allowed lines.
 
     Args:
-        rows: of `allowed_lines`, at least one.
-        spacing: of the smallest delays.
+        rows: result of `allowed_lines`, at least one row.
+        spacing: spacing of the smallest delays.
         middle_ns: mean time of the facts relative to the reference (<= 0).
-        prior_skew: what the skew is likely to be near to.
+        prior_skew: the value that the skew is likely to be near.
     """
     there, back = spacing.there_ns, spacing.back_ns
     logs = [
@@ -130,7 +136,7 @@ def believe(rows: list[Allowed], spacing: Spacing, middle_ns: float, prior_skew:
     best = rows[logs.index(most)]
     drops = [most - value for value in logs]
     middle, skew = _mean(rows, drops)
-    # The lines lie one spacing beyond the facts that touch them, on the average.
+    # On average, the lines lie one spacing beyond the facts that touch them.
     shift = (there - back) / 2
     offset = min(max(middle + shift, best.low_ns), best.high_ns)
     offset_error = skew_error = 0.0
@@ -144,7 +150,7 @@ def believe(rows: list[Allowed], spacing: Spacing, middle_ns: float, prior_skew:
 
 
 def _crossing(a: Allowed, b: Allowed) -> Allowed:
-    """Where low and high meet between two rows."""
+    """Return the row between two rows where low and high meet."""
     gap = a.high_ns - a.low_ns
     fraction = gap / (gap - (b.high_ns - b.low_ns))
     return _between(a, b, fraction)
@@ -155,7 +161,10 @@ def _between(a: Allowed, b: Allowed, fraction: float) -> Allowed:
 
 
 def _mean(rows: list[Allowed], drops: list[float]) -> tuple[float, float]:
-    """Posterior mean of the interval's middle and of the skew: exact integrals of (linear) x exp(linear) over each piece."""
+    """Return the posterior means of the interval's middle and of the skew.
+
+    These are exact integrals of (linear) x exp(linear) over each piece.
+    """
     total = middle = skew = 0.0
     for index in range(1, len(rows)):
         a, b, da, db = rows[index - 1], rows[index], drops[index - 1], drops[index]
@@ -181,7 +190,7 @@ def _mean(rows: list[Allowed], drops: list[float]) -> tuple[float, float]:
 
 
 def _region(rows: list[Allowed], drops: list[float], most_drop: float) -> list[tuple[Allowed, float]]:
-    """The rows whose log likelihood is no further below the greatest, and the points where it leaves that region."""
+    """Return the rows whose log-likelihood drop is at most `most_drop`, and the points at the border of that region."""
     region: list[tuple[Allowed, float]] = []
     for index, (row, drop) in enumerate(zip(rows, drops, strict=True)):
         if index and (drop <= most_drop) != (drops[index - 1] <= most_drop):

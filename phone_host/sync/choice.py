@@ -1,13 +1,14 @@
-"""Which of several links is to carry the frames: the one over which they are youngest when they come. Sans-I/O, `now_ns` passed in.
+"""Chooses the carrier among several links: the one whose frames are youngest on arrival. Sans-I/O, `now_ns` passed in.
 
-The age of a frame over a link is half of the round trip now and what a frame takes beyond it there, measured while the link carried. A link that has
-not carried yet, or long ago, is taken to be as good as its round trip: trying it costs a frame, not trying it could cost every one. While a
-frame is owed (there is credit, the board goes on grabbing, nothing comes) the carrier's age grows with the waiting, so a link
-whose frames are stuck gives way like a slow one.
+The expected age of a frame over a link is half of the present round trip plus the additional transit time of a frame,
+measured while the link was the carrier. A link that has never carried, or not recently, is assumed to be as good as its
+round trip: trying it costs one frame, but not trying it could cost on every frame. A frame is owed while there is
+credit and the board goes on grabbing but nothing comes. The carrier's age then grows with the wait, so a link whose
+frames are stuck is replaced like a slow one.
 
-Against flapping: the links stand in an order of preference. One that is preferred takes over if it is about as good (20 % and 8 ms), any other only if
-it is better by 30 % and 12 ms; what lies between changes nothing. Both must hold for a second, and for twice as long each time that a link failed while
-it carried.
+To avoid flapping, the links have an order of preference. A preferred link takes over if it is about as good (within
+20 % and 8 ms), any other only if it is better by 30 % and 12 ms. In between, nothing changes. The condition must hold
+for one second; this time doubles each time that a link fails while it is the carrier.
 """
 
 from collections import deque
@@ -17,29 +18,31 @@ from typing import Final
 _MS: Final = 1_000_000
 
 PROOF_NS: Final = 1000 * _MS
-"""So long a link must be up and better before it takes over: a wave of echoes a second tells."""
+"""A link must be up and better for this long before it takes over. One wave of echoes a second is enough to tell."""
 
 MOST_PROOF_NS: Final = 60_000 * _MS
-"""A link that breaks again and again is tried once a minute."""
+"""A link that keeps failing is tried once a minute."""
 
 MEMORY_NS: Final = 10_000 * _MS
 MOST_MEMORY_NS: Final = 300_000 * _MS
-"""What a frame took is forgotten after 10, 20, 40 … 300 s, as other trials of a link are repeated (flow.py): one stall of a busy machine must not keep
-a good link out for minutes, a slow one must not be tried all the time."""
+"""A frame's transit time is forgotten after 10, 20, 40 … 300 s, the intervals of other trials of a link (flow.py).
+
+One stall of a busy machine must not keep a good link out for minutes, and a slow link must not be tried all the
+time."""
 
 _AS_GOOD: Final = 1.2
 _AS_GOOD_NS: Final = 8 * _MS
-"""A quarter of a frame period at 30 per second: below that the order that the user gave says more than a measurement on a busy machine."""
+"""A quarter of a period at 30 fps. Below that, the user's order says more than a measurement on a busy machine."""
 
 _BETTER: Final = 0.7
 _BETTER_NS: Final = 12 * _MS
-"""So that there is a gap: what is given up at 1.43 a + 17 ms beside an age of a is taken back at 1.2 a + 8 ms."""
+"""Leaves a gap: beside a link of age a, a preferred one is given up at 1.43 a + 17 ms, taken back at 1.2 a + 8 ms."""
 
 _ECHOES: Final = 6
-"""The round trip now is the least of so many: two waves."""
+"""The present round trip is the least of this many echoes: two waves."""
 
 _UNHEARD_NS: Final = 2500 * _MS
-"""A link whose echoes fail to come for this long, two waves of a standby, is not one to change to."""
+"""A link without echoes for this long, two waves of a standby, is not chosen."""
 
 _SMOOTH: Final = 8
 
@@ -49,15 +52,15 @@ class _Known:
     """What is known of one link.
 
     Attributes:
-        up_since_ns: since when it is up; None while it is not.
+        up_since_ns: when it came up; None while it is not up.
         proof_ns: how long it must be up and better.
-        round_trips_ns: of the newest echoes.
-        heard_ns: when the newest came.
+        round_trips_ns: round trips of the newest echoes.
+        heard_ns: when the newest echo came.
         least_ns: least round trip since it came up.
-        frame_ns: transit of a frame, smoothed; None before it carried.
-        measured_ns: when that was.
-        memory_ns: how long that is remembered.
-        better_since_ns: since when it is better than the carrier.
+        frame_ns: smoothed transit time of a frame; None before it carried any.
+        measured_ns: when `frame_ns` was last measured.
+        memory_ns: how long `frame_ns` is remembered.
+        better_since_ns: since when it has been better than the carrier; None while it is not.
     """
 
     up_since_ns: int | None = None
@@ -71,7 +74,7 @@ class _Known:
     better_since_ns: int | None = None
 
     def is_forgotten(self, now_ns: int) -> bool:
-        """Whether it is too long ago that frames came over this link."""
+        """Return whether the last frame over this link came too long ago."""
         return now_ns - self.measured_ns > self.memory_ns
 
 
@@ -79,7 +82,7 @@ class LinkChoice:
     """Chooses among links in their order of preference.
 
     Args:
-        links: how many.
+        links: number of links.
     """
 
     def __init__(self, links: int) -> None:
@@ -102,7 +105,7 @@ class LinkChoice:
         known.up_since_ns = known.better_since_ns = None
 
     def carries(self, link: int, now_ns: int) -> None:
-        """Take note that frames come over that link from now on."""
+        """Take note that this link is the carrier from now on."""
         if link == self._carrier:
             return
         if self._carrier is not None:
@@ -117,14 +120,14 @@ class LinkChoice:
             known.better_since_ns = None
 
     def echo(self, link: int, round_trip_ns: int, now_ns: int) -> None:
-        """Take an echo's round trip."""
+        """Take note of an echo's round trip."""
         known = self._known[link]
         known.heard_ns = now_ns
         known.round_trips_ns.append(round_trip_ns)
         known.least_ns = min(known.least_ns or round_trip_ns, round_trip_ns)
 
     def frame(self, link: int, transit_ns: int, now_ns: int) -> None:
-        """Take how long a frame was under way."""
+        """Take note of a frame's transit time."""
         known = self._known[link]
         before = transit_ns if known.frame_ns is None or known.is_forgotten(now_ns) else known.frame_ns
         known.frame_ns = before + (transit_ns - before) / _SMOOTH
@@ -133,19 +136,19 @@ class LinkChoice:
             self._owed_since_ns = None
 
     def account(self, grabbed: int, now_ns: int, *, has_credit: bool) -> None:
-        """Take the board's account.
+        """Take note of the board's account.
 
         Args:
-            grabbed: frames that it has grabbed so far.
+            grabbed: number of frames that the board has grabbed so far.
             now_ns: host's clock, ns.
-            has_credit: whether the board has leave to send one.
+            has_credit: whether the board has credit for a frame.
         """
         if grabbed > self._grabbed and has_credit and self._owed_since_ns is None:
             self._owed_since_ns = now_ns
         self._grabbed = grabbed
 
     def age_ns(self, link: int, now_ns: int) -> float:
-        """How old a frame is expected to be when it has come over a link; infinite while it is not up."""
+        """Return the expected age of a frame on arrival over a link, ns. Infinite if the link is down or silent."""
         known = self._known[link]
         if known.up_since_ns is None or not known.round_trips_ns or now_ns - known.heard_ns > _UNHEARD_NS:
             return float("inf")
@@ -157,7 +160,7 @@ class LinkChoice:
         return known.frame_ns + (min(known.round_trips_ns) - known.least_ns) / 2
 
     def best(self, now_ns: int) -> int | None:
-        """Give the link that is to carry the frames; None: leave it as it is."""
+        """Return the link that should become the carrier; None: keep the present one."""
         carrier = self._carrier
         if carrier is None:
             return None
@@ -179,7 +182,10 @@ class LinkChoice:
         return None if found is None else found[1]
 
     def _failed(self, known: _Known, now_ns: int) -> None:
-        """The carrier was lost, or frames did not come: it has to prove itself for longer, and what it took before means nothing."""
+        """Handle a carrier that was lost or whose frames did not come.
+
+        It must prove itself for longer next time, and its earlier transit times no longer count.
+        """
         lasted = now_ns - self._carries_since_ns >= MOST_PROOF_NS
         known.proof_ns = PROOF_NS if lasted else min(MOST_PROOF_NS, 2 * known.proof_ns)
         known.frame_ns = None

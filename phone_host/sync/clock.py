@@ -1,18 +1,22 @@
-"""Where the board's clock stands to the host's, from two-way echoes. Pure: echoes in, estimate out; time is that of the newest echo.
+"""Estimates the offset between the board's and the host's clock from two-way echoes.
 
-An echo gives two hard facts: the board's t1 lies after the host's t0, and its t2 before the host's t3. With H(b) = b + offset(b) the host
-time of board time b:    t0 - t1 <= offset(t1)    and    offset(t2) <= t3 - t2.
-Averages are useless when frames fill the link (study of links, 3d); extremes are not. `hull` keeps the extremes, `strip` finds the lines between
-them and weighs them; this module feeds both, notices clocks that jump, and states two figures.
+Pure: echoes in, estimate out; the present is the time of the newest echo.
 
-A fact that contradicts the others is no knowledge yet: a clock has jumped, or the echo lies. Until further waves have decided, nothing is known.
+An echo gives two hard facts: the board's t1 lies after the host's t0, and the board's t2 before the host's t3. Let
+H(b) = b + offset(b) be the host time of board time b. Then t0 - t1 <= offset(t1) and offset(t2) <= t3 - t2.
+Averages are useless when frames fill the link (study of links, 3d), but extremes are not. `hull` keeps the extremes.
+`allowed_lines` finds and weighs the lines between them. This module feeds both, detects clock jumps, and provides two
+figures, `bound` and `uncertainty`.
 
-`bound`: hard. It contains the truth whatever the delays, as long as the clocks' rates differ by at most MAX_SKEW and their difference changes by at
-most SKEW_CHANGE. Half of the least round trip is the best it can be.
-`uncertainty`: contains the truth in 99.9 % if the link is nearly symmetric: the least delays there and back differ by at most twice ASYMMETRY of the
-least round trip, and the delays above them scatter without memory from wave to wave.
+A fact that contradicts the others proves nothing yet: either a clock has jumped, or the echo lies. Until further waves
+have decided, there is no estimate.
 
-Sources: Mills, RFC 5905 (four stamps, minimum filter); `hull` and `strip` name the others.
+`bound` is hard. It contains the true offset whatever the delays, as long as the clocks' rates differ by at most
+MAX_SKEW and that difference changes by at most SKEW_CHANGE. At best it is half of the least round trip. `uncertainty`
+contains the true offset in 99.9 % of cases if the link is nearly symmetric: the least delays in the two directions
+differ by at most twice ASYMMETRY of the least round trip, and the delays above them are independent from wave to wave.
+
+Sources: Mills, RFC 5905 (four stamps, minimum filter); `hull` and `allowed_lines` name the others.
 """
 
 import math
@@ -28,30 +32,36 @@ from phone_host.sync.hull import SKEW_CHANGE, Hull, widening_ns
 __all__ = ["ASYMMETRY", "CONFIRMED_WAVES", "MAX_SKEW", "ClockEstimate", "ClockEstimator", "Heard", "HostTime"]
 
 ASYMMETRY: Final = 0.04
-"""Error per least round trip that an unequal pair of least delays may make: half of their difference (bench_clock, real processes)."""
+"""Assumed greatest error from unequal least delays, as a share of the least round trip.
+
+The error is half of the delays' difference (bench_clock, real processes)."""
 
 WAVES: Final = 64
-"""Waves whose scatter is looked at: 32 s when old; at twice that the widening is as large as the scatter of a slow link."""
+"""Waves whose scatter is evaluated: 32 s in steady state. At twice that, the widening equals a slow link's scatter."""
 
 _SMALLEST: Final = 12
-"""The spacing is that of so many smallest delays: with 8 the uncertainty was too small in 0.5 % on a serial line (bench_clock)."""
+"""Number of smallest delays that give the spacing. With 8, 0.5 % of uncertainties on a serial line were too small
+(bench_clock)."""
 
 _LEAST_SPACING_NS: Final = 500.0
-"""Nobody takes a stamp more exactly than this in an interpreter."""
+"""An interpreter cannot take a stamp more precisely than this."""
 
 CONFIRMED_WAVES: Final = 3
-"""After so many waves on the new side of a jump it was no lie and no accident; they follow each other at once (`Waves.hasten`)."""
+"""After this many waves on the new side, a jump is real, not a lie or an accident. They follow at once
+(`Waves.hasten`)."""
 
 _HARMLESS_NS: Final = 4_000_000
-"""Two sides of a jump that cannot be further apart are as good as each other: half of the tolerance of cameras at 60 frames a second. So a clock that is
-being steered (NTP slews by 500 ppm) interrupts nothing where a round trip takes less; elsewhere it is a doubt of three waves now and then."""
+"""A jump that cannot exceed this is harmless: half of the tolerance of cameras at 60 frames a second.
+
+So a clock that is being steered (NTP slews by 500 ppm) interrupts nothing if a round trip is shorter than this.
+Otherwise it causes an occasional doubt of three waves."""
 
 
 class Heard(Enum):
-    """What an echo meant.
+    """The meaning of an echo.
 
-    NOTHING: it was no echo. AGREED: it fits what is known. DOUBTED: it does not; until that is decided there is no estimate.
-    STEPPED: a jump of the clocks is confirmed; what was known before holds no more.
+    NOTHING: not a valid echo. AGREED: it fits what is known. DOUBTED: it does not fit; there is no estimate until that
+    is decided. STEPPED: a jump of the clocks is confirmed; earlier knowledge is void.
     """
 
     NOTHING = 0
@@ -62,7 +72,7 @@ class Heard(Enum):
 
 @dataclass(frozen=True, slots=True)
 class HostTime:
-    """A moment of the board on the host's clock, ns, with the half-widths of what is not known."""
+    """A moment of the board on the host's clock, ns, with the half-widths of its error."""
 
     ns: int
     uncertainty_ns: int
@@ -71,19 +81,19 @@ class HostTime:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClockEstimate:
-    """The relation of two clocks near a moment.
+    """The relation between the two clocks near a moment.
 
     Attributes:
         reference_ns: board time at which `offset_ns` holds.
         offset_ns: host clock minus board clock there, ns.
         skew: change of the offset per ns of board time.
-        skew_uncertainty: of that skew, 99.9 % under near-symmetry.
-        uncertainty_ns: of the offset at the reference, 99.9 % under near-symmetry.
-        round_trip_ns: least round trip of late.
+        skew_uncertainty: uncertainty of that skew, 99.9 % on a nearly symmetric link.
+        uncertainty_ns: uncertainty of the offset at the reference, 99.9 % on a nearly symmetric link.
+        round_trip_ns: least recent round trip.
         low_ns: least offset at the reference that the facts allow; hard.
-        high_ns: greatest.
+        high_ns: greatest offset at the reference that the facts allow; hard.
         skew_low: least skew that the facts allow; hard.
-        skew_high: greatest.
+        skew_high: greatest skew that the facts allow; hard.
     """
 
     reference_ns: int
@@ -99,40 +109,43 @@ class ClockEstimate:
 
     @property
     def bound_ns(self) -> int:
-        """Half-width at the reference that contains the true offset whatever the asymmetry, ns."""
+        """Half-width at the reference that contains the true offset whatever the link's asymmetry, ns."""
         return self.bound_at(self.reference_ns)
 
     def offset_at(self, board_ns: int) -> int:
-        """Host clock minus board clock at a board time, ns."""
+        """Return host clock minus board clock at a board time, ns."""
         return self.offset_ns + round(self.skew * (board_ns - self.reference_ns))
 
     def limits_at(self, board_ns: int) -> tuple[int, int]:
-        """Least and greatest offset at a board time that the facts allow, ns; hard."""
+        """Return the least and greatest offset at a board time that the facts allow, ns; hard."""
         age_ns = board_ns - self.reference_ns
         low, high = (self.skew_low, self.skew_high) if age_ns >= 0 else (self.skew_high, self.skew_low)
         wide = widening_ns(age_ns)
         return self.low_ns + math.floor(low * age_ns - wide), self.high_ns + math.ceil(high * age_ns + wide)
 
     def bound_at(self, board_ns: int) -> int:
-        """Half-width of the interval around `offset_at` that contains the true offset whatever the asymmetry, ns."""
+        """Return the half-width around `offset_at` that contains the true offset whatever the link's asymmetry, ns."""
         offset_ns = self.offset_at(board_ns)
         low_ns, high_ns = self.limits_at(board_ns)
         return max(high_ns - offset_ns, offset_ns - low_ns)
 
     def uncertainty_at(self, board_ns: int) -> int:
-        """Half-width that contains the true offset in 99.9 % on a nearly symmetric link, ns; grows with the distance from the echoes."""
+        """Return the half-width that contains the true offset in 99.9 % on a nearly symmetric link, ns.
+
+        It grows with the distance from the echoes.
+        """
         age_ns = board_ns - self.reference_ns
         grown = self.skew_uncertainty * abs(age_ns) + widening_ns(age_ns)
         return min(self.uncertainty_ns + math.ceil(grown), self.bound_at(board_ns))
 
     def to_host(self, board_ns: int) -> HostTime:
-        """Give the host's time of a moment of the board's clock, ns."""
+        """Convert a moment of the board's clock, ns, to the host's clock."""
         return HostTime(board_ns + self.offset_at(board_ns), self.uncertainty_at(board_ns), self.bound_at(board_ns))
 
 
 @dataclass(slots=True)
 class _Wave:
-    """What one wave of echoes left: its tightest lower and upper fact (board's time, ns) and its least round trip."""
+    """The result of a wave of echoes: its tightest lower and upper facts (board's time, ns) and least round trip."""
 
     number: int
     lower: tuple[int, int]
@@ -141,11 +154,11 @@ class _Wave:
 
 
 class _Learned:
-    """All that is known of one pair of clocks between two jumps.
+    """Everything known about the two clocks between two jumps.
 
     Args:
-        echo: the first one.
-        prior_skew: what the skew was before the jump; 0 when nothing is known.
+        echo: the first echo.
+        prior_skew: the skew before the jump; 0 if unknown.
     """
 
     def __init__(self, echo: Echo, prior_skew: float) -> None:
@@ -159,7 +172,7 @@ class _Learned:
         assert self.estimate is not None
 
     def agrees_with(self, echo: Echo) -> bool:
-        """Whether an echo can be of these clocks: its facts leave something of what the earlier ones left."""
+        """Return whether an echo can belong to these clocks, i.e. its facts do not contradict the earlier ones."""
         estimate = self.estimate
         return estimate is not None and (
             echo.t0_ns - echo.t1_ns <= estimate.limits_at(echo.t1_ns)[1]
@@ -167,7 +180,10 @@ class _Learned:
         )
 
     def add(self, echo: Echo) -> bool:
-        """Learn from an echo; gives whether all facts still agree. One that is older than the newest has been overtaken and adds nothing."""
+        """Learn from an echo. Return whether all facts still agree.
+
+        An echo older than the newest one was overtaken and adds nothing.
+        """
         if echo.t1_ns < self._newest.t2_ns:
             return True
         new_wave = self.waves[-1].number != echo.wave
@@ -178,7 +194,7 @@ class _Learned:
         return self.estimate is not None
 
     def _store(self, echo: Echo) -> None:
-        # Stamps are rounded, so that a fact may be 1 ns too strict.
+        # Stamps are rounded, so a fact may be 1 ns too strict.
         lower, upper = (echo.t1_ns, echo.t0_ns - echo.t1_ns - 1), (echo.t2_ns, echo.t3_ns - echo.t2_ns + 1)
         round_trip_ns = (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns)
         self._lower.add(*lower)
@@ -193,7 +209,7 @@ class _Learned:
         wave.round_trip_ns = min(wave.round_trip_ns, round_trip_ns)
 
     def _is_tight(self, echo: Echo) -> bool:
-        """Whether an echo came closer to the truth than all before; others become part of the estimate with the next wave."""
+        """Return whether an echo is tighter than all before. Others enter the estimate with the next wave."""
         estimate = self.estimate
         if estimate is None or self._spacing is None:
             return True
@@ -203,8 +219,8 @@ class _Learned:
         return there_ns < 0 or back_ns < 0
 
     def _solved(self) -> ClockEstimate | None:
-        """Make the estimate; None if the facts contradict each other."""
-        # All values are taken relative to the newest fact: offsets may be hours, and floats must tell a ns.
+        """Compute the estimate; None if the facts contradict each other."""
+        # All values are relative to the newest fact: offsets may be hours, and floats must resolve a ns.
         reference_ns, origin_ns = self._newest.t2_ns, self._newest.t3_ns - self._newest.t2_ns
         lower = self._lower.seen_from(reference_ns, origin_ns)
         upper = self._upper.seen_from(reference_ns, -origin_ns)
@@ -220,7 +236,7 @@ class _Learned:
     def _told(self, rows: list[Allowed], belief: Belief, reference_ns: int, origin_ns: int) -> ClockEstimate:
         error = math.ceil(belief.offset_error_ns + ASYMMETRY * (belief.best.high_ns - belief.best.low_ns)) + 1
         offset_ns = round(belief.offset_ns)
-        # Low rises with the skew and high does too (all facts are past): the extremes lie at the ends.
+        # Both low and high rise with the skew, because all facts are in the past: the extremes lie at the ends.
         low_ns, high_ns = math.floor(rows[0].low_ns), math.ceil(rows[-1].high_ns)
         return ClockEstimate(
             reference_ns=reference_ns,
@@ -236,12 +252,12 @@ class _Learned:
         )
 
     def _first_spacing(self, rows: list[Allowed]) -> Spacing:
-        """A guess for the first wave: the delay above the least is a quarter of the round trip."""
+        """Guess the spacing for the first wave: the delay above the least is a quarter of the round trip."""
         guess = max(_LEAST_SPACING_NS, max(row.high_ns - row.low_ns for row in rows) / 4 / len(self.waves))
         return Spacing(guess, guess, 1)
 
     def _measured_spacing(self, line: Allowed, reference_ns: int, origin_ns: int) -> Spacing | None:
-        """Measure how close the waves' best echoes came to the touching lines; None while there are too few."""
+        """Measure how close the waves' best echoes came to the touching lines; None if there are too few waves."""
         count = min(_SMALLEST, len(self.waves) // 2)
         if count < 2:
             return None
@@ -260,20 +276,22 @@ class _Learned:
 
 
 def may_harm(old: ClockEstimate, new: ClockEstimate) -> bool:
-    """Whether two estimates may be so far apart that frames would be paired wrongly by one of them."""
+    """Return whether two estimates may be so far apart that one of them would pair frames wrongly."""
     low_ns, high_ns = old.limits_at(new.reference_ns)
     return max(high_ns - new.low_ns, new.high_ns - low_ns) > _HARMLESS_NS
 
 
 class ClockEstimator:
-    """Learns one board clock; a new boot of the board needs a new estimator.
+    """Estimates one board clock. A new boot of the board needs a new estimator.
 
-    An echo that contradicts what is known begins a rival: a second state that knows of this echo and its like only. While the two may be further
-    apart than is harmless there is no estimate. The rival falls with the first echo that agrees with the old state alone. Else further waves speak for the
-    one or the other: the rival takes the old state's place when it and those that follow make CONFIRMED_WAVES, and falls when as many waves speak against it.
+    An echo that contradicts what is known starts a rival: a second state that learns only from this echo and those that
+    agree with it. While the two states may be further apart than is harmless, there is no estimate. The first echo that
+    agrees only with the old state discards the rival. Otherwise each further wave votes for one state: the rival
+    replaces the old state when its first wave and the votes for it make CONFIRMED_WAVES, and is discarded after
+    CONFIRMED_WAVES - 1 votes against it.
 
     Args:
-        prior_skew: what the skew was before, where it is known.
+        prior_skew: the earlier skew, if known.
     """
 
     def __init__(self, prior_skew: float = 0.0) -> None:
@@ -285,19 +303,19 @@ class ClockEstimator:
 
     @property
     def estimate(self) -> ClockEstimate | None:
-        """The present estimate; None before the first echo, and while what was heard contradicts itself."""
+        """The present estimate; None before the first echo, and while echoes contradict each other."""
         if self._rival is not None:
             return None if self.in_doubt else self._rival.estimate
         return self._learned.estimate if self._learned is not None else None
 
     @property
     def began_ns(self) -> int | None:
-        """Board's time of the oldest echo that counts; None before the first."""
+        """Board's time of the oldest echo in use; None before the first."""
         return None if self._learned is None else self._learned.began_ns
 
     @property
     def skew(self) -> float:
-        """The rate as far as it is known well enough to survive a jump; a crystal does not change when a clock is set."""
+        """The skew, once known well enough to outlast a jump: setting a clock does not change its crystal."""
         learned = self._learned
         if learned is None or learned.estimate is None or len(learned.waves) < CONFIRMED_WAVES:
             return self._prior_skew
@@ -305,25 +323,25 @@ class ClockEstimator:
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether enough waves agree to be believed against all that was known before."""
+        """Whether enough waves agree to be believed over everything known before."""
         return self._rival is None and self._learned is not None and len(self._learned.waves) >= CONFIRMED_WAVES
 
     @property
     def in_doubt(self) -> bool:
-        """Whether echoes contradict each other by more than is harmless, and no later ones have decided yet."""
-        if self._rival is None or self._learned is None:  # asked for each frame
+        """Whether echoes contradict each other by more than is harmless and later ones have not decided yet."""
+        if self._rival is None or self._learned is None:  # short cut: this is asked for each frame
             return False
         old, new = self._learned.estimate, self._rival.estimate
         return old is not None and new is not None and may_harm(old, new)
 
     def add(self, echo: Echo) -> Heard:
-        """Learn from one echo; one whose times run backwards is no echo and is passed over.
+        """Learn from one echo. An echo whose stamps run backwards is invalid and ignored.
 
         Args:
-            echo: its four times.
+            echo: the echo with its four stamps.
 
         Returns:
-            What it meant.
+            The echo's meaning.
         """
         if echo.t3_ns - echo.t0_ns < echo.t2_ns - echo.t1_ns or echo.t2_ns < echo.t1_ns:
             return Heard.NOTHING
@@ -335,16 +353,17 @@ class ClockEstimator:
             return self._weigh(self._rival, echo, fits_both=fits)
         if fits:
             self._rival = None
-            if not self._learned.add(echo):  # within the bound, but the premise of its drift is broken
+            if not self._learned.add(echo):  # within the bound, but SKEW_CHANGE was exceeded
                 self._learned = _Learned(echo, self.skew)
             return Heard.AGREED
         self._rival, self._rival_wave, self._votes = _Learned(echo, self.skew), echo.wave, {}
         return Heard.DOUBTED if self.in_doubt else Heard.AGREED
 
     def _weigh(self, rival: _Learned, echo: Echo, *, fits_both: bool) -> Heard:
-        """Take an echo that agrees with the rival: which of the two its wave speaks for, and whether that decides.
+        """Take an echo that agrees with the rival: determine its wave's vote and whether that decides.
 
-        One that fits both took long; the ways there and back are alike on the whole, so that it speaks for the side nearer to its middle.
+        An echo that fits both states was slow. The delays of both directions are similar on the whole, so it votes for
+        the state nearer to its middle.
         """
         known, new = (self._learned.estimate if self._learned is not None else None), rival.estimate
         assert known is not None

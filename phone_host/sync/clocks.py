@@ -1,10 +1,11 @@
 """The board's clock as seen over several links at once. Pure: echoes in, one estimate out.
 
-All echoes are facts about the same two clocks, so the truth lies where the hard limits of all links meet: `bound` is that of the intersection. That
-the ways there and back are alike holds for each link by itself and for none between two, so offset, skew and `uncertainty` are those of one
-link: the one that knows best at the newest echo. An offset outside what the others' facts allow is moved to the nearest that they do
-allow, which is never further from the truth. While echoes contradict each other, those of one link or those of two, nothing is known over any; a jump
-that one link has confirmed is one for all.
+All echoes are facts about the same two clocks, so the true offset lies in the intersection of all links' hard limits;
+`bound` is that of the intersection. Near-symmetry of the two directions holds for each link separately, but not across
+links. So offset, skew and `uncertainty` come from one link: the one with the least uncertainty at the newest echo. If
+its offset is outside what the other links' facts allow, it is moved to the nearest allowed value, which is never
+further from the truth. While echoes of one link or of two links contradict each other, there is no estimate over any
+link. A jump that one link has confirmed holds for all.
 """
 
 from collections.abc import Iterable
@@ -16,13 +17,13 @@ from phone_host.sync.hull import SKEW_CHANGE
 
 
 class LinkClocks:
-    """Learns one board clock over some links; a new boot of the board needs a new one.
+    """Estimates one board clock over several links. A new boot of the board needs a new instance.
 
     Args:
-        links: how many.
+        links: number of links.
 
-    Attributes:
-        since_ns: board's time of the first echo after the last doubt: what was stamped before may be of a clock that has stepped since. None: no doubt yet.
+    Attributes: since_ns: board's time of the first echo after the last doubt. Earlier stamps may come from a clock that
+        has stepped since. None: no doubt yet.
     """
 
     def __init__(self, links: int) -> None:
@@ -39,11 +40,11 @@ class LinkClocks:
 
     @property
     def in_doubt(self) -> bool:
-        """Whether echoes contradict each other, or what was known is void, and no later ones have decided yet."""
+        """Whether echoes contradict each other, or earlier knowledge is void, and later echoes have not decided yet."""
         return self._void or self._contested or any(estimator.in_doubt for estimator in self._estimators)
 
     def round_trip_ns(self, link: int) -> int | None:
-        """Least round trip of late over one link; None before its first echo."""
+        """Return the least recent round trip over one link, ns; None before its first echo."""
         own = self._estimators[link].estimate
         return None if own is None else own.round_trip_ns
 
@@ -51,10 +52,10 @@ class LinkClocks:
         """Learn from one echo.
 
         Args:
-            echo: its four times, and the link that it came over.
+            echo: the echo with its four stamps and its link.
 
         Returns:
-            What it meant.
+            The echo's meaning.
         """
         estimator = self._estimators[echo.link]
         heard = estimator.add(echo)
@@ -65,7 +66,7 @@ class LinkClocks:
             self._contested = False
             self._forget(keep=echo.link)
         if heard is Heard.STEPPED or (heard is Heard.AGREED and self._void):
-            # What was known may hold still: it was another link that lied, or neither clock has stood still.
+            # Earlier knowledge may still hold: another link lied, or neither clock has stood still.
             heard = Heard.AGREED if self._fits_what_was_believed(estimator.estimate) else Heard.STEPPED
             self._void = False
             self.since_ns = estimator.began_ns
@@ -74,10 +75,10 @@ class LinkClocks:
         return heard
 
     def void(self, *, stepped: bool = False) -> None:
-        """Forget the offset: one of the two clocks may have stood still. What is known of their rates stays.
+        """Forget the offset, because one of the two clocks may have stood still. Keep what is known of their rates.
 
         Args:
-            stepped: whether one certainly has; else the next echo tells.
+            stepped: whether a clock certainly stood still. If False, the next echo tells.
         """
         if self._believed is None:
             return
@@ -87,7 +88,10 @@ class LinkClocks:
         self._estimate = None
 
     def down(self, link: int) -> None:
-        """Take note that a link is gone: a doubt that only its echoes could have settled is left to the next echo of any."""
+        """Take note that a link is gone.
+
+        A doubt that only its echoes could have settled is left to any link's next echo.
+        """
         if self._contested or self._estimators[link].in_doubt:
             self._estimators[link] = ClockEstimator(self._estimators[link].skew)
             self._void, self._contested = self._void or self._believed is not None, False
@@ -104,7 +108,7 @@ class LinkClocks:
         return _meet(newest, [moved(self._believed, newest.reference_ns)]) is not None
 
     def _contradicts_others(self, estimator: ClockEstimator) -> bool:
-        """Whether what one link says can be true with what no other says."""
+        """Return whether one link's facts contradict those of the others by more than is harmless."""
         newest = estimator.estimate
         if newest is None:
             return False
@@ -119,15 +123,15 @@ class LinkClocks:
         known = [moved(own, moment_ns) for one in self._estimators if (own := one.estimate) is not None]
         best = min(known, key=lambda one: one.uncertainty_ns)
         met = _meet(best, [one for one in known if one is not best])
-        # Links that contradict each other by as little as is harmless: a clock is being steered, and the link that was heard last knows.
+        # If links contradict each other only harmlessly, a clock is being steered, and the link heard last is right.
         return newest if met is None else met
 
 
 def moved(estimate: ClockEstimate, board_ns: int) -> ClockEstimate:
-    """Tell an estimate at another moment; what it says of any third moment gets no narrower by that.
+    """Restate an estimate at another moment. Its limits at any third moment get no narrower.
 
     Args:
-        estimate: what is known.
+        estimate: the estimate.
         board_ns: the moment, board's time.
     """
     age_ns = board_ns - estimate.reference_ns
@@ -149,7 +153,7 @@ def moved(estimate: ClockEstimate, board_ns: int) -> ClockEstimate:
 
 
 def _meet(best: ClockEstimate, others: Iterable[ClockEstimate]) -> ClockEstimate | None:
-    """Narrow an estimate's hard limits by those of others at the same moment; None where they contradict it."""
+    """Narrow an estimate's hard limits by those of others at the same moment; None if they contradict it."""
     for other in others:
         low_ns, high_ns = max(other.low_ns, best.low_ns), min(other.high_ns, best.high_ns)
         skew_low, skew_high = max(best.skew_low, other.skew_low), min(best.skew_high, other.skew_high)

@@ -1,4 +1,4 @@
-"""The bounded first-in-first-out queue between pairing and processing. Pure; the host's root adds the lock."""
+"""The bounded FIFO between pairing and processing. Pure; `stream/pair_queue.py` adds the lock."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 class Overflow(Enum):
-    """What happens to a pair that finds the queue full."""
+    """What happens when a pair finds the queue full."""
 
     DROP_OLDEST = "drop-oldest"
     DROP_NEWEST = "drop-newest"
@@ -23,8 +23,8 @@ class FifoSettings:
     """Depth and overflow policy.
 
     Attributes:
-        depth: most pairs that wait, at least 1.
-        overflow: what gives way.
+        depth: greatest number of waiting pairs, at least 1.
+        overflow: overflow policy.
     """
 
     depth: int = 1
@@ -32,15 +32,15 @@ class FifoSettings:
 
     @classmethod
     def parse(cls, text: str) -> "FifoSettings":
-        """Read DEPTH or DEPTH:POLICY, for example `2:block`; `oldest` and `newest` stand for the drop policies.
+        """Parse DEPTH or DEPTH:POLICY, for example `2:block`. `oldest` and `newest` are short for the drop policies.
 
         Raises:
-            SettingsError: it is neither.
+            SettingsError: the text has neither form.
         """
         depth, colon, policy = text.partition(":")
         short = {"oldest": "drop-oldest", "newest": "drop-newest"}
         full = short.get(policy, policy) if colon else Overflow.DROP_OLDEST.value
-        # Four digits at most: int() itself raises for thousands of them.
+        # Four digits at most: int() itself raises for thousands of digits.
         sound_depth = depth.isascii() and depth.isdigit() and len(depth) <= 4 and 1 <= int(depth) <= 1000
         if not sound_depth or full not in {item.value for item in Overflow}:
             raise SettingsError(
@@ -51,7 +51,7 @@ class FifoSettings:
 
 
 class Fifo(Generic[T]):
-    """Keeps the order; never holds more than its depth.
+    """Keeps the order and never holds more than its depth.
 
     Args:
         settings: depth and overflow policy.
@@ -75,9 +75,8 @@ class Fifo(Generic[T]):
         Args:
             item: the newest one.
 
-        Returns:
-            The items that gave way, perhaps this one; with `block` the source is held back by credit, so that a full queue means a source
-            that sends without being asked: then the newest gives way, too.
+        Returns: The dropped items, perhaps including this one. With `block`, credit holds the source back, so a full
+            queue means that the source sends without credit. Then the newest item is dropped, too.
         """
         dropped: list[T] = []
         if not self.free and self._settings.overflow is not Overflow.DROP_OLDEST:
@@ -88,7 +87,7 @@ class Fifo(Generic[T]):
         return dropped
 
     def take(self) -> T:
-        """Give the oldest item.
+        """Remove and return the oldest item.
 
         Raises:
             IndexError: the queue is empty.

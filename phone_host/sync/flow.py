@@ -1,29 +1,33 @@
-"""How many frames may be under way on a link at once, so that it is busy and none waits in it behind another. Sans-I/O, `now_ns` passed in.
+"""How many frames may be in flight on a link at once. Sans-I/O, `now_ns` passed in.
 
-A second frame under way is of use only where the link's delay, not its rate, keeps the board waiting; where the rate does, it queues behind the first one
-in socket buffers and is a frame time older when it comes. The two cannot be told apart from one frame, but by trying: if a frame more under way makes
-frames slower, they queue. With W under way, of which the swiftest of late took `base` and these take `transit`, W (1 - base / transit) frames
-stand in a queue (Brakmo, Peterson, "TCP Vegas", IEEE JSAC 13(8), 1995, 3.2).
+The link should be busy, but no frame should wait in it behind another. A second frame in flight helps only if the board
+waits because of the link's delay. If the link's rate is the limit, the second frame queues behind the first in socket
+buffers and is one frame time older on arrival. One frame alone cannot tell the two cases apart, so the host tries: if
+one more frame in flight makes frames slower, they queue. With W frames in flight, a fastest recent transit time of
+`base` and a present one of `transit`, W (1 - base / transit) frames are queued (Brakmo, Peterson, "TCP Vegas", IEEE
+JSAC 13(8), 1995, 3.2).
 
-More is tried only while frames had to wait on the board for leave to go. A trial that fails is repeated after 10, 20, 40 … s.
+More frames are tried only while frames had to wait on the board for credit. A failed trial is repeated after 10, 20,
+40 … s.
 """
 
 from typing import Final
 
 MOST: Final = 4
-"""Frames under way at most, however long the link: more would only be older."""
+"""Most frames in flight, however long the link's delay: more would only be older."""
 
 _QUEUED: Final = 0.6
-"""So much of a frame in the queue is too much: 1 where the rate is the limit and a second frame was tried, 0 where it is not; sizes differ by a fifth."""
+"""More queued frames than this are too many. With a second frame in flight, 1 frame is queued if the rate is the limit,
+otherwise 0; frame sizes differ by a fifth."""
 
 _SWIFT: Final = 4
-"""A link is swift while a frame takes less than this part of a period: then it has come before the next one is grabbed."""
+"""A link is fast while a frame takes less than a period divided by this: it arrives before the next one is grabbed."""
 
 _WAITED: Final = 8
-"""A frame waited for leave if it stood in the outbox for more than this part of a period."""
+"""A frame waited for credit if it was in the outbox for longer than a period divided by this."""
 
 _LONGEST_NS: Final = 250_000_000
-"""A frame that takes longer than this alone is held up by its bytes: radio links of all kinds and continents have less delay."""
+"""If a lone frame takes longer than this, the rate is the limit: all radio links and continents have less delay."""
 
 _SMOOTH: Final = 4
 _BASE_SPAN_NS: Final = 10_000_000_000
@@ -32,7 +36,7 @@ _MOST_TRIAL_NS: Final = 300_000_000_000
 
 
 class Flow:
-    """The frames under way on one link while it carries."""
+    """The frames in flight on one link while it is the carrier."""
 
     def __init__(self) -> None:
         self._window = 1
@@ -46,29 +50,29 @@ class Flow:
 
     @property
     def window(self) -> int:
-        """How many frames may be under way."""
+        """How many frames may be in flight."""
         return self._window
 
     def credit(self, outstanding: int, period_ns: int, paced_round_trip_ns: int | None = None) -> int:
-        """How many frames beyond the last one that came the board may send now.
+        """Return how many frames the board may now send beyond the last one that arrived.
 
         Args:
-            outstanding: frames that it may still send.
-            period_ns: between two frames of the camera.
-            paced_round_trip_ns: of a link that holds the next frame back itself, so that a newer one may take its place: it always has credit for
-                that one too, and for as many more as its round trip is periods long, which echoes tell truly there, for they pass by the
-                frames. None for other links.
+            outstanding: frames that the board may still send.
+            period_ns: the camera's period.
+            paced_round_trip_ns: the round trip of a self-paced link; None for other links. Such a link holds the next
+                frame back so that a newer one may replace it. It always has credit for that frame, too, and for as many
+                more as its round trip has periods. Echoes measure this round trip correctly because they bypass frames.
 
         Returns:
-            The number; 0: what was granted before is enough.
+            The number of frames; 0 if the credit granted before is enough.
         """
         needed = self._window
         if paced_round_trip_ns is not None:
             needed = min(MOST, 1 + max(1, paced_round_trip_ns // period_ns))
         if outstanding >= needed:
             return 0
-        # A swift link never has two frames under way, whatever the credit: then several are granted at once, which spares the
-        # board most wake-ups (a fifth of its CPU time a frame, bench_link).
+        # A fast link never has two frames in flight, whatever the credit. So grant several at once, which saves the
+        # board most wake-ups (a fifth of its CPU time per frame, bench_link).
         is_swift = self._newest_ns is not None and self._newest_ns * _SWIFT < period_ns
         return MOST if is_swift else needed
 
@@ -76,9 +80,9 @@ class Flow:
         """Take note of a frame.
 
         Args:
-            transit_ns: how long it was under way; may be wrong by the clocks' uncertainty.
-            waited_ns: how long it stood in the board's outbox.
-            period_ns: between two frames of the camera.
+            transit_ns: its transit time; may be wrong by the clocks' uncertainty.
+            waited_ns: how long it was in the board's outbox.
+            period_ns: the camera's period.
             now_ns: host's clock, ns.
         """
         self._newest_ns = transit_ns
@@ -86,7 +90,7 @@ class Flow:
         self._keep_least(transit_ns, now_ns)
         self._arrivals += 1
         if self._arrivals <= self._window:
-            self._transit_ns = transit_ns  # sent before the window was what it is
+            self._transit_ns = transit_ns  # sent before the window changed
             return
         self._transit_ns += (transit_ns - self._transit_ns) / _SMOOTH
         base_ns = min(self._base_ns, self._base_before_ns or self._base_ns)
@@ -107,7 +111,10 @@ class Flow:
         self._arrivals = 0
 
     def _keep_least(self, transit_ns: int, now_ns: int) -> None:
-        """Keep the least transit of this span and the one before. While frames queue there is nothing to learn of an empty link."""
+        """Keep the least transit time of this span and the previous one.
+
+        A new span begins only with one frame in flight: queued frames tell nothing about an empty link.
+        """
         if self._window == 1 and now_ns - self._base_since_ns >= _BASE_SPAN_NS:
             self._base_before_ns, self._base_ns, self._base_since_ns = self._base_ns, transit_ns, now_ns
         self._base_ns = min(self._base_ns or transit_ns, transit_ns)

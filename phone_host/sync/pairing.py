@@ -1,18 +1,20 @@
-"""Who belongs to whom: frames of two free-running cameras, by their stamps on one clock. Pure, `now_ns` passed in.
+"""Pairs the frames of two free-running cameras by their stamps on one clock. Pure, `now_ns` passed in.
 
-Invariants: both queues are sorted by stamp; after every call no two heads could still be paired or given up; each frame leaves exactly once,
-as half of a pair or as an orphan with its reason; pairs leave in the order of their stamps.
+Invariants: both queues are sorted by stamp. After every call, no two heads could still be paired or given up. Each
+frame leaves exactly once, as half of a pair or as an orphan with its reason. Pairs leave in the order of their stamps.
 
-Wanted are most pairs, and among those the least sum of time skews. Two facts make that possible without seeing the end. Pairing the two oldest
-frames whenever they are within tolerance, and else giving up the older one, never loses a pair (an exchange of partners in any other pairing gives
-this one). And where each camera's frames are further apart than twice the tolerance, no frame has a choice of partners, so this is the optimum, at
-once. Elsewhere the older head may be given up for its successor, if that is nearer to the other head and costs no pair: the other head's
-own successor would be no partner of it. Successors that have not come are taken to come after one period, and waited for only where that
-may gain something: one period of the slower camera at most.
+The aim is the greatest number of pairs and, among those solutions, the least sum of time skews. Two facts allow this
+without knowing later frames. First, pairing the two oldest frames whenever they are within tolerance, and otherwise
+giving up the older one, never loses a pair (exchanging partners turns any other pairing into this one). Second, if each
+camera's frames are more than twice the tolerance apart, no frame has a choice of partners, so this is optimal at once.
+Otherwise the older head may be given up for its successor if the successor is nearer to the other head and this costs
+no pair, i.e. the other head's own successor could not be the successor's partner. A successor that has not arrived is
+expected one period after its predecessor. Pairing waits for it only if it may help, for one period of the slower camera
+at most.
 
-Two cameras half a period apart could pair either way all the time; as giving up a frame for a nearer successor would cost a pair then, whatever
-partner the stream began with (previous or next) stays. Only at a beginning (first frames, or after an outage), where the choice is free, the
-nearer alignment is taken.
+Two cameras half a period apart could always pair either way. Giving up a frame for a nearer successor would then cost a
+pair, so the stream keeps the alignment that it began with (previous or next). Only at a beginning (first frames, or
+after an outage) is the choice free; then the nearer alignment is taken.
 """
 
 from collections import deque
@@ -25,7 +27,7 @@ H = TypeVar("H")
 
 
 _OUTAGE_FRAMES: Final = 3
-"""So many frames in succession without partner are an outage, no single losses: a new beginning."""
+"""This many successive frames without a partner are an outage, not single losses: the alignment is chosen anew."""
 
 
 class OrphanReason(Enum):
@@ -40,12 +42,12 @@ class OrphanReason(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PairingSettings:
-    """What makes a pair.
+    """The tolerance and the cameras' periods.
 
     Attributes:
         tolerance_ns: greatest time skew of a pair, ns.
         board_period_ns: time between two frames of the board's camera, ns.
-        host_period_ns: the same of the host's.
+        host_period_ns: the same for the host's camera.
     """
 
     tolerance_ns: int
@@ -55,7 +57,7 @@ class PairingSettings:
 
 @dataclass(frozen=True, slots=True)
 class Paired(Generic[B, H]):
-    """Two frames that belong together; `time_skew_ns` = board's stamp - host's stamp."""
+    """Two frames that belong together. `time_skew_ns` = board's stamp - host's stamp."""
 
     board: B
     host: H
@@ -64,7 +66,7 @@ class Paired(Generic[B, H]):
 
 @dataclass(frozen=True, slots=True)
 class BoardOrphan(Generic[B]):
-    """A frame of the board without partner."""
+    """A board frame without a partner."""
 
     frame: B
     reason: OrphanReason
@@ -72,7 +74,7 @@ class BoardOrphan(Generic[B]):
 
 @dataclass(frozen=True, slots=True)
 class HostOrphan(Generic[H]):
-    """A frame of the host without partner."""
+    """A host frame without a partner."""
 
     frame: H
     reason: OrphanReason
@@ -132,17 +134,17 @@ class Pairing(Generic[B, H]):
         return self.decide(now_ns)
 
     def decide(self, now_ns: int) -> list[Outcome[B, H]]:
-        """Settle all that can be settled; also to be called when time has passed without a frame."""
+        """Settle everything that can be settled. Call this also when time has passed without a frame."""
         return self._settle(now_ns)
 
     def change(self, settings: PairingSettings, now_ns: int) -> list[Outcome[B, H]]:
-        """Go by other periods and another tolerance from now on: a camera was set to another rate."""
+        """Use other periods and another tolerance from now on, because a camera's rate was changed."""
         self._settings = settings
         self._undecided_since_ns = None
         return self.decide(now_ns)
 
     def evict_host(self, before_ns: int) -> list[Outcome[B, H]]:
-        """Give up host frames older than this; no board frame that old can still come."""
+        """Give up host frames older than `before_ns`: no board frame that old can still come."""
         outcomes: list[Outcome[B, H]] = []
         while self._host and self._host[0][0] < before_ns:
             outcomes.append(HostOrphan(self._host.popleft()[1], OrphanReason.NO_PARTNER))
@@ -150,7 +152,7 @@ class Pairing(Generic[B, H]):
         return outcomes
 
     def evict_board(self, before_ns: int) -> list[Outcome[B, H]]:
-        """Give up board frames older than this; no host frame that old can still come."""
+        """Give up board frames older than `before_ns`: no host frame that old can still come."""
         outcomes: list[Outcome[B, H]] = []
         while self._board and self._board[0][0] < before_ns:
             outcomes.append(BoardOrphan(self._board.popleft()[1], OrphanReason.NO_PARTNER))
@@ -168,7 +170,7 @@ class Pairing(Generic[B, H]):
         return [BoardOrphan(self._board.popleft()[1], OrphanReason.EVICTED)] if self._board else []
 
     def restart(self, reason: OrphanReason) -> list[Outcome[B, H]]:
-        """Give up all board frames and forget their last stamp: another board clock or session follows."""
+        """Give up all board frames and forget their last stamp, because another board clock or session follows."""
         outcomes: list[Outcome[B, H]] = [BoardOrphan(frame, reason) for _, frame in self._board]
         self._board.clear()
         self._last_board_ns = -(2**63)
@@ -177,14 +179,17 @@ class Pairing(Generic[B, H]):
         return outcomes
 
     def void(self) -> list[Outcome[B, H]]:
-        """Give up all frames of both sides: one of the two clocks may have stood still, so that frames from before mean nothing to those that follow."""
+        """Give up all frames of both sides.
+
+        One of the two clocks may have stood still, so earlier frames cannot be compared with later ones.
+        """
         outcomes = self.restart(OrphanReason.CLOCK)
         outcomes += [HostOrphan(frame, OrphanReason.CLOCK) for _, frame in self._host]
         self._host.clear()
         return outcomes
 
     def finish(self) -> list[Outcome[B, H]]:
-        """Pair what can be paired without waiting for better, then give up the rest: no frame will follow."""
+        """No frame will follow: pair what can be paired without waiting for better partners, then give up the rest."""
         outcomes = self._settle(None)
         outcomes += self.restart(OrphanReason.STREAM_ENDED)
         outcomes += [HostOrphan(frame, OrphanReason.STREAM_ENDED) for _, frame in self._host]
@@ -192,12 +197,12 @@ class Pairing(Generic[B, H]):
         return outcomes
 
     def _settle(self, now_ns: int | None) -> list[Outcome[B, H]]:
-        """Settle the heads as long as that is possible; without a time nothing better is waited for."""
+        """Settle the heads as long as possible. If `now_ns` is None, do not wait for better partners."""
         outcomes: list[Outcome[B, H]] = []
         while self._board and self._host:
             skew_ns = self._board[0][0] - self._host[0][0]
             if abs(skew_ns) > self._settings.tolerance_ns:
-                # Both streams only go on in time: the earlier head has been passed by.
+                # Both streams only move forward in time, so the earlier head can find no partner any more.
                 outcomes.append(self._pop_earlier(skew_ns))
                 self._passed += 1
                 self._aligned = self._aligned and self._passed < _OUTAGE_FRAMES
@@ -219,7 +224,7 @@ class Pairing(Generic[B, H]):
         return HostOrphan(self._host.popleft()[1], OrphanReason.NO_PARTNER)
 
     def _choice(self, skew_ns: int) -> "_Choice":
-        """What to do with two heads within tolerance: whether the earlier one's successor would be a better partner of the later one."""
+        """Decide about two heads within tolerance: is the earlier one's successor a better partner of the later one?"""
         board = (self._board, self._settings.board_period_ns)
         host = (self._host, self._settings.host_period_ns)
         (earlier, earlier_period_ns), (later, later_period_ns) = (board, host) if skew_ns < 0 else (host, board)
@@ -234,7 +239,7 @@ class Pairing(Generic[B, H]):
         return _Choice.SKIP if len(earlier) > 1 else _Choice.WAIT
 
     def _waited(self, now_ns: int) -> bool:
-        """Whether the better partner has had its time: one period of the slower camera."""
+        """Return whether the wait for the better partner is over: one period of the slower camera."""
         if self._undecided_since_ns is None:
             self._undecided_since_ns = now_ns
         return now_ns - self._undecided_since_ns >= max(self._settings.board_period_ns, self._settings.host_period_ns)

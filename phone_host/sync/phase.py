@@ -1,9 +1,12 @@
-"""The phase of two free-running cameras: how far their exposures stand apart, how that drifts, and how to steer it to 0. Pure, `now_ns` passed in.
+"""The phase of two free-running cameras: how to measure it and its drift, and how to steer it to 0.
 
-Two cameras of equal rate keep the time skew that chance gave them, up to half a period, and no clock estimate helps. The phase is measured from the
-stamps of all frames, paired or not, modulo the shorter period. Where one camera can be steered the controller lets it expose later by
-what is missing, waits until frames exposed after that tell the outcome, and corrects again when crystals have drifted apart. It never
-steers on the word of frames that were exposed before its last correction took hold.
+Pure, `now_ns` passed in.
+
+Two cameras of equal rate keep whatever time skew they started with, up to half a period, and no clock estimate changes
+that. The phase is measured from the stamps of all frames, paired or not, modulo the shorter period. If a camera can be
+steered, the controller lets it expose later by the missing time and waits until newly exposed frames show the outcome.
+It corrects again when the crystals have drifted apart. It never steers by frames that were exposed before its last
+correction took effect.
 """
 
 import math
@@ -21,43 +24,50 @@ from common.protocol.message import Steering
 _MS: Final = 1_000_000
 
 _RECENT: Final = 15
-"""Frames whose median is the phase now: half a second at 30 fps, deaf to single late stamps."""
+"""The present phase is the median of this many frames: half a second at 30 fps. Single late stamps do not affect it."""
 
 _DRIFT_SAMPLES: Final = 1800
 _DRIFT_SPAN_NS: Final = 5_000 * _MS
-"""Stamps scatter by 1 ms on webcams: over 5 s of 30 fps the drift is known to some 20 ppm, over a minute to 1 ppm."""
+"""Webcam stamps scatter by 1 ms. At 30 fps, 5 s give the drift to about 20 ppm, a minute to 1 ppm."""
 
 _KEPT_HOST: Final = 256
-"""A board frame may come seconds after the host frame of its moment (Bluetooth)."""
+"""A board frame may arrive seconds after the host frame of the same moment (Bluetooth)."""
 
 _RATIO_OFF: Final = 0.01
-"""Rates whose ratio is farther than this from a whole number have no phase: 24 and 30 fps run through all of them six times a second."""
+"""Rates have no phase if their ratio differs from a whole number by more than this share of it.
+
+24 and 30 fps run through all phases six times a second."""
 
 _NEAR_NS: Final = 4 * _MS
 _NEAR_PART: Final = 8
-"""Good enough, and the point of correcting again: 4 ms, or an eighth of the period, and the scatter of the stamps beyond it. Restarts of
-webcams scatter by 1 to 3 ms."""
+"""The phase is good enough up to 4 ms or an eighth of the period, whichever is less, plus the scatter of the stamps.
+
+Beyond that, the controller corrects again. Restarts of webcams scatter by 1 to 3 ms."""
 
 _SETTLE_NS: Final = {Steering.GRID: 200 * _MS, Steering.RESTART: 1_000 * _MS}
-"""After this, frames are of the steered stream; a webcam's first frames after a start may have odd stamps."""
+"""Frames exposed after this time belong to the steered stream. A webcam's first frames may have odd stamps."""
 
 _PATIENCE_NS: Final = 10_000 * _MS
-"""A correction without new frames for so long has failed; and one that did not hold for so long counts against the camera."""
+"""A correction has failed if no new frames come for this long. One that does not hold for this long counts as a try."""
 
 _TRIES: Final = 6
-"""A restart of a board under full load may miss by more than the goal several times in a row (an emulated one did three times)."""
+"""Most tries.
+
+On a board under full load, several restarts in a row may miss the goal (three did on an emulated one).
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Phase:
-    """Where the two cameras stand to each other now.
+    """The two cameras' phase now.
 
     Attributes:
-        time_skew_ns: board's exposures minus the host's, modulo the period, in [-period/2, period/2); median of the newest frames.
+        time_skew_ns: board's exposures minus the host's, modulo the period, in [-period/2, period/2); median of the
+            newest frames.
         period_ns: the shorter of the two periods.
-        drift: its change per ns; NaN until it is known.
-        first_ns: exposure of the oldest frame that it rests on, host's clock.
-        scatter_ns: median distance of those frames' skews from theirs: how far stamps are to be trusted.
+        drift: change of the time skew per ns; NaN until it is known.
+        first_ns: exposure of the oldest frame used for the median, host's clock.
+        scatter_ns: median absolute deviation of those frames' skews; shows how accurate the stamps are.
     """
 
     time_skew_ns: float
@@ -68,7 +78,7 @@ class Phase:
 
     @property
     def beat_s(self) -> float:
-        """How long it takes until the cameras stand to each other as now; NaN until the drift is known, infinite without any."""
+        """Time until the phase is the same again, s; NaN until the drift is known, infinite without drift."""
         return self.period_ns / abs(self.drift) / 1e9 if self.drift else math.inf
 
 
@@ -77,7 +87,7 @@ class PhaseMeter:
 
     Args:
         board_period_ns: time between two frames of the board's camera.
-        host_period_ns: the same of the host's.
+        host_period_ns: the same for the host's camera.
     """
 
     def __init__(self, board_period_ns: int, host_period_ns: int) -> None:
@@ -86,14 +96,15 @@ class PhaseMeter:
         self.has_phase = abs(ratio - round(ratio)) <= _RATIO_OFF * ratio
         self._host: deque[int] = deque(maxlen=_KEPT_HOST)
         self._samples: deque[tuple[int, float]] = deque(maxlen=_DRIFT_SAMPLES)
-        # The same in rings, whose order a straight line does not care for: the drift is asked for with each frame.
+        # The same samples in rings. Their order does not matter for a line fit. Arrays, because each frame asks for the
+        # drift.
         self._moments_ns = np.zeros(_DRIFT_SAMPLES, dtype=np.int64)
         self._skews_ns = np.zeros(_DRIFT_SAMPLES)
         self._taken = 0
 
     @property
     def phase(self) -> Phase | None:
-        """The phase now; None before there are enough frames, and where rates differ so that there is none."""
+        """The phase now; None before there are enough frames, or if the rates have no phase."""
         if not self.has_phase or len(self._samples) < _RECENT:
             return None
         recent = [self._samples[index] for index in range(len(self._samples) - _RECENT, len(self._samples))]
@@ -108,18 +119,18 @@ class PhaseMeter:
         )
 
     def add_host(self, stamp_ns: int) -> None:
-        """Take note of a frame of the host's camera; stamps that go back are left out."""
+        """Take note of a host frame. Stamps that go backwards are ignored."""
         if not self._host or stamp_ns > self._host[-1]:
             self._host.append(stamp_ns)
 
     def add_board(self, stamp_ns: int) -> None:
-        """Take note of a frame of the board's camera, its stamp on the host's clock."""
+        """Take note of a board frame with its stamp on the host's clock, ns."""
         if not self._host or (self._samples and stamp_ns <= self._samples[-1][0]):
             return
         after = bisect_left(self._host, stamp_ns)
         nearest = min(self._near(after), key=lambda t: abs(t - stamp_ns))
         skew = self._wrapped(stamp_ns - nearest)
-        if self._samples:  # without jumps where it passes half a period
+        if self._samples:  # unwrap: no jump where it passes half a period
             skew = self._samples[-1][1] + self._wrapped(skew - self._samples[-1][1])
         self._samples.append((stamp_ns, skew))
         place = self._taken % _DRIFT_SAMPLES
@@ -127,12 +138,12 @@ class PhaseMeter:
         self._taken += 1
 
     def restart(self) -> None:
-        """Forget what was measured: one of the cameras has been steered."""
+        """Forget the measurements, because a camera has been steered."""
         self._samples.clear()
         self._taken = 0
 
     def _near(self, after: int) -> list[int]:
-        """The host stamps before and after a place among them."""
+        """Return the host stamps just before and at index `after`."""
         return [self._host[index] for index in (after - 1, after) if 0 <= index < len(self._host)]
 
     def _wrapped(self, skew_ns: float) -> float:
@@ -146,11 +157,11 @@ class PhaseMeter:
         count = len(self._samples)
         times = (self._moments_ns[:count] - first_ns).astype(np.float64)
         times -= times.mean()
-        return float(times @ self._skews_ns[:count] / (times @ times))  # the slope of least squares
+        return float(times @ self._skews_ns[:count] / (times @ times))  # least-squares slope
 
 
 class Aligning(Enum):
-    """How the steering stands."""
+    """The state of the steering."""
 
     MEASURING = "measuring"
     STEERING = "steering"
@@ -160,7 +171,7 @@ class Aligning(Enum):
 
 
 class Whose(Enum):
-    """Which camera is steered."""
+    """The camera to steer."""
 
     BOARD = "board"
     HOST = "host"
@@ -168,7 +179,7 @@ class Whose(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """Let this camera expose later by so much."""
+    """Let this camera expose later by `later_ns`."""
 
     whose: Whose
     later_ns: int
@@ -176,14 +187,14 @@ class Correction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alignment:
-    """What the steering has come to, for reports.
+    """The outcome of the steering, for reports.
 
     Attributes:
-        state: how it stands.
-        words: the same in words, with a remedy where it failed.
+        state: the state.
+        words: the state in words, with a remedy if it failed.
         corrections: how often a camera was steered.
-        before_ns: time skew before the first correction; NaN: none was needed.
-        after_ns: time skew when it was measured last; NaN: not yet.
+        before_ns: time skew before the first correction; NaN: no correction yet.
+        after_ns: time skew when last measured; NaN: not measured yet.
     """
 
     state: Aligning
@@ -198,13 +209,13 @@ class PhaseController:
 
     Args:
         board: how the board's camera can be steered.
-        host: how the host's can.
+        host: how the host's camera can be steered.
         has_phase: whether the two rates have a phase at all.
     """
 
     def __init__(self, board: Steering, host: Steering, *, has_phase: bool) -> None:
         ways = [(board, Whose.BOARD), (host, Whose.HOST)]
-        # A grid moves exactly and without a gap; of two restarts the own camera's needs no link.
+        # Prefer a grid: it moves exactly and without a gap. Then prefer the host camera, which needs no link.
         self._steering, self._whose = next(
             (way for kind in (Steering.GRID, Steering.RESTART) for way in reversed(ways) if way[0] is kind),
             (Steering.NONE, Whose.HOST),
@@ -229,7 +240,7 @@ class PhaseController:
 
     @property
     def alignment(self) -> Alignment:
-        """How it stands."""
+        """The outcome so far."""
         return Alignment(
             state=self._state,
             words=self._words,
@@ -239,14 +250,14 @@ class PhaseController:
         )
 
     def update(self, now_ns: int, phase: Phase | None) -> Correction | None:
-        """Look at the phase; to be called a few times a second.
+        """Evaluate the phase. Call this a few times a second.
 
         Args:
             now_ns: host's clock, ns.
-            phase: as measured now; None: not known.
+            phase: the phase measured now; None: unknown.
 
         Returns:
-            What to do now, if anything. The meter is to be restarted then.
+            The correction to apply now, or None. After a correction, restart the meter.
         """
         if self._state in {Aligning.GIVEN_UP, Aligning.IMPOSSIBLE}:
             return None

@@ -1,15 +1,17 @@
-"""Which frames of the board are believed: at once, when an echo has confirmed the clock, or never. Pure.
+"""Decides when a board frame is believed: at once, after an echo has confirmed the clock, or never. Pure.
 
-A frame's stamps are mapped by an estimate that rests on echoes before it. A clock may have stepped since: the board's or the host's stood still in
-a suspend of its machine, or was stopped with it. Then the frame would be paired with an image of another moment. Two things tell:
+A frame's stamps are mapped by an estimate that rests on earlier echoes. A clock may have stepped since: the board's or
+the host's clock stood still while its machine was suspended, or was stopped with it. The frame would then be paired
+with an image of another moment. Two signs reveal this:
 
-- What cannot be: a frame is not sent after it came (beyond the hard bound of the estimate), nor exposed after it was grabbed, nor
-  older than anything that the host keeps. Such a frame is dropped by name.
-- What is unusual: after a step by S the frames' times under way change by S. As long as they stay within STEP_PERIODS of what they were, no step of
-  two frame periods can hide in them, and frames pass at once. Any other frame waits for an echo that the board answered after sending it: one that
-  agrees proves the clock, one that does not voids the frame. On a link whose frames take very unequal times every frame waits, for one round trip.
+- The impossible: a frame cannot be sent after it arrived (beyond the estimate's hard bound), exposed after it was
+  grabbed, or older than anything that the host keeps. Such a frame is dropped and counted by reason.
+- The unusual: after a step by S, the frames' transit times change by S. While they stay within STEP_PERIODS of earlier
+  ones, no step of two frame periods can hide in them, and frames pass at once. Any other frame waits for an echo that
+  the board answered after sending the frame. If the echo agrees, it proves the clock; if not, the frame is dropped. On
+  a link with very uneven transit times, every frame waits for one round trip.
 
-A step of less than two periods may pass until the next echo; which frames those are is told (`Suspects`).
+A step of less than two periods may go unnoticed until the next echo. The frames affected are reported (`Suspects`).
 """
 
 from collections import deque
@@ -22,23 +24,23 @@ from common.ledger import BoardMarks
 F = TypeVar("F")
 
 STEP_PERIODS: Final = 1.5
-"""A step of two periods stays visible though a frame is half a period swifter or slower than any of late."""
+"""A step of two periods stays visible even if a frame is half a period faster or slower than all recent ones."""
 
 _RECENT: Final = 32
-"""A second of frames: a hitch makes the frames of so long wait for an echo, which takes a round trip of the link."""
+"""A second of frames. After a hitch, the frames of this long wait for an echo, which takes one round trip."""
 
 _HISTORY_NS: Final = 60_000_000_000
-"""No frame of the host's own camera is kept for longer (`stream/pair_queue.py`)."""
+"""No host frame is kept for longer (`stream/pair_queue.py`)."""
 
 PATIENCE_NS: Final = 10_000_000_000
-"""So long a frame waits for an echo: three times the round trip of the slowest link on which anything can be done."""
+"""A frame waits this long for an echo: three times the round trip of the slowest usable link."""
 
 LABELS_NS: Final = 2**60
-"""Stamps of images shown on demand are labels and may lie anywhere, but for differences that do not fit into 64 bits."""
+"""Stamps of images shown on demand are labels and may have any value, as long as differences fit into 64 bits."""
 
 
 class Disbelief(Enum):
-    """Why a frame of the board was not believed."""
+    """Why a board frame was disbelieved."""
 
     FUTURE = "from_the_future"
     PAST = "older_than_any_partner"
@@ -51,16 +53,18 @@ class Disbelief(Enum):
 
 
 def disbelief(marks: BoardMarks, received_ns: int, bound_ns: int, *, labelled: bool) -> Disbelief | None:
-    """Say what about a frame's marks cannot be. All times on the board's clock, so that no claim of the frame is used to judge it.
+    """Return what is impossible about a frame's marks.
+
+    All times are on the board's clock, so that no claim of the frame is used to judge it.
 
     Args:
-        marks: as they came.
+        marks: the marks as received.
         received_ns: arrival of the last byte, ns.
-        bound_ns: hard half-width of what is known of that moment.
-        labelled: the exposure is a label, as of images shown on demand.
+        bound_ns: hard half-width of the uncertainty of that moment.
+        labelled: whether the exposure is a label, as for images shown on demand.
 
     Returns:
-        The reason; None for a frame that can be.
+        The reason to disbelieve the frame; None if nothing is impossible.
     """
     exposed_ns = marks.grabbed_ns if labelled else marks.exposed_ns
     if max(exposed_ns, marks.sent_ns) > received_ns + bound_ns:
@@ -74,7 +78,7 @@ def disbelief(marks: BoardMarks, received_ns: int, bound_ns: int, *, labelled: b
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Held(Generic[F]):
-    """A frame that waits: when it was sent (board's clock), how long it took, and since when it waits (host's clock), ns."""
+    """A waiting frame: when it was sent (board's clock), its transit time, and its wait's begin (host's clock), ns."""
 
     frame: F
     sent_ns: int
@@ -83,7 +87,7 @@ class _Held(Generic[F]):
 
 
 class Quarantine(Generic[F]):
-    """Lets frames pass in the order in which they came, those that an echo has to confirm when it has."""
+    """Lets frames pass in order of arrival. Frames that need an echo's confirmation wait for it."""
 
     def __init__(self) -> None:
         self._recent: deque[int] = deque(maxlen=_RECENT)
@@ -98,14 +102,14 @@ class Quarantine(Generic[F]):
         """Take a frame.
 
         Args:
-            frame: a frame that can be.
-            sent_ns: its sending, board's clock, ns.
-            transit_ns: how long it was under way by the present estimate.
-            period_ns: between two frames of its camera.
+            frame: a frame that is not impossible.
+            sent_ns: when it was sent, board's clock, ns.
+            transit_ns: its transit time by the present estimate.
+            period_ns: its camera's period.
             now_ns: host's clock, ns.
 
         Returns:
-            Whether it may pass now; else it is kept until `confirmed`, `expired` or `void`.
+            Whether it may pass now. If not, it is kept until `confirmed`, `expired` or `void` returns it.
         """
         if not self._held and self._is_usual(transit_ns, period_ns):
             self._recent.append(transit_ns)
@@ -114,11 +118,11 @@ class Quarantine(Generic[F]):
         return False
 
     def confirmed(self, board_ns: int, before_ns: int) -> list[F]:
-        """Take note of an echo that agreed; gives the frames that may pass now.
+        """Take note of an echo that agreed. Return the frames that may pass now.
 
         Args:
-            board_ns: when the board heard it, board's clock, ns: what it sent before is proven.
-            before_ns: only frames that have waited since before this moment, host's clock, ns.
+            board_ns: when the board heard the echo, board's clock, ns. Frames sent before are proven.
+            before_ns: only frames whose wait began by this moment may pass, host's clock, ns.
         """
         passed = []
         while self._held and self._held[0].sent_ns <= board_ns and self._held[0].since_ns <= before_ns:
@@ -128,14 +132,14 @@ class Quarantine(Generic[F]):
         return passed
 
     def expired(self, now_ns: int) -> list[F]:
-        """Give up the frames that have waited for too long: a board that does not answer cannot be believed."""
+        """Give up and return frames that waited too long: a board that does not answer cannot be believed."""
         dropped = []
         while self._held and now_ns - self._held[0].since_ns > PATIENCE_NS:
             dropped.append(self._held.popleft().frame)
         return dropped
 
     def void(self) -> list[F]:
-        """Take note that the clock is in doubt, or begins anew; gives the frames that will not pass."""
+        """Take note that the clock is in doubt or begins anew. Return the frames that will not pass."""
         dropped = [held.frame for held in self._held]
         self._held.clear()
         self._recent.clear()
@@ -150,13 +154,13 @@ class Quarantine(Generic[F]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Suspects:
-    """Frames that were believed although a clock had stepped: the step was too small to be seen before an echo told of it.
+    """Frames that were believed although a clock had stepped, because the step was too small to see before an echo.
 
     Attributes:
         session: the board's session.
         first: sequence number of the first of these frames.
-        last: of the last.
-        frames: how many; those of them that were paired are suspect pairs.
+        last: sequence number of the last one.
+        frames: number of frames. Pairs formed with them are suspect, too.
     """
 
     session: str
@@ -166,26 +170,26 @@ class Suspects:
 
 
 _MOST_UNPROVEN: Final = 4096
-"""More frames than come between two echoes on any link."""
+"""More frames than arrive between two echoes on any link."""
 
 
 class Unproven:
-    """Frames that have passed and that no echo has confirmed yet."""
+    """Frames that have passed but that no echo has confirmed yet."""
 
     def __init__(self) -> None:
         self._frames: deque[tuple[int, str, int]] = deque(maxlen=_MOST_UNPROVEN)
 
     def passed(self, sent_ns: int, session: str, sequence: int) -> None:
-        """Take note of a frame: its sending (board's clock, ns), its session and its number."""
+        """Take note of a frame: when it was sent (board's clock, ns), its session and its sequence number."""
         self._frames.append((sent_ns, session, sequence))
 
     def confirmed(self, board_ns: int) -> None:
-        """Take note of an echo that agreed and that the board heard then."""
+        """Take note of an echo that agreed and that the board heard at `board_ns`."""
         while self._frames and self._frames[0][0] <= board_ns:
             self._frames.popleft()
 
     def stepped(self) -> Suspects | None:
-        """Take note of a step; gives the frames since the last echo before it, None if there were none."""
+        """Take note of a step. Return the frames since the last echo before it; None if there were none."""
         if not self._frames:
             return None
         session = self._frames[-1][1]

@@ -1,1 +1,1 @@
-"""One module for each verb of phone-host: its options, what it prints, its exit code."""
+"""One package for each verb of phone-host: its options, its output and its exit code."""

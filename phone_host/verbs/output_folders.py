@@ -1,4 +1,4 @@
-"""Where a verb's results go: what cannot be is said before the work, what fails while writing with its remedy."""
+"""Checks where a verb's results go. Impossible targets are refused before the work; write errors carry a remedy."""
 
 import re
 from collections.abc import Mapping
@@ -9,21 +9,21 @@ from phone_host.output.listed import claim
 
 
 def require_folder(out: Path) -> None:
-    """Refuse an --out that is there and is no folder.
+    """Refuse an --out that exists and is not a folder.
 
     Raises:
-        UnavailableError: it is something else, or lies in something else.
+        UnavailableError: it, or a parent of it, is not a folder.
     """
     _require_folder(out, out, "--out")
 
 
 def claim_names(folder: Path, out: Path, *names: str) -> None:
-    """Have the names that a verb will write in a folder, or say now that somebody else's files bear them.
+    """Claim the names that a verb will write in a folder, or report that other files have them.
 
     Args:
-        folder: where they will be.
-        out: what the user gave.
-        names: of the files.
+        folder: folder of the files.
+        out: the path that the user gave.
+        names: names of the files.
 
     Raises:
         UnavailableError: such a file is not from an earlier run, or the folder cannot be written to.
@@ -35,15 +35,15 @@ def claim_names(folder: Path, out: Path, *names: str) -> None:
 
 
 def spare_inputs(out: Path, names: str, inputs: Mapping[str, Path]) -> None:
-    """Refuse results that would take the place of what is read.
+    """Refuse results that would replace the inputs.
 
     Args:
         out: folder for the results.
-        names: which names in it are replaced, as a pattern.
-        inputs: what is read, by the words that name it in an error.
+        names: pattern of the names in it that are replaced.
+        inputs: the inputs, by the words that name them in an error.
 
     Raises:
-        SettingsError: one of them lies under such a name.
+        SettingsError: an input lies under such a name.
     """
     folder = out.resolve()
     for what, path in inputs.items():
@@ -55,14 +55,14 @@ def spare_inputs(out: Path, names: str, inputs: Mapping[str, Path]) -> None:
 
 
 def require_file(out: Path, option: str = "--out") -> None:
-    """Refuse an output that is there and is no regular file: replacing it would take a folder, a device or a pipe away.
+    """Refuse an output that exists and is not a regular file: replacing it would remove a folder, a device or a pipe.
 
     Args:
-        out: what the user gave.
-        option: with which it was given.
+        out: the path that the user gave.
+        option: the option with which it was given.
 
     Raises:
-        UnavailableError: it is something else, or lies in something that is no folder.
+        UnavailableError: it is not a regular file, or a parent of it is not a folder.
     """
     _require_folder(out.parent, out, option)
     if out.exists() and not out.is_file():
@@ -70,12 +70,12 @@ def require_file(out: Path, option: str = "--out") -> None:
 
 
 def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableError:
-    """What to say when results cannot be written.
+    """Make the error for results that cannot be written.
 
     Args:
-        out: what the user gave.
-        error: what the operating system said.
-        option: with which it was given.
+        out: the path that the user gave.
+        error: the operating system's error.
+        option: the option with which the path was given.
 
     Returns:
         The error to raise.

@@ -1,4 +1,4 @@
-"""The options that name a stereo core, shared by the verbs that need one. Light: arguments halves import it."""
+"""The options for the stereo core, shared by the verbs that need one. Light: the arguments halves import it."""
 
 import argparse
 from typing import Final
@@ -7,12 +7,13 @@ from phone_host.declared_settings import NEAR_M
 from phone_host.stereo.matcher_names import MatcherName
 
 _DEFAULT_NEAR_MM: Final = NEAR_M * 1000
-"""Nearest depth looked for where nobody says otherwise, mm: the near end of hand-held scanners (Structure Sensor 350 mm,
-RealSense D435 280 mm). Nearer costs time: the number of disparities goes with 1 / z."""
+"""Default nearest depth, mm: the near limit of hand-held scanners (Structure Sensor 350 mm, RealSense D435 280 mm).
+
+A nearer limit costs time: the number of disparities is proportional to 1 / z."""
 
 
 def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare --calibration, --rectified and what goes with them."""
+    """Declare --calibration, --rectified and their related options."""
     parser.add_argument(
         "--calibration", metavar="rig.yaml", help="calibration of the two cameras, made by phone-host calibrate"
     )

@@ -1,4 +1,4 @@
-"""The stereo core that a verb's options name, as `stereo_arguments` declares them."""
+"""Builds the stereo core from a verb's options, which `stereo_arguments` declares."""
 
 import argparse
 import math
@@ -17,20 +17,20 @@ from phone_host.stereo.reproject import disparities_for_near
 def build_core(
     options: argparse.Namespace, calibration: str, matcher: str, size_px: tuple[int, int]
 ) -> tuple[StereoCore | None, Side | None]:
-    """Make the core that the options name.
+    """Build the stereo core from the options.
 
     Args:
-        options: as `add_stereo_arguments` declares them.
+        options: options as `add_stereo_arguments` declares them.
         calibration: path of rig.yaml; empty for none.
-        matcher: the matcher's name.
-        size_px: width and height of images that come rectified.
+        matcher: name of the matcher.
+        size_px: width and height of images that arrive rectified, px.
 
-    Returns:
-        The core (None when neither a rig nor rectified images are named) and the side of the board's camera as the rig has it.
+    Returns: The core (None if neither a rig nor rectified images are given), and the side of the board's camera in the
+        rig (None without a rig).
 
     Raises:
-        SettingsError: options that contradict each other.
-        DataError: a bad rig.yaml.
+        SettingsError: the options contradict each other.
+        DataError: rig.yaml is invalid.
     """
     chosen = matcher_named(matcher)
     if not (math.isfinite(options.near) and options.near > 0):
@@ -60,7 +60,7 @@ def build_core(
 
 
 def _refuse_idle_geometry(options: argparse.Namespace, calibration: str) -> None:
-    """Refuse options of the geometry that would say nothing: the user means something by them."""
+    """Refuse geometry options that would have no effect, because the user expects one."""
     given = [f"--{name}" for name in ("focal", "baseline", "doffs", "center") if getattr(options, name) is not None]
     if given and calibration:
         raise SettingsError(f"{given[0]} contradicts --calibration", "leave it out: the calibration has its own")
@@ -74,7 +74,7 @@ def rectified_geometry(options: argparse.Namespace, size_px: tuple[int, int]) ->
     """Read --focal, --baseline, --doffs and --center; None without focal length and baseline.
 
     Raises:
-        SettingsError: one without the other, or numbers of no use.
+        SettingsError: only one of focal length and baseline is given, or a number is invalid.
     """
     if (options.focal is None) != (options.baseline is None):
         raise SettingsError("only one of --focal and --baseline is given", "give both for a point cloud, or neither")

@@ -1,1 +1,1 @@
-"""phone-host calibrate: its options, light, and what it does with them."""
+"""phone-host calibrate: its options (light), and its command."""

@@ -28,7 +28,7 @@ _CHECK_FAILED = 4
 
 
 def run(options: argparse.Namespace) -> int:
-    """Find the board in all pairs, calibrate, judge, write."""
+    """Find the chessboard in all pairs, calibrate, judge and write."""
     board = parse_board(options.board, options.square)
     require_file(options.out)
     if options.out.exists() and not is_rig(options.out):
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _look(files: ViewFiles, board: Board, limit: int) -> BoardViews:
-    """Search all images, with a progress bar when someone watches."""
+    """Search all images, with a progress bar if stderr is a terminal."""
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("looking for the board", total=len(files.pairs))
@@ -80,7 +80,7 @@ def _pairs(files: ViewFiles, rejected: tuple[Rejected, ...], used: int) -> dict[
 
 
 def _failed(files: ViewFiles, views: BoardViews, error: DataError) -> dict[str, Any]:
-    """The report when there is no rig at all."""
+    """Return the report for a calibration that gave no rig."""
     return {
         "format_version": REPORT_FORMAT,
         "pairs": _pairs(files, views.rejected, 0),

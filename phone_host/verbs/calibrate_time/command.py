@@ -1,4 +1,4 @@
-"""phone-host calibrate-time: measure what lies between the two cameras' stamps, and store it in rig.yaml."""
+"""phone-host calibrate-time: measure the time offset between the two cameras and store it in rig.yaml."""
 
 import argparse
 import math
@@ -44,7 +44,7 @@ _Reading = TypeVar("_Reading")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Film or read, measure, store."""
+    """Film or read frames, measure and store."""
     if options.pattern is not None:
         return _write_pattern(options)
     _check(options)
@@ -93,7 +93,7 @@ def _write_pattern(options: argparse.Namespace) -> int:
 
 
 def _progress(text: str) -> tuple[Any, Callable[[float], None]]:
-    """A progress bar of shares, on stderr when someone watches."""
+    """Return a progress bar on stderr, shown only in a terminal, and the function that sets its share from 0 to 1."""
     console = Console(stderr=True)
     progress = Progress(console=console, transient=True, disable=not console.is_terminal)
     task = progress.add_task(text, total=1.0)
@@ -150,7 +150,7 @@ def _seen(
     read: Callable[[Image], _Reading],
     advance: Callable[[float], None],
 ) -> list[tuple[Times, list[_Reading]]]:
-    """What was read in each camera's images, with their times; a spoiled image is left out as if it had been lost."""
+    """Return the readings of each camera's images with their times. A spoiled image is skipped as if it were lost."""
     done, sides = 0, []
     for shots, seconds in ((footage.board, board_s), (footage.host, host_s)):
         whole: list[int] = []

@@ -1,1 +1,1 @@
-"""phone-host demo: its options, light, and what it does with them."""
+"""phone-host demo: its options (light), and its command."""

@@ -1,4 +1,4 @@
-"""phone-host demo: both programs on this machine, a rendered scene with known truth, a full report."""
+"""phone-host demo: run both programs on this machine with a rendered scene of known depth, and write a full report."""
 
 import argparse
 import json
@@ -33,7 +33,7 @@ _CHECK_FAILED = 4
 
 
 def run(options: argparse.Namespace) -> int:
-    """Render, stream, measure, compare with the truth."""
+    """Render, stream, measure and compare with the true depth."""
     if not 1 <= options.seconds <= 3600:
         raise SettingsError(f"--seconds is {options.seconds:g}", "give 1 to 3600 seconds")
     logs.set_up(30)
@@ -76,10 +76,10 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _clear(out: Path) -> None:
-    """Remove what an earlier demo left in the folder; said before the rendering, what is in the way.
+    """Remove an earlier demo's results from the folder, and report anything in the way before rendering.
 
     Raises:
-        UnavailableError: something that is not ours is.
+        UnavailableError: something that is not ours is in the way.
         OSError: the folder cannot be used.
     """
     names = rf"{NAMES}|rig\.yaml|cloud\.ply|disparity\.png"
@@ -89,14 +89,14 @@ def _clear(out: Path) -> None:
 
 
 class _StoppedError(Exception):
-    """The way out of a rendering that is not wanted any more."""
+    """Ends a rendering that is no longer wanted."""
 
 
 def _render(scene: Scene, rig: Rig, folder: Path, console: Console, signals: StopSignals) -> Film:
     """Render the film with a progress bar.
 
     Raises:
-        _StoppedError: a signal came.
+        _StoppedError: a stop signal came.
         OSError: the folder cannot be written to.
     """
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:

@@ -1,1 +1,1 @@
-"""phone-host doctor: its options, light, and what it does with them."""
+"""phone-host doctor: its options (light), and its command."""

@@ -1,4 +1,4 @@
-"""The options of phone-host doctor: light, for every start of the command imports them."""
+"""The options of phone-host doctor. Light, because every start of the command imports them."""
 
 import argparse
 from pathlib import Path

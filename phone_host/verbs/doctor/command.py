@@ -11,7 +11,7 @@ from phone_host.settings import key_folder, resolve_settings
 
 
 def run(options: argparse.Namespace) -> int:
-    """Check, and print what was found."""
+    """Run the checks and print the findings."""
     if not (math.isfinite(options.wait) and options.wait >= 0):
         raise SettingsError(f"--wait is {options.wait}", "give 0 or more seconds")
     settings = resolve_settings(options).values

@@ -1,1 +1,1 @@
-"""phone-host keys: its options, light, and what it does with them."""
+"""phone-host keys: its options (light), and its command."""

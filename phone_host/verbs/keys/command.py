@@ -9,7 +9,7 @@ from phone_host.settings import chosen_keys
 
 
 def run(options: argparse.Namespace) -> int:
-    """Change what is asked for and print what there is."""
+    """Make the requested change, then print the keys."""
     folder = chosen_keys(options.config, options.keys)
     name, address, key = options.add or ("", "", "")
     if options.add and not address.startswith("tcp://"):

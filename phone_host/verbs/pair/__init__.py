@@ -1,1 +1,1 @@
-"""phone-host pair: its options, light, and what it does with them."""
+"""phone-host pair: its options (light), and its command."""

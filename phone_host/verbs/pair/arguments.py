@@ -1,4 +1,4 @@
-"""The options of phone-host pair: light, for every start of the command imports them."""
+"""The options of phone-host pair. Light, because every start of the command imports them."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""phone-host pair: learn a board's key, and let it learn ours, by a code that the board shows; or give a board on a USB cable its names."""
+"""phone-host pair: exchange keys with a board by a code that the board shows; or name a board on a USB cable."""
 
 import argparse
 import json
@@ -20,11 +20,11 @@ from phone_host.settings import chosen_keys
 
 _TRIES = 3
 _PATIENCE_S = 20.0
-"""A board that is not named is looked for so long: it is there, since its owner stands before it."""
+"""How long to look for a board if none is named. It should be there, because its owner is in front of it."""
 
 
 def run(options: argparse.Namespace) -> int:
-    """Pair; asks for the code on the terminal."""
+    """Enrol with a board; ask for the code on the terminal if needed."""
     if options.udev:
         return _name_device(options)
     keys = chosen_keys(options.config, options.keys)
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _name_device(options: argparse.Namespace) -> int:
-    """Write the rule, and have udev read it."""
+    """Write the udev rule and let udev reload its rules."""
     if options.code is not None or options.pairing_port is not None:
         raise SettingsError("--udev does not pair: it only writes a rule", "leave --code and --pairing-port out")
     link = options.link and parse_link(options.link, listens_by_default=False)
@@ -65,7 +65,7 @@ def _name_device(options: argparse.Namespace) -> int:
 
 
 def _paired(keys: KeyFolder, door: tuple[str, int], link: str, given: str | None) -> Peer:
-    """Pair; who mistypes on a terminal is asked again."""
+    """Enrol with the board. On a terminal, ask again after a wrong code."""
     tries = 1
     while True:
         call = PairingCall(door, keys)
@@ -88,7 +88,7 @@ def _door(address: str, port: int | None) -> tuple[str, int]:
 
 
 def _code(given: str | None, name: str) -> int:
-    """Take the code from the option, or from whoever types it."""
+    """Return the code from the option, or ask for it."""
     if given is None:
         words = f"run `sudo board-agent pair` on {name} and type the {CODE_DIGITS} digits that it shows: "
         print(words, end="", file=sys.stderr, flush=True)

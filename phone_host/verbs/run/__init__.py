@@ -1,1 +1,1 @@
-"""phone-host run: its options, light, and what it does with them."""
+"""phone-host run: its options (light), and its command."""

@@ -1,4 +1,4 @@
-"""phone-host run: pair a board's frames with the own camera's, compute depth, measure every delay."""
+"""phone-host run: pair a board's frames with the host camera's, compute depth and measure every delay."""
 
 import argparse
 import json
@@ -39,12 +39,12 @@ _CHECK_FAILED = 4
 
 
 def replayed(uri: str) -> str:
-    """The path of a camera that replays images; empty for any other."""
+    """Return the path of a camera that replays images; empty for any other camera."""
     return uri.removeprefix("replay:").partition("?")[0] if uri.startswith("replay:") else ""
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run until stopped, the pairs are reached or a stream ends."""
+    """Run until stopped, until the number of pairs is reached, or until a stream ends."""
     resolved = resolve_settings(options)
     settings = resolved.values
     check(settings)
@@ -89,7 +89,7 @@ def run(options: argparse.Namespace) -> int:
 def _core(
     options: argparse.Namespace, settings: PhoneHostSettings, size_px: tuple[int, int]
 ) -> tuple[StereoCore | None, Side]:
-    """The stereo core, if any, and the side of the board's camera: as the option says, else as the rig does, else left."""
+    """Return the stereo core, if any, and the side of the board's camera: from the option, else the rig, else left."""
     core, rig_side = build_core(options, settings.calibration, settings.matcher, size_px)
     board_side = Side(options.board_side) if options.board_side else rig_side or Side.LEFT
     if rig_side not in {None, board_side}:

@@ -1,1 +1,1 @@
-"""phone-host settings: its options, light, and what it does with them."""
+"""phone-host settings: its options (light), and its command."""

@@ -1,4 +1,4 @@
-"""The options of phone-host settings: light, for every start of the command imports them."""
+"""The options of phone-host settings. Light, because every start of the command imports them."""
 
 import argparse
 from dataclasses import fields
@@ -15,7 +15,7 @@ EXAMPLES = """  phone-host settings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's options: an option for each setting."""
+    """Declare the verb's options, one for each setting."""
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
     for item in fields(PhoneHostSettings):
         several, option = isinstance(item.default, tuple), f"--{item.name.replace('_', '-')}"

@@ -7,7 +7,7 @@ from phone_host.settings import check, resolve_settings
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the settings; those that `run` would refuse are refused here too."""
+    """Print the settings. Refuse those that `run` would refuse."""
     resolved = resolve_settings(options)
     check(resolved.values)
     print(listing(resolved, as_json=options.json))

@@ -1,1 +1,1 @@
-"""phone-host stereo: its options, light, and what it does with them."""
+"""phone-host stereo: its options (light), and its command."""

@@ -1,4 +1,4 @@
-"""phone-host stereo: disparity and point cloud of one pair of images."""
+"""phone-host stereo: compute disparity and point cloud of one pair of images."""
 
 import argparse
 from dataclasses import asdict
@@ -26,13 +26,13 @@ from phone_host.verbs.output_folders import require_folder, unwritable
 from phone_host.verbs.stereo_options import build_core
 
 _DEFAULT_MATCHER = "sgbm"
-# Of a textured scene both cameras see more than 90 % is matched; below a third the pair itself is wrong far more often than
-# the scene is bare.
+# In a textured scene that both cameras see, more than 90 % of the pixels are matched. Below a third, a wrong pair is
+# far more likely than a scene without texture.
 _LOW_DENSITY = 0.33
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read, rectify or pass, match, reproject, write."""
+    """Read, rectify if needed, match, reproject and write."""
     if not options.calibration and not options.rectified:
         raise SettingsError(
             "neither --calibration nor --rectified is given",
@@ -46,18 +46,18 @@ def run(options: argparse.Namespace) -> int:
         require_same_size(files[0].size_px, files[1].size_px, files[0].name, files[1].name)
     matcher = options.matcher or _DEFAULT_MATCHER
     core, _ = build_core(options, options.calibration or "", matcher, files[0].size_px)
-    if core is None:  # cannot be: one of the two ways to a core was checked above
+    if core is None:  # cannot happen: one of the two options was checked above
         raise SettingsError("no stereo core", "give --calibration or --rectified")
     core.require_sizes(files[0].size_px, files[1].size_px)
     watch.lap("prepare")
     left, right = decode_files(*files)
     _clear(
         options.out, has_cloud=core.geometry is not None
-    )  # not before the images are known to be sound: else an earlier result is lost for nothing
+    )  # only once the images are known to be sound, or an earlier result would be lost for nothing
     watch.lap("read")
     processed = core.compute(left, right, now.monotonic_ns)
     pair, disparity, cloud = processed.pair, processed.disparity, processed.cloud
-    assert disparity is not None  # `compute` gives one
+    assert disparity is not None  # `compute` always returns one
     watch.take_over(processed.stages)
     points = _write(options.out, pair, disparity, cloud)
     watch.lap("write")
@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 class _StopWatch:
-    """Times of the stages, one after the other."""
+    """Times the stages, one after the other."""
 
     def __init__(self) -> None:
         self._laps_ns: list[tuple[str, int]] = []
@@ -90,7 +90,7 @@ class _StopWatch:
         self._last_ns = at_ns
 
     def take_over(self, stages: StageTimes) -> None:
-        """Take the stages that somebody else has timed meanwhile."""
+        """Add the stages that the core has timed meanwhile."""
         self._laps_ns += [(stage, getattr(stages, stage)) for stage in ("rectify", "match", "reproject")]
         self._last_ns = now.monotonic_ns()
 
@@ -100,7 +100,7 @@ class _StopWatch:
 
 
 def _figures(options: argparse.Namespace, core: StereoCore, disparity: Disparity) -> dict[str, Any]:
-    """Geometry, number of disparities, density and what the user should know about them."""
+    """Return geometry, number of disparities, density and warnings about them."""
     geometry, width_px = core.geometry, disparity.shape[1]
     count = options.disparities
     warnings = []
@@ -129,7 +129,7 @@ def _figures(options: argparse.Namespace, core: StereoCore, disparity: Disparity
 
 
 def _clear(out: Path, *, has_cloud: bool) -> None:
-    """Remove an earlier run's results, or they might be taken for this one's."""
+    """Remove an earlier run's results, which could be mistaken for this run's."""
     try:
         folder = ListedFolder(out, r"disparity\.(pfm|png)|cloud\.ply|report\.json")
         folder.add("disparity.pfm", "disparity.png", *(["cloud.ply"] if has_cloud else []), "report.json")
@@ -139,7 +139,7 @@ def _clear(out: Path, *, has_cloud: bool) -> None:
 
 
 def _write(out: Path, pair: RectifiedPair, disparity: Disparity, cloud: CloudImage | None) -> int | None:
-    """Write all but the report; the number of points, or None without a cloud."""
+    """Write everything but the report. Return the number of points, or None without a cloud."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         write_pfm(out / "disparity.pfm", disparity)
