@@ -46,7 +46,7 @@ def list_cameras() -> list[Listed]:
 def table(cameras: list[Listed]) -> str:
     """The cameras as text."""
     if not cameras:
-        return "no camera was found: plug one in, or check that the user is in the group video"
+        return "no camera was found: plug one in"
     return "\n\n".join("\n".join(_lines(camera)) for camera in cameras)
 
 

@@ -9,7 +9,7 @@ from typing import Final
 from board_agent.rate_control import ways
 from common.camera.factory import parse_camera
 from common.errors import SettingsError
-from common.keys import KeyFolder, default_folder
+from common.keys import SERVICE_FOLDER, KeyFolder, default_folder
 from common.link.factory import parse_link
 from common.program.declaration import setting
 from common.program.settings import Resolved, log_level, resolve
@@ -64,6 +64,11 @@ def chosen_keys(options: argparse.Namespace) -> KeyFolder:
     if not (options.config or options.keys) and SERVICE_SETTINGS.is_file():
         options.config = SERVICE_SETTINGS
     return key_folder(resolve_settings(options).values.keys)
+
+
+def is_service_hidden(keys: KeyFolder) -> bool:
+    """Return whether the machine has the service, but this user may not use its keys: then they see their own, which the service does not know."""
+    return SERVICE_SETTINGS.is_file() and keys.path != SERVICE_FOLDER and not os.access(SERVICE_FOLDER, os.W_OK)
 
 
 def resolve_settings(options: argparse.Namespace) -> Resolved[BoardSettings]:

@@ -5,21 +5,25 @@ import json
 import sys
 
 from board_agent.enrolment import NOBODY, absence, follow
-from board_agent.settings import LONGEST_S, chosen_keys
-from common.errors import SettingsError
+from board_agent.settings import LONGEST_S, chosen_keys, is_service_hidden
+from common.errors import SettingsError, UnavailableError
 
 
 def run(options: argparse.Namespace) -> int:
     """Show the code until a host has proved it."""
     if not 0 < options.seconds < LONGEST_S:
         raise SettingsError(f"--seconds is {options.seconds:g}", "give a number of seconds above 0")
-    name, keys = "", chosen_keys(options)
+    name, failed, keys = "", None, chosen_keys(options)
     for state in follow(keys, options.seconds):
+        if state == NOBODY and is_service_hidden(keys):
+            raise UnavailableError("the service's keys may not be used by this user", "run sudo board-agent pair")
         if state == NOBODY:
             print(f"board-agent: waiting: {absence(keys)}", file=sys.stderr)
         if state.problem:
             print(f"board-agent: waiting: {state.problem}: stop what uses that port, or move the link", file=sys.stderr)
-        name = state.paired
+        if failed is not None and state.failed > failed:
+            print("board-agent: the code that was typed on the host was wrong; here is a new one", file=sys.stderr)
+        name, failed = state.paired, state.failed
         if state.code and not name:
             asks = f"{state.asking} asks; " if state.asking else ""
             words = f"{state.address}: {asks}type this code on the host: {state.code}"

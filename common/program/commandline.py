@@ -4,8 +4,9 @@ import argparse
 import contextlib
 import errno
 import os
+import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Final, NoReturn
 
 from common.errors import TandemError
@@ -40,10 +41,47 @@ class ExamplesFirstParser(argparse.ArgumentParser):
         """Print the help text. Unlike argparse's own method, this does not hide a failure to write it."""
         print(self.format_help(), end="", file=file)
 
+    def parse_known_args(  # type: ignore[override]  # of one type only
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """Parse, and refuse what is left over: the verb's own parser knows best what its options are called."""
+        options, rest = super().parse_known_args(args, namespace)
+        if rest:
+            self.error(self._unknown(rest))
+        return options, rest
+
+    def _unknown(self, rest: Sequence[str]) -> str:
+        """Say what is wrong with arguments that nothing takes."""
+        options = [word.partition("=")[0] for word in rest if word.startswith("-")]
+        if options:
+            return f"unknown option {options[0]}{_guess(options[0], self._option_string_actions)}"
+        return f"nothing takes {' '.join(rest[:3])}{' ...' if rest[3:] else ''} (put patterns such as 'left*.jpg' in quotes)"
+
     def error(self, message: str) -> NoReturn:
         """Print the problem as one line on stderr, without the usage, and exit with code 2."""
-        one_line = " ".join(message.split())
+        one_line = _plain(" ".join(message.split()))
         self.exit(2, f"{self.prog}: error: {one_line}: see {self.prog} --help\n")
+
+
+def _guess(word: str, known: Iterable[str]) -> str:
+    """What was probably meant, in brackets; empty if nothing is near."""
+    import difflib  # noqa: PLC0415 - only for mistakes; a start does not pay for it
+
+    close = difflib.get_close_matches(word, list(known), 1, cutoff=0.65)
+    return f" (did you mean {close[0]}?)" if close else ""
+
+
+def _plain(message: str) -> str:
+    """Put argparse's own messages into plain words."""
+    if found := re.fullmatch(r"argument VERB: invalid choice: '(.*)' \(choose from (.*)\)", message):
+        verbs = re.findall(r"[\w-]+", found[2])
+        listed = f" (the verbs are {', '.join(verbs)})"
+        return f"unknown verb {found[1]}{_guess(found[1], verbs) or listed}"
+    if found := re.fullmatch(r"argument (\S+): invalid (?:float|int) value: (.*)", message):
+        return f"{found[1]} is {found[2]}, which is not a number (leave units out)"
+    if found := re.fullmatch(r"the following arguments are required: (.*)", message):
+        return f"missing: {found[1]}"
+    return message
 
 
 class _VersionAction(argparse.Action):

@@ -166,5 +166,5 @@ def _parsed(text: str, hint: Any, where: str) -> object:  # noqa: ANN401 - a typ
 
 def _name(hint: Any) -> str:  # noqa: ANN401 - a type hint
     if get_origin(hint) is tuple:
-        return "a list of texts"
+        return 'a list of texts, such as ["one", "two"]'
     return {str: "a text", int: "a whole number", float: "a number", bool: "true or false"}[hint]

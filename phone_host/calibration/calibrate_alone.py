@@ -44,7 +44,7 @@ def require_enough(pairs: list[BoardPair], rejected: list[Rejected]) -> None:
     if len(pairs) < LEAST_PAIRS:
         why = f" ({len(rejected)} rejected: {rejected[0].name}: {rejected[0].detail}, ...)" if rejected else ""
         raise DataError(
-            f"only {len(pairs)} pairs are left to calibrate from{why}",
+            f"only {len(pairs)} of at least {LEAST_PAIRS} pairs can be used{why}",
             "take 15 or more pairs with the whole board sharp in both images",
         )
 

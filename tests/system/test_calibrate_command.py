@@ -148,10 +148,10 @@ def test_too_few_pairs_are_exit_4_with_a_report(small: Path, tmp_path: Path) -> 
     )  # fmt: skip
     assert done.returncode == 4
     assert done.stderr.count("\n") == 1
-    assert done.stderr.startswith("phone-host: error: only 0 pairs")
+    assert done.stderr.startswith("phone-host: error: only 0 of at least 3 pairs")
     report = _report(done)
     assert report["verdict"] == "reject"
-    assert report["remedy"]
+    assert "inner corners" in report["remedy"]
     assert len(report["pairs"]["rejected"]) == 6
     assert report == json.loads((tmp_path / "report.json").read_text())
     assert not (tmp_path / "rig.yaml").exists()

@@ -130,7 +130,7 @@ def test_few_pairs_are_never_good() -> None:
 @pytest.mark.parametrize("count", [0, 2])
 def test_fewer_than_three_pairs_are_refused(count: int) -> None:
     """Nothing is made up from two views."""
-    with pytest.raises(DataError, match=f"only {count} pairs"):
+    with pytest.raises(DataError, match=f"only {count} of at least 3 pairs"):
         calibrate(exact_pairs(_rig(), poses(count, seed=1)), BOARD, _SIZES)
 
 

@@ -26,7 +26,7 @@ def sample() -> ExamplesFirstParser:
         (["run"], "sample run: error: ", "--count"),
         (["run", "--count", "many\nlines"], "sample run: error: ", "many"),
         (["run", "--count", "1", "--kind", "c"], "sample run: error: ", "--kind"),
-        (["run", "--count", "1", "--spee\nd", "3"], "sample: error: ", "--spee"),
+        (["run", "--count", "1", "--spee\nd", "3"], "sample run: error: ", "--spee"),
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_2(
@@ -92,3 +92,21 @@ def test_an_error_that_is_not_stdouts_is_not_called_so() -> None:
     """An OSError about a file is a gap in our code and stays one."""
     with pytest.raises(OSError, match="No space"):
         run(failing(OSError(errno.ENOSPC, "No space left on device", "cloud.ply")))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["ron"], "unknown verb ron (did you mean run?)"),
+        (["walk"], "unknown verb walk (the verbs are run)"),
+        (["run", "--cuont", "3"], "missing: --count"),
+        (["run", "--count", "3", "--knid", "a"], "unknown option --knid (did you mean --kind?)"),
+        (["run", "--count", "3", "left2.jpg"], "nothing takes left2.jpg (put patterns such as 'left*.jpg' in quotes)"),
+        (["run", "--count", "3mm"], "--count is '3mm', which is not a number (leave units out)"),
+    ],
+)
+def test_a_mistake_of_typing_is_named(arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The line says which word is wrong and, if one is near, what was probably meant."""
+    with pytest.raises(SystemExit):
+        sample().parse_args(arguments)
+    assert told in capsys.readouterr().err

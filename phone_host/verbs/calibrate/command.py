@@ -11,7 +11,7 @@ from rich.progress import Progress
 
 from common.errors import DataError, UnavailableError
 from common.versions import REPORT_FORMAT
-from phone_host.calibration.board_pairs import Calibration, Rejected
+from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
 from phone_host.calibration.board_views import BoardViews, look_for_boards
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.target import Board, parse_board
@@ -26,6 +26,12 @@ from phone_host.verbs.output_folders import claim_names, require_file, unwritabl
 
 _CHECK_FAILED = 4
 
+_NOT_FOUND = frozenset({Reason.NOT_FOUND_LEFT, Reason.NOT_FOUND_RIGHT, Reason.NOT_FOUND_BOTH})
+_COUNT_CORNERS = (
+    "check --board: it counts inner corners, one less than the squares each way (10x7 squares are --board 9x6); or take 15 or"
+    " more pairs with the whole board sharp in both images"
+)
+
 
 def run(options: argparse.Namespace) -> int:
     """Find the chessboard in all pairs, calibrate, judge and write."""
@@ -38,7 +44,9 @@ def run(options: argparse.Namespace) -> int:
     views = _look(files, board, most_pixels(None, options.max_megapixels))
     try:
         calibration = calibrate(list(views.pairs), board, views.sizes_px, Side(options.board_side))
-    except DataError as error:
+    except DataError as failure:
+        unseen = sum(each.reason in _NOT_FOUND for each in views.rejected)
+        error = DataError(failure.problem, _COUNT_CORNERS) if 2 * unseen > len(files.pairs) else failure
         report = _failed(files, views, error) | _write_rig(options.out, None)
         _write_report(options.out, report)
         print(
@@ -46,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
             if options.json
             else "\n".join([_rejections(views.rejected), *_unwritten(report, options.out)])
         )
-        raise
+        raise error from None
     rejected = (*views.rejected, *calibration.rejected)
     judgement = judge(calibration, rejected)
     report = {
