@@ -42,8 +42,9 @@ from phone_host.report.run_json import build
 from phone_host.run.host import EndReason, Host, HostSettings
 from phone_host.settings import key_folder
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.match import Matcher, MatchSettings, create_matcher
+from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import matcher_named
+from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.sync.fifo import FifoSettings
@@ -80,7 +81,7 @@ def open_scanner(
         rig: a rig, or the path of a rig.yaml. None: if `disparities` is given, the images are taken as rectified;
             otherwise no depth is computed, only pairs and delays.
         geometry: geometry of images that arrive rectified. None: disparities are not converted to metres.
-        matcher: name of a matcher, or any object with `match(pair) -> disparity` (`phone_host.stereo.match.Matcher`).
+        matcher: name of a matcher, or any object with `match(pair) -> disparity` (`phone_host.stereo.matcher_protocol.Matcher`).
         disparities: the matcher searches 0 <= d < disparities, px. None with a rig: computed from `near_m`.
         near_m: nearest depth to search for, m.
         board_side: which view the board's camera is, `left` or `right`. None: as in the rig; without a rig, left.

@@ -21,6 +21,9 @@ Corners = NDArray[np.float64]
 _UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "": 1e-3}
 _LENGTH = re.compile(r"\A\s*(\d+(?:\.\d*)?|\.\d+)\s*(mm|cm|m|)\s*\Z")
 _LEAST_CORNERS, _MOST_CORNERS = 3, 100
+_SMALLEST_SQUARE_M = 0.0005
+"""A smaller one is a length in metres whose unit was forgotten: a bare number is millimetres."""
+
 _LARGEST_SQUARE_M = 2.0
 
 # Sector-based detection (Duda and Frese, BMVC 2018), with and without contrast normalisation: glare on paper defeats
@@ -61,8 +64,11 @@ class Board:
                 f"--board {self.columns}x{self.rows} is not a chessboard",
                 "give its inner corners, such as 9x6 (3 to 100 each)",
             )
-        if not 0 < self.square_m <= _LARGEST_SQUARE_M:
-            raise SettingsError(f"--square {self.square_m:g} m", "give the side of a square, such as 25mm")
+        if not _SMALLEST_SQUARE_M <= self.square_m <= _LARGEST_SQUARE_M:
+            raise SettingsError(
+                f"--square is {self.square_m * 1e3:g} mm, which no chessboard has",
+                "give the side of one square with its unit, such as 25mm, 2.5cm or 0.025m",
+            )
 
     def points_m(self) -> NDArray[np.float64]:
         """Return the inner corners, row by row, in the board's own plane z = 0: (N, 3) float64, m."""

@@ -48,7 +48,7 @@ def pair_files(left: str, right: str) -> ViewFiles:
         folder = left if Path(left).is_dir() else str(Path(left).parent)
         raise SettingsError(
             f"LEFT and RIGHT both name {min(both)}",
-            f"give one quoted glob for each side, such as '{folder}/left*' '{folder}/right*'",
+            f"give two folders, or one quoted glob for each side, such as '{folder}/left*' '{folder}/right*'",
         )
     numbered = _numbered(left_files, right_files)
     if numbered is None:

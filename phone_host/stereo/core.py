@@ -8,7 +8,7 @@ from collections.abc import Callable
 from common.ledger import StageTimes
 from phone_host.model import Image, Processed, RectifiedPair, StereoGeometry
 from phone_host.stereo.images import require_same_size, size_px
-from phone_host.stereo.match import Matcher
+from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import reproject
 

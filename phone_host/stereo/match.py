@@ -15,32 +15,15 @@ user types. The entry point is a callable that takes the number of disparities (
 """
 
 from dataclasses import dataclass
-from typing import Protocol, assert_never
+from typing import assert_never
 
 from common.errors import SettingsError
 from common.program.extensions import make_registered
-from phone_host.model import Disparity, RectifiedPair
 from phone_host.stereo.match_block import BlockMatcher
+from phone_host.stereo.match_checked import CheckedMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
 from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher
-
-
-class Matcher(Protocol):
-    """Finds, for each pixel of the left image, where the same point appears in the right one."""
-
-    def match(self, pair: RectifiedPair) -> Disparity:
-        """Match one pair.
-
-        Args:
-            pair: two uint8 images of one size, grey (H, W) or BGR (H, W, 3), rectified.
-
-        Returns:
-            (H, W) float32, px, left x - right x, in [0, N); NaN = not trusted.
-
-        Raises:
-            DataError: the two images differ in size, or are not uint8 images.
-        """
-        ...
+from phone_host.stereo.matcher_protocol import Matcher
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +68,6 @@ def create_matcher(settings: MatchSettings) -> Matcher:
             return SgbmMatcher(settings.disparities)
         case RegisteredMatcher(name):
             registered: Matcher = make_registered(MATCHERS, name, Matcher, settings.disparities)
-            return registered
+            return CheckedMatcher(registered, name, settings.disparities)
         case _:
             assert_never(settings.matcher)

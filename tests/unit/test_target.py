@@ -21,7 +21,7 @@ def test_lengths_are_read_with_their_unit(square: str) -> None:
 @pytest.mark.parametrize(
     ("corners", "square", "option"),
     [("9", "25mm", "--board"), ("9x", "25mm", "--board"), ("2x6", "25mm", "--board"), ("9x6", "25in", "--square"),
-     ("9x6", "0mm", "--square"), ("9x6", "-25mm", "--square"), ("9x6", "5m", "--square"), ("9x6", "nan", "--square")],
+     ("9x6", "0mm", "--square"), ("9x6", "0.025", "--square"), ("9x6", "-25mm", "--square"), ("9x6", "5m", "--square"), ("9x6", "nan", "--square")],
 )  # fmt: skip
 def test_sizes_that_make_no_sense_name_their_option(corners: str, square: str, option: str) -> None:
     """A wrong size is a usage error that names the option."""

@@ -115,8 +115,8 @@ def _figures(options: argparse.Namespace, core: StereoCore, disparity: Disparity
     density = float(np.isfinite(disparity).mean())
     if density < _LOW_DENSITY:
         warnings.append(
-            f"only {density:.0%} of the pixels found a partner: are LEFT and RIGHT swapped, is the pair not rectified,"
-            " or the scene without texture or nearer than the search reaches?"
+            f"only {density:.0%} of the pixels have depth: check that LEFT and RIGHT are not swapped, that both show the same scene,"
+            " that --calibration or --rectified fits them, and that the scene has texture and is not nearer than --near"
         )
     if geometry is None:
         warnings.append("no cloud.ply: focal length and baseline are unknown; give --focal PX --baseline MM")
