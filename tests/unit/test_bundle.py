@@ -38,7 +38,7 @@ def test_an_answer_that_cannot_be_bettered_is_kept() -> None:
 
 
 def test_the_rig_is_found_from_a_rough_start() -> None:
-    """Starting from a focal length 2 % off, the corners are met to their noise, 0.2 px in each coordinate; started there, it moves by less than a micrometre."""
+    """From a focal length 2 % off, the corners are met to their noise, 0.2 px in each coordinate; a second search from that answer moves by less than a micrometre."""
     rig, boards = unlike_rig(), poses(6, seed=2)
     views = [BundleView(pair.left_px, pair.right_px) for pair in exact_pairs(rig, boards, noise_px=0.2, seed=3)]
     rough = BundleState(

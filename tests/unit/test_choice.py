@@ -61,7 +61,7 @@ def test_the_link_of_the_youngest_frames_carries() -> None:
 
 
 def test_of_links_alike_the_first_carries() -> None:
-    """If ages differ by only a few ms the order decides: the stream returns to the first link after that has been up again for its time of proof, and not before."""
+    """If ages differ by only a few ms the order decides: the stream returns to the first link no sooner than a second after that is up again."""
     links = Links([2 * MS, MS], [6 * MS, MS])
     links.choice.down(0, links.now_ns)
     links.choice.carries(1, links.now_ns)

@@ -137,7 +137,7 @@ def test_a_jump_is_doubted_at_once_and_believed_when_confirmed(jump_ns: int, pau
 @pytest.mark.parametrize("echoes", [1, 5])
 @pytest.mark.parametrize("lie_ns", [-3600 * SECOND_NS, -20 * MS, 20 * MS, 3600 * SECOND_NS])
 def test_a_wave_that_lies_is_never_believed(lie_ns: int, echoes: int) -> None:
-    """One echo, or a whole wave, that is an hour off leaves the clock in doubt until the next wave; then the earlier estimate holds again."""
+    """One echo, or a whole wave, that is 20 ms or an hour off leaves the clock in doubt until the next wave; then the earlier estimate holds again."""
     chance = random.Random(lie_ns)
     clocks = TwoClocks(START_NS + SECOND_NS, Fraction(80, 10**6))
     estimator = ClockEstimator()
@@ -157,7 +157,7 @@ def test_a_wave_that_lies_is_never_believed(lie_ns: int, echoes: int) -> None:
 
 
 def test_a_clock_that_is_steered_interrupts_nothing() -> None:
-    """A clock that slews by a millisecond within a second (NTP at full speed and more) contradicts itself and is believed all the same."""
+    """A clock that slews by a millisecond within a second (NTP at full speed and more) is not quite consistent with itself, and is believed all the same."""
     chance, estimator = random.Random(9), ClockEstimator()
     clocks = TwoClocks(START_NS, Fraction(0))
     run(estimator, clocks, chance, seconds=15)

@@ -38,7 +38,7 @@ def learnt() -> tuple[ClockEstimator, int]:
 
 
 def test_slow_echoes_vote_a_lie_down() -> None:
-    """One echo that is 6 ms off ends the estimate. Slow ones fit it as well as the truth, but their middle is the truth: their second wave restores it."""
+    """One echo that is 6 ms off ends the estimate. Slow echoes fit it as well as they fit the truth, but their middle is the truth, and the second of their waves restores it."""
     estimator, now_ns = learnt()
     lie = echo(100, now_ns, 100_000, 100_000, off_ns=6 * MS)
     slow = [echo(101 + k, now_ns + (k + 1) * 50 * MS, 20 * MS, 20 * MS) for k in range(2)]
@@ -50,7 +50,7 @@ def test_slow_echoes_vote_a_lie_down() -> None:
 
 
 def test_facts_that_fit_one_by_one_and_not_together_begin_anew() -> None:
-    """The board kept an echo for two minutes. It is at one edge of the possible when it came and at the other when it left, so it fits no steady clock: only it is believed."""
+    """An echo that the board kept for two minutes, at one edge of the possible when it came and at the other when it left, fits no steady clock: then only that echo is believed."""
     clocks, estimator, chance = TwoClocks(START_NS, Fraction(-350, 10**6)), ClockEstimator(), random.Random(2)
     for number in range(5):
         for one in clocks.wave(number, START_NS + number * 250 * MS, chance, least_ns=50_000, jitter_ns=0)[0]:

@@ -101,7 +101,7 @@ def test_every_finding_is_one_line_and_the_exit_code_follows_the_worst() -> None
     ],
 )
 def test_access_follows_owner_group_and_mode(node: Node, account: Account, *, may: bool) -> None:
-    """The verdict on who may read and write a node is the kernel's own; for the user who asks, the kernel was asked."""
+    """Who may read and write a node is judged as the kernel would judge it; for the user who asks, the kernel itself was asked."""
     assert may_open(node, account) is may
     assert check_access("permission", node, account).verdict is (OK if may else FAIL)
 

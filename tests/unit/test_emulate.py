@@ -110,7 +110,7 @@ def test_a_full_direction_has_no_room_until_something_arrived() -> None:
 
 
 def test_the_end_of_a_stream_comes_behind_its_last_byte() -> None:
-    """The end of the stream is news too, and overtakes no bytes."""
+    """An empty piece marks the end of the stream and overtakes nothing."""
     for profile in (PLAIN, NOTHING):
         way: Way[str] = Way(profile)
         way.put("a", b"last", 0)
@@ -138,7 +138,7 @@ def test_profiles_are_sound() -> None:
 
 
 def test_a_line_without_a_rate_still_holds_no_more_than_a_pipe() -> None:
-    """A line that adds no time holds 64 KiB, as a Linux pipe does (pipe(7)), and takes no more until they were read."""
+    """A line that adds no time holds 64 KiB, as a Linux pipe does (pipe(7)), and takes no more until these have been read."""
     way: Way[str] = Way(NOTHING)
     assert way.room_bytes == 65_536
     way.put("a", bytes(65_000), 5)

@@ -171,7 +171,7 @@ def test_after_three_wrong_codes_there_is_a_pause_that_grows() -> None:
 
 
 def test_the_owner_ends_a_pause_and_success_forgets_failures() -> None:
-    """`pardon` lets hosts try again at once; a successful pairing does the same for later ones."""
+    """`pardon` lets hosts try again at once; a successful pairing clears the failures for later hosts."""
     desk = Desk(BOARD, chance(4))
     for _ in range(TRIES):
         fail_once(desk, 0)

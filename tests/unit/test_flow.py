@@ -85,7 +85,7 @@ def test_a_swift_link_gets_leave_for_several_frames_at_once() -> None:
 
 @pytest.mark.parametrize(("round_trip_ns", "frames"), [(0, 2), (PERIOD_NS, 2), (2 * PERIOD_NS, 3), (SECOND_NS, MOST)])
 def test_a_link_that_paces_itself_always_has_leave_for_the_next_frame(round_trip_ns: int, frames: int) -> None:
-    """One frame more than is under way, plus one for each period of the round trip, four at most."""
+    """One frame, plus one for each period of the round trip (at least one), four at most."""
     flow = Flow()
     flow.arrived(PERIOD_NS, 0, PERIOD_NS, SECOND_NS)
     assert flow.credit(frames - 1, PERIOD_NS, round_trip_ns) == frames
