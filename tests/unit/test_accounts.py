@@ -1,4 +1,4 @@
-"""What reports say of what the board told."""
+"""What reports say about what the board told."""
 
 from common.protocol.message import BoardCounts, Rung
 from common.protocol.session import StaleReason
@@ -12,7 +12,7 @@ def account(rung: Rung) -> LinkAccount:
 
 
 def test_a_lowered_camera_is_told_of_in_one_line() -> None:
-    """Rung, rate, quality and the number of changes are named; a camera that was never lowered is not spoken of."""
+    """Rung, rate, quality and the number of changes are named; a camera that was never lowered is not mentioned."""
     assert rung_lines(LinkAccount()) == []
     assert rung_lines(account(Rung(index=0, last=3, changes=0, period_ns=50_000_000))) == []
     [line] = rung_lines(account(Rung(index=2, last=3, changes=4, period_ns=133_333_333, quality=45)))
@@ -22,7 +22,7 @@ def test_a_lowered_camera_is_told_of_in_one_line() -> None:
 
 
 def test_what_cannot_be_set_is_null() -> None:
-    """The JSON object has every value, and null for a quality or size that the camera does not let itself be told."""
+    """The JSON object has every value, with null for a quality or size that cannot be set on the camera."""
     assert rung_values(Rung(index=2, last=3, changes=4, period_ns=125_000_000, quality=45, width_px=320, height_px=240)) == {
         "rung": 2, "lowest_rung": 3, "changes": 4, "fps": 8.0, "quality": 45, "size": "320x240",
     }  # fmt: skip
@@ -32,7 +32,7 @@ def test_what_cannot_be_set_is_null() -> None:
 
 
 def test_a_copy_of_an_account_stays_as_it_was() -> None:
-    """Nothing that the receiver counts afterwards reaches a copy: sessions, links, suspects, reasons."""
+    """Nothing that the receiver counts later reaches a copy: sessions, links, suspects, reasons."""
     seen = LinkAccount([SessionAccount("s", BoardCounts(), BoardCounts())], links=(LinkTally("tcp"),))
     seen.sessions[0].disbelieved[Disbelief.FUTURE] = 2
     seen.suspects.append(Suspects(session="s", first=1, last=2, frames=2))

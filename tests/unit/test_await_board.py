@@ -1,4 +1,4 @@
-"""Who waits for a board is told why there is none, each reason by an error of its own, and waits no longer than it helps."""
+"""A program that waits for a board is told why there is none, with an error for each reason, and waits only as long as it helps."""
 
 import sys
 import threading
@@ -22,7 +22,7 @@ LOOKS = 200_000
 
 
 def ends_after(patience_ns: int | None, refused: RefusalReason | None) -> tuple[int, UnavailableError] | None:
-    """The second in which patience with a board that was never there ends, and with what; None: not within a minute."""
+    """The second in which patience with a board that was never there ends, and the error; None: not within a minute."""
     patience = BoardPatience(patience_ns, 0)
     for second in range(61):
         try:
@@ -37,11 +37,11 @@ def ends_after(patience_ns: int | None, refused: RefusalReason | None) -> tuple[
     [
         (3, None, 4, AbsentBoardError),
         (0, None, 1, AbsentBoardError),
-        # A board may take a host that crashed for alive for a moment: busy is not believed for 4 s.
+        # For a moment a board may take a crashed host to be alive: busy is not believed for 4 s.
         (0, RefusalReason.BUSY, 5, BusyBoardError),
         (10, RefusalReason.BUSY, 11, BusyBoardError),
         (None, RefusalReason.BUSY, 5, BusyBoardError),
-        # No waiting mends another version.
+        # Waiting does not cure a different version.
         (10, RefusalReason.VERSION, 1, OtherVersionError),
         (None, RefusalReason.VERSION, 1, OtherVersionError),
     ],
@@ -49,7 +49,7 @@ def ends_after(patience_ns: int | None, refused: RefusalReason | None) -> tuple[
 def test_patience_ends_by_the_reason(
     patience_s: int | None, refused: RefusalReason | None, ends_s: int, kind: type[UnavailableError]
 ) -> None:
-    """An absent board is waited for as long as was asked, a busy one 4 s at least, one of another version not at all."""
+    """The host waits as long as was asked for an absent board, at least 4 s for a busy one, and not at all for one of another version."""
     ended = ends_after(None if patience_s is None else patience_s * S, refused)
     assert ended is not None
     second, error = ended
@@ -59,7 +59,7 @@ def test_patience_ends_by_the_reason(
 
 
 def test_without_a_limit_an_absent_board_is_waited_for() -> None:
-    """No patience given: a silent board is waited for without end."""
+    """Without a limit the host waits for a silent board forever."""
     assert ends_after(None, None) is None
 
 
@@ -75,7 +75,7 @@ def test_patience_begins_anew_when_a_board_goes() -> None:
 
 @contextmanager
 def receiver_at(folder: Path) -> Iterator[Receiver]:
-    """A receiver with a link at whose other end nobody is."""
+    """A receiver with a link that has nobody at its other end."""
     receiver = Receiver([open_link(parse_link(f"ipc://{folder}/board", listens_by_default=False))], "host", NoFrames())
     receiver.start()
     try:
@@ -85,7 +85,7 @@ def receiver_at(folder: Path) -> Iterator[Receiver]:
 
 
 def test_the_wait_ends_in_each_of_its_ways(tmp_path: Path) -> None:
-    """It ends when the board has given what is needed, when it is stopped, when time is up, and by the caller's own error."""
+    """The wait ends when the board has given what is needed, when it is stopped, when time is up, or by the caller's own error."""
     with receiver_at(tmp_path) as receiver:
         answers = iter((False, False, True))
         assert await_board(receiver, BoardPatience(None, 0), lambda: next(answers))
@@ -98,7 +98,7 @@ def test_the_wait_ends_in_each_of_its_ways(tmp_path: Path) -> None:
 
 
 def test_a_receivers_failure_ends_the_wait(tmp_path: Path) -> None:
-    """What went wrong in the receiver's thread is raised where the board is waited for."""
+    """A failure in the receiver's thread is raised where the board is waited for."""
     with receiver_at(tmp_path) as receiver:
         receiver.failure = OSError("gone")
         with pytest.raises(OSError, match="gone"):
@@ -106,7 +106,7 @@ def test_a_receivers_failure_ends_the_wait(tmp_path: Path) -> None:
 
 
 def test_a_refusal_that_ends_while_it_is_told_is_a_refusal(tmp_path: Path) -> None:
-    """The receiver's thread may take a refusal back at any moment: whoever waits sees one or none, and nothing in between."""
+    """The receiver's thread may withdraw a refusal at any moment: the waiting thread sees a whole refusal or none."""
     receiver = Receiver(
         [open_link(parse_link(f"ipc://{tmp_path}/board", listens_by_default=False))], "host", NoFrames()
     )

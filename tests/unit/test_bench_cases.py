@@ -1,4 +1,4 @@
-"""What the delay benchmark is asked for: links, sizes, rates, qualities, profiles, and the cases that they make."""
+"""What the delay benchmark is asked for: links, sizes, rates, qualities and profiles, and the cases they make."""
 
 import pytest
 from hypothesis import given
@@ -23,7 +23,7 @@ from phone_host.bench.runs import rig_of
 
 @given(st.lists(st.sampled_from(LOCAL_LINKS), min_size=1))
 def test_links_are_each_measured_once(names: list[str]) -> None:
-    """Links come out in the order in which they were first named, none twice."""
+    """Links come out in the order in which they were first named, each once."""
     assert parse_links(" , ".join(names)) == tuple(dict.fromkeys(names))
 
 
@@ -37,7 +37,7 @@ def test_a_link_that_is_not_there_is_refused_with_those_that_are(text: str) -> N
 
 @given(st.text())
 def test_any_text_is_read_or_refused(text: str) -> None:
-    """Whatever is typed for sizes, rates or links gives values or one SettingsError, nothing else."""
+    """Any text for sizes, rates or links gives values or one SettingsError, nothing else."""
     for parse in (parse_sizes, parse_rates, parse_qualities, parse_links):
         try:
             assert parse(text)
@@ -49,7 +49,7 @@ def test_any_text_is_read_or_refused(text: str) -> None:
     "text", ["640", "640x", "x480", "0x0", "640x480x3", "-640x480", "63x480", "99999x9", "\u0666\u0664\u0660x480"]
 )
 def test_a_size_of_no_use_is_refused(text: str) -> None:
-    """Sizes are WIDTHxHEIGHT in plain digits within the limits."""
+    """Sizes are WIDTHxHEIGHT in plain digits, within the limits."""
     with pytest.raises(SettingsError):
         parse_sizes(text)
 
@@ -70,13 +70,13 @@ def test_a_quality_of_no_use_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["tcp://", "tcp://192.168.7.2", "pigeon:5555", "serial:"])
 def test_a_uri_of_no_link_is_refused(text: str) -> None:
-    """What has a colon is a board's address and is checked as one."""
+    """A name with a colon is a board's address and is checked as one."""
     with pytest.raises(SettingsError):
         parse_links(text)
 
 
 def test_every_profile_is_carried_by_its_own_link_or_the_named_ones() -> None:
-    """Without names each profile has its own carrier; with names every link stands in for every profile; without profiles links are themselves."""
+    """Without named links each profile uses its own carrier; with them every link stands in for every profile; without profiles links are themselves."""
     assert interfaces((), PROFILES) == tuple(Interface(one.carrier, one) for one in PROFILES)
     assert len(interfaces(SHAPED_LINKS, PROFILES)) == len(SHAPED_LINKS) * len(PROFILES)
     assert interfaces((), ()) == tuple(Interface(link) for link in LOCAL_LINKS)
@@ -85,14 +85,14 @@ def test_every_profile_is_carried_by_its_own_link_or_the_named_ones() -> None:
 
 @pytest.mark.parametrize("link", ["rfcomm", "tcp://192.168.7.2:5555"])
 def test_what_is_not_local_cannot_be_shaped(link: str) -> None:
-    """A real radio or a real board stands for itself only."""
+    """A real radio or a real board stands only for itself."""
     with pytest.raises(SettingsError) as caught:
         interfaces((link,), PROFILES)
     assert link in caught.value.problem
 
 
 def test_cases_are_all_combinations_with_links_next_to_each_other() -> None:
-    """Every link is measured with every size and rate, and the links of one size and rate follow each other."""
+    """Every link is measured with every size and rate, and the links of one size and rate come next to each other."""
     measured = (Interface("tcp"), Interface("ipc"))
     planned = cases(measured, (Size(320, 240), Size(640, 480)), (50, 80), (15, 30))
     assert len(set(planned)) == len(planned) == 16
@@ -102,7 +102,7 @@ def test_cases_are_all_combinations_with_links_next_to_each_other() -> None:
 
 @given(st.integers(64, 4096), st.integers(64, 4096))
 def test_a_rig_of_any_size_has_the_same_field_of_view(width_px: int, height_px: int) -> None:
-    """Half the width over the focal length is the same for every size (tan of half the angle), and the centre is the middle."""
+    """Half the width over the focal length (tan of half the angle) is the same for every size, and the centre is in the middle."""
     camera = rig_of(Size(width_px, height_px)).left
     assert width_px / 2 / camera.matrix[0, 0] == pytest.approx(320 / 525, rel=1e-12)
     assert (camera.matrix[0, 2], camera.matrix[1, 2]) == ((width_px - 1) / 2, (height_px - 1) / 2)

@@ -21,7 +21,7 @@ TARGET = Target(
 
 
 def test_each_change_changes_what_it_names() -> None:
-    """Rate, size, bytes, queue, processing and link are as asked for; a size alone takes its bytes with its pixels."""
+    """Rate, size, bytes, queue, processing and link are as asked for; a change of size alone scales the bytes with the pixels."""
     (change,) = parse_changes(["fps=60, size=320x240, fifo=4:block, processing=0.5, link=bluetooth"])
     made = change.applied(TARGET)
     assert made.images.period_ns == pytest.approx(1e9 / 60)
@@ -35,14 +35,14 @@ def test_each_change_changes_what_it_names() -> None:
 
 
 def test_bytes_that_are_named_are_the_mean() -> None:
-    """`kB=20` halves frames of 40 kB on average, whatever size is asked for beside it."""
+    """`kB=20` halves frames of 40 kB on average, whatever size is asked for with it."""
     for text in ("kB=20", "size=320x240,kB=20", "kB=20,size=320x240"):
         (change,) = parse_changes([text])
         assert change.applied(TARGET).images.size_bytes.mean() == pytest.approx(20_000.0)
 
 
 def test_what_is_not_named_stays() -> None:
-    """A change of one thing leaves all others."""
+    """A change of one thing leaves all others as they were."""
     (change,) = parse_changes(["processing=2"])
     made = change.applied(TARGET)
     assert (made.images, made.link, made.fifo) == (TARGET.images, LINK, FifoSettings())
@@ -66,14 +66,14 @@ def test_what_is_not_named_stays() -> None:
     ],
 )
 def test_what_makes_no_sense_is_refused(text: str) -> None:
-    """Unknown names and impossible values are one SettingsError."""
+    """Unknown names and impossible values give one SettingsError."""
     with pytest.raises(SettingsError):
         parse_changes([text])
 
 
 @given(st.text())
 def test_any_text_is_read_or_refused(text: str) -> None:
-    """Whatever is typed gives changes or one SettingsError, nothing else."""
+    """Any text gives changes or one SettingsError, nothing else."""
     try:
         assert parse_changes([text])
     except SettingsError as error:

@@ -1,4 +1,4 @@
-"""What the delay benchmark leaves out, and what it says: report, tables, page, figure."""
+"""What the delay benchmark leaves out, and what its report, tables, page and figure say."""
 
 import dataclasses
 import html
@@ -80,7 +80,7 @@ def ledger(number: int, period_ns: int = 33_000_000) -> PairLedger:
 
 
 def result(pairs: int = 100, link: str = "tcp") -> CaseResult:
-    """A run of 108 frames: 3 dropped on the board, 1 under way, 2 lost, 1 orphaned, the FIFO dropped one pair."""
+    """A run of 108 frames: 3 dropped on the board, 1 under way, 2 lost, 1 orphaned; the FIFO dropped one pair."""
     counts = BoardCounts()
     account = SessionAccount("s", counts, counts, received=102, lost=2)
     host = PairCounts(received=102, paired=101, dropped=1, taken=100, board_orphans=(("no_partner", 1),))
@@ -120,7 +120,7 @@ def keys_of_numbers(value: Any, key: str = "") -> list[str]:
 
 @given(st.integers(0, 200))
 def test_the_first_second_is_left_out(pairs: int) -> None:
-    """No pair done within a second of the first one is kept, every later one is, and pairs over their time is the rate at which they were done."""
+    """Pairs done within a second of the first one are left out and all later ones kept; pairs over their time is the rate at which they were done."""
     done = [ledger(number) for number in range(pairs)]
     kept, measured_s = after_warm_up(done)
     begin_ns = 30_000_000 + round(WARM_UP_S * 1e9)
@@ -129,14 +129,14 @@ def test_the_first_second_is_left_out(pairs: int) -> None:
 
 
 def test_every_number_of_the_report_has_its_unit_in_its_key() -> None:
-    """A reader needs nothing but the key to know what a number is."""
+    """A reader needs only the key to know what a number is."""
     report = as_json([result()], UNDER, analysed(result()))
     assert json.loads(json.dumps(report, allow_nan=False)) == report
     assert [key for key in keys_of_numbers(report) if not key.endswith(UNITS)] == []
 
 
 def test_report_holds_each_delay_and_stage() -> None:
-    """The known delays of the pairs come out, stage by stage, in ms."""
+    """The known delays of the pairs are reported, stage by stage, in ms."""
     run: Any = as_json([result()], UNDER, analysed(result()))["runs"]
     known = {
         "capture": 1,
@@ -172,7 +172,7 @@ def test_counts_of_the_report_are_conserved() -> None:
 
 
 def test_each_run_says_which_regime_held_and_what_would_help() -> None:
-    """Work of 15 ms after a wait of 1 ms is a backlog, after one of 85 ms at a tenth of the cameras' rate a slow link: object, terminal and page say so."""
+    """Work of 15 ms after a wait of 1 ms is a backlog; after a wait of 85 ms, at a tenth of the cameras' rate, it is a slow link. Object, terminal and page say so."""
     busy, waiting = result(pairs=100), result(link="serial")
     far = [
         dataclasses.replace(ledger(number, 330_000_000), previous_done_ns=number * 330_000_000 - 75_000_000)
@@ -203,7 +203,7 @@ def test_losses_name_what_became_of_each_frame() -> None:
 
 
 def test_the_line_of_a_run_never_sets_an_uncertainty_above_its_bound() -> None:
-    """Uncertainty and hard bound are those of one moment, 45 and 70 us; what the pairs had (40 us) is told apart, with how many pairs there were."""
+    """Uncertainty and hard bound are from one moment, 45 and 70 us; the uncertainty that the pairs had (40 us) is given separately, with the number of pairs."""
     line = summary_line(result())
     assert line.startswith(
         f"{len(result().ledgers)} pairs, 30.3/s, clock of the pairs +-40 us (p95), at the end +-45 us (+-70 us "
@@ -233,7 +233,7 @@ def test_what_a_line_cannot_tell_is_said_in_words() -> None:
 
 
 def test_a_run_without_pairs_is_reported_without_numbers() -> None:
-    """Nothing measured is null in JSON and a dash in the table, never a zero."""
+    """What was not measured is null in JSON and a dash in the table, never a zero."""
     empty = result(pairs=0)
     runs: Any = as_json([empty], UNDER, analysed(empty))["runs"]
     assert runs[0]["delays"]["processing"]["p50_ms"] is None
@@ -243,7 +243,7 @@ def test_a_run_without_pairs_is_reported_without_numbers() -> None:
 
 
 def test_a_profile_that_loses_bytes_is_predicted_without_and_says_so() -> None:
-    """The model knows rate, delay and jitter: a profile with losses is marked, asked for or not, one without is not."""
+    """The model knows rate, delay and jitter: a profile with losses is marked, asked for or not; one without is not."""
     settings = analyse([result()], UNDER.fifo, parse_changes(["link=wifi", "link=ethernet"])).what_ifs
     said = {one.setting if one.asked_for else one.interface: one.setting for one in settings}
     for name in ("link=wifi, without its losses", "usb-serial-lossy (serial)", "wifi (tcp)"):
@@ -253,7 +253,7 @@ def test_a_profile_that_loses_bytes_is_predicted_without_and_says_so() -> None:
 
 
 def test_the_table_has_a_line_for_each_stage_and_link() -> None:
-    """Every delay and every stage of processing stands there once for each link."""
+    """The table has every delay and every stage of processing once for each link."""
     table = rows([result(), result(link="ipc")])
     assert len(table) == 2 * (len(DELAYS) + len(STAGES) + 1)
     assert [row[1] for row in table[:2]] == ["tcp", "ipc"]
@@ -291,7 +291,7 @@ def test_page_is_whole_html_and_refers_to_nothing_outside() -> None:
     checker.feed(text)
     assert checker.open_tags == []
     assert not re.search(r"<script|<link|<iframe|<object|@import|url\(|<image", text)
-    # In two widths each: four for both kinds of images, one for both interfaces, one for the model.
+    # Each in two widths: four for both kinds of images, one for both interfaces, one for the model.
     assert checker.plots == 2 * (4 * 2 + 2 + 1)
     assert "rfcomm was not run: no radio" in text
     assert "640x480 JPEG 80 at 30" in text
@@ -303,7 +303,7 @@ def test_page_is_whole_html_and_refers_to_nothing_outside() -> None:
     [(1.044e9, "1.04 GB/s"), (999.6e6, "1 GB/s"), (4.45e6, "4.45 MB/s"), (669e3, "669 kB/s"), (20.0, "0.02 kB/s")],
 )
 def test_a_rate_has_the_unit_that_keeps_it_short(bytes_per_s: float, text: str) -> None:
-    """Rates are told with three digits in kB/s, MB/s or GB/s."""
+    """Rates are given with three digits in kB/s, MB/s or GB/s."""
     assert rate_text(bytes_per_s) == text
 
 
@@ -319,7 +319,7 @@ def test_figure_is_an_svg_file_of_its_own() -> None:
 
 
 def test_predictions_stand_in_terminal_and_tables_with_reasons_where_there_are_none() -> None:
-    """Each run beside its prediction, and what was asked for; a prediction that could not be made says why in its place."""
+    """Each run is shown beside its prediction and what was asked for; where no prediction could be made, the reason stands in its place."""
     said = Figures(
         pairs_per_s=12.5,
         lost_share=0.25,
@@ -358,5 +358,5 @@ def test_predictions_stand_in_terminal_and_tables_with_reasons_where_there_are_n
 
 
 def test_one_run_alone_is_compared_with_nothing() -> None:
-    """A single run has no others that could foretell it, and nothing was asked for: no line at all."""
+    """A single run has no others to predict it from, and nothing was asked for: no line at all."""
     assert prediction_lines(analysed(result())) == []

@@ -1,4 +1,4 @@
-"""What speaks with BlueZ, where there is none: one line each. With bluetoothd it is tested in the guest (tests/vm/test_bluetooth.py)."""
+"""The code that talks to BlueZ, where there is none: one line each. The guest tests it with bluetoothd (tests/vm/test_bluetooth.py)."""
 
 import subprocess
 import sys
@@ -36,7 +36,7 @@ except UnavailableError as error:
 
 
 def _said(script: str, bus: Path) -> list[str]:
-    """Run a script with another system bus; gives its lines on stderr."""
+    """Run a script with another system bus; return its lines on stderr."""
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", "import sys\n" + script],
         capture_output=True,
@@ -56,7 +56,7 @@ def _said(script: str, bus: Path) -> list[str]:
     ],
 )
 def test_what_is_missing_is_told_in_one_line(begin: str, problem: str, remedy: str, tmp_path: Path) -> None:
-    """Without dbus-fast, or without a bus, the record's thread says so once with the remedy and ends when it is told to; a name cannot be looked up."""
+    """Without dbus-fast, or without a bus, the record's thread says so once, with the remedy, and ends when told to; a name cannot be looked up."""
     (line,) = _said(begin + _PUBLISH, tmp_path / "nobus")
     assert "bluetooth_record_missing channel=1 " in line
     assert problem in line

@@ -1,4 +1,4 @@
-"""The limit on branches that no test takes: CI's unit part fails by it."""
+"""The limit on branches that no test takes: beyond it CI's unit part fails."""
 
 import pytest
 
@@ -16,7 +16,7 @@ from tests.support.branches import judge
     ],
 )
 def test_less_than_98_percent_is_not_enough(taken: int, every: int, told: str, *, enough: bool) -> None:
-    """The line gives the share, cut off to a tenth, and both counts; 98 % of the branches are enough, one less and none measured are not."""
+    """The line gives the share, truncated to a tenth, and both counts. 98 % of the branches are enough; one fewer is not, nor is none measured."""
     assert judge({"covered_branches": taken, "num_branches": every}) == (
         f"branches of the pure modules: {told}",
         enough,

@@ -1,4 +1,4 @@
-"""The bundle adjustment by itself: from a rough start to the rig, and from its own answer nowhere else."""
+"""The bundle adjustment by itself: from a rough start it finds the rig, and from its own answer it stays there."""
 
 import numpy as np
 import pytest
@@ -14,13 +14,13 @@ FREE = np.array([True] * 8 + [False])
 
 
 def parameters(camera: CameraModel) -> np.ndarray:
-    """A camera as the adjustment has it: fx fy cx cy k1 k2 p1 p2 k3."""
+    """A camera as the adjustment holds it: fx fy cx cy k1 k2 p1 p2 k3."""
     (fx, _, cx), (_, fy, cy), _ = camera.matrix
     return np.array([fx, fy, cx, cy, *camera.distortion])
 
 
 def test_an_answer_that_cannot_be_bettered_is_kept() -> None:
-    """Begun at its own answer, again and again, the search finds no better one and gives up: the rig of exact corners stays the true one."""
+    """Restarted from its own answer again and again, the search finds no better one and gives up: the rig of exact corners stays the true one."""
     rig, boards = unlike_rig(), poses(6, seed=2)
     views = [BundleView(pair.left_px, pair.right_px) for pair in exact_pairs(rig, boards)]
     state = BundleState(
@@ -38,7 +38,7 @@ def test_an_answer_that_cannot_be_bettered_is_kept() -> None:
 
 
 def test_the_rig_is_found_from_a_rough_start() -> None:
-    """From a focal length 2 % off the corners are met to their noise, 0.2 px in each coordinate; begun there, it moves by less than a micrometre."""
+    """From a focal length 2 % off, the corners are met to their noise, 0.2 px in each coordinate; a second search from that answer moves by less than a micrometre."""
     rig, boards = unlike_rig(), poses(6, seed=2)
     views = [BundleView(pair.left_px, pair.right_px) for pair in exact_pairs(rig, boards, noise_px=0.2, seed=3)]
     rough = BundleState(

@@ -19,7 +19,7 @@ _SIZES = ((640, 480), (1280, 720))
 
 
 def _rig() -> Rig:
-    """The unlike rig without k3, which the boards do not reach far enough to tell."""
+    """The unlike rig without k3, because the boards do not reach far enough out to determine it."""
     rig = unlike_rig()
     for camera in (rig.left, rig.right):
         camera.distortion[4] = 0
@@ -52,7 +52,7 @@ def test_exact_corners_give_back_the_rig() -> None:
 @given(st.integers(0, 1000))
 @settings(deadline=None, max_examples=8)
 def test_the_baseline_is_off_by_no_more_than_the_report_says(seed: int) -> None:
-    """With 0.2 px of noise the error stays within four of the reported standard deviations, and these are small."""
+    """With 0.2 px of noise the error stays within four of the reported standard deviations, which are small."""
     pairs = exact_pairs(_rig(), poses(12, seed=seed), noise_px=0.2, seed=seed)
     found = calibrate(pairs, BOARD, _SIZES)
     assert found.baseline_sigma_m * 1e3 < 1.0
@@ -68,7 +68,7 @@ def _changed(pairs: list[BoardPair], index: int, right_px: np.ndarray) -> list[B
 
 @pytest.mark.parametrize("jump_px", [2.0, 13.0])
 def test_a_view_whose_corners_jump_is_rejected_and_does_no_harm(jump_px: float) -> None:
-    """Of 15 pairs, the one with a third of its right corners off is named; the rig is that of the other 14."""
+    """Of 15 pairs, the one with a third of its right corners off is named; the rig comes from the other 14."""
     pairs = exact_pairs(_rig(), poses(15, seed=1), noise_px=0.1, seed=5)
     jumped = pairs[6].right_px.copy()
     jumped[::3] += np.array([jump_px, -jump_px / 2])
@@ -80,7 +80,7 @@ def test_a_view_whose_corners_jump_is_rejected_and_does_no_harm(jump_px: float) 
 
 @pytest.mark.parametrize("shift_m", [0.0015, 0.05])
 def test_a_pair_of_two_moments_is_rejected(shift_m: float) -> None:
-    """A board that moved between the two exposures, by much or by a little more than a millimetre, is told as such."""
+    """A board that moved between the two exposures, by much or by a little over a millimetre, is reported as such."""
     rig, where = _rig(), poses(15, seed=2)
     pairs = exact_pairs(rig, where, noise_px=0.1, seed=6)
     later = where[4].copy()
@@ -90,7 +90,7 @@ def test_a_pair_of_two_moments_is_rejected(shift_m: float) -> None:
 
 
 def test_swapped_sides_are_told_with_the_remedy() -> None:
-    """Left images given as right ones calibrate well, but the verdict is reject: swap LEFT and RIGHT."""
+    """Swapped left and right images calibrate well, but the verdict is reject: swap LEFT and RIGHT."""
     pairs = [BoardPair(p.name, p.right_px, p.left_px) for p in exact_pairs(_rig(), poses(12, seed=3))]
     found = calibrate(pairs, BOARD, (_SIZES[1], _SIZES[0]))
     judgement = judge(found, ())
@@ -107,14 +107,14 @@ def test_boards_that_are_all_parallel_are_told() -> None:
 
 
 def test_a_board_in_the_middle_only_is_told() -> None:
-    """Boards far away cover the middle: a remedy asks for the corners."""
+    """Boards far away cover only the middle: a remedy asks for the corners."""
     pairs = exact_pairs(_rig(), poses(12, seed=4, depth_m=(1.2, 1.3)), noise_px=0.1, seed=7)
     judgement = judge(calibrate(pairs, BOARD, _SIZES), ())
     assert any("corners" in remedy for remedy in judgement.remedies)
 
 
 def test_wild_corners_everywhere_are_no_calibration() -> None:
-    """With 1 px of noise rows cannot meet to half a pixel: reject, with what to do."""
+    """With 1 px of noise rows cannot meet to half a pixel: reject, with a remedy."""
     pairs = exact_pairs(_rig(), poses(12, seed=8), noise_px=1.0, seed=8)
     judgement = judge(calibrate(pairs, BOARD, _SIZES), ())
     assert judgement.verdict is Verdict.REJECT
@@ -129,13 +129,13 @@ def test_few_pairs_are_never_good() -> None:
 
 @pytest.mark.parametrize("count", [0, 2])
 def test_fewer_than_three_pairs_are_refused(count: int) -> None:
-    """Nothing is made up from two views."""
+    """Nothing is invented from two views."""
     with pytest.raises(DataError, match=f"only {count} of at least 3 pairs"):
         calibrate(exact_pairs(_rig(), poses(count, seed=1)), BOARD, _SIZES)
 
 
 def test_remedies_fit_what_is_wrong() -> None:
-    """Rows between good and usable, a baseline left open, and many rejected pairs each have their remedy; the gravest is first."""
+    """Rows between good and usable, an undetermined baseline, and many rejected pairs each have their remedy; the gravest comes first."""
     pairs = exact_pairs(_rig(), poses(8, seed=2), noise_px=0.2, seed=2)
     found = calibrate(pairs, BOARD, _SIZES)
     judgement = judge(found, ())
@@ -150,7 +150,7 @@ def test_remedies_fit_what_is_wrong() -> None:
 
 
 def test_a_baseline_known_to_two_percent_limits_the_verdict() -> None:
-    """A hundredth is good, a twentieth is no scale at all; between them the calibration is usable, and says what would better it."""
+    """A hundredth is good, a twentieth gives no scale at all; in between the calibration is usable, and says what would improve it."""
     found = calibrate(exact_pairs(_rig(), poses(10, seed=1)), BOARD, _SIZES)
     wide = replace(found, spread=0.9, tilts_deg=np.array([30.0]))
     assert judge(wide, ()) == Assessment(Verdict.GOOD, ())
@@ -162,7 +162,7 @@ def test_a_baseline_known_to_two_percent_limits_the_verdict() -> None:
 
 
 def test_a_lens_that_takes_all_five_terms_gets_them() -> None:
-    """Where boards reach so far out that the third radial term shows, it is estimated, and comes back; in all other tests here four are enough."""
+    """Where boards reach far enough out for the third radial term to show, it is estimated and comes back; in all other tests here four terms are enough."""
     rig = _rig()
     rig.left.distortion[:] = (-0.25, 0.08, 0.0, 0.0, 0.4)
     found = calibrate(exact_pairs(rig, poses(10, seed=3, depth_m=(0.3, 0.4)), noise_px=0.02, seed=1), BOARD, _SIZES)

@@ -1,4 +1,4 @@
-"""When a camera is opened, given up and tried again, without a device: the automaton alone, for both kinds of camera that live by it."""
+"""When a camera is opened, given up and tried again, without a device: the automaton alone, for both kinds of camera that use it."""
 
 import pytest
 
@@ -18,7 +18,7 @@ def opened(settings: LifeSettings, now_ns: int = 0, period_ns: int = 0) -> Life:
 
 @BOTH
 def test_it_is_opened_at_once_and_once(settings: LifeSettings) -> None:
-    """A new life is opened at its first moment, and not a second time while the outcome is awaited."""
+    """A new life is opened at its first moment, and not again while the outcome is awaited."""
     life = Life(settings, 5)
     assert life.due_ns == 5
     assert life.due(5) is Step.OPEN
@@ -28,7 +28,7 @@ def test_it_is_opened_at_once_and_once(settings: LifeSettings) -> None:
 
 @BOTH
 def test_a_start_is_given_up(settings: LifeSettings) -> None:
-    """Before it is accepted a camera is given up when it is refused, or when its first time is over; afterwards never, and its loss at the start is no news."""
+    """Until it is accepted, a camera is given up when it is refused or its start time runs out; afterwards never. A failure during the start does not count as a lost camera."""
     silent = Life(settings, 0)
     silent.due(0)
     silent.opened(0)
@@ -46,7 +46,7 @@ def test_a_start_is_given_up(settings: LifeSettings) -> None:
 
 @BOTH
 def test_silence_is_a_stall(settings: LifeSettings) -> None:
-    """Without a frame for the patience of its kind an open camera is closed, and tried again after a rest; a frame in time puts that off."""
+    """An open camera without a frame for its kind's patience is closed, and tried again after a rest; a frame in time puts that off."""
     life = opened(settings)
     life.heard(S)
     assert life.due(S + settings.silence_ns - 1) is Step.NONE
@@ -56,7 +56,7 @@ def test_silence_is_a_stall(settings: LifeSettings) -> None:
     assert life.due(stall_ns) is Step.CLOSE
     assert life.counts.lost == {Loss.STALLED: 1, Loss.FAILED: 0, Loss.UNPLUGGED: 0}
     assert life.state is CameraState.GONE
-    assert life.due(100 * S) is Step.NONE  # nothing before it is closed
+    assert life.due(100 * S) is Step.NONE  # nothing until it is closed
     life.closed()
     assert life.due_ns == stall_ns + settings.rest_ns
     assert life.due(life.due_ns) is Step.OPEN
@@ -64,7 +64,7 @@ def test_silence_is_a_stall(settings: LifeSettings) -> None:
 
 @pytest.mark.parametrize(("period_ns", "patience_ns"), [(0, S), (S // 30, S), (S // 2, 5 * S)])
 def test_a_slow_camera_is_given_ten_periods(period_ns: int, patience_ns: int) -> None:
-    """A camera of long periods may be silent for ten of them."""
+    """A camera with long periods may be silent for ten of them."""
     life = opened(DEVICE)
     life.heard(7, period_ns)
     assert life.due_ns == 7 + patience_ns
@@ -72,7 +72,7 @@ def test_a_slow_camera_is_given_ten_periods(period_ns: int, patience_ns: int) ->
 
 @BOTH
 def test_the_first_frame_may_take_longer(settings: LifeSettings) -> None:
-    """The very first frame gets the time of the start, that after a later opening its own."""
+    """The very first frame gets the start's time; the first frame after a later opening has a time of its own."""
     life = Life(settings, 0)
     life.due(0)
     life.opened(0)
@@ -88,7 +88,7 @@ def test_the_first_frame_may_take_longer(settings: LifeSettings) -> None:
 
 
 def test_a_lost_device_is_tried_at_once_then_five_times_a_second() -> None:
-    """A device that gave frames and failed is opened again at once, and each refusal is followed by a fifth of a second of rest."""
+    """A device that gave frames and failed is reopened at once, with a rest of a fifth of a second after each refusal."""
     life = opened(DEVICE)
     life.heard(S)
     life.lost(Loss.UNPLUGGED, 2 * S)
@@ -98,7 +98,7 @@ def test_a_lost_device_is_tried_at_once_then_five_times_a_second() -> None:
 
 
 def test_a_lost_server_is_tried_ever_more_rarely() -> None:
-    """A server's rests are 0.1 s, then doubled with each refusal up to a second; a frame makes them short again."""
+    """A server's rests start at 0.1 s and double with each refusal up to a second; a frame makes them short again."""
     life = opened(SERVER)
     life.heard(S)
     life.lost(Loss.FAILED, S)
@@ -115,7 +115,7 @@ def test_a_lost_server_is_tried_ever_more_rarely() -> None:
 
 
 def refusals(life: Life, count: int) -> list[int]:
-    """Refuse so many openings; gives when they were tried."""
+    """Refuse this many openings; return when they were tried."""
     tries_ns = []
     for _ in range(count):
         tries_ns.append(life.due_ns)
@@ -126,7 +126,7 @@ def refusals(life: Life, count: int) -> list[int]:
 
 @BOTH
 def test_a_listener_ends_the_rest(settings: LifeSettings) -> None:
-    """Whoever comes while a lost camera rests is served at once."""
+    """A listener that comes while a lost camera rests is served at once."""
     life = Life(settings, 0)
     now_ns = refusals(life, 5)[-1] + 1
     assert life.due(now_ns) is Step.NONE
@@ -137,7 +137,7 @@ def test_a_listener_ends_the_rest(settings: LifeSettings) -> None:
 
 
 def test_a_camera_that_opens_and_fails_at_once_is_not_opened_without_a_rest() -> None:
-    """A device that can be opened and fails before its first frame gets the rest of one that was refused."""
+    """A device that opens but fails before its first frame rests as if it had been refused."""
     life = opened(DEVICE)
     life.lost(Loss.FAILED, 1)
     life.closed()
@@ -146,7 +146,7 @@ def test_a_camera_that_opens_and_fails_at_once_is_not_opened_without_a_rest() ->
 
 @BOTH
 def test_images_of_no_use_are_no_silence_and_no_return(settings: LifeSettings) -> None:
-    """A lost camera that comes back with other images is not closed for silence, and stays lost until a frame of use comes."""
+    """A lost camera that comes back with unusable images is not closed for silence, and stays lost until a usable frame comes."""
     life = opened(settings)
     life.heard(1)
     assert life.lost(Loss.FAILED, 2) is Step.CLOSE
@@ -181,7 +181,7 @@ def test_it_is_back_with_its_first_frame(settings: LifeSettings) -> None:
 
 
 def test_a_device_that_nobody_wants_stays_open_and_is_looked_for() -> None:
-    """A paused device is switched off, looked for at once and then every second, and switched on by the next listener; lost meanwhile, it is back when opened."""
+    """A paused device is switched off, looked for at once and then every second, and switched on by the next listener. If it is lost meanwhile, it is back when opened."""
     life = opened(DEVICE)
     assert life.pause() is Step.STOP
     assert life.pause() is Step.NONE
@@ -201,7 +201,7 @@ def test_a_device_that_nobody_wants_stays_open_and_is_looked_for() -> None:
 
 
 def test_a_server_that_nobody_wants_is_closed_and_left_alone() -> None:
-    """A paused server is closed, not tried again, not counted as lost, and called at once for the next listener, even while it is still being closed."""
+    """A paused server is closed, not retried and not counted as lost. It is called at once for the next listener, even while it is still being closed."""
     life = opened(SERVER)
     life.heard(1)
     assert life.pause() is Step.CLOSE
@@ -220,7 +220,7 @@ def test_a_server_that_nobody_wants_is_closed_and_left_alone() -> None:
 
 @BOTH
 def test_a_steered_camera_is_off_until_its_moment(settings: LifeSettings) -> None:
-    """Steered, a camera is off until the moment that was named, may be steered again before, and is no stall meanwhile."""
+    """A steered camera is off until the named moment, may be steered again before then, and does not count as a stall meanwhile."""
     life = opened(settings)
     assert life.steer(50 * S) is Step.STOP
     assert life.steer(60 * S) is Step.STOP
@@ -233,7 +233,7 @@ def test_a_steered_camera_is_off_until_its_moment(settings: LifeSettings) -> Non
 
 @BOTH
 def test_a_camera_is_renewed_without_a_rest(settings: LifeSettings) -> None:
-    """A camera that is to be another is closed and opened at once, and that is no loss."""
+    """A camera that is to become another is closed and opened at once, and that is no loss."""
     life = opened(settings)
     assert life.renew(9) is Step.CLOSE
     life.closed()
@@ -244,7 +244,7 @@ def test_a_camera_is_renewed_without_a_rest(settings: LifeSettings) -> None:
 
 @BOTH
 def test_the_end_is_the_end(settings: LifeSettings) -> None:
-    """An ended camera is closed and never opened again; one that was being opened is closed when it is open."""
+    """An ended camera is closed and never opened again; one that was being opened is closed once it is open."""
     life = opened(settings)
     assert life.end() is Step.CLOSE
     life.closed()

@@ -1,4 +1,4 @@
-"""Whatever happens to a camera, in any order: what holds for the automaton of its life, whichever kind it is of."""
+"""What holds for the automaton of a camera's life, of either kind, whatever happens in whatever order."""
 
 from dataclasses import dataclass, field
 from enum import Enum
@@ -31,16 +31,16 @@ class Chance(Enum):
 
 @dataclass(slots=True)
 class World:
-    """A camera and its shell, which does as it is told, late.
+    """A camera and its shell, which does as it is told, but late.
 
     Attributes:
         life: the automaton.
         now_ns: the time.
-        is_open: whether the device is; None: being opened.
-        is_closing: whether CLOSE was told and is not done.
-        tries: openings that were told.
-        rests_until_ns: before which no opening may be told.
-        was_heard: whether a frame came since it was opened.
+        is_open: whether the device is open; None: being opened.
+        is_closing: whether CLOSE was ordered and is not done yet.
+        tries: openings that were ordered.
+        rests_until_ns: no opening may be ordered before this time.
+        was_heard: whether a frame has come since it was opened.
     """
 
     settings: LifeSettings
@@ -56,7 +56,7 @@ class World:
         self.life = Life(self.settings, 0)
 
     def obey(self, step: Step) -> None:
-        """Begin what was told."""
+        """Begin what was ordered."""
         match step:
             case Step.OPEN:
                 assert self.is_open is False, "two openings without a close"
@@ -85,7 +85,7 @@ class World:
         self.obey(step)
 
     def report(self, chance: Chance) -> None:
-        """An outcome, if one is awaited."""
+        """Report an outcome, if one is awaited."""
         if chance is Chance.CLOSED and self.is_closing:
             self.is_open = self.is_closing = False
             self.life.closed()
@@ -101,7 +101,7 @@ class World:
             self.life.heard(self.now_ns, S // 30)
 
     def order(self, chance: Chance) -> None:
-        """Something the owner wants; it ends a rest."""
+        """Pass on an order of the owner; it ends a rest."""
         match chance:
             case Chance.PAUSE:
                 self.obey(self.life.pause())
@@ -120,7 +120,7 @@ class World:
                 self.obey(self.life.end())
 
     def let(self, chance: Chance, wait_ns: int) -> None:
-        """Let this happen, and then what time brings."""
+        """Let this happen, and then whatever time brings."""
         match chance:
             case Chance.TIME:
                 self.now_ns += wait_ns
@@ -160,7 +160,7 @@ HAPPENINGS = st.lists(
 @BOTH
 @given(happenings=HAPPENINGS)
 def test_whatever_happens(settings: LifeSettings, happenings: list[tuple[Chance, int]]) -> None:
-    """In any order of events: never two openings without a close, never an opening before its rest is over, and all counts add up."""
+    """In any order of events there are never two openings without a close and never an opening before its rest is over, and all counts add up."""
     world = World(settings)
     for chance, wait_ns in happenings:
         world.let(chance, wait_ns)
@@ -170,7 +170,7 @@ def test_whatever_happens(settings: LifeSettings, happenings: list[tuple[Chance,
 @BOTH
 @given(happenings=HAPPENINGS)
 def test_silence_always_ends_in_a_retry(settings: LifeSettings, happenings: list[tuple[Chance, int]]) -> None:
-    """Whatever happened before: a camera that is wanted and then silent is opened again within its patience and the longest rest."""
+    """Whatever happened before, a camera that is wanted and then silent is reopened within its patience and the longest rest."""
     world = World(settings)
     for chance, wait_ns in happenings:
         if chance is not Chance.END:

@@ -42,7 +42,7 @@ _CAMERA = Listed(
 
 
 def test_the_table_names_all_that_can_be_asked_for() -> None:
-    """Path, size, rates and each control with its value and range stand in the table; formats that are not passed on are named as such."""
+    """The table has path, size, rates and each control with its value and range; formats that are not passed on are marked as such."""
     text = table([_CAMERA])
     for part in ("usb-Some_Cam-video-index0", "/dev/video2", "uvcvideo", "640x480  30, 15", "not used: H264"):
         assert part in text
@@ -52,7 +52,7 @@ def test_the_table_names_all_that_can_be_asked_for() -> None:
 
 
 def test_the_json_holds_the_same_and_more() -> None:
-    """The values survive JSON and hold every format, used or not, with its rates as numbers."""
+    """The values survive JSON, which holds every format, used or not, with its rates as numbers."""
     (camera,) = json.loads(json.dumps(values([_CAMERA])))["cameras"]
     assert [item["format"] for item in camera["formats"]] == ["mjpeg", None]
     assert camera["formats"][0]["sizes"] == [{"size": "640x480", "fps": [30.0, 15.0], "fps_range": []}]
@@ -61,6 +61,6 @@ def test_the_json_holds_the_same_and_more() -> None:
 
 
 def test_no_camera_is_said_with_a_remedy() -> None:
-    """An empty list is a sentence that says what to do, not an empty table."""
+    """An empty list gives a sentence that says what to do, not an empty table."""
     assert "plug one in" in table([])
     assert values([]) == {"cameras": []}

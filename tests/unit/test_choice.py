@@ -14,7 +14,7 @@ STEP_NS = 100 * MS
 
 
 class Links:
-    """Links that are simulated: each with a round trip, what a frame takes beyond half of it, and whether frames get through.
+    """Simulated links, each with a round trip, what a frame takes beyond half of it, and whether frames get through.
 
     Args:
         round_trips_ns: of each.
@@ -54,14 +54,14 @@ class Links:
 
 
 def test_the_link_of_the_youngest_frames_carries() -> None:
-    """A link that has a longer round trip and carries frames faster is found by trying: of 400 ms and 60 ms the 60 ms win, and stay."""
+    """A link with a longer round trip that carries frames faster is found by trying: of 400 ms and 60 ms, 60 ms wins and stays."""
     links = Links([4 * MS, 20 * MS], [400 * MS, 50 * MS])
     links.run(2 * MEMORY_NS - SECOND_NS, jitter=0.3)
     assert [link for _, link in links.changes] == [1]
 
 
 def test_of_links_alike_the_first_carries() -> None:
-    """Where ages differ by a few ms the order decides: the stream goes back to the first link a second after it is up again, and not before."""
+    """If ages differ by only a few ms the order decides: the stream returns to the first link no sooner than a second after that is up again."""
     links = Links([2 * MS, MS], [6 * MS, MS])
     links.choice.down(0, links.now_ns)
     links.choice.carries(1, links.now_ns)
@@ -74,12 +74,12 @@ def test_of_links_alike_the_first_carries() -> None:
     assert links.carrier == 0
     assert (
         PROOF_NS <= links.changes[0][0] - back_ns <= 2 * PROOF_NS + 2 * STEP_NS
-    )  # it failed once, so it proves itself twice as long
+    )  # it failed once, so it must prove itself twice as long
     assert len(links.changes) == 1
 
 
 def test_a_link_whose_frames_are_stuck_gives_way() -> None:
-    """While the board grabs and nothing comes, the other link takes over within two seconds, though the first one's echoes are swift."""
+    """If the board grabs and nothing comes, the other link takes over within two seconds, even though the first one's echoes are swift."""
     links = Links([MS, 30 * MS], [5 * MS, 100 * MS])
     links.run(5 * SECOND_NS)
     assert links.carrier == 0
@@ -91,7 +91,7 @@ def test_a_link_whose_frames_are_stuck_gives_way() -> None:
 
 
 def test_a_link_that_stays_stuck_is_tried_ever_more_seldom() -> None:
-    """In ten minutes a link that is always stuck is tried about once in two minutes at the end, not every second."""
+    """In ten minutes a link that is always stuck comes to be tried only about once in two minutes, not every second."""
     links = Links([MS, 30 * MS], [5 * MS, 30 * MS])
     links.stuck.add(0)
     links.run(600 * SECOND_NS)
@@ -113,7 +113,7 @@ def test_no_camera_no_blame() -> None:
 
 
 def test_a_slow_link_is_tried_again_after_a_while() -> None:
-    """A link that was slow when it was tried and has become swift is found again, at most five minutes later."""
+    """A link that was slow when tried and has become swift is found again within five minutes."""
     links = Links([MS, 10 * MS], [900 * MS, 20 * MS])
     links.run(1000 * SECOND_NS)
     assert links.carrier == 1
@@ -123,7 +123,7 @@ def test_a_slow_link_is_tried_again_after_a_while() -> None:
 
 
 def test_a_link_that_stays_slow_is_tried_ever_more_seldom() -> None:
-    """In half an hour a link that is always slow is tried about ten times, and at the end once in five minutes."""
+    """In half an hour a link that is always slow is tried about ten times, and towards the end once in five minutes."""
     links = Links([MS, 10 * MS], [900 * MS, 20 * MS])
     links.run(1800 * SECOND_NS)
     tries = [now_ns for now_ns, link in links.changes if link == 0]
@@ -132,7 +132,7 @@ def test_a_link_that_stays_slow_is_tried_ever_more_seldom() -> None:
 
 
 def test_a_stall_keeps_a_good_link_out_for_seconds_only() -> None:
-    """The preferred link, left because a stalled machine held up its frames for two seconds, carries again within 15 s."""
+    """If the preferred link was left because a stalled machine held up its frames for two seconds, it carries again within 15 s."""
     links = Links([MS, 10 * MS], [5 * MS, 5 * MS])
     links.run(60 * SECOND_NS)
     assert links.carrier == 0
@@ -150,7 +150,7 @@ def test_a_stall_keeps_a_good_link_out_for_seconds_only() -> None:
 )
 @settings(deadline=None, max_examples=60)
 def test_links_that_stay_as_they_are_are_not_changed_for_ever(kinds: list[tuple[float, float]], jitter: float) -> None:
-    """With steady links every one is tried at most once a memory's time, and the last choice is within the margins of the best."""
+    """With steady links each one is tried at most once per memory time, and the last choice is within the margins of the best."""
     links = Links([round_trip * MS for round_trip, _ in kinds], [frame * MS for _, frame in kinds])
     links.run(2 * MEMORY_NS - SECOND_NS, jitter)
     assert len(links.changes) <= 2 * len(kinds)
@@ -160,7 +160,7 @@ def test_links_that_stay_as_they_are_are_not_changed_for_ever(kinds: list[tuple[
 
 @pytest.mark.parametrize("late_ns", [3 * SECOND_NS])
 def test_a_link_that_is_not_heard_is_not_chosen(late_ns: int) -> None:
-    """A preferred link whose echoes have failed to come for three seconds does not take over, however good it was."""
+    """A preferred link whose echoes have been missing for three seconds does not take over, however good it was."""
     choice = LinkChoice(2)
     for link in range(2):
         choice.up(link, 0)
@@ -173,7 +173,7 @@ def test_a_link_that_is_not_heard_is_not_chosen(late_ns: int) -> None:
 
 
 def test_a_late_frame_of_the_link_before_pays_no_debt_of_the_new_one() -> None:
-    """After a change frames that were under way on the old link still come: the new one, over which none comes, gives way all the same."""
+    """After a switch, frames under way on the old link still come. The new link gives way all the same if no frame comes over it."""
     choice = LinkChoice(2)
     for link in range(2):
         choice.up(link, 0)

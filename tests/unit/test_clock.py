@@ -41,7 +41,7 @@ def run(
     jitter_ns: int = 200_000,
     doubtful_waves: int = 0,
 ) -> list[Error]:
-    """Waves as the session sends them (50 ms apart in the first second, then 250 ms); the errors for a frame after each of them.
+    """Send waves as the session does (50 ms apart in the first second, then 250 ms); return the errors for a frame after each.
 
     After at most `doubtful_waves` of them there may be no estimate, because they contradict what was known.
     """
@@ -80,7 +80,7 @@ CLOCKS = st.builds(
 def test_the_true_offset_lies_within_the_uncertainty(
     clocks: TwoClocks, seed: int, least_ns: int, jitter_ns: int
 ) -> None:
-    """Hours apart, up to 100 ppm, whatever the jitter: in no run leaves the true offset the stated interval for long."""
+    """With clocks hours apart, up to 100 ppm, and any jitter, the true offset never leaves the stated interval for long."""
     errors = run(ClockEstimator(), clocks, random.Random(seed), least_ns=least_ns, jitter_ns=jitter_ns)
     outside = sum(item.error_ns > item.uncertainty_ns + 1 for item in errors)
     assert outside <= len(errors) * 0.15
@@ -88,7 +88,7 @@ def test_the_true_offset_lies_within_the_uncertainty(
 
 @pytest.mark.long
 def test_the_stated_uncertainty_is_rarely_wrong() -> None:
-    """Over forty runs with jitter from none to fifty times the least delay, 99.5 % of all errors are within what was stated."""
+    """Over forty runs, with jitter from none to fifty times the least delay, 99.5 % of all errors are within what was stated."""
     errors: list[Error] = []
     for seed in range(40):
         chance = random.Random(seed)
@@ -98,7 +98,7 @@ def test_the_stated_uncertainty_is_rarely_wrong() -> None:
 
 
 def test_error_is_below_half_the_least_round_trip() -> None:
-    """With a symmetric link, after the first two seconds, 99 % of all errors are below half of the least round trip."""
+    """On a symmetric link, after the first two seconds, 99 % of all errors are below half of the least round trip."""
     errors: list[float] = []
     for seed in range(12):
         chance = random.Random(seed)
@@ -123,7 +123,7 @@ def test_skew_is_found() -> None:
 @pytest.mark.parametrize("jump_ns", [-20 * SECOND_NS, -SECOND_NS, -20 * MS, 20 * MS, SECOND_NS, 3600 * SECOND_NS])
 @pytest.mark.parametrize("pause_ns", [250 * MS, 60 * SECOND_NS])
 def test_a_jump_is_doubted_at_once_and_believed_when_confirmed(jump_ns: int, pause_ns: int) -> None:
-    """When a clock jumps (a phone that slept) nothing is known for two waves; the third gives the new offset, and so do all that follow."""
+    """When a clock jumps (a phone that slept), nothing is known for two waves; the third gives the new offset, and so do all that follow."""
     chance = random.Random(jump_ns)
     clocks = TwoClocks(START_NS + SECOND_NS, Fraction(80, 10**6))
     estimator = ClockEstimator()
@@ -137,7 +137,7 @@ def test_a_jump_is_doubted_at_once_and_believed_when_confirmed(jump_ns: int, pau
 @pytest.mark.parametrize("echoes", [1, 5])
 @pytest.mark.parametrize("lie_ns", [-3600 * SECOND_NS, -20 * MS, 20 * MS, 3600 * SECOND_NS])
 def test_a_wave_that_lies_is_never_believed(lie_ns: int, echoes: int) -> None:
-    """One echo, or a whole wave, an hour off leaves the clock in doubt until the next wave; then what was known before is known again."""
+    """One echo, or a whole wave, that is 20 ms or an hour off leaves the clock in doubt until the next wave; then the earlier estimate holds again."""
     chance = random.Random(lie_ns)
     clocks = TwoClocks(START_NS + SECOND_NS, Fraction(80, 10**6))
     estimator = ClockEstimator()
@@ -157,7 +157,7 @@ def test_a_wave_that_lies_is_never_believed(lie_ns: int, echoes: int) -> None:
 
 
 def test_a_clock_that_is_steered_interrupts_nothing() -> None:
-    """A clock that slews by a millisecond within a second (NTP at full speed and more) contradicts itself and is believed all the same."""
+    """A clock that slews by a millisecond within a second (NTP at full speed and more) is not quite consistent with itself, and is believed all the same."""
     chance, estimator = random.Random(9), ClockEstimator()
     clocks = TwoClocks(START_NS, Fraction(0))
     run(estimator, clocks, chance, seconds=15)
@@ -172,7 +172,7 @@ def test_a_clock_that_is_steered_interrupts_nothing() -> None:
 
 
 def test_a_long_silence_is_no_jump() -> None:
-    """After a minute without echoes the estimate is right again with the first wave, and was honest about its growing doubt."""
+    """After a minute without echoes the first wave makes the estimate right again; until then it stated its growing uncertainty honestly."""
     chance = random.Random(1)
     clocks = TwoClocks(START_NS, Fraction(-90, 10**6))
     estimator = ClockEstimator()
@@ -187,14 +187,14 @@ def test_a_long_silence_is_no_jump() -> None:
 
 @pytest.mark.parametrize("queue_ns", [500 * MS, 5 * SECOND_NS])
 def test_a_link_that_fills_up_does_not_make_forget(queue_ns: int) -> None:
-    """When all echoes of a minute wait seconds behind frames on one of the two ways, the error stays below 200 ppm of that minute."""
+    """When all echoes of a minute wait seconds behind frames in one direction, the error stays below 200 ppm of that minute."""
     clocks = TwoClocks(START_NS - SECOND_NS, Fraction(50, 10**6))
     estimator = ClockEstimator()
     run(estimator, clocks, random.Random(2), seconds=15)
     for number in range(240):
         t0 = START_NS + 15 * SECOND_NS + number * 250 * MS
         t1 = t0 + 50_000
-        t3 = t1 + queue_ns + (number * 7919 % 100) * MS  # the way back is full, the queue's length changes
+        t3 = t1 + queue_ns + (number * 7919 % 100) * MS  # the way back is full, and the queue's length changes
         estimator.add(
             Echo(wave=10**6 + number, t0_ns=t0, t1_ns=clocks.board(t1), t2_ns=clocks.board(t1) + 10, t3_ns=t3)
         )
@@ -206,7 +206,7 @@ def test_a_link_that_fills_up_does_not_make_forget(queue_ns: int) -> None:
 
 
 def test_nothing_heard_is_nothing_known() -> None:
-    """Before the first echo there is no estimate, and echoes whose times run backwards are none."""
+    """Before the first echo there is no estimate, and echoes whose times run backwards do not count."""
     estimator = ClockEstimator()
     assert estimator.estimate is None
     estimator.add(Echo(wave=1, t0_ns=100, t1_ns=5, t2_ns=6, t3_ns=99))
@@ -226,7 +226,8 @@ def test_one_echo_bounds_the_offset(offset_ns: int, there_ns: int, work_ns: int,
     estimate = estimator.estimate
     assert estimate is not None
     assert estimate.round_trip_ns == there_ns + back_ns
-    # The board's work lies between the two facts: each limit and its rate may be off by the drift meanwhile; four times are rounded outwards.
+    # The board's work lies between the two facts: each limit and its rate may be off by the drift meanwhile; four times
+    # are rounded outwards.
     slack_ns = 4 * MAX_SKEW * work_ns + 4
     assert abs(estimate.offset_at(t1) - offset_ns) <= estimate.bound_at(t1) + 1
     assert estimate.bound_at(t1) <= (there_ns + back_ns) / 2 + slack_ns

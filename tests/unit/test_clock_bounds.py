@@ -1,4 +1,4 @@
-"""The clock estimate's parts: hulls lose nothing that matters, the strip is exact, the hard bound holds against any link."""
+"""The parts of the clock estimate: hulls lose nothing that matters, the strip is exact, the hard bound holds on any link."""
 
 import random
 from fractions import Fraction
@@ -35,7 +35,7 @@ FACTS = st.lists(
 @given(FACTS, st.floats(-MAX_SKEW, MAX_SKEW))
 @settings(deadline=None, max_examples=150)
 def test_the_strip_is_that_of_all_facts(facts: list[tuple[int, int, int]], skew: float) -> None:
-    """Hulls and walk give the same lowest and highest offset for a skew as a look at every single widened fact."""
+    """For a skew, hulls and walk give the same lowest and highest offset as a look at every single widened fact."""
     lower, upper = Hull(), Hull()
     x_ns, times = START_NS, []
     for step_ns, low_ns, gap_ns in facts:
@@ -60,7 +60,7 @@ def test_the_strip_is_that_of_all_facts(facts: list[tuple[int, int, int]], skew:
 
 
 def test_a_link_without_noise_does_not_fill_the_memory() -> None:
-    """An hour of facts on a straight line, of which each is a corner of the widened hull, leaves a bounded number of points."""
+    """An hour of facts on a straight line, each a corner of the widened hull, leaves a bounded number of points."""
     hull = Hull()
     for second in range(3600):
         hull.add(START_NS + second * SECOND_NS, 5)
@@ -80,7 +80,7 @@ PROFILES: list[Profile] = [
 @pytest.mark.long
 @pytest.mark.parametrize("profile", PROFILES, ids=lambda profile: profile.__name__)
 def test_the_bound_contains_the_truth_on_any_link(profile: Profile) -> None:
-    """Over half a minute of waves and twenty seconds of silence, however unequal and changing the ways, no error exceeds the bound."""
+    """Over half a minute of waves and twenty seconds of silence, no error exceeds the bound, however unequal and changeable the two directions are."""
     for seed in range(6):
         chance = random.Random(seed)
         clocks = DriftingClocks(chance, PPM_PER_MINUTE)
@@ -108,7 +108,7 @@ def test_the_bound_contains_the_truth_on_any_link(profile: Profile) -> None:
 def test_no_delays_whatever_break_the_bound(
     seed: int, board_start_ns: int, skew: Fraction, delays: list[tuple[int, int, int]]
 ) -> None:
-    """Any chosen delays and pauses: the true offset stays within the bound after every echo, and no echo counts as a contradiction."""
+    """With any delays and pauses the true offset stays within the bound after every echo, and no echo counts as a contradiction."""
     chance = random.Random(seed)
     clocks = TwoClocks(board_start_ns, skew)
     estimator, host_ns, lowest_rtt_ns = ClockEstimator(), START_NS, 2**62
@@ -127,7 +127,7 @@ def test_no_delays_whatever_break_the_bound(
 
 
 def test_a_single_false_echo_is_an_excursion() -> None:
-    """An echo that contradicts all others is believed only until the next one; then the estimate is what it was before."""
+    """An echo that contradicts all others has no lasting effect: after the next wave the estimate is what it was before."""
     clocks, chance = TwoClocks(START_NS, Fraction(30, 10**6)), random.Random(5)
     estimator = ClockEstimator()
     host_ns = behind_ns = START_NS
@@ -172,6 +172,6 @@ def test_the_skew_survives_a_jump() -> None:
 
 
 def test_old_facts_fade() -> None:
-    """After the time in which the skew may have changed by s the offset a minute back says nothing more exact than s times that minute, halved."""
+    """If the skew may have changed by s within a minute, the offset a minute ago is known no more exactly than s times that minute, halved."""
     assert widening_ns(60e9) == pytest.approx(SKEW_CHANGE * 60e9 * 60e9 / 2)
     assert widening_ns(-60e9) == widening_ns(60e9) == pytest.approx(30_000)

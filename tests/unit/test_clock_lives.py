@@ -1,4 +1,4 @@
-"""What befalls clocks in their lives: a board that boots anew, machines that sleep with an echo under way, crystals that warm up, liars."""
+"""What happens to clocks during their lives: boards that reboot, machines that sleep with an echo under way, crystals that warm up, liars."""
 
 import random
 from fractions import Fraction
@@ -30,7 +30,7 @@ def moved(clocks: TwoClocks, jump_ns: int) -> TwoClocks:
 
 @pytest.mark.parametrize("uptime_ns", [0, 20 * SECOND_NS])
 def test_a_board_that_booted_anew(uptime_ns: int) -> None:
-    """A clock that begins at 0 again, after a pause of a minute, is known with the third wave, even if nobody told of the boot."""
+    """A clock that starts at 0 again after a pause of a minute is known with the third wave, even if nobody reported the boot."""
     estimator, clocks, chance = learnt(1)
     booted = TwoClocks(uptime_ns - 60 * SECOND_NS - LEARN_S * SECOND_NS, clocks.skew)
     errors = run(estimator, booted, chance, from_ns=(LEARN_S + 60) * SECOND_NS, seconds=5, doubtful_waves=2)
@@ -39,7 +39,7 @@ def test_a_board_that_booted_anew(uptime_ns: int) -> None:
 
 @pytest.mark.parametrize("asleep_s", [0.5, 30, 8 * 3600])
 def test_a_host_that_slept_with_an_echo_under_way(asleep_s: float) -> None:
-    """CLOCK_MONOTONIC stands still in sleep: the answer that waited looks swift and is right; all that follow show the board further on."""
+    """CLOCK_MONOTONIC stands still in sleep: the answer that waited looks swift and is right; all later ones show the board further ahead."""
     estimator, clocks, chance = learnt(2)
     estimator.add(
         Echo(
@@ -57,7 +57,7 @@ def test_a_host_that_slept_with_an_echo_under_way(asleep_s: float) -> None:
 
 @pytest.mark.parametrize("asleep_s", [0.5, 30, 8 * 3600])
 def test_a_board_that_slept_with_an_echo_under_way(asleep_s: float) -> None:
-    """The echo whose answer waited for the board's waking took long and says little; three waves after it show the board behind."""
+    """An echo whose answer waited for the board to wake took long and says little; three waves later the board is known to be behind."""
     estimator, clocks, chance = learnt(3)
     asleep_ns = round(asleep_s * SECOND_NS)
     woken = moved(clocks, -asleep_ns)
@@ -71,7 +71,7 @@ def test_a_board_that_slept_with_an_echo_under_way(asleep_s: float) -> None:
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_echoes_that_took_long_spoil_nothing(share: float) -> None:
-    """Whatever part of the echoes is held up for up to two seconds, on the way back only, the error stays that of the swift ones."""
+    """Whatever share of the echoes is held up on the way back by up to two seconds, the error stays that of the swift ones."""
     estimator, chance = ClockEstimator(), random.Random(4)
     clocks, host_ns, errors = TwoClocks(START_NS, Fraction(70, 10**6)), START_NS, []
     for number in range(160):
@@ -92,7 +92,7 @@ def test_echoes_that_took_long_spoil_nothing(share: float) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("profile", [loopback, wifi, loaded_line(8e6, 0.3 * MS, 0.125 * MS)])
 def test_crystals_that_warm_up(profile: Profile) -> None:
-    """Skews to 97 ppm that change by up to 1 ppm a minute: over ten links of a minute each the stated uncertainty holds in 99 %, the bound always."""
+    """With skews up to 97 ppm that change by up to 1 ppm a minute, over ten links of a minute each, the stated uncertainty holds in 99 %, the bound always."""
     outside = samples = 0
     for seed in range(10):
         chance = random.Random(seed)

@@ -1,4 +1,4 @@
-"""What is decided where echoes contradict each other, or tell of nothing: one clock over one link, over several, and the border that goes by them."""
+"""Decisions when echoes contradict each other or say nothing: one clock over one link, over several, and the border that relies on them."""
 
 import random
 from dataclasses import replace
@@ -23,13 +23,13 @@ SAME = TwoClocks(START_NS, Fraction(0))
 
 
 def echo(wave: int, at_ns: int, there_ns: int, back_ns: int, off_ns: int = 0) -> Echo:
-    """An echo between clocks that agree, but for a board that says to be `off_ns` ahead; it took so long there and back."""
+    """An echo between clocks that agree, except that the board claims to be `off_ns` ahead; with these delays there and back."""
     board_ns = at_ns + there_ns + off_ns
     return Echo(wave=wave, t0_ns=at_ns, t1_ns=board_ns, t2_ns=board_ns, t3_ns=at_ns + there_ns + back_ns)
 
 
 def learnt() -> tuple[ClockEstimator, int]:
-    """An estimator that has known two equal clocks for ten seconds, to 0.1 ms; and when that was."""
+    """An estimator that has known two equal clocks for ten seconds, to 0.1 ms; and the time at the end."""
     estimator, chance = ClockEstimator(), random.Random(1)
     for number in range(40):
         for one in SAME.wave(number, START_NS + number * 250 * MS, chance, least_ns=100_000, jitter_ns=50_000)[0]:
@@ -38,7 +38,7 @@ def learnt() -> tuple[ClockEstimator, int]:
 
 
 def test_slow_echoes_vote_a_lie_down() -> None:
-    """One echo that is 6 ms off ends the estimate; slow ones that fit it as well as the truth, but whose middle is the truth, bring that back with their second wave."""
+    """One echo that is 6 ms off ends the estimate. Slow echoes fit it as well as they fit the truth, but their middle is the truth, and the second of their waves restores it."""
     estimator, now_ns = learnt()
     lie = echo(100, now_ns, 100_000, 100_000, off_ns=6 * MS)
     slow = [echo(101 + k, now_ns + (k + 1) * 50 * MS, 20 * MS, 20 * MS) for k in range(2)]
@@ -50,7 +50,7 @@ def test_slow_echoes_vote_a_lie_down() -> None:
 
 
 def test_facts_that_fit_one_by_one_and_not_together_begin_anew() -> None:
-    """An echo that the board kept for two minutes, at one edge of the possible when it came and at the other when it left, fits no steady clock: only it is believed."""
+    """An echo that the board kept for two minutes, at one edge of the possible when it came and at the other when it left, fits no steady clock: then only that echo is believed."""
     clocks, estimator, chance = TwoClocks(START_NS, Fraction(-350, 10**6)), ClockEstimator(), random.Random(2)
     for number in range(5):
         for one in clocks.wave(number, START_NS + number * 250 * MS, chance, least_ns=50_000, jitter_ns=0)[0]:
@@ -68,7 +68,7 @@ def test_facts_that_fit_one_by_one_and_not_together_begin_anew() -> None:
 
 
 def test_the_only_line_that_fits_all_facts_is_the_answer() -> None:
-    """Facts above and below that touch at two moments leave one line alone: through (-1 s, 3 us) and (0, 5 us), 2 ppm."""
+    """Facts above and below that touch at two moments leave a single line: through (-1 s, 3 us) and (0, 5 us), 2 ppm."""
     points = [(-1e9, 3000.0), (0.0, 5000.0)]
     rows = allowed_lines(points, [(age, -value) for age, value in points], 0.0)
     belief = believe(rows, Spacing(1000.0, 1000.0, 5), -SECOND_NS / 2, 0.0)
@@ -77,7 +77,7 @@ def test_the_only_line_that_fits_all_facts_is_the_answer() -> None:
 
 
 def test_an_echo_that_runs_backwards_is_none() -> None:
-    """Where the first thing heard cannot be an echo nothing is known over any link, and nothing is in doubt; an honest one then gives the estimate."""
+    """If the first thing heard cannot be an echo, nothing is known over any link and nothing is in doubt; an honest echo then gives the estimate."""
     clocks = LinkClocks(2)
     bad = replace(echo(1, START_NS, MS, MS), t2_ns=START_NS)
     assert clocks.add(bad) is Heard.NOTHING
@@ -101,7 +101,7 @@ class Gate:
         self.wave = 0
 
     def learn(self, link: int, off_ns: int = 0, waves: int = 1) -> list[Admitted]:
-        """Waves of echoes over a link, 50 ms apart, 0.1 ms each way; gives the frames that they prove."""
+        """Hear waves of echoes over a link, 50 ms apart, 0.1 ms each way; return the frames that they prove."""
         proven = []
         for _ in range(waves):
             self.now_ns += 50 * MS
@@ -121,12 +121,12 @@ class Gate:
         )
 
     def show(self) -> int:
-        """A frame comes; gives how many pass, now or with the echo behind it."""
+        """Let a frame come; return how many pass, now or with the echo behind it."""
         return len(self.border.admit(self.arrival()) + self.learn(0))
 
 
 def test_a_frame_before_the_first_echo_is_counted_by_itself() -> None:
-    """What comes before anything is known of the clock is dropped and counted as that, not as disbelieved."""
+    """A frame that comes before anything is known of the clock is dropped and counted as such, not as disbelieved."""
     gate = Gate()
     assert gate.border.admit(gate.arrival()) == []
     assert (gate.account.no_clock, gate.account.disbelieved.total()) == (1, 0)
@@ -135,7 +135,7 @@ def test_a_frame_before_the_first_echo_is_counted_by_itself() -> None:
 
 
 def test_a_board_that_boots_while_its_clock_is_in_doubt_leaves_suspects() -> None:
-    """The doubt of a clock that is gone is never decided: frames that passed after the last echo that agreed are named as suspect."""
+    """The doubt about a clock that is gone is never settled: frames that passed after the last echo that agreed are named as suspect."""
     gate = Gate()
     gate.learn(0, waves=5)
     gate.border.passed(gate.arrival().frame)
@@ -147,7 +147,7 @@ def test_a_board_that_boots_while_its_clock_is_in_doubt_leaves_suspects() -> Non
 
 
 def test_while_one_link_is_in_doubt_an_echo_of_the_other_proves_nothing() -> None:
-    """A frame passes over neither link before the link that contradicted itself has said which of its echoes lied."""
+    """While a link contradicts itself no frame passes over either link, until the first one has said which of its echoes lied."""
     gate = Gate()
     for link in (0, 1):
         gate.learn(link, waves=5)

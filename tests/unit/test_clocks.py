@@ -1,4 +1,4 @@
-"""One clock estimate of several links: the hard bound holds and is never wider than any link's own, and the loss of the best link is survived."""
+"""One clock estimate from several links: the hard bound holds, is never wider than any single link's, and survives the loss of the best link."""
 
 import random
 from collections.abc import Iterator
@@ -74,7 +74,7 @@ def test_the_bound_is_that_of_all_links_and_holds(profiles: tuple[Profile, ...])
 @pytest.mark.parametrize("runs", [8, pytest.param(100, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("second", [SERIAL, wifi], ids=["serial", "wifi"])
 def test_the_uncertainty_holds_beside_a_slow_link_and_after_the_swift_one(second: Profile, runs: int) -> None:
-    """Of nearly symmetric links the stated 99.9 % hold while both are there and after the swift one is lost; what it taught is kept."""
+    """On nearly symmetric links the stated 99.9 % hold while both are up and after the swift one is lost; what that one taught is kept."""
     errors: list[bool] = []
     for seed in range(runs):
         chance = random.Random(100 + seed)
@@ -99,7 +99,7 @@ def test_the_uncertainty_holds_beside_a_slow_link_and_after_the_swift_one(second
 
 
 def known_over_two_links(seed: int) -> tuple[LinkClocks, DriftingClocks, int]:
-    """Two clocks well known over loopback and Wi-Fi, and the host's time then."""
+    """Two clocks well known over loopback and Wi-Fi, and the host's time afterwards."""
     chance = random.Random(seed)
     clocks, together = DriftingClocks(chance, PPM_PER_MINUTE), LinkClocks(2)
     for _, echoes in mixed(clocks, (loopback, wifi), chance, 5):
@@ -116,7 +116,7 @@ def echo_at(clocks: DriftingClocks, host_ns: int, wave: int, link: int, jump_ns:
 
 
 def test_a_jump_that_one_link_confirms_is_one_for_all() -> None:
-    """After a clock jumped by 3 s nothing is known until three waves over the link that is heard agree, though the other one swears by the old time."""
+    """After a clock has jumped by 3 s nothing is known until three waves agree over the link that is heard, though the other link still stands by the old time."""
     together, clocks, host_ns = known_over_two_links(7)
     jump_ns = 3 * SECOND_NS
     heard = [together.add(echo_at(clocks, host_ns + wave * 50 * MS, 10**6 + wave, 1, jump_ns)) for wave in range(3)]
@@ -128,7 +128,7 @@ def test_a_jump_that_one_link_confirms_is_one_for_all() -> None:
 
 
 def test_a_new_link_that_lies_is_not_believed() -> None:
-    """A link that was not heard before and says otherwise leaves all in doubt; the other link's next word ends it."""
+    """A link that was not heard before and contradicts the others puts everything in doubt; the other link's next echo ends the doubt."""
     together, clocks, host_ns = known_over_two_links(8)
     together.void()
     assert together.in_doubt
@@ -146,7 +146,7 @@ def test_a_new_link_that_lies_is_not_believed() -> None:
 
 
 def test_a_doubt_goes_with_the_link_that_could_settle_it() -> None:
-    """Where the link that contradicted goes down the other one's knowledge counts again with its next word."""
+    """When the link that contradicted goes down, the other link's knowledge counts again with its next echo."""
     together, clocks, host_ns = known_over_two_links(9)
     assert together.add(echo_at(clocks, host_ns, 10**6, 1, SECOND_NS)) is Heard.DOUBTED
     together.down(1)
@@ -155,7 +155,7 @@ def test_a_doubt_goes_with_the_link_that_could_settle_it() -> None:
 
 
 def test_an_estimate_told_at_another_moment_says_no_more_than_before() -> None:
-    """Moving an estimate to another moment narrows neither its limits nor its uncertainty, wherever one looks."""
+    """Moving an estimate to another moment narrows neither its limits nor its uncertainty at any time."""
     chance = random.Random(3)
     clocks = DriftingClocks(chance, PPM_PER_MINUTE)
     estimator = ClockEstimator()
@@ -175,7 +175,7 @@ def test_an_estimate_told_at_another_moment_says_no_more_than_before() -> None:
 
 
 def test_a_link_that_goes_takes_its_doubt_along() -> None:
-    """A doubt that only one link's echoes could settle ends with the link: the next echo of any other decides."""
+    """A doubt that only one link's echoes could settle ends when that link goes down: the next echo of any other decides."""
     chance = random.Random(3)
     clocks = DriftingClocks(chance, PPM_PER_MINUTE)
     together = LinkClocks(2)

@@ -1,4 +1,4 @@
-"""What all commands do alike: errors are one line, wherever they come from."""
+"""What all commands have in common: errors are one line, wherever they come from."""
 
 import errno
 from argparse import Namespace
@@ -32,7 +32,7 @@ def sample() -> ExamplesFirstParser:
 def test_wrong_usage_is_one_line_and_exit_2(
     arguments: list[str], start: str, culprit: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The command's and a verb's own errors are one line on stderr that names the culprit, without the usage."""
+    """Errors of the command or of a verb are one line on stderr that names the culprit, without the usage."""
     with pytest.raises(SystemExit) as caught:
         sample().parse_args(arguments)
     assert caught.value.code == 2
@@ -69,7 +69,7 @@ def failing(error: BaseException) -> Callable[[Namespace], int]:
 def test_errors_are_one_line_and_their_exit_code(
     error: BaseException, code: int, line: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Each error of the tree and Ctrl-C is one line on stderr with its exit code."""
+    """Each error class, and Ctrl-C, gives one line on stderr and its exit code."""
     assert run(failing(error)) == code
     assert capsys.readouterr().err == line
 
@@ -89,7 +89,7 @@ def test_debug_shows_the_traceback() -> None:
 
 
 def test_an_error_that_is_not_stdouts_is_not_called_so() -> None:
-    """An OSError about a file is a gap in our code and stays one."""
+    """An OSError about a file is a bug in our code and stays one."""
     with pytest.raises(OSError, match="No space"):
         run(failing(OSError(errno.ENOSPC, "No space left on device", "cloud.ply")))
 
@@ -106,7 +106,7 @@ def test_an_error_that_is_not_stdouts_is_not_called_so() -> None:
     ],
 )
 def test_a_mistake_of_typing_is_named(arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """The line says which word is wrong and, if one is near, what was probably meant."""
+    """The line says which word is wrong and, if a known one is close, what was probably meant."""
     with pytest.raises(SystemExit):
         sample().parse_args(arguments)
     assert told in capsys.readouterr().err

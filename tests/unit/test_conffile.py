@@ -1,4 +1,4 @@
-"""The package's settings file: all that may be set, each with its comment, and nothing that board-agent would refuse."""
+"""The package's settings file: every setting with its comment, and nothing that board-agent would refuse."""
 
 import re
 from dataclasses import fields
@@ -21,7 +21,7 @@ def test_every_setting_stands_there_with_a_comment_above() -> None:
 
 
 def test_its_values_and_examples_are_understood() -> None:
-    """The values and each quoted URI in the comments are accepted; as delivered nobody outside the machine gets in."""
+    """The values and every quoted URI in the comments are accepted; as delivered, nobody outside the machine gets in."""
     settings = resolve(BoardSettings, ENVIRONMENT_PREFIX, CONFFILE, {}).values
     assert not any(needs_keys(parse_link(uri, listens_by_default=True)) for uri in settings.link)
     quoted = re.findall(r'"([^"\s]+:[^"\s]+)"', CONFFILE.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Corrections of a camera's phase come through whole, however the threads that order and carry them out fall."""
+"""No correction of a camera's phase is lost, however the ordering threads and the executing threads interleave."""
 
 import sys
 import threading
@@ -29,12 +29,12 @@ from tests.support.session_world import CAMERA
 
 ORDERS = 2000
 LAST_NS = 1_000_000
-"""More than all other orders together, so that its coming is seen; and less than the camera's period."""
+"""More than all other orders together, so that its arrival is seen; and less than the camera's period."""
 
 
 @pytest.fixture(autouse=True)
 def eager() -> Iterator[None]:
-    """Threads take turns as often as they can."""
+    """Make threads switch as often as they can."""
     usual_s = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
     yield
@@ -56,7 +56,7 @@ def hammer(order: Callable[[int], None], threads: int = 3) -> None:
 
 
 class Steered(threading.Thread):
-    """A board that a host steers: it answers as a board does, and adds up what it is told.
+    """A board that a host steers: it answers as a board does, and adds up the corrections it gets.
 
     Args:
         address: to listen at.
@@ -97,7 +97,7 @@ class Steered(threading.Thread):
 
 
 def test_what_is_added_is_taken_once() -> None:
-    """While three threads order and a fourth takes, the sum of what is taken is the sum of what was ordered."""
+    """While three threads order and a fourth takes, the sum taken equals the sum ordered."""
     corrections, taken, done = Corrections(), [0], threading.Event()
 
     def take() -> None:
@@ -113,7 +113,7 @@ def test_what_is_added_is_taken_once() -> None:
 
 
 def test_no_order_to_the_board_is_lost(tmp_path: Path) -> None:
-    """All that threads order of a receiver that is at work arrives at the board, each order once, in however many messages."""
+    """Everything that threads order of a running receiver reaches the board, each order once, in any number of messages."""
     address = f"ipc://{tmp_path}/board"
     board = Steered(address)
     receiver = Receiver([open_link(parse_link(address, listens_by_default=False))], "host", NoFrames())
@@ -131,7 +131,7 @@ def test_no_order_to_the_board_is_lost(tmp_path: Path) -> None:
 
 
 def test_an_order_waits_for_a_link(tmp_path: Path) -> None:
-    """What is ordered before a link carries frames is carried out when one does."""
+    """An order given before a link carries frames is carried out once one does."""
     address = f"ipc://{tmp_path}/board"
     receiver = Receiver([open_link(parse_link(address, listens_by_default=False))], "host", NoFrames())
     receiver.steer(LAST_NS)
@@ -147,7 +147,7 @@ def test_an_order_waits_for_a_link(tmp_path: Path) -> None:
 
 
 def test_two_orders_in_a_row_are_one_of_their_sum(tmp_path: Path) -> None:
-    """An order that comes before the one before it was carried out does not take its place: the own camera exposes later by both."""
+    """An order given before the previous one was carried out does not replace it: the host camera exposes later by both."""
     (tmp_path / "0.jpg").write_bytes(jpeg())
     start_ns, frames = now.monotonic_ns(), list[Frame]()
     camera = ReplayCamera(ReplaySettings(path=str(tmp_path), fps=Fraction(20), loop=True), start_ns)

@@ -44,24 +44,24 @@ def series(values: list[int]) -> Series:
 @given(st.lists(st.integers(-(2**50), 2**50), min_size=2, max_size=300))
 @settings(deadline=None)
 def test_short_series_are_exact(values: list[int]) -> None:
-    """Count, greatest, mean and median are those of all values, and so are the percentiles."""
+    """Count, greatest, mean, median and percentiles are those of all values."""
     spread = series(values).spread()
     assert (spread.count, spread.max_ns) == (len(values), max(values))
     assert spread.mean_ns == pytest.approx(statistics.fmean(values), rel=1e-12, abs=1e-3)
     assert spread.p50_ns == pytest.approx(statistics.median(values))
-    # Python's own percentiles: the 19th of 19 points that cut the values in 20 parts of one size, and the 99th of 99.
+    # Python's own percentiles: the 19th of 19 points that cut the values into 20 equal parts, and the 99th of 99.
     assert spread.p95_ns == pytest.approx(statistics.quantiles(values, n=20, method="inclusive")[18])
     assert spread.p99_ns == pytest.approx(statistics.quantiles(values, n=100, method="inclusive")[98])
 
 
 def test_the_percentiles_of_a_known_series() -> None:
-    """Of 1 to 101 the median is 51, 95 % lie up to 96, and 99 % up to 100, whatever their order."""
+    """For 1 to 101 in any order the median is 51, 95 % lie up to 96, and 99 % up to 100."""
     spread = series([(10 * i) % 101 + 1 for i in range(101)]).spread()  # 101 is prime: each number once
     assert (spread.p50_ns, spread.p95_ns, spread.p99_ns, spread.max_ns, spread.mean_ns) == (51, 96, 100, 101, 51)
 
 
 def test_percentiles_are_exact_up_to_the_stated_length() -> None:
-    """Of 65536 values that are 0 to 65535 in some order the median lies between 32767 and 32768, and 99 % up to 64879.65."""
+    """For the 65536 values 0 to 65535 in some order the median lies between 32767 and 32768, and 99 % lie up to 64879.65."""
     values = [(7919 * i) % 65536 for i in range(65536)]  # 7919 is odd: each number once
     spread = series(values).spread()
     assert spread.p50_ns == 32767.5
@@ -69,8 +69,8 @@ def test_percentiles_are_exact_up_to_the_stated_length() -> None:
 
 
 def test_a_long_series_is_thinned_evenly() -> None:
-    """Beyond EXACT, memory stays bounded, count, mean and greatest stay exact, and percentiles of a smooth series are within 1 %."""
-    # 0 to 299 999 in an order that no stride of the thinning follows (a prime, and no divisor of the length), and one giant.
+    """Beyond EXACT memory stays bounded; count, mean and greatest stay exact; percentiles of a smooth series are within 1 %."""
+    # 0 to 299 999 in an order that no stride of the thinning follows (a prime that does not divide the length), and one giant.
     count = 300_000
     values = [1_000_000 + (104_729 * i) % count for i in range(count)]
     values[12345] = 10**12
@@ -85,7 +85,7 @@ def test_a_long_series_is_thinned_evenly() -> None:
 
 @pytest.mark.parametrize("count", [1, 50, EXACT, 2 * EXACT, 5 * EXACT])
 def test_the_last_values_are_the_newest(count: int) -> None:
-    """The spread of the last 30 values of a rising series is about the newest 30, however long the series is."""
+    """The spread of the last 30 values of a rising series covers about the newest 30, however long the series is."""
     newest = range(max(0, count - 30), count)
     filled = series(list(range(count)))
     spread = filled.spread(last=30)
@@ -95,7 +95,7 @@ def test_the_last_values_are_the_newest(count: int) -> None:
 
 
 def test_nothing_measured_is_nan() -> None:
-    """An empty series has no values, not zeros."""
+    """An empty series has no values rather than zeros."""
     spread = Series().spread()
     assert spread.count == 0
     assert all(math.isnan(value) for value in (spread.p50_ns, spread.p99_ns, spread.max_ns, spread.mean_ns))
@@ -115,7 +115,7 @@ def test_each_delay_of_a_ledger_reaches_its_series() -> None:
 
 @pytest.mark.parametrize("count", [1, SAMPLE, SAMPLE + 1, 3 * SAMPLE])
 def test_a_sample_is_even_and_bounded(count: int) -> None:
-    """Of however many ledgers at most SAMPLE are kept, the first among them, at one distance from each other."""
+    """However many ledgers come, at most SAMPLE are kept, evenly spaced and with the first among them."""
     sample = Sample()
     for number in range(count):
         sample.add(replace(LEDGER, sequence=number))
@@ -127,7 +127,7 @@ def test_a_sample_is_even_and_bounded(count: int) -> None:
 
 
 def test_the_mean_length_of_the_frames_needs_a_frame() -> None:
-    """Frames of 100 and 300 bytes have 200 in the mean; without any the mean is not known."""
+    """Frames of 100 and 300 bytes have a mean of 200; without frames the mean is not known."""
     statistic = DelayStatistics()
     assert math.isnan(statistic.frame_bytes)
     for size in (100, 300):
@@ -136,7 +136,7 @@ def test_the_mean_length_of_the_frames_needs_a_frame() -> None:
 
 
 def test_a_copy_stays_as_it_was() -> None:
-    """What is added afterwards does not reach a copy of the statistics, of however many values."""
+    """Values added later do not reach a copy of the statistics, however many there are."""
     statistic = DelayStatistics()
     for number in range(1, 4):
         statistic.add(replace(LEDGER, uncertainty_ns=number))
@@ -148,7 +148,7 @@ def test_a_copy_stays_as_it_was() -> None:
     assert copied.spread("capture").count == 3
     assert copied.frame_bytes == 9
     assert statistic.spread("uncertainty").p50_ns == 1000
-    one = series([1, 2, 3])  # of what all the statistics are made: thinned, after it was copied
+    one = series([1, 2, 3])  # the part of which all statistics are made: thinned after it was copied
     copied_one = one.copy()
     for _ in range(EXACT + 1):
         one.add(1000)

@@ -1,4 +1,4 @@
-"""Pacing by demand: every image is asked for by the frame that it belongs to, and labels are compared with labels only."""
+"""Pacing by demand: every image is asked for by the frame that it belongs to, and labels are compared only with labels."""
 
 import threading
 
@@ -10,7 +10,7 @@ from phone_host.stream.demand_clock import DemandClock
 
 
 class Shown:
-    """An own camera that notes what it is told to show."""
+    """A host camera that notes what it is told to show."""
 
     def __init__(self, demand: DemandClock) -> None:
         self._demand = demand
@@ -18,20 +18,20 @@ class Shown:
         self.images = 0
 
     def anchor(self, label_ns: int, number: int) -> None:
-        """Its next image is that one."""
+        """Set which image is next."""
         self.anchors.append((label_ns, number))
 
     def show(self) -> None:
-        """It shows its next image."""
+        """Show the next image."""
         self.images += 1
 
     def answer(self) -> None:
-        """Let it answer the oldest want."""
+        """Let it answer the oldest request."""
         self._demand.show_next(self.anchor, self.show)
 
 
 def test_images_of_one_number_belong_together() -> None:
-    """Beside a board that shows labels each image is the one of the frame's number: labels are set once, and again where a frame is missing."""
+    """Beside a board that shows labels each image is the one with the frame's number: labels are set once, and again after a missing frame."""
     demand = DemandClock(Pacing.DEMAND)
     shown = Shown(demand)
     demand.begin(Pacing.DEMAND)
@@ -43,7 +43,7 @@ def test_images_of_one_number_belong_together() -> None:
 
 
 def test_beside_a_clock_images_come_in_their_order() -> None:
-    """Beside a board with a clock the own camera shows its images from the first on, with labels from the first frame's stamp on."""
+    """Beside a board with a clock the host camera shows its images from the first one on, with labels that start at the first frame's stamp."""
     demand = DemandClock(Pacing.DEMAND)
     shown = Shown(demand)
     demand.begin(Pacing.CLOCK)
@@ -55,7 +55,7 @@ def test_beside_a_clock_images_come_in_their_order() -> None:
 
 
 def test_nothing_asked_for_before_a_new_life_comes_after_it() -> None:
-    """A board that begins anew with image 0 finds image 0: wants of the life before are let go."""
+    """A board that starts again with image 0 gets image 0: requests from the previous life are dropped."""
     demand = DemandClock(Pacing.DEMAND)
     shown = Shown(demand)
     demand.begin(Pacing.DEMAND)
@@ -72,7 +72,7 @@ def test_nothing_asked_for_before_a_new_life_comes_after_it() -> None:
 
 
 def test_a_new_life_waits_for_the_image_that_is_being_shown() -> None:
-    """The image in hand is delivered before the new life begins, not into it."""
+    """The image in hand is delivered before the new life begins, not during it."""
     demand = DemandClock(Pacing.DEMAND)
     demand.begin(Pacing.DEMAND)
     order: list[str] = []
@@ -100,7 +100,7 @@ def test_a_new_life_waits_for_the_image_that_is_being_shown() -> None:
 
 
 def test_a_camera_with_a_clock_is_asked_for_nothing() -> None:
-    """Frames of any board leave an own camera with a clock alone; `wake` alone ends its wait."""
+    """Frames of any board leave a host camera with a clock alone; only `wake` ends its wait."""
     demand = DemandClock(Pacing.CLOCK)
     shown = Shown(demand)
     demand.begin(Pacing.CLOCK)
@@ -122,7 +122,7 @@ def test_a_camera_with_a_clock_is_asked_for_nothing() -> None:
 def test_what_stamps_mean(
     *, own: Pacing, board: Pacing, paces_own: bool, labels: bool, timeless: bool, one_sided: bool
 ) -> None:
-    """One camera on demand is enough for stamps that no clock can judge; a board's labels need an own camera that follows them."""
+    """One camera on demand is enough to make stamps that no clock can judge; a board's labels need a host camera that follows them."""
     demand = DemandClock(own)
     demand.begin(board)
     told = (demand.paces_own_camera, demand.labels_board, demand.is_timeless, demand.is_one_sided)
@@ -130,7 +130,7 @@ def test_what_stamps_mean(
 
 
 def test_labels_of_a_life_go_by_its_first_offset() -> None:
-    """A better estimate of the clock moves no label, and the next life's labels go by an offset of their own; times move with the estimate."""
+    """A better estimate of the clock moves no label, and the next life's labels use their own offset; times move with the estimate."""
     demand = DemandClock(Pacing.DEMAND)
     for first_ns in (5 * MS, -3 * MS):
         demand.begin(Pacing.DEMAND)

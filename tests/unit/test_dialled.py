@@ -1,4 +1,4 @@
-"""A connection that is dialled: its news wakes who waits for them, whenever they came."""
+"""A dialled connection: its news wakes whoever waits for it, whenever the news came."""
 
 import socket
 from pathlib import Path
@@ -17,12 +17,12 @@ NEVER = 2**63 - 1
 
 
 def test_news_from_before_the_first_wait_wakes_who_waits() -> None:
-    """A peer that hung up before anybody waited is told of by the descriptor of the monitor alone."""
+    """If a peer hung up before anybody waited, the monitor's descriptor alone reports it."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     with socket.create_server(("127.0.0.1", 0)) as server:
         sock = context.socket(zmq.DEALER)
         dialled = Dialled(sock, f"tcp://127.0.0.1:{server.getsockname()[1]}", "", "frames")
-        for _ in range(3):  # who dials again has written down that the one before was no good
+        for _ in range(3):  # a client that dials again has noted that the previous connection failed
             accepted, _ = server.accept()
             with accepted:
                 accepted.recv(64)
@@ -34,7 +34,7 @@ def test_news_from_before_the_first_wait_wakes_who_waits() -> None:
 
 
 def test_both_lanes_of_a_link_that_is_refused_are_dialled_again(tmp_path: Path) -> None:
-    """When both lanes have been turned away by the time anybody looks, who waits on descriptors alone learns of both, so both are dialled again."""
+    """When both lanes were turned away before anybody looked, a waiter on descriptors alone learns of both, so both are dialled again."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     open_door = context.socket(zmq.ROUTER)
     address = f"tcp://127.0.0.1:{open_door.bind_to_random_port('tcp://127.0.0.1')}"
@@ -55,7 +55,7 @@ def test_both_lanes_of_a_link_that_is_refused_are_dialled_again(tmp_path: Path) 
 
 
 def receive(dialler: ZeroMqDialer) -> int:
-    """Look once; how many refusals that told, one or none."""
+    """Look once; return how many refusals were reported, one or none."""
     try:
         assert not [incoming for incoming in dialler.receive() if not isinstance(incoming, Broken)]
     except UnavailableError:

@@ -28,7 +28,7 @@ _COMMANDS = documented()
 
 @pytest.mark.parametrize("command", _COMMANDS, ids=lambda command: f"{command.page} {command.line}"[:90])
 def test_every_command_line_is_one_that_the_program_takes(command: Command) -> None:
-    """The real parser takes it; what only names a verb names one that there is."""
+    """The real parser accepts it; text that only names a verb names an existing one."""
     parser = _PARSERS[command.words[0]]()
     if command.is_mention:
         assert set(command.named[1:]) <= _verbs(parser)
@@ -37,7 +37,7 @@ def test_every_command_line_is_one_that_the_program_takes(command: Command) -> N
 
 
 def test_the_pages_are_read() -> None:
-    """Each page of the first steps has command lines, so that a change of their layout does not empty the test above."""
+    """Each page of the first steps has command lines, so that a change of layout cannot empty the test above."""
     counts = {
         page.name: sum(command.page.startswith(str(page.relative_to(ROOT))) for command in _COMMANDS)
         for page in pages()
@@ -47,13 +47,13 @@ def test_the_pages_are_read() -> None:
 
 
 def test_every_error_stands_in_troubleshooting_with_its_remedy() -> None:
-    """No message is unreadable for the page's maker, and the page is the one that the code makes today (`make docs` writes it)."""
+    """The page's maker can read every message, and the page is the one that today's code gives (`make docs` writes it)."""
     assert troubleshooting.unresolved(_CODE) == []
     assert troubleshooting.PAGE.read_text(encoding="utf-8") == troubleshooting.page(_CODE)
 
 
 def test_troubleshooting_misses_no_error() -> None:
-    """As many messages as there are calls that make errors: counted in the source text, not in the tree that the page is made of."""
+    """There are as many messages as calls that make errors, counted in the source text, not in the tree that the page is made from."""
     raised = re.compile(rf"\b({'|'.join(_CODE.errors)})\(\n?\s*[^)\s]")
     in_text = sum(len(raised.findall(path.read_text(encoding="utf-8"))) for path in troubleshooting.packages())
     rows = [
@@ -66,7 +66,7 @@ def test_troubleshooting_misses_no_error() -> None:
 
 
 def test_every_key_of_our_files_is_described(tmp_path: Path) -> None:
-    """Each key of a rig.yaml and of a line of delays.jsonl stands in the page of file formats."""
+    """Each key of a rig.yaml and of a line of delays.jsonl is on the page of file formats."""
     described = set(re.findall(r"`(\w+)`", (ROOT / "docs" / "files.md").read_text(encoding="utf-8")))
     rig = unlike_rig()
     write_rig(tmp_path / "rig.yaml", rig, rectify_rig(rig))
@@ -77,7 +77,7 @@ def test_every_key_of_our_files_is_described(tmp_path: Path) -> None:
 
 
 def test_readme_is_one_screen() -> None:
-    """At most 120 lines of 120 characters and 900 words; every figure in it comes from the page of figures."""
+    """At most 120 lines of 120 characters, and 900 words; every figure in it comes from the page of figures."""
     lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
     assert len(lines) <= 120
     assert max(map(len, lines)) <= 120

@@ -73,7 +73,7 @@ def log(*texts: str) -> KernelLog:
 
 
 def test_every_finding_is_one_line_and_the_exit_code_follows_the_worst() -> None:
-    """A line each, remedy behind an arrow; only a failed check makes exit 4; the object counts both kinds."""
+    """Each finding has one line, with the remedy behind an arrow; only a failed check makes exit 4; the object counts both kinds."""
     findings = [ok("disk", "50 MB"), warn("usb-log", "a reset", "another cable")]
     assert table(findings).splitlines() == ["ok    disk     50 MB", "warn  usb-log  a reset -> another cable"]
     assert exit_code(findings) == 0
@@ -101,13 +101,13 @@ def test_every_finding_is_one_line_and_the_exit_code_follows_the_worst() -> None
     ],
 )
 def test_access_follows_owner_group_and_mode(node: Node, account: Account, *, may: bool) -> None:
-    """Who may read and write a node is what the kernel would say; for the user who asks the kernel was asked."""
+    """Who may read and write a node is judged as the kernel would judge it; for the user who asks, the kernel itself was asked."""
     assert may_open(node, account) is may
     assert check_access("permission", node, account).verdict is (OK if may else FAIL)
 
 
 def test_a_user_outside_the_group_is_told_to_join_and_a_changed_mode_is_named() -> None:
-    """Where the group would do, the remedy is usermod; where not even the group may, it is the node itself."""
+    """If the group has access, the remedy is usermod; if not even the group has, the remedy is for the node itself."""
     outside = check_access("permission", VIDEO, Account("pi", 1000, frozenset({1000}), is_me=False))
     assert "usermod -aG video pi" in outside.remedy
     shut = check_access(
@@ -117,7 +117,7 @@ def test_a_user_outside_the_group_is_told_to_join_and_a_changed_mode_is_named() 
 
 
 def test_an_absent_camera_is_told_from_one_without_driver() -> None:
-    """A camera that the USB bus sees and no driver has asks for the driver, no camera at all for one to be plugged in."""
+    """A camera that the USB bus sees without a driver needs the driver; no camera at all means that one must be plugged in."""
     assert "plug one in" in check_absence(0, ()).remedy
     driverless = check_absence(0, (UsbCamera("HD Cam", has_driver=False),))
     assert (driverless.verdict, "HD Cam" in driverless.text, "modprobe" in driverless.remedy) == (FAIL, True, True)
@@ -135,7 +135,7 @@ def test_an_absent_camera_is_told_from_one_without_driver() -> None:
     ],
 )
 def test_what_is_asked_is_held_against_the_offer(wanted: Wanted, verdict: Grade, word: str) -> None:
-    """An offered format is named; of one that is not the finding lists what is."""
+    """An offered format is named; for one that is not offered the finding lists those that are."""
     finding = check_format("/dev/video0", OFFERED, wanted)
     assert finding.verdict is verdict
     assert word in finding.text + finding.remedy
@@ -179,7 +179,7 @@ def test_a_second_of_frames_is_judged(sample: Sample, verdict: Grade, word: str)
 
 
 def test_stamps_and_refused_controls_have_lines_of_their_own() -> None:
-    """Stamps that cannot be true and controls that were refused are warnings; a camera without frames has neither line."""
+    """Impossible stamps and refused controls are warnings; a camera without frames has neither line."""
     assert [item.what for item in check_stream(SOUND)] == ["stream", "stamps"]
     doubtful = check_stream(replace(SOUND, distrusted=30, stamps=StampClock.UNKNOWN, driver="vivid", refused=2))
     assert [(item.what, item.verdict) for item in doubtful] == [("stream", OK), ("stamps", WARN), ("controls", WARN)]
@@ -204,7 +204,7 @@ AGENT, OTHER = Holder(412, "board-agent"), Holder(77, "motion")
 def test_a_taken_camera_is_judged_by_who_has_it(
     holders: tuple[Holder, ...], status: str, verdict: Grade, word: str, *, all_seen: bool
 ) -> None:
-    """Our own service may have it, if it streams; another program is named; what only root may see is said to be so."""
+    """Our own service may hold the camera if it streams; another program is named; what only root may see is reported as such."""
     finding = check_taken(holders, AGENT.pid, status, all_seen=all_seen)
     assert finding.verdict is verdict
     assert word in finding.text
@@ -225,7 +225,7 @@ def test_a_taken_camera_is_judged_by_who_has_it(
     ],
 )
 def test_a_link_is_judged_by_who_has_it(link: LinkReadings, verdict: Grade, word: str) -> None:
-    """Free, ours, another's, a getty's, the console's, or not to be had: each is told, and each fault has its remedy."""
+    """Free, ours, another's, a getty's, the console's, or unavailable: each is reported, and each fault has its remedy."""
     finding = check_link(link, AGENT.pid)
     assert finding.verdict is verdict
     assert word in finding.text + finding.remedy
@@ -242,7 +242,7 @@ def test_a_link_is_judged_by_who_has_it(link: LinkReadings, verdict: Grade, word
     ],
 )
 def test_a_full_or_read_only_disk_warns(disk: Disk, verdict: Grade) -> None:
-    """Frames need no disk, so nothing here fails; what is short is named."""
+    """Frames need no disk, so nothing here fails; the finding names what is short."""
     assert check_disk(disk).verdict is verdict
 
 
@@ -267,7 +267,7 @@ def test_a_full_or_read_only_disk_warns(disk: Disk, verdict: Grade) -> None:
 def test_power_is_judged_by_firmware_and_kernel_log(
     kernel: KernelLog, supply: Supply, verdict: Grade, word: str
 ) -> None:
-    """Too low now fails, too low before warns with how often and when; what may not be read is said to be so."""
+    """Too low now fails; too low earlier warns with how often and when; what may not be read is reported as such."""
     finding = check_power(kernel, supply)
     assert finding.verdict is verdict
     assert word in finding.text
@@ -285,12 +285,12 @@ def test_power_is_judged_by_firmware_and_kernel_log(
     ],
 )
 def test_usb_trouble_in_the_kernel_log_warns(text: str, verdict: Grade) -> None:
-    """Resets and errors warn; pulling a device is nobody's fault."""
+    """Resets and errors warn; unplugging a device is nobody's fault."""
     assert check_usb_log(log(text)).verdict is verdict
 
 
 def test_clocks() -> None:
-    """A coarse clock fails, a date before the program's own files warns, an unsynchronised one is no fault."""
+    """A coarse clock fails, a date before that of the program's own files warns, an unsynchronised clock is no fault."""
     good = Clocks(2e9, 1.7e9, synchronised=False, source="tsc", resolution_ns=1)
     assert [item.verdict for item in check_clocks(good)] == [OK, OK]
     assert "not synchronised" in check_clocks(good)[1].text
@@ -312,7 +312,7 @@ def test_clocks() -> None:
     ],
 )
 def test_bluetooth_fails_only_where_a_link_asks_for_it(bluetooth: Bluetooth, verdict: Grade, *, wanted: bool) -> None:
-    """Python's sockets, an adapter, and that it is switched on."""
+    """Python's sockets, an adapter, and whether it is switched on."""
     assert check_bluetooth(bluetooth, wanted=wanted).verdict is verdict
 
 
@@ -343,7 +343,7 @@ def unit(**fields: object) -> Unit:
     ],
 )
 def test_the_service_is_judged_by_its_state(state: Unit, verdict: Grade, word: str) -> None:
-    """A failing service fails with the way to its reason, a stopped one warns, none at all is fine."""
+    """A failing service fails and says how to find the reason, a stopped one warns, none at all is fine."""
     finding = check_unit(state)
     assert finding.verdict is verdict
     assert word in finding.text + finding.remedy
@@ -357,7 +357,7 @@ def test_exit_code_and_counts_agree(drawn: list[tuple[Grade, str]]) -> None:
 
 
 def test_keys_are_judged_without_making_any(tmp_path: Path) -> None:
-    """No folder and no host warn, a host is named, files of others and open ones fail; an absent key is not made by looking."""
+    """No folder and no host warn, a host is named, other people's and open files fail; looking does not create an absent key."""
     me = Account("me", os.geteuid(), frozenset(), is_me=True)
     folder = KeyFolder(tmp_path / "keys")
     assert check_keys(folder, me).verdict is Grade.WARN
@@ -380,7 +380,7 @@ def test_keys_are_judged_without_making_any(tmp_path: Path) -> None:
 
 
 def test_a_log_that_may_not_be_read_is_no_all_clear() -> None:
-    """Where only root may read the kernel's log the check of USB warns, and says how to ask again."""
+    """Where only root may read the kernel's log, the USB check warns and says how to ask again."""
     finding = check_usb_log(KernelLog(readable=False))
     assert (finding.verdict, finding.remedy) == (WARN, "ask again as root: sudo")
 

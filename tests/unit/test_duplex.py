@@ -22,7 +22,7 @@ RATES = {"115200 8N1": 11_520, "1.5 Mbit/s": 187_500, "gadget": 20_000_000}
 
 
 def line(bytes_per_s: float = 1e6, delay_ns: int = 300_000, chance: random.Random | None = None) -> VirtualLine:
-    """A line whose two ends have met; with a source of chance it spoils bytes from then on."""
+    """A line whose two ends have met; given a source of chance, it spoils bytes from then on."""
     made = VirtualLine.of(bytes_per_s, delay_ns)
     made.meet()
     if chance is not None:
@@ -32,7 +32,7 @@ def line(bytes_per_s: float = 1e6, delay_ns: int = 300_000, chance: random.Rando
 
 
 def spoiled(data: bytes, chance: random.Random) -> bytes:
-    """Now and then a flipped bit, a lost byte, some noise, or nothing at all of it."""
+    """Now and then flip a bit, lose a byte, add noise, or lose all of it."""
     kind = chance.random() * 600
     at = chance.randrange(len(data))
     if kind < 1:
@@ -80,7 +80,7 @@ class Film:
 
 
 def test_two_ends_meet_whoever_comes_first() -> None:
-    """Dialler and listener meet once; before that nothing is taken."""
+    """Dialler and listener meet once; nothing is accepted before that."""
     made = VirtualLine.of(1e5, MS)
     assert not made.ends[HOST].put(Lane.CONTROL, b"too early", b"")
     made.meet()
@@ -139,8 +139,8 @@ def test_packets_come_whole_and_in_order(packets: list[tuple[Lane, bytes, int]],
 def test_a_saturated_line_is_full_and_echoes_do_not_wait(rate: str, delay_ms: int, seconds: int) -> None:
     """While 25 KB frames fill the line, an echo waits at most 10 ms or two chunks of 256 bytes, and the line is never idle.
 
-    The bound: both delays, the echo's own bytes both ways, what may be written ahead; on a line with a long delay, also what was written at
-    one go after it had run empty. A line that is never idle carries all but the frames of its units and this film's echoes.
+    The bound: both delays, the echo's own bytes both ways, and what may be written ahead; on a line with a long delay, also what was written at
+    one go after it had run empty. A line that is never idle carries everything except the framing of its units and this film's echoes.
     """
     bytes_per_s, delay_ns = RATES[rate], delay_ms * MS
     made = line(bytes_per_s, delay_ns)
@@ -162,7 +162,7 @@ def test_a_saturated_line_is_full_and_echoes_do_not_wait(rate: str, delay_ms: in
 
 @pytest.mark.long
 def test_the_rate_is_learnt() -> None:
-    """The measured rate is within a tenth of the line's, at first as after the line has become slower."""
+    """The measured rate is within a tenth of the line's, both at first and after the line has become slower."""
     made = line(200_000, MS)
     film = Film(25_000)
     made.run(made.now_ns + 3 * S, film)
@@ -177,7 +177,7 @@ def test_the_rate_is_learnt() -> None:
     ("rate", "frame_bytes"), [(187_500, 25_000), pytest.param(1_000_000, 250_000, marks=pytest.mark.slow)]
 )
 def test_a_reader_that_is_seldom_awake_gets_what_the_line_carries(rate: float, frame_bytes: int) -> None:
-    """When the host comes to read only every 100 ms, the line is still filled, and once it is awake again echoes wait no longer than ever."""
+    """If the host reads only every 100 ms the line is still filled, and once the host is awake again echoes wait no longer than before."""
     made = line(rate)
     film = Film(frame_bytes)
     made.run(made.now_ns + 2 * S, film)
@@ -197,7 +197,7 @@ def test_a_reader_that_is_seldom_awake_gets_what_the_line_carries(rate: float, f
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 30))])
 def test_a_bad_line_loses_frames_and_alters_none(seed: int) -> None:
-    """On a line that flips, loses, inserts and swallows, frames come in order, unaltered, and the stream never stops."""
+    """On a line that flips, loses, inserts and swallows bytes, frames come in order and unaltered, and the stream never stops."""
     chance = random.Random(seed)
     made = line(500_000, MS, chance)
     film = Film(8000)
@@ -214,7 +214,7 @@ def test_a_bad_line_loses_frames_and_alters_none(seed: int) -> None:
 
 
 def test_a_lost_chunk_costs_one_frame() -> None:
-    """When one unit is swallowed, the frame that it belonged to is missing and all others come."""
+    """When one unit is swallowed, the frame it belonged to is missing and all others come."""
     made = line(500_000, MS)
     film = Film(8000, echo_ns=10 * S, frames=20)
     eaten = [40]
@@ -232,7 +232,7 @@ def test_a_lost_chunk_costs_one_frame() -> None:
 
 
 def test_acknowledgements_that_all_get_lost_do_not_stop_the_stream() -> None:
-    """While the way back is dead little is written; when it lives again the stream is back within a second, with fresh frames."""
+    """While the way back is dead little is written; once it works again fresh frames are back within a second."""
     made = line(500_000, MS)
     film = Film(8000, echo_ns=10**6 * S)
     made.run(made.now_ns + S, film)
@@ -249,7 +249,7 @@ def test_acknowledgements_that_all_get_lost_do_not_stop_the_stream() -> None:
 
 
 def test_only_a_silence_that_was_listened_to_gives_a_frame_up() -> None:
-    """A frame half sent outlives ten seconds in which its own sender slept; after one second of listening in vain it is given up, and counted."""
+    """A half-sent frame survives ten seconds in which its own sender slept; after one second of listening in vain it is given up and counted."""
     made = line(500_000, MS)
     board, host = made.ends[BOARD], made.ends[HOST]
     for sleep_ns, step_ns in ((10 * S, 10 * S), (0, 50 * MS)):
@@ -275,7 +275,7 @@ def test_only_a_silence_that_was_listened_to_gives_a_frame_up() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("restarts", [BOARD, HOST])
 def test_a_restarted_end_is_met_anew(restarts: LinkEnd) -> None:
-    """When either end's program is replaced without a word, the other is told that the first has gone, and packets flow again."""
+    """When the program at either end is replaced without notice, the other end learns that the first has gone, and packets flow again."""
     made = line(200_000, MS)
     film = Film(8000)
     made.run(made.now_ns + S, film)
@@ -290,7 +290,7 @@ def test_a_restarted_end_is_met_anew(restarts: LinkEnd) -> None:
 
 
 def test_goodbye_is_heard() -> None:
-    """An end that leaves is gone for the other, behind its last words."""
+    """When an end leaves, the other end gets its last words first and then learns that it has gone."""
     made = line()
     assert made.ends[BOARD].put(Lane.CONTROL, b"last words", b"")
     made.write()
@@ -302,7 +302,7 @@ def test_goodbye_is_heard() -> None:
 
 
 def test_an_echoing_line_does_no_harm() -> None:
-    """When the other end only gives back what it gets (a getty before raw mode), nothing is met and nothing delivered."""
+    """When the other end only returns what it gets (a getty before raw mode), the ends do not meet and nothing is delivered."""
     for side in LinkEnd:
         end = Duplex(side, 5)
         events = []
@@ -336,7 +336,7 @@ def test_hostile_units_neither_fill_memory_nor_raise() -> None:
 
 
 def test_a_peer_that_talks_and_never_reads_is_not_answered_for_ever() -> None:
-    """However often the host says OPEN and CLOSE and talks as a stranger while the line takes nothing, a few words wait; the newest answer is among them."""
+    """However often the host says OPEN and CLOSE and talks as a stranger while the line takes nothing, only a few words wait; the newest answer is among them."""
     end = Duplex(BOARD, 5)
     for number in range(10_000):
         for unit in (
@@ -351,13 +351,13 @@ def test_a_peer_that_talks_and_never_reads_is_not_answered_for_ever() -> None:
 
 
 def _word(value: int, number: int) -> Unit:
-    """A unit of contact, by its number on the wire."""
+    """A contact unit, by its word's number on the wire."""
     return Unit(kind=UnitKind.CONTACT, first=True, last=True, number=0, body=struct.pack("<BI", value, number))
 
 
 @pytest.mark.parametrize("lost_by", [BOARD, HOST])
 def test_a_line_that_was_lost_is_met_anew(lost_by: LinkEnd) -> None:
-    """An end whose line was interrupted keeps its counts, has to be met again under another number, and then packets flow as before."""
+    """An end whose line was interrupted keeps its counts and must be met again under another number; then packets flow as before."""
     made = line()
     film = Film(2000)
     made.run(made.now_ns + 100 * MS, film)
@@ -374,7 +374,7 @@ def test_a_line_that_was_lost_is_met_anew(lost_by: LinkEnd) -> None:
 
 
 def test_a_goodbye_before_the_meeting_says_nothing() -> None:
-    """Who leaves before the two have met has nobody to tell."""
+    """An end that leaves before the two have met has nobody to tell."""
     end = Duplex(BOARD, 5)
     end.leave()
     assert end.take(S) == Duplex(BOARD, 5).take(S)
@@ -383,7 +383,7 @@ def test_a_goodbye_before_the_meeting_says_nothing() -> None:
 
 @pytest.mark.parametrize("body", [b"", b"\x00", bytes(6), struct.pack("<BI", 9, 1)])
 def test_a_word_that_is_none_changes_nothing(body: bytes) -> None:
-    """A unit of contact of another length, or with a word that nobody knows, neither meets nor parts."""
+    """A contact unit of the wrong length, or with an unknown word, makes the ends neither meet nor part."""
     made = line()
     unit = Unit(kind=UnitKind.CONTACT, first=True, last=True, number=0, body=body)
     for side in LinkEnd:

@@ -15,7 +15,7 @@ PLAIN = Profile(name="plain", carrier="tcp", bytes_per_s=1_000_000, delay_ns=3 *
 
 
 def drained(way: Way[str]) -> list[tuple[int, str, bytes]]:
-    """All that is under way, with the time of each piece's arrival."""
+    """All that is under way, with the arrival time of each piece."""
     came = []
     while way.due_ns < 2**63 - 1:
         now_ns = way.due_ns
@@ -25,7 +25,7 @@ def drained(way: Way[str]) -> list[tuple[int, str, bytes]]:
 
 @given(st.lists(st.tuples(st.sampled_from("ab"), st.binary(min_size=1, max_size=5000), st.integers(0, 10 * MS))))
 def test_every_byte_arrives_once_and_in_order(puts: list[tuple[str, bytes, int]]) -> None:
-    """Without byte loss each connection gets exactly its bytes in their order, whatever jitter and stalls do."""
+    """Without byte loss each connection gets exactly its bytes in order, whatever jitter and stalls do."""
     profile = Profile(
         name="p",
         carrier="tcp",
@@ -48,7 +48,7 @@ def test_every_byte_arrives_once_and_in_order(puts: list[tuple[str, bytes, int]]
 
 @given(st.integers(1, 60_000), st.integers(1, 60_000))
 def test_bytes_arrive_after_delay_and_their_time_at_the_rate(first: int, second: int) -> None:
-    """Two blocks handed over at once arrive bytes / rate + delay later: the second behind the first (to a rounding of 1 ns a piece)."""
+    """Two blocks handed over at once arrive bytes / rate + delay later, the second behind the first (to a rounding of 1 ns per piece)."""
     way: Way[str] = Way(PLAIN)
     way.put("a", bytes(first), 7)
     way.put("b", bytes(second), 7)
@@ -59,7 +59,7 @@ def test_bytes_arrive_after_delay_and_their_time_at_the_rate(first: int, second:
 
 
 def test_an_idle_line_saves_nothing_up() -> None:
-    """After a pause bytes still take their time at the rate: a bucket without depth."""
+    """After a pause bytes still take their time at the rate, like a bucket without depth."""
     way: Way[str] = Way(PLAIN)
     way.put("a", bytes(1000), 0)
     drained(way)
@@ -68,7 +68,7 @@ def test_an_idle_line_saves_nothing_up() -> None:
 
 
 def test_jitter_is_spread_evenly_over_its_range() -> None:
-    """Bytes sent alone arrive between delay and delay + jitter, about half of them in each half of it."""
+    """Bytes sent alone arrive between delay and delay + jitter, about half of them in each half of that range."""
     way: Way[str] = Way(dataclasses.replace(PLAIN, jitter_ns=8 * MS), 1)
     late_ns = []
     for k in range(1000):
@@ -79,7 +79,7 @@ def test_jitter_is_spread_evenly_over_its_range() -> None:
 
 
 def test_a_lost_segment_holds_up_what_follows() -> None:
-    """With every hundredth segment lost, about that many stalls happen, each as long as said, and nothing overtakes."""
+    """With every hundredth segment lost there are about that many stalls, each as long as stated, and nothing overtakes."""
     profile = dataclasses.replace(PLAIN, stall_share=0.01, stall_ns=200 * MS)
     way: Way[str] = Way(profile, 5)
     for k in range(2000):
@@ -100,7 +100,7 @@ def test_lost_bytes_are_as_many_as_said() -> None:
 
 
 def test_a_full_direction_has_no_room_until_something_arrived() -> None:
-    """What a direction holds is bounded by its queue and what is under way: 5 ms + 3 ms at 1 MB/s here."""
+    """A direction holds at most its queue and what is under way: 5 ms + 3 ms at 1 MB/s here."""
     way: Way[str] = Way(PLAIN)
     assert way.room_bytes == 8000
     way.put("a", bytes(8000), 0)
@@ -110,7 +110,7 @@ def test_a_full_direction_has_no_room_until_something_arrived() -> None:
 
 
 def test_the_end_of_a_stream_comes_behind_its_last_byte() -> None:
-    """No bytes at all is news, too, and overtakes nothing."""
+    """An empty piece marks the end of the stream and overtakes nothing."""
     for profile in (PLAIN, NOTHING):
         way: Way[str] = Way(profile)
         way.put("a", b"last", 0)
@@ -119,7 +119,7 @@ def test_the_end_of_a_stream_comes_behind_its_last_byte() -> None:
 
 
 def test_profiles_are_found_by_name() -> None:
-    """Names come out in their order, each once; one that is not there is refused with those that are."""
+    """Names come out in order, each once; an unknown one is refused with a list of the known ones."""
     assert [profile.name for profile in parse_profiles("wifi, bluetooth,wifi")] == ["wifi", "bluetooth"]
     for text in ("", "pigeon", "wifi,", "WIFI"):
         with pytest.raises(SettingsError) as caught:
@@ -138,7 +138,7 @@ def test_profiles_are_sound() -> None:
 
 
 def test_a_line_without_a_rate_still_holds_no_more_than_a_pipe() -> None:
-    """What adds no time takes 64 KiB, as a pipe of Linux does (pipe(7)), and no more until they were taken."""
+    """A line that adds no time holds 64 KiB, as a Linux pipe does (pipe(7)), and takes no more until these have been read."""
     way: Way[str] = Way(NOTHING)
     assert way.room_bytes == 65_536
     way.put("a", bytes(65_000), 5)

@@ -1,4 +1,4 @@
-"""A board's image that was made smaller for the link stands where the larger one would: rig and geometry hold for it."""
+"""A board's image made smaller for the link stands in for the larger one: rig and geometry hold for it."""
 
 from dataclasses import replace
 from typing import Final
@@ -29,7 +29,7 @@ _SCENE: Final = plane(shortest_px=14.0)
 
 
 def halved(image: Image) -> Image:
-    """What a camera gives that puts four pixels into one."""
+    """The image of a camera that bins four pixels into one."""
     height, width = image.shape[:2]
     return np.asarray(image.reshape(height // 2, 2, width // 2, 2).mean(axis=(1, 3)).round(), np.uint8)
 
@@ -64,7 +64,7 @@ def pair_of(left: Image, right: Image, board_side: Side, asked_px: tuple[int, in
 
 
 def disparity_error_px(scene: Plane, left: Image, right: Image, side: Side) -> float:
-    """The median error of the disparity over the view's middle, px."""
+    """The median error of the disparity over the middle of the view, px."""
     core = StereoCore(create_matcher(MatchSettings(MatcherName.SGBM, 48)))
     height, width = scene.disparity_px.shape
     done = Pipeline(core, side, now.monotonic_ns).process(pair_of(left, right, side, (width, height)))
@@ -77,7 +77,7 @@ def disparity_error_px(scene: Plane, left: Image, right: Image, side: Side) -> f
 
 @pytest.mark.parametrize("side", Side)
 def test_depth_is_that_of_the_whole_size(side: Side) -> None:
-    """With the board's image at half of its size the disparity is that of the scene, in pixels of the whole size, without a shift."""
+    """With the board's image at half its size the disparity is that of the scene, in pixels of the full size, without a shift."""
     left, right = _SCENE.pair.left, _SCENE.pair.right
     small = (halved(left), right) if side is Side.LEFT else (left, halved(right))
     assert abs(disparity_error_px(_SCENE, left, right, side)) < 0.05
@@ -86,18 +86,18 @@ def test_depth_is_that_of_the_whole_size(side: Side) -> None:
 
 @given(st.sampled_from([2, 3, 4]), st.integers(2, 12), st.integers(2, 12), st.floats(-2, 2), st.floats(-2, 2))
 def test_edges_coincide(part: int, width: int, height: int, slope_x: float, slope_y: float) -> None:
-    """A plane of grey levels whose pixels were averaged comes back as the same plane, but for the roundings and the outermost pixels."""
+    """A plane of grey levels whose pixels were averaged comes back as the same plane, except for rounding and the outermost pixels."""
     y, x = np.mgrid[: height * part, : width * part].astype(np.float64)
     level = 128 + slope_x * (x - x.mean()) + slope_y * (y - y.mean())
     small = level.reshape(height, part, width, part).mean(axis=(1, 3))
     back = enlarged(np.asarray(small.round(), np.uint8), (width * part, height * part), "image")
     inside = (slice(part, -part), slice(part, -part))
-    # Half a level for each rounding, and a half for OpenCV's fixed-point sums, which cut off quarters of a level.
+    # Half a level for each rounding, and half for OpenCV's fixed-point sums, which cut off quarters of a level.
     np.testing.assert_allclose(back[inside], level[inside], rtol=0, atol=1.5)
 
 
 def test_another_shape_is_refused() -> None:
-    """An image of another shape shows a part of the view: bad data, told with both sizes and the remedy."""
+    """An image of another shape shows only part of the view: this is bad data, reported with both sizes and the remedy."""
     frame = pair_of(np.zeros((90, 160), np.uint8), np.zeros((480, 640), np.uint8), Side.LEFT, (640, 480))
     with pytest.raises(DataError) as caught:
         Pipeline(None, Side.LEFT, now.monotonic_ns).process(frame)
@@ -106,7 +106,7 @@ def test_another_shape_is_refused() -> None:
 
 
 def test_a_frame_of_the_asked_size_is_left_alone() -> None:
-    """An image of the size that was asked for, or of a board that named none, passes as it is."""
+    """An image of the requested size, or of a board that named none, passes as it is."""
     image = cv2.merge([_SCENE.pair.left] * 3)
     assert enlarged(np.asarray(image, np.uint8), (image.shape[1], image.shape[0]), "image") is image
     frame = pair_of(_SCENE.pair.left, _SCENE.pair.right, Side.LEFT, (0, 0))

@@ -1,4 +1,4 @@
-"""The pairing code's core: who knows the code is trusted, who guesses is not, and guessing gets slow."""
+"""The core of pairing by code: a host that knows the code is trusted, one that guesses is not, and guessing becomes slow."""
 
 import random
 from collections.abc import Callable
@@ -53,7 +53,7 @@ def shown_code(outputs: list[Output]) -> int:
 
 
 def converse(desk: Desk, asking: Asking, typed: int, connection: bytes, now_ns: int) -> list[Output]:
-    """Carry words between the two until neither has more to say; gives all that the desk put out."""
+    """Carry words between the two until neither has more to say; return all that the desk put out."""
     word: Word | None = asking.begin(typed)
     everything: list[Output] = []
     while word is not None:
@@ -67,7 +67,7 @@ def converse(desk: Desk, asking: Asking, typed: int, connection: bytes, now_ns: 
 
 
 def start(desk: Desk, asking: Asking, connection: bytes = b"a", now_ns: int = 0) -> int:
-    """Ask; gives the code that the board shows."""
+    """Ask; return the code that the board shows."""
     outputs = desk.receive(connection, asking.ask(), now_ns)
     (answer,) = said(outputs)
     asking.receive(answer)
@@ -76,7 +76,7 @@ def start(desk: Desk, asking: Asking, connection: bytes = b"a", now_ns: int = 0)
 
 @given(st.integers(0, 2**32))
 def test_who_types_the_code_is_trusted_and_trusts(seed: int) -> None:
-    """With the right code both sides end with the other's key proved, and the code is spent."""
+    """With the right code each side ends with the other's key proved, and the code is spent."""
     desk, asking = Desk(BOARD, chance(seed)), Asking(HOST, chance(seed + 1))
     code = start(desk, asking)
     outputs = converse(desk, asking, code, b"a", 0)
@@ -106,7 +106,7 @@ def test_any_other_code_proves_nothing(seed: int, off: int) -> None:
 @given(codes, st.integers(0, 2**32))
 @settings(max_examples=30)
 def test_keys_changed_on_the_way_are_noticed_even_with_the_right_code(code: int, seed: int) -> None:
-    """Whoever puts a key or a name of its own into the exchange fails in the first round although all know the code."""
+    """Whoever inserts a key or name of their own into the exchange fails in the first round, although all know the code."""
     for changed in (MALLORY, replace(HOST, name="fone")):
         desk, asking = Desk(BOARD, chance(seed)), Asking(HOST, chance(seed + 1))
         asking.receive(Shown(BOARD))
@@ -125,7 +125,7 @@ def test_keys_changed_on_the_way_are_noticed_even_with_the_right_code(code: int,
 
 
 def test_a_guess_succeeds_once_in_two_to_the_rounds() -> None:
-    """Of all codes exactly those with the same first k bits pass k rounds: each round halves what is left, 20 rounds leave one of 2^20."""
+    """Exactly the codes with the same first k bits pass k rounds: each round halves what is left, and 20 rounds leave one of 2^20."""
     desk = Desk(BOARD, chance(7))
     asking = Asking(HOST, chance(8))
     code = start(desk, asking)
@@ -158,7 +158,7 @@ def fail_once(desk: Desk, now_ns: int, connection: bytes = b"x") -> list[Output]
 
 
 def test_after_three_wrong_codes_there_is_a_pause_that_grows() -> None:
-    """Three tries, a minute; three more, two minutes; and so on to an hour at most; whoever asks meanwhile hears how long."""
+    """After three tries a pause of one minute, after three more two minutes, and so on up to an hour; a host that asks meanwhile is told how long."""
     desk, now_ns, pauses = Desk(BOARD, chance(3)), 0, []
     for _ in range(10):
         failures = [output for _ in range(TRIES) for output in fail_once(desk, now_ns) if isinstance(output, Failed)]
@@ -171,7 +171,7 @@ def test_after_three_wrong_codes_there_is_a_pause_that_grows() -> None:
 
 
 def test_the_owner_ends_a_pause_and_success_forgets_failures() -> None:
-    """`pardon` lets hosts try at once; so does a pairing that came off, for later ones."""
+    """`pardon` lets hosts try again at once; a successful pairing clears the failures for later hosts."""
     desk = Desk(BOARD, chance(4))
     for _ in range(TRIES):
         fail_once(desk, 0)
@@ -188,7 +188,7 @@ def test_the_owner_ends_a_pause_and_success_forgets_failures() -> None:
 
 
 def test_who_only_asks_keeps_nobody_waiting() -> None:
-    """Any number of hosts that ask and say nothing more reserve nothing and spend nothing: whoever types the code shown is taken in."""
+    """Hosts that ask and say no more, however many, reserve and spend nothing: a host that types the shown code still gets in."""
     desk, first = Desk(BOARD, chance(6)), Asking(HOST, chance(7))
     code = start(desk, first)
     for number in range(1000):
@@ -200,7 +200,7 @@ def test_who_only_asks_keeps_nobody_waiting() -> None:
 
 
 def test_one_proof_at_a_time_and_for_seconds() -> None:
-    """While a proof lasts others hear `busy` and disturb nothing; one that falls silent has failed within seconds, counts as a try and spends the code."""
+    """While a proof lasts others hear `busy` and disturb nothing. A proof that falls silent fails within seconds, counts as a try and spends the code."""
     desk, first = Desk(BOARD, chance(6)), Asking(HOST, chance(7))
     code = start(desk, first)
     commit = said(desk.receive(b"a", first.begin(code), 0))[0]
@@ -229,7 +229,7 @@ def test_one_proof_at_a_time_and_for_seconds() -> None:
 
 
 def test_tries_are_counted_whoever_makes_them_and_however_often_they_connect() -> None:
-    """A guess from a new connection, under a new key and name, without asking first, or broken off half way, is one of the three all the same."""
+    """A guess counts as one of the three even from a new connection, under a new key and name, without asking first, or broken off half way."""
     desk = Desk(BOARD, chance(20))
     desk.receive(b"a", Begin(MALLORY, bytes(32)), 0)
     assert any(isinstance(output, Failed) for output in desk.receive(b"a", Refuse(Denial.CLOSED), 0))
@@ -242,7 +242,7 @@ def test_tries_are_counted_whoever_makes_them_and_however_often_they_connect() -
 
 
 def test_a_code_that_nobody_types_runs_out() -> None:
-    """A code is spent when nobody has used it for its life after it was last asked for; that alone is no failed try."""
+    """A code is spent when nobody has used it within its life since it was last asked for; that alone is no failed try."""
     desk = Desk(BOARD, chance(9))
     code = start(desk, Asking(HOST, chance(10)))
     again_ns = CODE_LIFE_NS - 1
@@ -290,7 +290,7 @@ def test_words_survive_the_line(word: Word) -> None:
 
 @given(st.lists(words, max_size=6), st.lists(st.integers(1, 300)))
 def test_words_are_the_same_however_the_stream_is_chopped(sequence: list[Word], cuts: list[int]) -> None:
-    """A stream of words gives the same words in any pieces, and no more than one unfinished word is kept."""
+    """A stream of words gives the same words however it is cut up, and at most one unfinished word is kept."""
     fitting = [word for word in sequence if len(encode_word(word)) <= MAX_WORD_BYTES]
     stream = b"".join(frame_word(word) for word in fitting)
     reader, heard = WordReader(), []
@@ -303,7 +303,7 @@ def test_words_are_the_same_however_the_stream_is_chopped(sequence: list[Word], 
 
 @given(st.binary(min_size=1, max_size=600))
 def test_a_stream_of_anything_is_words_or_refused(stream: bytes) -> None:
-    """Hostile bytes at the door raise ProtocolError at most, and are not kept."""
+    """Hostile bytes at the door raise at most ProtocolError, and are not kept."""
     reader = WordReader()
     try:
         for at in range(0, len(stream), 7):
@@ -315,7 +315,7 @@ def test_a_stream_of_anything_is_words_or_refused(stream: bytes) -> None:
 
 @given(st.lists(st.tuples(st.sampled_from([b"a", b"b"]), words, st.integers(0, 400 * S)), max_size=12))
 def test_no_order_of_words_lets_a_stranger_in(events: list[tuple[bytes, Word, int]]) -> None:
-    """Whatever strangers say, in any order, nobody is taken in, and a word has six consequences at most (an attempt runs out, one fails, one begins)."""
+    """Whatever strangers say, in any order, nobody is let in, and a word has at most six consequences (an attempt runs out, one fails, one begins)."""
     desk, now_ns = Desk(BOARD, chance(13)), 0
     for connection, word, wait_ns in events:
         now_ns += wait_ns
@@ -335,7 +335,7 @@ def test_any_bytes_are_a_word_or_refused(packed: bytes) -> None:
 
 @given(codes)
 def test_codes_are_read_as_people_type_them(code: int) -> None:
-    """Six digits, with blanks or hyphens, are the code; anything else is none."""
+    """Six digits, with blanks or hyphens, are a code; anything else is not."""
     text = code_text(code)
     assert read_code(text) == read_code(f" {text[:3]} {text[3:]}\n") == read_code(f"{text[:3]}-{text[3:]}") == code
     for wrong in (text[:5], text + "0", text[:5] + "x", "", "٣" * 6):
@@ -344,7 +344,7 @@ def test_codes_are_read_as_people_type_them(code: int) -> None:
 
 
 def test_codes_are_equally_likely() -> None:
-    """Bytes beyond the greatest multiple of a million are drawn again: no code is favoured."""
+    """Bytes at or above the greatest multiple of a million are drawn again, so no code is favoured."""
     draws = iter([b"\xff" * 4, (4294000000 - 1).to_bytes(4, "big"), (1_000_001).to_bytes(4, "big")])
     assert new_code(lambda _: next(draws)) == 999_999
     assert new_code(lambda _: next(draws)) == 1
@@ -364,7 +364,7 @@ def test_a_host_takes_no_word_out_of_turn(word: Word) -> None:
 
 
 def test_a_board_that_does_not_know_the_code_is_not_trusted() -> None:
-    """Whoever stands in for the board and opens what it did not commit to is found out by the host, which then trusts nobody."""
+    """If a stand-in for the board opens what it did not commit to, the host notices and trusts nobody."""
     asking = Asking(HOST, chance(15))
     asking.receive(Shown(BOARD))
     asking.begin(123_456)
@@ -375,7 +375,7 @@ def test_a_board_that_does_not_know_the_code_is_not_trusted() -> None:
 
 
 def test_a_pardon_does_not_spoil_a_proof_under_way() -> None:
-    """The owner who lifts the pause while a host proves its code leaves that code in force: the host gets in."""
+    """When the owner lifts the pause while a host proves its code, the code stays in force: the host gets in."""
     desk, asking = Desk(BOARD, chance(16)), Asking(HOST, chance(17))
     code = start(desk, asking)
     word: Word | None = asking.begin(code)

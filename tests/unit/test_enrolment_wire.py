@@ -1,4 +1,4 @@
-"""Words of pairing as bytes: what no word can be is refused by what is wrong with it, before anything of it is used."""
+"""Words of pairing as bytes: an invalid word is refused with what is wrong with it, before any of it is used."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ def packed(*items: Any) -> bytes:
     [Ask(ME), Shown(ME), Begin(ME, COMMITMENT), Commit(3, COMMITMENT), Open(3, NONCE), Refuse(Denial(0), 60)],
 )
 def test_every_kind_of_word_comes_back(word: Word) -> None:
-    """Each kind of word is the same behind its bytes, also when these come one by one."""
+    """Every kind of word survives its bytes, even when these come one by one."""
     assert decode_word(encode_word(word)) == word
     reader = WordReader()
     came = [whole for byte in frame_word(word) for whole in reader.feed(bytes((byte,)))]
@@ -63,14 +63,14 @@ def test_every_kind_of_word_comes_back(word: Word) -> None:
     ],
 )
 def test_what_is_no_word_is_refused(data: bytes, problem: str) -> None:
-    """Too long, no msgpack, another shape, version, kind, or a field of another type or size."""
+    """A word is refused if it is too long, no msgpack, of another shape, version or kind, or has a field of another type or size."""
     with pytest.raises(ProtocolError) as caught:
         decode_word(data)
     assert problem in caught.value.problem
 
 
 def test_a_word_too_long_to_travel_is_not_framed() -> None:
-    """64 letters of four bytes beside a commitment leave no room in the one byte of length."""
+    """64 letters of four bytes beside a commitment exceed what the single length byte can state."""
     with pytest.raises(ProtocolError) as caught:
         frame_word(Begin(Identity(KEY, 64 * "\U0001f980"), COMMITMENT))
     assert "bytes" in caught.value.problem

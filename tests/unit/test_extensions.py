@@ -118,7 +118,7 @@ def test_a_registered_matcher_is_used_by_its_name(install: Callable[[str], None]
 
 
 def test_our_own_names_cannot_be_taken(install: Callable[[str], None]) -> None:
-    """A package that registers one of our names changes nothing: ours are looked for first."""
+    """A package that registers one of our names changes nothing: ours are looked up first."""
     install("[tandemscan.matchers]\nsgbm = somebodys:Flat\n[tandemscan.cameras]\nreplay = somebodys:Still\n")
     assert matcher_named("sgbm") is MatcherName.SGBM
     with pytest.raises(UnavailableError):
@@ -126,14 +126,14 @@ def test_our_own_names_cannot_be_taken(install: Callable[[str], None]) -> None:
 
 
 def test_an_unknown_matcher_is_refused_with_all_names(install: Callable[[str], None]) -> None:
-    """The error of a matcher that nobody has names ours and those that are installed."""
+    """The error for an unknown matcher names ours and the installed ones."""
     install("[tandemscan.matchers]\nflat = somebodys:Flat\n")
     with pytest.raises(SettingsError, match="block or sgbm or flat"):
         matcher_named("magic")
 
 
 def test_a_registered_camera_is_opened_by_its_scheme(install: Callable[[str], None]) -> None:
-    """The name of an entry point is a camera URI's scheme; it gets path, options, clock and the time, and the host takes it too."""
+    """The name of an entry point is a camera URI's scheme. The camera gets path, options, clock and the time, and the host accepts it too."""
     install("[tandemscan.cameras]\nstill = somebodys:Still\n")
     check_camera("still:somewhere?width=9")
     camera = open_camera("still:somewhere?width=9&x=1", "board", 5)
@@ -146,7 +146,7 @@ def test_a_registered_camera_is_opened_by_its_scheme(install: Callable[[str], No
 
 
 def test_a_registered_link_is_opened_by_its_scheme(install: Callable[[str], None]) -> None:
-    """The name of an entry point is a link URI's scheme; it gets the address, who listens, its options, and which side this is."""
+    """The name of an entry point is a link URI's scheme. The link gets the address, who listens, its options, and which side this is."""
     install("[tandemscan.links]\nnowhere = somebodys:Nowhere\n")
     uri = parse_link("nowhere://here?loss=3&bind=1", listens_by_default=False)
     assert (uri.address, uri.listens, uri.options) == ("nowhere://here", True, (("loss", "3"),))
@@ -162,7 +162,7 @@ def test_a_registered_link_is_opened_by_its_scheme(install: Callable[[str], None
 
 @pytest.mark.parametrize("uri", ["nowhere://", "nowhere:", "nowhere", "elsewhere://x", "nowhere://x?bind=1&connect=1"])
 def test_a_link_that_makes_no_sense_is_refused(install: Callable[[str], None], uri: str) -> None:
-    """A registered scheme without an address, one that nobody registers, and contradicting sides are wrong settings."""
+    """A registered scheme without an address, an unregistered one, and contradicting sides are wrong settings."""
     install("[tandemscan.links]\nnowhere = somebodys:Nowhere\n")
     with pytest.raises(SettingsError):
         parse_link(uri, listens_by_default=True)
@@ -189,7 +189,7 @@ def test_what_does_not_fit_is_a_wrong_setting(install: Callable[[str], None], re
 
 
 def test_what_is_no_camera_and_no_link_is_refused(install: Callable[[str], None]) -> None:
-    """What an entry point gives has every member of the protocol, or it is refused with those that it lacks."""
+    """What an entry point gives must have every member of the protocol; otherwise it is refused with a list of the missing ones."""
     install("[tandemscan.cameras]\nstill = somebodys:empty\n[tandemscan.links]\nnowhere = somebodys:empty\n")
     with pytest.raises(SettingsError, match="gave no Camera: it has no adapt, anchor"):
         open_camera("still:x", "host", 0)
@@ -198,7 +198,7 @@ def test_what_is_no_camera_and_no_link_is_refused(install: Callable[[str], None]
 
 
 def test_two_packages_of_one_name_are_refused(install: Callable[..., None]) -> None:
-    """Where two packages register one name nobody can say which is meant."""
+    """When two packages register the same name, nobody can say which is meant."""
     install("[tandemscan.matchers]\nflat = somebodys:Flat\n")
     install("[tandemscan.matchers]\nflat = others:Flat\n", "others")
     with pytest.raises(SettingsError, match="registered by others:Flat and by somebodys:Flat"):
@@ -206,7 +206,7 @@ def test_two_packages_of_one_name_are_refused(install: Callable[..., None]) -> N
 
 
 def test_nothing_is_loaded_to_read_a_uri(install: Callable[[str], None]) -> None:
-    """To check settings no foreign code is run: a package is imported when its camera, link or matcher is opened."""
+    """No foreign code is run to check settings: a package is imported only when its camera, link or matcher is opened."""
     install("[tandemscan.matchers]\nf = somebodys:Flat\n[tandemscan.cameras]\ns = somebodys:Still\n")
     matcher_named("f")
     assert parse_camera("s:x", "host") is None

@@ -13,7 +13,7 @@ PUT, TAKE = True, False
 @given(st.integers(1, 5), st.sampled_from(Overflow), st.lists(st.sampled_from([PUT, TAKE]), max_size=80))
 @settings(deadline=None, max_examples=200)
 def test_order_bound_policy_and_conservation(depth: int, overflow: Overflow, acts: list[bool]) -> None:
-    """Order is kept, the depth never passed, only a full queue drops, each policy drops its end, and none is lost unseen."""
+    """Order is kept, the depth is never exceeded, only a full queue drops, each policy drops at its end, and nothing is lost unnoticed."""
     fifo: Fifo[int] = Fifo(FifoSettings(depth, overflow))
     inside: list[int] = []
     for number, act in enumerate(acts):

@@ -1,4 +1,4 @@
-"""The page of figures: what it says of results that were made up, and that README quotes nothing else."""
+"""The page of figures: what it says about made-up results, and that README quotes nothing else."""
 
 import json
 import re
@@ -47,7 +47,7 @@ def test_a_result_is_told_in_rows_with_command_machine_and_date(tmp_path: Path) 
 
 
 def test_a_missed_figure_is_told() -> None:
-    """In its row, and at the page's head with what was found."""
+    """A missed figure is reported in its row, and at the head of the page with what was found."""
     text = page({"age": _outcome(_age(77.5), code=4)})
     assert "| age at the link | 77.5 ms | 35.0 ms: **missed** |" in text
     assert "Of 1 figures that are to be reached, 0 were." in text
@@ -57,7 +57,7 @@ def test_a_missed_figure_is_told() -> None:
 
 
 def test_the_board_is_told_where_it_can_be_measured() -> None:
-    """CPU time a frame and memory, from what bench_board counts: 600 frames in 6 s of CPU time are 10 ms each."""
+    """CPU time per frame and memory, from what bench_board counts: 600 frames in 6 s of CPU time are 10 ms each."""
     cost = Cost(frames=600, seconds=20.0, cpu_ns=6_000_000_000, system_ns=1, resident_bytes=25_000_000)
     found = asdict(Figures(quiet=True, interpreter_s=2.0, costs={"C program": [cost]})) | {"verdicts": []}
     section = _section(page({"board": _outcome(json.loads(json.dumps(found)))}), Topic.BOARD)
@@ -65,7 +65,7 @@ def test_the_board_is_told_where_it_can_be_measured() -> None:
 
 
 def test_a_source_that_cannot_run_here_is_told_with_its_reason() -> None:
-    """One line with the reason, its command, and no table."""
+    """One line with the reason and its command, and no table."""
     section = _section(page({"board": _outcome({}, code=3, reason="no root | here")}), Topic.BOARD)
     assert "Not measured on this machine: no root \\| here.\n" in section
     assert f"`{_BY_NAME['board'].command}`" in section
@@ -88,14 +88,14 @@ def test_commands_name_no_path_of_a_machine(source: Source) -> None:
 
 
 def test_the_committed_page_has_every_source() -> None:
-    """It was written by the sources of today: each command stands in it, and no folder of the machine that wrote it."""
+    """Today's sources wrote it: it has each command, and no folder of the machine that wrote it."""
     text = PAGE.read_text(encoding="utf-8")
     assert all(f"`{source.command}`" in text for source in SOURCES)
     assert not re.search(r"/(home|root|work|tmp|Users)/", text)
 
 
 def test_readme_quotes_at_most_eight_figures_and_each_stands_on_the_page() -> None:
-    """Every number of README's table, with its unit, is on the page of figures: whoever measures anew must tell README."""
+    """Every number in README's table is on the page of figures with its unit: whoever measures again must update README."""
     section = (ROOT / "README.md").read_text(encoding="utf-8").partition("## Figures\n")[2].partition("\n## ")[0]
     rows = [line.split("|")[1:-1] for line in section.splitlines() if line.startswith("| ")][1:]
     assert 1 <= len(rows) <= 8

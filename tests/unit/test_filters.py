@@ -1,4 +1,4 @@
-"""Checks take values away and never invent them; repairs touch only what they are for."""
+"""Checks remove values and never invent them; repairs touch only what they are for."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ maps = arrays(
 
 
 def test_left_right_check_by_hand() -> None:
-    """At x = 3, d = 2 is confirmed by right x = 1 with 2.5; at x = 4, d = 2 is not by right x = 2 with 4; nor is d = 0 by 4."""
+    """At x = 3, d = 2 is confirmed by 2.5 at right x = 1; at x = 4, d = 2 is not confirmed by 4 at right x = 2, nor is d = 0 by 4."""
     left = np.array([[32, -16, 0, 32, 32]], np.int16)
     right = np.array([[0, 40, 64, 0, 0]], np.int16)
     assert confirmed(left, right, 1.0)[0].tolist() == [False, False, False, True, False]
@@ -35,13 +35,13 @@ def test_left_right_check_by_hand() -> None:
 @settings(deadline=None, max_examples=50)
 @given(width=st.integers(1, 20), d=st.integers(0, 25))
 def test_exactly_what_the_right_image_shows_is_confirmed(width: int, d: int) -> None:
-    """With one disparity everywhere, the left pixels from x = d on are confirmed and no others."""
+    """With one disparity everywhere, exactly the left pixels from x = d on are confirmed."""
     steps = np.full((3, width), d * STEPS_PER_PX, np.int16)
     assert (confirmed(steps, steps, 0.0) == (np.arange(width) >= d)).all()
 
 
 def test_islands_go_and_surfaces_stay() -> None:
-    """A 3 x 3 island 5 px off its surroundings is dropped whole; the surface round it stays."""
+    """A 3 x 3 island 5 px off its surroundings is dropped whole; the surface around it stays."""
     steps = np.full((30, 30), 160, np.int16)
     steps[10:13, 10:13] = 240
     kept = without_speckles(steps, 20, 1.0)
@@ -51,7 +51,7 @@ def test_islands_go_and_surfaces_stay() -> None:
 
 
 def test_steps_become_px() -> None:
-    """Sixteenths become px exactly, every negative becomes NaN."""
+    """Sixteenths become px exactly, and every negative becomes NaN."""
     assert to_px(np.array([[24, 0, -16, -1]], np.int16)).tolist()[0][:2] == [1.5, 0.0]
     assert np.isnan(to_px(np.array([[-16, -1]], np.int16))).all()
 
@@ -73,7 +73,7 @@ def test_bridging_keeps_every_value_and_stays_between_its_ends(disparity: Dispar
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_gap_in_a_plane_is_closed_exactly(axis: int) -> None:
-    """In d = 10 + 0.05 x + 0.02 y a gap of 6 px, in a row or a column, gets back the plane's own values."""
+    """In d = 10 + 0.05 x + 0.02 y a gap of 6 px, in a row or a column, is filled with the plane's own values."""
     y, x = np.mgrid[:30, :40]
     truth = (10 + 0.05 * x + 0.02 * y).astype(np.float32)
     holed = truth.copy()
@@ -86,7 +86,7 @@ def test_a_gap_in_a_plane_is_closed_exactly(axis: int) -> None:
 
 
 def test_a_gap_between_two_surfaces_stays_open() -> None:
-    """Ends that differ by more than the step, and gaps at the border, are not bridged."""
+    """Gaps whose ends differ by more than the step, and gaps at the border, are not bridged."""
     row = np.array([[np.nan, 5, np.nan, 9, np.nan]], np.float32)
     assert np.isnan(bridged(row, 4, 1.0)).tolist() == [[True, False, True, False, True]]
 
@@ -104,7 +104,7 @@ def test_unlocking_keeps_order_and_fixed_points(amplitude: float) -> None:
 
 
 def test_unlocking_takes_the_sine_back() -> None:
-    """Values pulled to whole pixels by 0.1 sin(2 pi d) come back to within 0.04 px (the first order's remainder)."""
+    """Values pulled to whole pixels by 0.1 sin(2 pi d) return to within 0.04 px (the first-order remainder)."""
     truth = np.arange(0, 8, 1 / 64, dtype=np.float32)[None]
     locked = truth - np.float32(0.1) * np.sin(2 * np.pi * truth).astype(np.float32)
     assert np.abs(locked - truth).max() > 0.09
@@ -114,7 +114,7 @@ def test_unlocking_takes_the_sine_back() -> None:
 @settings(deadline=None, max_examples=50)
 @given(disparity=maps)
 def test_smoothing_keeps_the_holes_and_the_range(disparity: Disparity) -> None:
-    """NaN stays NaN, values stay values, and none leaves the range of the values there were."""
+    """NaN stays NaN, values stay values, and none leaves the range of the original values."""
     after = smoothed(disparity, 9, 1.0, 4.0)
     known = np.isfinite(disparity)
     assert (np.isfinite(after) == known).all()

@@ -1,4 +1,4 @@
-"""The line through frames of different size."""
+"""The line through frames of different sizes."""
 
 import math
 
@@ -13,7 +13,7 @@ from phone_host.measure.delay_fit import fit_delay, neighbours
 @given(st.floats(1e4, 1e8), st.floats(0.1, 1e5), st.integers(2, 200))
 @settings(deadline=None, max_examples=50)
 def test_a_line_without_noise_is_found(latency_ns: float, ns_per_byte: float, count: int) -> None:
-    """Delays that lie on a line give that line, and nothing is left over."""
+    """Delays that lie on a line give that line, with nothing left over."""
     size = np.linspace(5_000.0, 60_000.0, count)
     fit = fit_delay(size, latency_ns + ns_per_byte * size, draws=0)
     assert fit.ns_per_byte == pytest.approx(ns_per_byte, rel=1e-3)
@@ -22,7 +22,7 @@ def test_a_line_without_noise_is_found(latency_ns: float, ns_per_byte: float, co
 
 
 def test_outliers_do_not_move_the_line() -> None:
-    """A fifth of the frames held up by up to 300 ms leaves latency 2 ms and 1 MB/s within 3 %, where least squares is off by far."""
+    """With a fifth of the frames held up by up to 300 ms, the latency of 2 ms is found within 0.5 ms and 1 MB/s within 3 %; least squares is far off."""
     random = np.random.default_rng(1)
     size = random.uniform(5_000, 60_000, 1000)
     delay = 2e6 + 1000.0 * size + random.normal(0, 1e5, 1000)
@@ -36,7 +36,7 @@ def test_outliers_do_not_move_the_line() -> None:
 
 @pytest.mark.parametrize(("count", "least"), [(15, 11), pytest.param(200, 178, marks=pytest.mark.slow)])
 def test_the_interval_holds_the_truth_as_often_as_it_says(count: int, least: int) -> None:
-    """Of measurements with noise that neighbours share, the 95 % intervals of latency and slope hold the truth in all but a few.
+    """For measurements whose noise is shared by neighbours, the 95 % intervals of latency and slope hold the truth in all but a few.
 
     Binomial: a true 95 % misses 11 of 15, and 178 of 200, less than once in 1500 times; the seeds are fixed.
     """
@@ -51,7 +51,7 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(count: int, least: int
 
 
 def test_one_size_gives_no_line() -> None:
-    """Without two sizes there is no rate: NaN, no guess; and too few points are no error."""
+    """Without two sizes there is no rate: NaN, not a guess. Too few points are no error."""
     for count in (0, 1, 50):
         fit = fit_delay(np.full(count, 5e4), np.full(count, 1e6))
         assert math.isnan(fit.ns_per_byte)
@@ -62,7 +62,7 @@ def test_one_size_gives_no_line() -> None:
 
 
 def test_sizes_that_make_no_difference_give_no_upper_end() -> None:
-    """Where larger frames are not slower the rate has a lower end only."""
+    """If larger frames are not slower, the rate has only a lower end."""
     random = np.random.default_rng(2)
     size = random.uniform(40_000, 60_000, 300)
     fit = fit_delay(size, 1e6 + random.exponential(1e6, 300))
@@ -72,7 +72,7 @@ def test_sizes_that_make_no_difference_give_no_upper_end() -> None:
 
 @pytest.mark.parametrize("count", [4, 10, 20])
 def test_few_frames_give_a_wide_interval_not_none(count: int) -> None:
-    """A handful of noisy frames tells little: the intervals have room, and hold the truth's neighbourhood."""
+    """A handful of noisy frames says little: the intervals are wide and hold the neighbourhood of the truth."""
     random = np.random.default_rng(count)
     size = np.repeat([10_000.0, 30_000.0], count // 2)
     fit = fit_delay(size, 1e6 + 100.0 * size + random.exponential(1e6, count))
@@ -81,13 +81,13 @@ def test_few_frames_give_a_wide_interval_not_none(count: int) -> None:
 
 
 def test_two_frames_are_enough_for_a_line() -> None:
-    """Two sizes, one frame each: a line, without any error."""
+    """Two sizes, one frame each, give a line without any error."""
     fit = fit_delay(np.array([1e4, 2e4]), np.array([1e6, 2e6]))
     assert fit.ns_per_byte == pytest.approx(100.0, rel=1e-3)
 
 
 def test_a_single_frame_of_another_size_gives_no_interval() -> None:
-    """One odd frame among a thousand is no ground for an interval, and looking for one comes to an end."""
+    """One odd frame in a thousand is no basis for an interval, and the search for one ends."""
     size = np.full(1000, 3e4)
     size[500] = 1e4
     fit = fit_delay(size, 1e6 + 100.0 * size)
@@ -106,7 +106,7 @@ def test_no_line_promises_a_frame_before_it_was_sent(frames: list[tuple[float, f
 
 
 def test_a_line_that_would_begin_below_zero_is_the_best_one_through_zero() -> None:
-    """Of all lines through zero and a point none is nearer, in the sum of deviations; and where larger frames came sooner, the level line stands at the median."""
+    """Of all lines through zero and a point it has the least sum of deviations; where larger frames came sooner, the level line is at the median."""
     random = np.random.default_rng(5)
     size = random.uniform(5_000, 60_000, 101)
     delay = np.maximum(0.0, 1000.0 * size - 4e6 + random.normal(0, 2e6, size.size))
@@ -119,7 +119,7 @@ def test_a_line_that_would_begin_below_zero_is_the_best_one_through_zero() -> No
 
 @given(st.integers(1, 500), st.integers(1, 500), st.integers(0, 99))
 def test_neighbours_are_drawn_together(size: int, count: int, seed: int) -> None:
-    """As many as wanted, all out of the series, and of a long one at most every fifteenth begins elsewhere than behind the one before."""
+    """As many are drawn as wanted, all from the series. In a long one at most every fifteenth does not follow directly on the one before."""
     drawn = neighbours(size, count, np.random.default_rng(seed))
     assert drawn.size == count
     assert 0 <= drawn.min() <= drawn.max() < size

@@ -13,7 +13,7 @@ PERIOD_NS = 33 * MS
 
 
 def ages(delay_ns: int, bytes_per_s: float, seconds: int, frame_bytes: int = 25_000) -> list[tuple[int, int]]:
-    """A board that sends its newest frame whenever there is leave, over a queue with a rate and a delay: (time, transit) of each frame."""
+    """A board that sends its newest frame whenever it has credit, over a queue with a rate and a delay: (time, transit) of each frame."""
     flow, chance = Flow(), random.Random(1)
     arrivals: deque[tuple[int, int, int]] = deque()
     grants: deque[int] = deque()
@@ -41,7 +41,7 @@ def ages(delay_ns: int, bytes_per_s: float, seconds: int, frame_bytes: int = 25_
 
 @pytest.mark.parametrize("bytes_per_s", [12_500, 100_000, 500_000])
 def test_where_the_rate_is_the_limit_no_frame_waits_in_the_link(bytes_per_s: float) -> None:
-    """At 100 kbit/s to 4 Mbit/s nine frames of ten take no longer than 1.2 times what their bytes need, and the link is busy for 85 % of the time."""
+    """At 100 kbit/s to 4 Mbit/s nine frames in ten take at most 1.2 times what their bytes need, and the link is busy 85 % of the time."""
     told = ages(5 * MS, bytes_per_s, 120)
     own_ns = 25_000 / bytes_per_s * 1e9 + 5 * MS
     slow = [transit_ns for _, transit_ns in told if transit_ns > 1.2 * own_ns]
@@ -50,7 +50,7 @@ def test_where_the_rate_is_the_limit_no_frame_waits_in_the_link(bytes_per_s: flo
 
 
 def test_where_the_delay_is_the_limit_every_frame_goes() -> None:
-    """Over a link with 50 ms each way and a high rate the whole frame rate comes, none slower than the delay."""
+    """Over a link with 50 ms each way and a high rate the full frame rate arrives, no frame slower than the delay."""
     told = ages(50 * MS, 1e8, 30)
     late = [transit_ns for now_ns, transit_ns in told if now_ns > 5 * SECOND_NS]
     assert len(late) >= 0.97 * 25 * SECOND_NS / PERIOD_NS
@@ -58,7 +58,7 @@ def test_where_the_delay_is_the_limit_every_frame_goes() -> None:
 
 
 def test_a_swift_link_needs_no_more_than_one() -> None:
-    """Where a frame has come long before the next one is there, the window stays at one."""
+    """If each frame arrives long before the next one is there, the window stays at one."""
     flow = Flow()
     for number in range(1000):
         flow.arrived(MS, MS // 5, PERIOD_NS, number * PERIOD_NS)
@@ -66,7 +66,7 @@ def test_a_swift_link_needs_no_more_than_one() -> None:
 
 
 def test_the_window_is_bounded() -> None:
-    """However long the link, no more than MOST frames are under way."""
+    """However long the link is, at most MOST frames are under way."""
     flow = Flow()
     for number in range(1000):
         flow.arrived(200 * MS, 30 * MS, PERIOD_NS, number * PERIOD_NS)
@@ -74,7 +74,7 @@ def test_the_window_is_bounded() -> None:
 
 
 def test_a_swift_link_gets_leave_for_several_frames_at_once() -> None:
-    """Where a frame takes a tenth of a period four are granted as soon as there is none outstanding; before any has come, or where it is slow, one."""
+    """If a frame takes a tenth of a period, four are granted as soon as none is outstanding; before any has come, or if the link is slow, one."""
     flow = Flow()
     assert flow.credit(0, PERIOD_NS) == 1
     flow.arrived(PERIOD_NS // 10, 0, PERIOD_NS, SECOND_NS)
@@ -85,7 +85,7 @@ def test_a_swift_link_gets_leave_for_several_frames_at_once() -> None:
 
 @pytest.mark.parametrize(("round_trip_ns", "frames"), [(0, 2), (PERIOD_NS, 2), (2 * PERIOD_NS, 3), (SECOND_NS, MOST)])
 def test_a_link_that_paces_itself_always_has_leave_for_the_next_frame(round_trip_ns: int, frames: int) -> None:
-    """One frame more than is under way, and one for each period of the round trip, four at most."""
+    """One frame, plus one for each period of the round trip (at least one), four at most."""
     flow = Flow()
     flow.arrived(PERIOD_NS, 0, PERIOD_NS, SECOND_NS)
     assert flow.credit(frames - 1, PERIOD_NS, round_trip_ns) == frames

@@ -14,7 +14,7 @@ PNG = encoded(".png", picture())
 @given(st.integers(0, 255))
 @settings(deadline=None)
 def test_whole_jpeg_is_sound_with_and_without_padding(zeros: int) -> None:
-    """A JPEG that an encoder wrote is sound, also with the zeros that some webcams put behind it."""
+    """A JPEG from an encoder is sound, even with the zeros that some webcams append."""
     assert find_fault(PixelFormat.MJPEG, JPEG + bytes(min(zeros, 254))) is None
 
 
@@ -27,7 +27,7 @@ def test_any_buffer_will_do(kind: type[Buffer]) -> None:
 
 
 def test_every_truncation_of_a_jpeg_is_found() -> None:
-    """Whatever its length, a JPEG that lost its end is faulty, and one that lost its start too."""
+    """A JPEG that lost its end is faulty at any length, and so is one that lost its start too."""
     for length in range(len(JPEG)):
         assert find_fault(PixelFormat.MJPEG, JPEG[:length]) is not None
         assert find_fault(PixelFormat.MJPEG, JPEG[:length] + bytes(100)) is not None
@@ -36,7 +36,7 @@ def test_every_truncation_of_a_jpeg_is_found() -> None:
 
 
 def test_every_truncation_of_a_png_is_found() -> None:
-    """Whatever its length, a PNG that lost its end or start is faulty."""
+    """A PNG that lost its end or start is faulty at any length."""
     for length in range(len(PNG)):
         assert find_fault(PixelFormat.PNG, PNG[:length]) is not None
     for start in range(1, len(PNG)):
@@ -45,13 +45,13 @@ def test_every_truncation_of_a_png_is_found() -> None:
 
 @pytest.mark.parametrize("pixel_format", PixelFormat)
 def test_nothing_is_empty(pixel_format: PixelFormat) -> None:
-    """No bytes are no image, whatever they claim to be."""
+    """Zero bytes are no image, whatever format they claim."""
     assert find_fault(pixel_format, b"") is FrameFault.EMPTY
     assert find_fault(pixel_format, memoryview(b"")) is FrameFault.EMPTY
 
 
 def test_formats_are_not_mistaken_for_each_other() -> None:
-    """A PNG is no JPEG and the other way round."""
+    """A PNG is not taken for a JPEG, nor the other way round."""
     assert find_fault(PixelFormat.MJPEG, PNG) is FrameFault.NO_START
     assert find_fault(PixelFormat.PNG, JPEG) is FrameFault.NO_START
 

@@ -1,4 +1,4 @@
-"""Units in a byte stream: whole and unaltered or not at all, whatever happens to the bytes."""
+"""Units in a byte stream arrive whole and unaltered or not at all, whatever happens to the bytes."""
 
 import random
 import tracemalloc
@@ -35,12 +35,12 @@ def wire(unit: Unit) -> bytes:
 
 
 def found(deframer: Deframer, data: bytes) -> list[Unit]:
-    """Units in these bytes, bodies as bytes."""
+    """Units in these bytes, with bodies as bytes."""
     return [plain(unit) for unit in deframer.feed(data)]
 
 
 def plain(unit: Unit) -> Unit:
-    """The same unit with a body that can be compared."""
+    """The same unit with a comparable body."""
     return Unit(kind=unit.kind, first=unit.first, last=unit.last, number=unit.number, body=bytes(unit.body))
 
 
@@ -65,7 +65,7 @@ def numbered(count: int, chance: random.Random, most_bytes: int = MAX_BODY_BYTES
 
 
 def test_the_bytes_of_a_unit_are_fixed() -> None:
-    """A unit is marker, head, number, half a CRC over these, body, CRC-32 over all but that half; little endian."""
+    """A unit is marker, head, number, half a CRC over these, body, and CRC-32 over all except that half; little endian."""
     head = b"\xc6" + (0b01_1_0_000000000011).to_bytes(2, "little") + (0x1234).to_bytes(2, "little")
     crc = crc32(head)
     expected = head + (crc & 0xFFFF).to_bytes(2, "little") + b"abc" + crc32(head + b"abc").to_bytes(4, "little")
@@ -76,7 +76,7 @@ def test_the_bytes_of_a_unit_are_fixed() -> None:
 @given(units=st.lists(UNITS, max_size=8), data=st.data())
 @settings(deadline=None)
 def test_any_chopping_gives_the_same_units(units: list[Unit], data: st.DataObject) -> None:
-    """However a stream of units is chopped, exactly these units come out, and no byte is garbage."""
+    """However a stream of units is cut up, exactly these units come out, and no byte is garbage."""
     stream = b"".join(map(wire, units))
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=12)))
     deframer = Deframer(SIDE)
@@ -89,7 +89,7 @@ def test_any_chopping_gives_the_same_units(units: list[Unit], data: st.DataObjec
 @given(units=st.lists(UNITS, max_size=3))
 @settings(deadline=None, max_examples=30)
 def test_byte_by_byte(units: list[Unit]) -> None:
-    """A stream that comes byte by byte gives the same units."""
+    """A stream that arrives byte by byte gives the same units."""
     deframer = Deframer(SIDE)
     stream = b"".join(map(wire, units))
     assert [unit for i in range(len(stream)) for unit in found(deframer, stream[i : i + 1])] == units
@@ -98,7 +98,7 @@ def test_byte_by_byte(units: list[Unit]) -> None:
 @given(units=st.lists(UNITS, min_size=1, max_size=8), data=st.data())
 @settings(deadline=None)
 def test_a_spoiled_place_loses_only_the_units_that_it_touches(units: list[Unit], data: st.DataObject) -> None:
-    """Bytes flipped, inserted or deleted anywhere lose at most the units that held them; all others come, unaltered and in order."""
+    """Bytes flipped, inserted or deleted anywhere lose at most the units that held them; all others arrive unaltered and in order."""
     pieces = [wire(unit) for unit in units]
     touched = data.draw(st.integers(0, len(units) - 1))
     piece = pieces[touched]
@@ -119,12 +119,12 @@ def test_a_spoiled_place_loses_only_the_units_that_it_touches(units: list[Unit],
 
 @given(garbage=st.binary(max_size=2000), unit=UNITS)
 def test_a_good_unit_behind_garbage_is_found(garbage: bytes, unit: Unit) -> None:
-    """Whatever comes before a whole unit, the unit is found at the latest when the line falls silent."""
+    """Whatever comes before a whole unit, the unit is found by the time the line falls silent."""
     assert everything(garbage + wire(unit))[-1] == unit
 
 
 def test_the_own_echo_is_garbage() -> None:
-    """What a line echoes back is no unit for its sender."""
+    """A sender does not take its own bytes, echoed by the line, for units."""
     unit = Unit(kind=UnitKind.CONTROL, first=True, last=True, number=1, body=b"hello")
     deframer = Deframer(SIDE.peer)
     assert deframer.feed(wire(unit)) == []
@@ -132,7 +132,7 @@ def test_the_own_echo_is_garbage() -> None:
 
 
 def test_ten_million_random_bytes_are_no_unit() -> None:
-    """Of 10^7 random bytes none makes a unit, memory stays below two megabytes, and the good unit behind them is found."""
+    """Among 10^7 random bytes no unit is found, memory stays below two megabytes, and the good unit behind them is found."""
     chance = random.Random(1)
     deframer = Deframer(SIDE)
     unit = Unit(kind=UnitKind.FRAMES, first=True, last=True, number=7, body=b"good")
@@ -148,7 +148,7 @@ def test_ten_million_random_bytes_are_no_unit() -> None:
 
 
 def test_hostile_headers_cost_no_memory() -> None:
-    """Headers with sound checks and the greatest length, back to back, hold no more than one unit's bytes."""
+    """Headers with valid checks and the greatest length, back to back, hold no more than one unit's bytes."""
     start = MARKER + (0x0FFF).to_bytes(2, "little") + b"\0\0"
     hostile = start + (crc32(start) & 0xFFFF).to_bytes(2, "little")
     longest = MARKER + MAX_BODY_BYTES.to_bytes(2, "little") + b"\0\0"
@@ -166,7 +166,7 @@ def test_hostile_headers_cost_no_memory() -> None:
 
 @pytest.mark.long
 def test_of_many_units_with_flipped_bits_none_comes_altered() -> None:
-    """10^5 units, half of them with one to eight bits flipped anywhere: every sound one comes, no altered one does."""
+    """Of 10^5 units, half of them with one to eight bits flipped anywhere, every sound one arrives and no altered one does."""
     chance = random.Random(2)
     deframer = Deframer(SIDE)
     for block in range(100):
@@ -186,7 +186,7 @@ def test_of_many_units_with_flipped_bits_none_comes_altered() -> None:
 
 @pytest.mark.parametrize("hole_bytes", [1, 5, 400, 4000])
 def test_a_hole_is_given_up_when_the_line_falls_silent(hole_bytes: int) -> None:
-    """A unit whose middle was lost swallows what follows only until the line is silent: then the followers come."""
+    """A unit that lost its middle swallows what follows only until the line is silent: then the following units come out."""
     long = Unit(kind=UnitKind.FRAMES, first=True, last=True, number=1, body=bytes(MAX_BODY_BYTES))
     short = Unit(kind=UnitKind.CONTROL, first=True, last=True, number=2, body=b"echo")
     stream = wire(long)

@@ -58,7 +58,7 @@ def test_python_must_be_3_11(version: tuple[int, int, int], verdict: Grade) -> N
     ],
 )
 def test_packages_are_judged_by_version_and_company(package: Package, verdict: Grade, word: str) -> None:
-    """In range is fine, out of range warns, broken or twice fails; the remedy keeps the headless wheel."""
+    """In range is fine, out of range warns, broken or installed twice fails; the remedy keeps the headless wheel."""
     finding = check_package(package)
     assert finding.verdict is verdict
     assert word in finding.text + finding.remedy
@@ -79,7 +79,7 @@ def test_packages_are_judged_by_version_and_company(package: Package, verdict: G
     ],
 )
 def test_a_rig_must_be_sound_and_fit_the_camera(rig: RigReadings, verdict: Grade, word: str) -> None:
-    """A good rig names its baseline; a bad file, another image size or a large error are told with the remedy."""
+    """A good rig names its baseline; a bad file, another image size or a large error is reported with the remedy."""
     finding = check_rig(rig)
     assert finding.verdict is verdict
     assert word in finding.text + finding.remedy
@@ -87,7 +87,7 @@ def test_a_rig_must_be_sound_and_fit_the_camera(rig: RigReadings, verdict: Grade
 
 @pytest.mark.parametrize("answer", Answer)
 def test_every_answer_of_a_board_is_judged(answer: Answer) -> None:
-    """Only a board that answers is fine, a busy one warns, everything else fails with a remedy."""
+    """Only a board that answers is fine, a busy one warns, anything else fails with a remedy."""
     finding = check_board(
         BoardReadings(
             uri="tcp://board:5555",
@@ -103,7 +103,7 @@ def test_every_answer_of_a_board_is_judged(answer: Answer) -> None:
 
 
 def test_ports_and_folder() -> None:
-    """No serial port is no fault, no pyserial warns; a folder that cannot be written to fails."""
+    """No serial port is no fault, no pyserial warns; a folder that is not writable fails."""
     assert check_ports((), "").verdict is OK
     assert check_ports((), "No module named 'serial'").verdict is WARN
     assert check_out("scan", writable=True) == []

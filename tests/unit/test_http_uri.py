@@ -1,4 +1,4 @@
-"""The address of an MJPEG server, and how irregular arrivals are told."""
+"""The address of an MJPEG server, and how irregular arrivals are reported."""
 
 import random
 
@@ -63,13 +63,13 @@ def test_addresses(uri: str, settings: HttpSettings) -> None:
     ],
 )
 def test_what_is_no_address_is_refused(uri: str, named: str) -> None:
-    """An address or option of no use is refused in one line that names it."""
+    """An unusable address or option is refused in one line that names it."""
     with pytest.raises(SettingsError, match=named):
         http_settings(uri, "host")
 
 
 def test_a_password_is_never_shown() -> None:
-    """Neither an error nor the address for logs holds the password."""
+    """Neither an error nor the address in logs contains the password."""
     assert "secret" not in http_settings("http://me:secret@phone/video", "host").shown
     for wrong in ("http://me:secret@phone/v?latency_ms=x", "http://me:secret@phone:99999/v", "http://me:secret@/v"):
         with pytest.raises(SettingsError) as caught:
@@ -79,7 +79,7 @@ def test_a_password_is_never_shown() -> None:
 
 @given(st.floats(1e6, 1e9), st.integers(0, 2**40))
 def test_a_steady_pace_has_no_jitter(period_ns: float, start_ns: int) -> None:
-    """Arrivals at an even pace, of any rate, are not late, to the rounding of ns."""
+    """Arrivals at an even pace of any rate are not late, apart from rounding to ns."""
     arrivals = Arrivals()
     for number in range(40):
         arrivals.add(number, start_ns + round(number * period_ns))
@@ -88,7 +88,7 @@ def test_a_steady_pace_has_no_jitter(period_ns: float, start_ns: int) -> None:
 
 
 def test_jitter_is_how_late_nineteen_of_twenty_are() -> None:
-    """Of arrivals that are late by 0 to 20 ms evenly, 95 % are late by about 19 ms or less, whatever frames are missing."""
+    """If arrivals are evenly 0 to 20 ms late, 95 % are late by about 19 ms or less, whichever frames are missing."""
     chance, arrivals = random.Random(3), Arrivals()
     for number in range(200):
         if number % 7:
@@ -110,5 +110,5 @@ def test_jitter_is_how_late_nineteen_of_twenty_are() -> None:
     ],
 )
 def test_a_camera_is_named_in_files_without_its_password(uri: str, shown: str) -> None:
-    """Name and password of a server are left out, the rest stays; what is no server's address stays as it is."""
+    """Name and password of a server are left out and the rest stays; anything that is not a server's address stays as it is."""
     assert without_password(uri) == shown
