@@ -171,7 +171,7 @@ def test_legal_markers_are_walked_over_byte_by_byte(markers: bytes) -> None:
     ids=["no marker, short", "no marker", "a code that is none", "a length of one", "another beginning"],
 )
 def test_illegal_markers_break_the_image_and_only_that(spoiled: bytes) -> None:
-    """If a marker comes where none can be, the image in progress is broken, and the next one is found."""
+    """An illegal marker breaks the image in progress; the next image is found."""
     stream = JpegStream()
     events = [*stream.feed(spoiled, 1), *stream.feed(IMAGES[0], 2)]
     assert [type(event) for event in events] == [Broken, Whole]

@@ -152,7 +152,7 @@ def test_what_other_machines_can_reach_asks_for_keys(uri: str, *, asks: bool) ->
     ],
 )
 def test_a_link_on_anothers_door_is_refused(links: tuple[str, ...], tmp_path: Path) -> None:
-    """A board's link on the port next to a secured link's, at the same address, is the user's mistake: nothing is opened."""
+    """A board's link on the door's port of a secured one, at the same address, is the user's mistake: nothing is opened."""
     with pytest.raises(SettingsError) as caught:
         open_links([parse_link(uri, listens_by_default=True) for uri in links], KeyFolder(tmp_path / "k"), board=True)
     assert "takes in new hosts" in str(caught.value)

@@ -30,7 +30,7 @@ def test_what_the_right_image_does_not_show_has_no_value() -> None:
 
 
 def test_more_than_opencv_can_hold_is_refused() -> None:
-    """More than 2032 disparities on an equally wide image would overflow; a narrower image does not have them."""
+    """More than 2032 disparities would overflow on an image that wide and are refused; a narrower image cannot have as many."""
     wide, narrow = noise(2100, 2), noise(300, 8)
     with pytest.raises(SettingsError, match="2032"):
         SgbmMatcher(2100).match(RectifiedPair(wide, wide))
