@@ -239,8 +239,8 @@ def test_dense_streams_lose_hardly_a_pair_and_wait_a_period_at_most(
 ) -> None:
     """Whatever the tolerance, phase and losses: at least 98 % of the optimum's pairs over five seconds, and no wait beyond a period.
 
-    Where phase and tolerance both are half a period to within the jitter, now this neighbour is near enough, now the other. Who knows the future changes
-    sides each time; ours keeps one side, so that the partner does not flip, and finds at least 92 %.
+    Where phase and tolerance are both half a period to within the jitter, sometimes one neighbour is near enough, sometimes the other. The optimum, which
+    knows the future, changes sides each time. Our pairing keeps one side, so that the partner does not flip, and finds at least 92 %.
     """
     cameras = Cameras(tolerance=tolerance, phase=phase, loss=loss, seed=seed)
     board, host, _ = cameras.streams()

@@ -75,10 +75,10 @@ class Pair:
     """Two cameras and a controller on simulated time, frames arriving 50 ms after exposure.
 
     Attributes:
-        skew_ns: the board's exposures after the host's.
-        drift: of that, per ns.
-        scatter_ns: by so much a steered camera misses.
-        follows: whether it takes notice at all.
+        skew_ns: how long after the host's the board's exposures come.
+        drift: change of that skew, per ns.
+        scatter_ns: by how much a steered camera misses.
+        follows: whether it responds to corrections at all.
     """
 
     controller: PhaseController
@@ -220,7 +220,7 @@ def corrected(controller: PhaseController, now_ns: int, times: int) -> int:
 
 
 def test_six_corrections_in_vain_are_enough() -> None:
-    """A camera whose phase is still 12 ms after six corrections is steered no more, and the advice is given; the phase before is the first one."""
+    """A camera whose phase six corrections have left at 12 ms is steered no more, and advice is given; the reported phase before is that before the first one."""
     controller = PhaseController(Steering.GRID, Steering.NONE, has_phase=True)
     now_ns = corrected(controller, 10**12, 6) + 2000 * MS
     assert (

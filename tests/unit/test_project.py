@@ -131,7 +131,7 @@ def test_licence_is_apache_2() -> None:
 def test_version_has_one_source() -> None:
     """The version is in common/versions.py only: pyproject.toml takes it from there, the installed metadata repeat it, and no other module states a version.
 
-    Where the metadata are older, the environment is: `make venv`, or `pip install -e . --no-deps`.
+    Older metadata mean an outdated environment: run `make venv`, or `pip install -e . --no-deps`.
     """
     project = pyproject()
     assert project["project"]["dynamic"] == ["version"]

@@ -37,7 +37,7 @@ def test_marks_that_cannot_be(exposed_ms: int, grabbed_ms: int, sent_ms: int, re
 
 @given(st.integers(-(2**62), 2**62))
 def test_labels_may_lie_anywhere_but_at_the_ends(exposed_ns: int) -> None:
-    """Stamps of images shown on demand are believed unless the difference of two exceeds 64 bits; the stamp of sending is no label."""
+    """Stamps of images shown on demand are believed unless the difference of two exceeds 64 bits; the time of sending is no label."""
     marks = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=NOW_NS - 2, sent_ns=NOW_NS - 1)
     far = abs(NOW_NS - exposed_ns) >= LABELS_NS
     assert disbelief(marks, NOW_NS, 0, labelled=True) is (Disbelief.PAST if far else None)

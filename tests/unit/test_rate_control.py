@@ -49,8 +49,8 @@ class Street:
     Attributes:
         modes: the ladder.
         bytes_per_s: what the link carries.
-        spread: by which share sizes differ from their mean.
-        steps: when the mode changed and to which index.
+        spread: by which share sizes vary around their mean.
+        steps: when the mode changed, and to which index.
     """
 
     modes: tuple[Mode, ...]

@@ -16,8 +16,8 @@ class TwoLines:
     """A reception, and a board that answers at once, apart from each line's round trip; they share a clock.
 
     Attributes:
-        round_trips_ns: of the lines.
-        mute: connections over which nothing comes back.
+        round_trips_ns: of each line.
+        mute: connections on which no answer comes.
     """
 
     def __init__(self, *round_trips_ns: int) -> None:
@@ -59,7 +59,7 @@ def test_the_swifter_line_comes_to_carry() -> None:
 
 
 def test_a_line_whose_frames_are_stuck_stays_in_the_choice() -> None:
-    """If the preferred link's frames lane gives no answer, the other link carries, and the first one still counts as up; once repaired, it carries again."""
+    """If no answer comes on the preferred link's lane for frames, the other link carries, and the first one still counts as up; once repaired, it carries again."""
     lines = TwoLines(MS, MS)
     lines.mute = {LANES[0][Lane.FRAMES]}
     assert lines.run(2_000 * MS)[-1] == "ipc"
@@ -83,7 +83,7 @@ def test_without_a_board_nobody_is_steered() -> None:
 
 
 def test_a_leave_that_was_taken_before_any_frame_has_an_open_end() -> None:
-    """A board greeted but its frames lanes never carried anything: the report holds one session without a name, with zero counts."""
+    """A board greeted, but nothing ever came on its lanes for frames: the account holds one session without a name, with zero counts."""
     lines = TwoLines(MS, MS)
     lines.mute = {lanes[Lane.FRAMES] for lanes in LANES}
     assert set(lines.run(500 * MS)) == {""}
