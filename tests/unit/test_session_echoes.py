@@ -149,7 +149,7 @@ def test_swift_echoes_are_learnt_from_when_their_wave_has_ended() -> None:
 
 
 def test_a_wish_to_steer_is_given_once() -> None:
-    """The board's camera gets the host's request once, for at most one period, and not again before half a second has passed."""
+    """The host's request reaches the board's camera once, as less than one period, and not again before half a second has passed."""
     world = World(board_dials=False)
     world.settle()
     host = world.hosts[0]
