@@ -80,7 +80,7 @@ def test_a_narrow_band_is_stretched() -> None:
 
 @pytest.mark.parametrize("value", [0, 5, 255, 65535])
 def test_a_constant_deep_image_does_not_fail(value: int) -> None:
-    """A lens cap or a saturated image is an image."""
+    """A black image (lens cap) and a saturated one are images, too."""
     assert np.ptp(to_8_bit((np.full((4, 4), value, np.uint16),))[0]) == 0
 
 
@@ -109,7 +109,7 @@ def test_cut_images_are_refused(encode: Any, share: float) -> None:
 
 
 def test_bytes_behind_the_end_of_a_jpeg_are_legal() -> None:
-    """Padding of webcams and trailers of phones do not spoil the picture."""
+    """Padding from webcams and trailers from phones do not spoil the image."""
     content = _jpeg(_COLOUR)
     for trailer in (bytes(512), b"SEFT" + bytes(range(256)) * 40):
         np.testing.assert_array_equal(decode(content + trailer), decode(content))

@@ -25,7 +25,7 @@ from phone_host.stereo.match import MatchSettings, create_matcher
 
 PERIOD_S = 1 / 30
 MOMENT_S = 0.4
-"""The board's newest image; the scene's bodies move at about half a metre a second then."""
+"""The time of the board's newest image; the scene's bodies then move at about half a metre a second."""
 
 FOCAL_M_PX = 525.0 * 0.1
 """Focal length times baseline of `matched_rig`: depth x disparity."""

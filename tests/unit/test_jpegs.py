@@ -100,7 +100,7 @@ def test_a_truncated_image_costs_only_itself(at: int, between: bytes) -> None:
 @given(garbage=st.binary(max_size=2000))
 @settings(deadline=None)
 def test_images_behind_garbage_are_found(garbage: bytes) -> None:
-    """After any garbage images come again: all from the first one that is not covered by a false segment length in the garbage."""
+    """After any garbage images come again: all from the first one on that no false segment length in the garbage covers."""
     stream = JpegStream()
     came = parts(stream, garbage + bytes(70_000) + b"".join(IMAGES))
     assert came == IMAGES

@@ -116,7 +116,7 @@ def test_peers_are_added_renewed_and_forgotten(tmp_path: Path) -> None:
 
 
 def test_the_state_changes_with_the_file(tmp_path: Path) -> None:
-    """A listener that watches the state misses no change of the peers."""
+    """The recorded state of the peers changes with every change of the file, so a listener misses none."""
     folder = KeyFolder(tmp_path)
     states = [folder.peers_state]
     for number in range(5):

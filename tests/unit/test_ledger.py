@@ -37,7 +37,7 @@ KEYS = (
     "capture_ns outbox_ns propagation_ns pairing_ns queuing_ns processing_ns end_to_end_ns starvation_ns, stages_ns, time_skew_ns, "
     "offset_ns, uncertainty_ns, host_exposed_ns host_grabbed_ns"
 )
-"""The keys of delays.jsonl as the design lists them, and the host frame's own marks."""
+"""The keys of delays.jsonl as listed in the design, and the host frame's own marks."""
 
 
 @given(LEDGERS)
@@ -52,7 +52,7 @@ def test_delays_add_up_to_the_nanosecond(ledger: PairLedger) -> None:
 @given(LEDGERS)
 @settings(deadline=None)
 def test_starvation_is_the_idle_time_before_the_pair(ledger: PairLedger) -> None:
-    """Starvation of pair k is max(0, queued_k - done_(k-1)); for the first pair it is 0, by its own queued_ns."""
+    """Starvation of pair k is max(0, queued_k - done_(k-1)); the first pair uses its own queued_ns as done, so its starvation is 0."""
     expected = ledger.queued_ns - ledger.previous_done_ns
     assert ledger.starvation_ns == max(0, expected)
     assert replace(ledger, previous_done_ns=ledger.queued_ns).starvation_ns == 0

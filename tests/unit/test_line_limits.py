@@ -90,7 +90,7 @@ def test_a_packet_of_another_length_than_it_announced_is_none(announced: int, bo
 
 
 def test_a_unit_whose_rest_was_lost_holds_nothing_up() -> None:
-    """If a unit lost its rest, the next bytes are taken for its body. After some silence on the line they are passed on after all, and the loss is reported."""
+    """If the rest of a unit was lost, the bytes that follow are taken for its body. After some silence on the line they are passed on after all, and the loss is reported."""
     board, host = Duplex(BOARD, 1), Duplex(HOST, 2)
     events = []
     for now_ns in range(0, 10 * MS, MS):

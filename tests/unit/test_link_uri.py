@@ -34,7 +34,7 @@ def test_ipc_addresses() -> None:
 
 
 def test_serial_ports() -> None:
-    """A serial port is named by its path; its speed and who plays the listener are options."""
+    """A serial port is named by its path; its speed and which side acts as listener are options."""
     assert parse_link("serial:/dev/ttyGS0", listens_by_default=True) == LinkUri(
         address="serial:/dev/ttyGS0", listens=True
     )

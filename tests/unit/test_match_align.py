@@ -61,7 +61,7 @@ def test_a_pair_without_vertical_detail_is_left_alone() -> None:
 
 
 def test_without_disparities_there_is_no_evidence() -> None:
-    """Where nothing was matched nothing is measured."""
+    """If nothing was matched, nothing is measured."""
     image = plane().pair.left
     assert vertical_offset_px(image, moved_up(image, 0.5), np.full(image.shape, np.nan, np.float32)) == 0.0
 

@@ -51,7 +51,7 @@ def test_search_is_the_definition_bit_for_bit(data: st.DataObject, width: int, h
 
 
 def test_strips_leave_no_seam() -> None:
-    """An image taller than two strips gives the loops' winners on every row."""
+    """An image taller than two strips has the loops' winners on every row."""
     left, right = noise(12, 2 * STRIP_ROWS + 5, seed=1), noise(12, 2 * STRIP_ROWS + 5, seed=2)
     winners = search(left, right, 6)
     left_px, right_px = slow_search(left, right, 6)

@@ -65,7 +65,7 @@ def camera_of(period_ns: int, pacing: Pacing = Pacing.CLOCK) -> CameraDescriptio
 
 
 def queue_of(depth: int = 1, overflow: Overflow = Overflow.DROP_OLDEST) -> PairQueue:
-    """A queue whose board session has begun."""
+    """A queue after the start of a board session."""
     queue = PairQueue(FifoSettings(depth, overflow), None, PERIOD_NS)
     queue.begin(camera_of(PERIOD_NS))
     return queue

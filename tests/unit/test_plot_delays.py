@@ -133,7 +133,7 @@ def test_what_is_foretold_rightly_stands_on_the_line() -> None:
         x, y = float(dot.get("cx", "nan")), float(dot.get("cy", "nan"))
         off.append(y0 + (x - x0) / (x1 - x0) * (y1 - y0) - y)
     assert abs(off[0]) < 0.2
-    # Twice is log(2) / log(span) of the height.
+    # A factor of two is log(2) / log(span) of the height.
     span = math.log(1.25 * 1e9 / (0.8 * 1e7))
     assert off[1] == pytest.approx(math.log(2.0) / span * (y0 - y1), abs=0.3)
     assert off[2] == pytest.approx(math.log(0.4) / span * (y0 - y1), abs=0.3)

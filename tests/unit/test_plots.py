@@ -105,7 +105,7 @@ def test_an_outlier_is_cut_off_and_marked() -> None:
 
 
 def test_strips_show_the_percentiles() -> None:
-    """Bar, median line and numbers stand at the percentiles of the data on the logarithmic axis."""
+    """Bar, median line and numbers are at the percentiles of the data on the logarithmic axis."""
     values = np.arange(0.0, 1001.0) * 1000.0  # 0 to 1 ms in steps of 1 µs: percentile p is p * 10 µs
     root = svg(
         distributions([Strips("tcp", (Quantity(label="queuing", values_ns=values, colour=4, meaning="waiting"),))], 520)

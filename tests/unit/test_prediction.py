@@ -84,7 +84,7 @@ TWENTY_KB = Figures(
     end_to_end_p50_ns=33.0 * MS,
     end_to_end_p95_ns=33.0 * MS,
 )
-"""20 000 bytes every 50 ms, by hand: 2 + 20 ms on the link; 1 ms of capture before and 10 ms of processing behind it; idle for the rest of 50 ms."""
+"""20 000 bytes every 50 ms, by hand: 2 + 20 ms on the link, 1 ms of capture before and 10 ms of processing after it; idle for the rest of 50 ms."""
 
 
 def assert_like(found: Figures, expected: Figures) -> None:

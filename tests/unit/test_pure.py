@@ -15,7 +15,7 @@ FILES = {
     "exists", "is_dir", "is_file", "iterdir", "lstat", "mkdir", "read_bytes", "read_text", "stat", "unlink",
     "write_bytes", "write_text",
 }  # fmt: skip
-"""What a path that was passed in could be asked for."""
+"""Methods that would ask the disk about a path that was passed in."""
 
 
 @pytest.mark.parametrize("name", PURE)

@@ -42,7 +42,7 @@ from tests.support.unkept import Unkept
 
 
 def test_an_account_from_before_the_goodbye_is_not_the_last_one() -> None:
-    """A leaving host waits for the board's answer. Counts that were under way behind the last frame by then, and later frames, do not end the wait."""
+    """A leaving host waits for the board's answer. Counts that were then under way behind the last frame, and later frames, do not end the wait."""
     talk = Talk()
     talk.run(60)
     assert talk.reception.leave(talk.now_ns)

@@ -63,7 +63,7 @@ class Page(HTMLParser):
         self.elements.append((tag, dict(attrs)))
 
     def handle_endtag(self, tag: str) -> None:
-        """Closes the innermost element, which must be this one."""
+        """Closes the innermost element, whose tag must match."""
         if tag not in VOID:
             assert self.open.pop() == tag
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from common.link.sdp import SERVICE_UUID, channel_in, query, record_xml
 
 _ANSWER = bytes.fromhex("0700010018001535133511090004350c35031901003505190003080700")
-"""What bluetoothd 5.66 said of a record with channel 7 (Debian 12, two virtual controllers)."""
+"""What bluetoothd 5.66 answered about a record with channel 7 (Debian 12, two virtual controllers)."""
 
 
 def test_the_channel_in_a_real_answer() -> None:

@@ -19,7 +19,7 @@ NEAR_NS = st.integers(5 * MS, 2 * PERIOD_NS - 1)
 
 
 class Happenings(RuleBasedStateMachine):
-    """Everything that may happen between two machines."""
+    """Every event that may happen between two machines."""
 
     world: SteppingWorld
     usual: int

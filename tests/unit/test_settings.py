@@ -152,7 +152,7 @@ def test_log_levels_go_by_name() -> None:
 
 
 def test_a_run_is_saved_with_the_origin_of_each_setting(tmp_path: Path) -> None:
-    """Settings keep their origin; for options that are not settings the origin is whether they were given, even abbreviated; paths become texts."""
+    """Settings keep their origin; other options show whether they were given, even abbreviated; paths are saved as text."""
     resolved = resolve(Sample, "NOBODY_SETS_THIS", None, {"depth": 4})
     options = {"name": None, "out": tmp_path, "save_every": 3, "pairs": 0, "wait": 2.5}
     words = ["phone-host", "run", "--out", str(tmp_path), "--save=3", "--wait", "2.5", "--pairs-of-nothing"]

@@ -38,7 +38,7 @@ def flipped(content: bytes, bits: int = 40) -> bytes:
 
 
 def without_a_restart(content: bytes) -> bytes:
-    """A JPEG without one of its restart markers and the data before it."""
+    """A JPEG without the bytes from its restart marker FF D2 up to FF D4."""
     start = content.index(b"\xff\xd2")
     return content[:start] + content[content.index(b"\xff\xd4") :]
 

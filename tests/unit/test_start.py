@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 HEAVY = {"numpy", "cv2", "rich", "zmq", "msgpack", "serial", "zeroconf", "asyncio", "importlib.metadata"}
 
 HELP_MS = 150.0
-"""CPU of `phone-host --help`: a command that answers within a tenth of a second or two feels instant, also where it is started by others."""
+"""CPU of `phone-host --help`: a command that answers within a tenth of a second or two feels instant, even when another program starts it."""
 
 
 def loaded_by(module: str, *arguments: str) -> set[str]:

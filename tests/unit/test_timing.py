@@ -42,7 +42,7 @@ REFRESH_S = 1 / 59.94
 START_S = 12.3
 
 UNIT_PX = 12
-"""Of the pattern as it is shown; it is filmed at half that, so that its markers are about as small as they may be."""
+"""Size in the displayed pattern; it is filmed at half that, so that its markers are about as small as they may be."""
 
 
 def stamps(seconds: float, fps: float, phase_s: float) -> Times:

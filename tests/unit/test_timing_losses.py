@@ -105,7 +105,7 @@ def test_a_regular_lamp_is_refused_though_a_change_was_missed() -> None:
 
 
 def test_a_switch_that_bounces_tells_nothing_where_it_does() -> None:
-    """A fast camera sees every third change three times within 40 ms, a slow one once. Which one it saw is unknown; those are left out, and the others give the offset."""
+    """A fast camera sees every third change three times within 40 ms, a slow one once, and which of the three is unknown. These changes are left out, and the others give the offset."""
     bounces_s = np.sort(np.concatenate([SWITCHES_S, SWITCHES_S[::3] + 0.02, SWITCHES_S[::3] + 0.04]))
     swift_s = np.arange(0.0, 12.0, 1 / 100)
     once = measure_lamp(lamp_seen(FILM_S), lamp_seen(swift_s, 0.025))

@@ -171,7 +171,7 @@ def test_a_scaling_camera_without_the_usual_size_gives_the_nearest(
 
 
 def test_the_highest_rate_is_the_first_of_a_list_or_the_end_of_a_range() -> None:
-    """The exposure's minimum duration follows from it; a driver that names no rate leaves it open."""
+    """The highest rate is the first of a list or the upper end of a range; if a driver names no rate, it is unknown."""
     assert Rates((Fraction(60), Fraction(30))).highest_hz == 60
     assert Rates(between_hz=(Fraction(1), Fraction(90))).highest_hz == 90
     assert Rates().highest_hz is None

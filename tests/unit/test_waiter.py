@@ -70,7 +70,7 @@ def test_what_is_readable_ends_the_looking(clock: Clock, pipe: tuple[int, int]) 
 
 
 def test_a_core_that_others_want_is_left_to_them(clock: Clock, pipe: tuple[int, int]) -> None:
-    """Once other threads kept the interpreter for longer than the waiter may poll, it sleeps normally for a second, however often it is told to stay awake; news of that turn is reported."""
+    """If other programs had the core for longer than the waiter may poll, it sleeps normally for a second, however often it is told to stay awake; news of that turn is reported."""
     waiter = Waiter(pipe[:1], clock)
     waiter.stay_awake()
     os.write(pipe[1], b"x")

@@ -141,13 +141,13 @@ def test_long_header_is_refused() -> None:
 @given(MESSAGES.filter(lambda message: not isinstance(message, FrameMessage)), st.binary(min_size=1, max_size=9))
 @settings(deadline=None, max_examples=50)
 def test_only_frames_carry_a_payload(message: Message, payload: bytes) -> None:
-    """Image bytes behind any other message make it invalid."""
+    """Image bytes after any other message make it invalid."""
     with pytest.raises(ProtocolError, match="payload"):
         decode(encode(message)[0], payload)
 
 
 FRAME_FIELDS: list[Any] = ["s", 0, 0, 640, 480, 0, None, 1, 2, 3]
-"""A frame's header behind version and kind: session, sent index, sequence, width, height, format, exposure, three marks."""
+"""A frame's header after version and kind: session, sent index, sequence, width, height, format, exposure, three marks."""
 
 
 @pytest.mark.parametrize(
