@@ -181,7 +181,7 @@ def test_all_lines_and_every_third_pair_are_on_disk(tmp_path: Path) -> None:
 
 
 def test_a_pair_whose_name_somebody_has_taken_is_counted_and_the_run_goes_on(tmp_path: Path) -> None:
-    """A file in the way of one pair's folder costs only this pair: its half-made folder is removed, and the other pairs lose nothing."""
+    """Somebody's folder in the place of one pair's costs only this pair: the half-made folder is removed, and that person's file stays."""
     sink = FileSink(tmp_path, 1, waits=True)
     (tmp_path / "pair-000001").mkdir()
     (tmp_path / "pair-000001" / "mine").write_text("mine")
