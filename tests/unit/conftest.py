@@ -1,8 +1,8 @@
-"""For the unit tests: one thread for the linear algebra of each worker.
+"""One thread for the linear algebra of each worker of the unit tests.
 
-There are as many workers as cores: threads of OpenBLAS for matrices as small as these mostly wait for each other, and burn a tenth of the suite's time in that.
+There are as many workers as cores. With matrices as small as these OpenBLAS's threads mostly wait for each other, which costs a tenth of the suite's time.
 """
 
 import os
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when numpy is imported, which no conftest does before
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when numpy is imported, which no conftest does earlier

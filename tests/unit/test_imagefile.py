@@ -1,4 +1,4 @@
-"""Image files as they are sent: untouched where a camera could have made them, lossless where not."""
+"""Image files as they are sent: unchanged if a camera could have made them, otherwise converted without loss."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ PIXELS = st.one_of(
 def test_raw_maps_become_lossless_png(
     tmp_path_factory: pytest.TempPathFactory, pixels: NDArray[np.uint8] | NDArray[np.uint16]
 ) -> None:
-    """A grey or colour map of 8 or 16 bit, read back by OpenCV from the PNG, has the same pixels and the size that was told."""
+    """OpenCV reads back from the PNG the same pixels, and the reported size, of a grey or colour map of 8 or 16 bits."""
     path = tmp_path_factory.mktemp("maps") / ("map.pgm" if pixels.ndim == 2 else "map.ppm")
     assert cv2.imwrite(str(path), pixels)
     image = load(path)
@@ -45,7 +45,7 @@ def test_raw_maps_become_lossless_png(
 
 @pytest.mark.parametrize(("suffix", "pixel_format"), [(".jpg", PixelFormat.MJPEG), (".png", PixelFormat.PNG)])
 def test_jpeg_and_png_pass_untouched(tmp_path: Path, suffix: str, pixel_format: PixelFormat) -> None:
-    """A file of a kind that hosts decode is sent byte for byte, with the size from its header."""
+    """A file of a kind that hosts decode is sent byte for byte. Its size comes from its header."""
     path = tmp_path / f"image{suffix}"
     path.write_bytes(encoded(suffix, picture(37, 23)))
     image = load(path)
@@ -54,7 +54,7 @@ def test_jpeg_and_png_pass_untouched(tmp_path: Path, suffix: str, pixel_format: 
 
 
 def test_the_contents_decide_not_the_name(tmp_path: Path) -> None:
-    """A JPEG that is called .png is a JPEG."""
+    """A JPEG named .png is still a JPEG."""
     path = tmp_path / "image.png"
     path.write_bytes(jpeg())
     assert load(path).pixel_format is PixelFormat.MJPEG
@@ -62,14 +62,14 @@ def test_the_contents_decide_not_the_name(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("quality", [[cv2.IMWRITE_JPEG_PROGRESSIVE, 1], [cv2.IMWRITE_JPEG_RST_INTERVAL, 4]])
 def test_size_of_other_kinds_of_jpeg(tmp_path: Path, quality: list[int]) -> None:
-    """Progressive JPEGs and those with restart intervals tell their size, too."""
+    """The size of progressive JPEGs and of JPEGs with restart intervals is read, too."""
     path = tmp_path / "image.jpg"
     assert cv2.imwrite(str(path), picture(41, 29), quality)
     assert (load(path).width_px, load(path).height_px) == (41, 29)
 
 
 def test_fill_bytes_before_a_marker(tmp_path: Path) -> None:
-    """Fill bytes FF before a JPEG's marker (T.81, B.1.1.2) are passed over."""
+    """Fill bytes FF before a JPEG's marker (T.81, B.1.1.2) are skipped."""
     path = tmp_path / "image.jpg"
     data = jpeg(41, 29)
     path.write_bytes(data[:2] + b"\xff\xff\xff" + data[2:])
@@ -77,7 +77,7 @@ def test_fill_bytes_before_a_marker(tmp_path: Path) -> None:
 
 
 def test_comments_and_blanks_in_a_map(tmp_path: Path) -> None:
-    """Comments and any white space between a map's numbers (pgm(5)) change nothing."""
+    """Comments and any white space between a map's numbers (pgm(5)) make no difference."""
     path = tmp_path / "map.pgm"
     path.write_bytes(b"P5#made by hand\n# 2x1\n 2\t\r\n1 # next: maximum\n255\n\x07\x08")
     decoded = cv2.imdecode(np.frombuffer(load(path).payload, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -108,7 +108,7 @@ def test_comments_and_blanks_in_a_map(tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_replayed_is_named(tmp_path: Path, content: bytes) -> None:
-    """A file that holds no image, or one that no link would take, is refused at once by name."""
+    """A file that holds no image, or one that no link would take, is refused at once; the error names the file."""
     path = tmp_path / "bad.jpg"
     path.write_bytes(content)
     with pytest.raises(DataError, match=r"bad\.jpg"):
@@ -124,7 +124,7 @@ def test_an_image_too_large_for_any_link_is_refused(tmp_path: Path) -> None:
 
 
 def test_an_unreadable_file_is_named(tmp_path: Path) -> None:
-    """A missing file and a folder are DataErrors, not OSErrors."""
+    """A missing file or a folder raises DataError, not OSError."""
     for path in (tmp_path / "none.jpg", tmp_path):
         with pytest.raises(DataError, match=path.name):
             load(path)
@@ -133,7 +133,7 @@ def test_an_unreadable_file_is_named(tmp_path: Path) -> None:
 @given(st.sampled_from([b"\xff\xd8\xff", b"P5 ", b"P6", b"\x89PNG\r\n\x1a\n", b""]), st.binary(max_size=200))
 @settings(deadline=None, max_examples=200)
 def test_any_content_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, start: bytes, rest: bytes) -> None:
-    """Whatever a file holds, the answer is an image with a size or a DataError."""
+    """For any file content the result is an image with a size or a DataError."""
     path = tmp_path_factory.getbasetemp() / "any.bin"
     path.write_bytes(start + rest)
     try:

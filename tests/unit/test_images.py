@@ -33,13 +33,13 @@ def test_grey_files_keep_their_values(tmp_path: Path, suffix: str) -> None:
 
 
 def test_colour_stays_bgr_and_alpha_is_dropped() -> None:
-    """Three channels come back as they were; a fourth one disappears."""
+    """Three channels come back unchanged; a fourth one is removed."""
     np.testing.assert_array_equal(decode(_png(_COLOUR)), _COLOUR)
     np.testing.assert_array_equal(decode(_png(np.dstack([_COLOUR, _RAMP]))), _COLOUR)
 
 
 def test_memoryview_is_taken() -> None:
-    """Bytes of a received message are decoded in place, from a view."""
+    """The bytes of a received message are decoded in place, from a view."""
     np.testing.assert_array_equal(decode(memoryview(_png(_RAMP))), _RAMP)
 
 
@@ -63,7 +63,7 @@ def test_both_images_get_one_scale(bits: int) -> None:
 
 
 def test_hot_pixels_do_not_set_the_scale() -> None:
-    """One saturated pixel leaves the others their levels."""
+    """One saturated pixel does not change the levels of the others."""
     image = np.linspace(0, 1023, 4096).reshape(64, 64).astype(np.uint16)
     expected = to_8_bit((image,))[0]
     image[3, 3] = 65535
@@ -80,7 +80,7 @@ def test_a_narrow_band_is_stretched() -> None:
 
 @pytest.mark.parametrize("value", [0, 5, 255, 65535])
 def test_a_constant_deep_image_does_not_fail(value: int) -> None:
-    """A lens cap or a saturated image is an image."""
+    """A black image (lens cap) and a saturated one are images, too."""
     assert np.ptp(to_8_bit((np.full((4, 4), value, np.uint16),))[0]) == 0
 
 
@@ -93,7 +93,7 @@ def test_float_images_are_stretched_without_their_nan() -> None:
 
 @pytest.mark.parametrize("content", [b"", b"no image at all", b"\xff\xd8\xff\xd9", b"\x89PNG\r\n\x1a\n"])
 def test_bytes_that_are_no_image_are_refused(content: bytes) -> None:
-    """Empty and foreign bytes raise DataError with the given name."""
+    """Empty and foreign bytes raise a DataError with the given name."""
     with pytest.raises(DataError, match="frame 7"):
         decode(content, "frame 7")
 
@@ -101,7 +101,7 @@ def test_bytes_that_are_no_image_are_refused(content: bytes) -> None:
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9, 0.999])
 @pytest.mark.parametrize("encode", [_jpeg, _png])
 def test_cut_images_are_refused(encode: Any, share: float) -> None:
-    """Half a JPEG decodes to an image that is grey below; it must not pass."""
+    """Half a JPEG decodes to an image whose lower part is grey; it must be refused."""
     noise = np.random.default_rng(1).integers(0, 255, (64, 64, 3)).astype(np.uint8)
     content = encode(noise)
     with pytest.raises(DataError):
@@ -109,14 +109,14 @@ def test_cut_images_are_refused(encode: Any, share: float) -> None:
 
 
 def test_bytes_behind_the_end_of_a_jpeg_are_legal() -> None:
-    """Padding of webcams and trailers of phones do not spoil the picture."""
+    """Padding from webcams and trailers from phones do not spoil the image."""
     content = _jpeg(_COLOUR)
     for trailer in (bytes(512), b"SEFT" + bytes(range(256)) * 40):
         np.testing.assert_array_equal(decode(content + trailer), decode(content))
 
 
 def test_the_end_of_a_thumbnail_is_not_the_end_of_the_picture() -> None:
-    """A JPEG with an EXIF thumbnail that is cut short is refused though it holds an end marker."""
+    """A truncated JPEG with an EXIF thumbnail is refused although it holds an end marker."""
     content, thumbnail = _jpeg(_COLOUR), _jpeg(_RAMP)
     segment = b"Exif\0\0" + thumbnail
     whole = content[:2] + b"\xff\xe1" + (len(segment) + 2).to_bytes(2, "big") + segment + content[2:]
@@ -128,7 +128,7 @@ def test_the_end_of_a_thumbnail_is_not_the_end_of_the_picture() -> None:
 @given(st.binary(max_size=200), st.sampled_from([b"", b"\xff\xd8", b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff\xda"]))
 @settings(deadline=None, max_examples=200)
 def test_any_bytes_give_an_image_or_a_data_error(content: bytes, head: bytes) -> None:
-    """No bytes from outside raise anything else."""
+    """Bytes from outside never raise any other error."""
     try:
         image = decode(head + content)
     except DataError:

@@ -1,4 +1,4 @@
-"""Sizes of images are read from their headers, and what cannot be the image that it claims to be is refused before anything is decoded."""
+"""The size of an image is read from its header. What cannot be the image that it claims to be is refused before anything is decoded."""
 
 import struct
 from pathlib import Path
@@ -28,14 +28,14 @@ KINDS = {
 
 
 def judge(content: bytes, name: str) -> bytes:
-    """All that is done before decoding."""
+    """All checks before decoding."""
     head = read_head(content, name)
     require_believable(head, MOST_PIXELS, name)
     return whole_image(content, head, name)
 
 
 def fault_of(content: bytes) -> FrameFault:
-    """Why an image is refused."""
+    """The reason for which an image is refused."""
     with pytest.raises(SpoiledImageError) as caught:
         judge(content, "frame 7")
     assert "frame 7" in caught.value.problem
@@ -45,7 +45,7 @@ def fault_of(content: bytes) -> FrameFault:
 @given(st.sampled_from(list(KINDS)), st.integers(1, 300), st.integers(1, 300))
 @settings(deadline=None)
 def test_the_size_is_what_the_writer_wrote(suffix: str, width_px: int, height_px: int) -> None:
-    """Whatever OpenCV writes, in every kind, has the size that its header tells, and is whole."""
+    """Everything that OpenCV writes has the size in its header, and is whole."""
     content = encoded(suffix, picture(width_px, height_px))
     head = read_head(content, "image")
     assert (head.kind, head.size_px) == (KINDS[suffix], (width_px, height_px))
@@ -56,7 +56,7 @@ def test_the_size_is_what_the_writer_wrote(suffix: str, width_px: int, height_px
 @pytest.mark.parametrize("flags", [[], [cv2.IMWRITE_JPEG_PROGRESSIVE, 1], [cv2.IMWRITE_JPEG_OPTIMIZE, 1]])
 @pytest.mark.parametrize("level", [0, 255])
 def test_the_plainest_images_are_long_enough(quality: int, flags: list[int], level: int) -> None:
-    """A black or white JPEG at any quality has no fewer bytes than the bound: it follows from the code, not from pictures."""
+    """A black or white JPEG at any quality has no fewer bytes than the bound, which follows from the code and not from example images."""
     for channels in (1, 3):
         image = np.full((480, 640, channels), level, np.uint8)
         done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality, *flags])
@@ -66,7 +66,7 @@ def test_the_plainest_images_are_long_enough(quality: int, flags: list[int], lev
 
 
 def test_webp_of_both_codings_and_a_large_tiff() -> None:
-    """Lossless and lossy WebP, with alpha, and TIFF in tiles tell their size."""
+    """The size of lossless and lossy WebP, of WebP with alpha and of tiled TIFF is read."""
     for quality in (50, 101):
         done, data = cv2.imencode(".webp", picture(53, 31), [cv2.IMWRITE_WEBP_QUALITY, quality])
         assert done
@@ -80,7 +80,7 @@ def test_webp_of_both_codings_and_a_large_tiff() -> None:
 @pytest.mark.parametrize("order", ["<", ">"])
 @pytest.mark.parametrize("is_big", [False, True])
 def test_tiff_in_both_orders(order: str, is_big: bool) -> None:  # noqa: FBT001 - a parameter of the test
-    """Classic and big TIFF, in both byte orders: the size of the first directory; of doubled entries the larger one."""
+    """Classic and big TIFF, in both byte orders: the first directory gives the size; of repeated entries the larger one counts."""
 
     def entry(tag: int, value: int) -> bytes:
         number = struct.pack(f"{order}{'Q' if is_big else 'I'}", value)
@@ -94,7 +94,7 @@ def test_tiff_in_both_orders(order: str, is_big: bool) -> None:  # noqa: FBT001 
 
 
 def test_a_tile_counts_like_an_image() -> None:
-    """A small TIFF whose tile would be decoded into gigabytes is beyond the limit."""
+    """A small TIFF whose tile would decode into gigabytes exceeds the limit."""
     fields = ((256, 70), (257, 50), (322, 40_000), (323, 40_000))
     entries = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in fields)
     content = b"II*\0" + struct.pack("<IH", 8, len(fields)) + entries
@@ -102,7 +102,7 @@ def test_a_tile_counts_like_an_image() -> None:
 
 
 def short_tiff(*entries: tuple[int, int, int]) -> bytes:
-    """A TIFF of 32 bits with a directory of tags, kinds and values, and nothing else."""
+    """A 32-bit TIFF with a directory of tags, kinds and values, and nothing else."""
     fields = b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in entries)
     return b"II*\0" + struct.pack("<IH", 8, len(entries)) + fields
 
@@ -151,7 +151,7 @@ def test_what_cannot_be_whole_is_refused(case: str) -> None:
 
 
 def test_the_limit_is_told() -> None:
-    """An image beyond the limit is refused by name, with its size, the limit and the remedy; the phones' 64 MP lie within it."""
+    """An image beyond the limit is refused. The error gives its name, its size, the limit and the remedy. Phones' 64 MP are within the limit."""
     head = read_head(bombs.black_png(200, 100), "image")
     require_believable(head, 20_000, "a.png")
     with pytest.raises(ImageSizeError) as caught:
@@ -171,14 +171,14 @@ def test_usual_progressive_images_pass() -> None:
 
 
 def test_only_pixels_of_a_png_are_decoded() -> None:
-    """Texts, profiles and animations do not reach the decoder; the image stays the same."""
+    """Texts, profiles and animations do not reach the decoder; the image is unchanged."""
     texts = bombs.chunk(b"zTXt", b"a\0\0" + bombs.packed_zeros(7)) * 3 + bombs.chunk(b"iCCP", b"a\0\0" + bytes(100))
     plain, padded = bombs.black_png(64, 48), bombs.black_png(64, 48, extra=texts)
     assert whole_image(padded, read_head(padded, "image"), "image") == plain
 
 
 def test_bytes_before_a_marker_are_passed_over() -> None:
-    """As decoders do: fill bytes and what a sloppy writer left between segments change nothing, and hide no size."""
+    """As in decoders, fill bytes and a sloppy writer's junk between segments change nothing, and hide no size."""
     content = jpeg(41, 29)
     for junk in (b"\xff\xff\xff", b"\0\0\0", b"\xff\0", b"abc"):
         sloppy = content[:20] + junk + content[20:]  # behind the JFIF segment
@@ -192,7 +192,7 @@ def test_bytes_before_a_marker_are_passed_over() -> None:
 )
 @settings(deadline=None, max_examples=500)
 def test_any_bytes_are_read_or_refused(start: bytes, rest: bytes) -> None:
-    """Whatever comes, the answer is a head with a size or a SpoiledImageError."""
+    """For any bytes the result is a head with a size or a SpoiledImageError."""
     try:
         head = read_head(start + rest, "image")
         whole_image(start + rest, head, "image")
@@ -204,7 +204,7 @@ def test_any_bytes_are_read_or_refused(start: bytes, rest: bytes) -> None:
 @given(st.sampled_from(sorted(KINDS)), st.data())
 @settings(deadline=None, max_examples=300)
 def test_what_is_decoded_has_the_size_that_was_read(suffix: str, data: st.DataObject) -> None:
-    """With bytes changed anywhere an image is refused, or what OpenCV makes of it has the size that was read and judged before."""
+    """An image with changed bytes is refused, or OpenCV decodes it to the size that was read and judged before."""
     content = bytearray(encoded(suffix, picture(24, 16)))
     for _ in range(data.draw(st.integers(1, 4))):
         content[data.draw(st.integers(0, min(len(content) - 1, 400)))] = data.draw(st.integers(0, 255))
@@ -217,7 +217,7 @@ def test_what_is_decoded_has_the_size_that_was_read(suffix: str, data: st.DataOb
 
 @pytest.mark.parametrize("orientation", [0, 1, 3, 6])
 def test_a_tiff_that_is_to_be_turned_is_refused(orientation: int) -> None:
-    """Decoders turn a TIFF by its orientation tag, so that its size would not be the one that was read: only upright ones are taken (TIFF 6.0: 1)."""
+    """Only upright TIFFs are taken (TIFF 6.0: 1): decoders turn a TIFF by its orientation tag, so its size would differ from the one that was read."""
     content = short_tiff((256, 3, 70), (257, 3, 50), (274, 3, orientation))
     if orientation <= 1:
         assert read_head(content, "a.tif").size_px == (70, 50)
@@ -227,20 +227,20 @@ def test_a_tiff_that_is_to_be_turned_is_refused(orientation: int) -> None:
 
 
 def test_markers_without_a_length_are_passed_over() -> None:
-    """A JPEG with TEM and restart markers before its frame header, which carry no length (T.81, table B.1), has the size that it was written with."""
+    """A JPEG with TEM and restart markers, which carry no length (T.81, table B.1), before its frame header has the size that it was written with."""
     content = jpeg(41, 29)
     assert read_head(content[:2] + b"\xff\x01\xff\xd0\xff\xd7" + content[2:], "image").size_px == (41, 29)
 
 
 def test_a_foreign_marker_between_scans_is_no_segment() -> None:
-    """Behind a marker that may not stand between scans the search goes on at once: its would-be length is not believed, and the end is found."""
+    """After a marker that may not stand between scans the search continues at once: the bytes after it are not taken as a length, and the end is found."""
     content = jpeg(16, 8)
     inside = content[:-2] + b"\xff\x02\xff\xff" + b"\xff\xd9"
     assert whole_image(inside, read_head(inside, "image"), "image") == inside
 
 
 def test_real_files_of_a_folder_keep_their_bytes(tmp_path: Path) -> None:
-    """A PNG without texts is handed on as it is, not copied."""
+    """A PNG without texts is passed on as it is, not copied."""
     path = tmp_path / "a.png"
     cv2.imwrite(str(path), picture())
     content = path.read_bytes()

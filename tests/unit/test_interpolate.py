@@ -1,4 +1,4 @@
-"""Images moved in time: what a rendered moving scene loses by a time skew, and gets back."""
+"""Images moved in time: what a time skew costs in a rendered moving scene, and what interpolation wins back."""
 
 from dataclasses import replace
 from functools import cache
@@ -25,7 +25,7 @@ from phone_host.stereo.match import MatchSettings, create_matcher
 
 PERIOD_S = 1 / 30
 MOMENT_S = 0.4
-"""The board's newest image; the scene's bodies move at about half a metre a second then."""
+"""The time of the board's newest image; the scene's bodies then move at about half a metre a second."""
 
 FOCAL_M_PX = 525.0 * 0.1
 """Focal length times baseline of `matched_rig`: depth x disparity."""
@@ -40,7 +40,7 @@ def textured(size: tuple[int, int]) -> Image:
 
 @pytest.mark.parametrize("part", [-0.5, -0.2, 0.3, 0.5, 1.0])
 def test_a_moving_picture_is_moved(part: float) -> None:
-    """A picture that moves by (6, -4) px from one image to the next is, at any part of the way back or on, moved by that part."""
+    """For a picture that moves by (6, -4) px from one image to the next, interpolation by any fraction, back or on, moves it by that fraction."""
     picture = textured((300, 400))
 
     def shown(x: float, y: float) -> Image:
@@ -56,14 +56,14 @@ def test_a_moving_picture_is_moved(part: float) -> None:
 
 
 def test_nothing_is_done_for_no_time() -> None:
-    """For the later image's own moment that image comes back, untouched."""
+    """At the later image's own moment that image comes back unchanged."""
     first, second = textured((100, 120)), textured((100, 120))[::-1].copy()
     assert Interpolator().back(first, second, 0.0) is second
 
 
 @cache
 def scene() -> Scene:
-    """The demo's still life with a ball and a cube that cross it quickly."""
+    """The demo's still life with a ball and a cube that cross it fast."""
     sideways = Path(amplitude_m=(0.16, 0.05, 0.0), phase_rad=(2.2, 0.9, 0.0), period_s=2.0)
     bodies = [
         replace(body, path=sideways) if body.name in {"ball", "cube"} else resting(body) for body in demo_scene().bodies
@@ -86,7 +86,7 @@ def renderers() -> tuple[Renderer, Renderer]:
 
 @cache
 def judged(moment_s: float, *, still: bool = False) -> Truth:
-    """What is true at a moment, with the moving bodies or without."""
+    """The truth at a moment, with or without the moving bodies."""
     rig = matched_rig()
     left, right = rig_poses(rig)
     bodies = tuple(body for body in scene().bodies if not (still and body.path.moves))
@@ -94,7 +94,7 @@ def judged(moment_s: float, *, still: bool = False) -> Truth:
 
 
 def depth_errors(skew_s: float) -> tuple[float, float, float]:
-    """Median |depth error| on the moving bodies, mm: with this time skew, interpolated, and without any skew."""
+    """Median |depth error| on the moving bodies, mm: with this time skew, with interpolation, and without any skew."""
     left, right = renderers()
     host_s = MOMENT_S - skew_s
     earlier, later, other = left.frame(MOMENT_S - PERIOD_S), left.frame(MOMENT_S), right.frame(host_s)
@@ -109,14 +109,14 @@ def depth_errors(skew_s: float) -> tuple[float, float, float]:
         assert moving.sum() > 5000
         return float(np.median(off_mm))
 
-    # The image with the skew is judged by its own moment, the others by the host's.
+    # The image with the skew is judged at its own moment, the others at the host's.
     return error_mm(later, MOMENT_S), error_mm(moved, host_s), error_mm(left.frame(host_s), host_s)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("part", [0.5, -0.45])
 def test_depth_of_what_moves_is_right_again(part: float) -> None:
-    """At half a period of skew the depth of moving things is off by centimetres; interpolated, or continued, most of that is gone."""
+    """At a skew of half a period the depth of moving things is off by centimetres; interpolation or extrapolation removes most of that."""
     skewed_mm, interpolated_mm, best_mm = depth_errors(part * PERIOD_S)
     print(
         f"part {part}: skewed {skewed_mm:.1f} mm, interpolated {interpolated_mm:.1f} mm, without skew {best_mm:.1f} mm"
@@ -127,7 +127,7 @@ def test_depth_of_what_moves_is_right_again(part: float) -> None:
 
 
 def test_the_second_image_of_a_size_is_moved_like_the_first() -> None:
-    """What is kept of a size between images changes nothing, also when another size came between."""
+    """The buffers that are kept for one image size change nothing, even after an image of another size."""
     large, small = textured((240, 320)), textured((120, 160))
     keeps = Interpolator()
     for picture in (large, large, small, large):

@@ -1,4 +1,4 @@
-"""ipc paths in folders into which others write, and sockets of other users. Real users, real sockets."""
+"""ipc paths in folders that others can write to, and sockets of other users. Real users, real sockets."""
 
 import os
 import shutil
@@ -31,7 +31,7 @@ needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can play tw
 
 @pytest.fixture
 def shared() -> Iterator[Path]:
-    """A folder like /tmp: everybody may write, and it is sticky."""
+    """A folder like /tmp: world-writable and sticky."""
     folder = Path(tempfile.mkdtemp())
     folder.chmod(0o1777)
     yield folder
@@ -40,7 +40,7 @@ def shared() -> Iterator[Path]:
 
 @contextmanager
 def as_nobody(what: Callable[[], None], sign: Path) -> Iterator[None]:
-    """Another user's process for the length of a block, from its sign of life on."""
+    """Another user's process for the length of a block, once it has shown that it runs."""
     child = os.fork()
     if not child:
         try:
@@ -72,7 +72,7 @@ def dial(uri: str) -> Link:
 
 
 def false_board(path: Path) -> None:
-    """Listens at a path, and says to whoever comes what a board might say."""
+    """Listens at a path, and sends to every caller what a board might send."""
     os.umask(0)
     sock = zmq.Context().socket(zmq.ROUTER)
     sock.bind(f"ipc://{path}")
@@ -81,7 +81,7 @@ def false_board(path: Path) -> None:
 
 
 def silent_listener(path: Path) -> None:
-    """Listens with the shortest queue, fills it, and accepts nobody."""
+    """Listens with the shortest queue, fills it, and accepts no connection."""
     os.umask(0)
     with socket.socket(socket.AF_UNIX) as sock:
         sock.bind(str(path))
@@ -95,7 +95,7 @@ def silent_listener(path: Path) -> None:
 
 
 def refused_word(link: Link) -> UnavailableError:
-    """Greet until what answers is refused."""
+    """Send hellos until the answering side is refused."""
     deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
         for connection in link.dialled.values():
@@ -110,7 +110,7 @@ def refused_word(link: Link) -> UnavailableError:
 
 @needs_root
 def test_a_socket_of_another_user_is_not_dialled(shared: Path) -> None:
-    """A socket in /tmp that is somebody else's is refused at once, in a line that names path, owner and both remedies; `owner=` allows it."""
+    """Another user's socket in /tmp is refused at once, in a line that names path, owner and both remedies; `owner=` allows it."""
     path = shared / "board"
     with as_nobody(lambda: false_board(path), path):
         with pytest.raises(UnavailableError, match=f"ipc://{path} .*nobody.*XDG_RUNTIME_DIR.*owner=nobody") as caught:
@@ -122,7 +122,7 @@ def test_a_socket_of_another_user_is_not_dialled(shared: Path) -> None:
 
 @needs_root
 def test_a_stranger_who_comes_later_is_not_believed(shared: Path) -> None:
-    """Who takes a free path after a host has begun to wait for its board is known by his process: none of his packets comes through."""
+    """If another user takes a free path after a host has begun to wait for its board, his process gives him away: none of his packets gets through."""
     path = shared / "board"
     with closing(dial(f"ipc://{path}")) as link, as_nobody(lambda: false_board(path), path):
         assert "a process of user nobody listens there" in str(refused_word(link))
@@ -138,7 +138,7 @@ def test_a_stranger_who_comes_later_is_not_believed(shared: Path) -> None:
 @needs_root
 @pytest.mark.parametrize("way", ["straight", "through a link"])
 def test_a_folder_of_another_user_is_not_used(shared: Path, way: str) -> None:
-    """Neither side meets the other in somebody else's folder, where he could exchange the socket; `owner=` allows it."""
+    """Neither side uses another user's folder, whose owner could exchange the socket; `owner=` allows it."""
     place = shared / "nobodys"
     place.mkdir()
     os.chown(place, NOBODY, NOBODY)
@@ -158,7 +158,7 @@ def test_a_folder_of_another_user_is_not_used(shared: Path, way: str) -> None:
 def test_a_folder_where_anybody_may_exchange_sockets_is_refused(
     open_end: Callable[[str], Link], tmp_path: Path
 ) -> None:
-    """Neither side uses a folder that others may write to and that is not sticky; the line names it and chmod."""
+    """Neither side uses a folder that others may write to and that is not sticky. The line names it and chmod."""
     for mode in (0o777, 0o702):
         tmp_path.chmod(mode)
         with pytest.raises(UnavailableError, match=f"other users may write to {tmp_path}.*chmod go-w"):
@@ -171,7 +171,7 @@ def test_a_folder_where_anybody_may_exchange_sockets_is_refused(
 @needs_root
 @pytest.mark.timeout(60)
 def test_a_listener_that_accepts_nobody_holds_up_nobody(shared: Path) -> None:
-    """A stranger's socket with a full queue is told as taken, with his name, at once."""
+    """Another user's socket with a full queue is reported at once as taken, with the user's name."""
     path = shared / "board"
     with (
         as_nobody(lambda: silent_listener(path), shared / "full"),
@@ -182,7 +182,7 @@ def test_a_listener_that_accepts_nobody_holds_up_nobody(shared: Path) -> None:
 
 @needs_root
 def test_root_and_oneself_are_trusted(shared: Path) -> None:
-    """A host of the same user meets its board in a shared folder, whose socket is closed to others."""
+    """A host meets its own user's board in a shared folder; the socket is closed to others."""
     with closing(listen(f"ipc://{shared}/board")) as board, closing(dial(f"ipc://{shared}/board")) as host:
         assert stat.S_IMODE((shared / "board").stat().st_mode) == 0o600
         heard: list[Incoming] = []
@@ -196,19 +196,19 @@ def test_root_and_oneself_are_trusted(shared: Path) -> None:
 
 @pytest.mark.parametrize("uri", ["ipc://x?owner=", "ipc://@board", "tcp://127.0.0.1:5555?owner=root"])
 def test_links_without_an_owner_to_check_are_refused(uri: str) -> None:
-    """An empty owner, a name that belongs to nobody (Linux's abstract sockets), an owner of a tcp link: wrong usage."""
+    """An empty owner, a name that belongs to nobody (Linux's abstract sockets) and an owner of a tcp link are wrong usage."""
     with pytest.raises(SettingsError):
         parse_link(uri, listens_by_default=True)
 
 
 def test_an_owner_who_does_not_exist_is_wrong_usage(tmp_path: Path) -> None:
-    """The line names him."""
+    """The line names the user."""
     with pytest.raises(SettingsError, match="no-such-user"):
         dial(f"ipc://{tmp_path}/x?owner=no-such-user")
 
 
 def test_the_folder_for_sockets(tmp_path: Path) -> None:
-    """$XDG_RUNTIME_DIR where it is one's own alone; else a folder of mode 0700 among the temporary files, whatever the umask."""
+    """$XDG_RUNTIME_DIR if it is private to the user; else a folder of mode 0700 among the temporary files, whatever the umask."""
     own = tmp_path / "run"
     own.mkdir(mode=0o700)
     assert runtime_folder({"XDG_RUNTIME_DIR": str(own)}) == own
@@ -226,7 +226,7 @@ def test_the_folder_for_sockets(tmp_path: Path) -> None:
 @needs_root
 @pytest.mark.parametrize("plant", ["link", "file", "foreign", "open"])
 def test_a_folder_for_sockets_that_somebody_has_planted_is_refused(plant: str, tmp_path: Path) -> None:
-    """A link, a file, another user's folder or one that others may enter is named with the remedy, and not used."""
+    """A link, a file, another user's folder or one that others may enter is not used; the error names it and the remedy."""
     folder = tmp_path / f"tandemscan-{os.geteuid()}"
     match plant:
         case "link":
@@ -245,7 +245,7 @@ def test_a_folder_for_sockets_that_somebody_has_planted_is_refused(plant: str, t
 
 @needs_root
 def test_the_doctor_asks_as_the_user_who_serves(shared: Path) -> None:
-    """Root's doctor finds nothing wrong with a path in the service's own folder."""
+    """Root's doctor has nothing to report about a path in the service's own folder."""
     place = shared / "run"
     place.mkdir(mode=0o750)
     os.chown(place, NOBODY, NOBODY)

@@ -1,4 +1,4 @@
-"""Images in a stream of multipart or whatever: each whole one once, with its own bytes, whatever stands between them."""
+"""JPEG images in a byte stream, multipart or not: each whole image comes once, with its own bytes, whatever lies between images."""
 
 import random
 
@@ -15,7 +15,7 @@ IMAGES = [jpeg(16 + 8 * seed, 8, seed=seed) for seed in range(6)]
 
 
 def progressive(seed: int) -> bytes:
-    """An image of several scans, with tables between them and restart markers within."""
+    """An image of several scans, with tables between them and restart markers in them."""
     flags = [cv2.IMWRITE_JPEG_PROGRESSIVE, 1, cv2.IMWRITE_JPEG_RST_INTERVAL, 1]
     done, data = cv2.imencode(".jpg", picture(64, 48, seed=seed), flags)
     assert done
@@ -23,7 +23,7 @@ def progressive(seed: int) -> bytes:
 
 
 def with_comment(image: bytes, comment: bytes) -> bytes:
-    """The image with a comment segment behind its first marker (T.81, B.2.4.5), such as a thumbnail in EXIF data."""
+    """The image with a comment segment after its first marker (T.81, B.2.4.5), such as a thumbnail in EXIF data."""
     return image[:2] + b"\xff\xfe" + (len(comment) + 2).to_bytes(2, "big") + comment + image[2:]
 
 
@@ -48,7 +48,7 @@ BETWEEN = {
 
 @pytest.mark.parametrize("between", BETWEEN.values(), ids=BETWEEN.keys())
 def test_every_way_of_parting_images(between: bytes) -> None:
-    """Whatever stands between the images of a stream, each comes once, with exactly its bytes and size."""
+    """Whatever lies between the images of a stream, each comes once, with exactly its bytes and size."""
     stream = JpegStream()
     data = b"".join((between % len(image) if b"%d" in between else between) + image for image in IMAGES)
     events = stream.feed(data + between, 1)
@@ -62,7 +62,7 @@ def test_every_way_of_parting_images(between: bytes) -> None:
 @given(cuts=st.lists(st.integers(0, 20_000), max_size=30), between=st.sampled_from(sorted(BETWEEN.values())))
 @settings(deadline=None, max_examples=60)
 def test_any_chopping_gives_the_same_images(cuts: list[int], between: bytes) -> None:
-    """However the bytes are chopped, the same images come."""
+    """However the bytes are split into chunks, the same images come."""
     data = b"".join(between + image for image in [*IMAGES, progressive(3)])
     edges = sorted(min(cut, len(data)) for cut in cuts)
     stream = JpegStream()
@@ -71,7 +71,7 @@ def test_any_chopping_gives_the_same_images(cuts: list[int], between: bytes) -> 
 
 
 def test_an_image_is_there_with_its_last_byte() -> None:
-    """An image is given as soon as its last byte has come, not with the next part; its first byte's time is told."""
+    """An image is given as soon as its last byte has arrived, not with the next part. The arrival time of its first byte is given, too."""
     stream, image = JpegStream(), IMAGES[2]
     assert stream.feed(b"--frame\r\n\r\n", 5) == []
     assert stream.feed(image[:1], 10) == []
@@ -81,7 +81,7 @@ def test_an_image_is_there_with_its_last_byte() -> None:
 
 
 def test_a_thumbnail_ends_no_image() -> None:
-    """An image within a segment of another one, and the word of an end there, belong to the outer one."""
+    """An image inside a segment of another one, and an end marker there, belong to the outer image."""
     outer = with_comment(IMAGES[3], IMAGES[0] + b"\xff\xd9\xff\xd8")
     assert parts(JpegStream(), outer + IMAGES[1]) == [outer, IMAGES[1]]
 
@@ -89,7 +89,7 @@ def test_a_thumbnail_ends_no_image() -> None:
 @given(at=st.integers(400, 10_000), between=st.sampled_from(sorted(BETWEEN.values())))
 @settings(deadline=None)
 def test_a_truncated_image_costs_only_itself(at: int, between: bytes) -> None:
-    """An image that breaks off in its data is told of as broken once; the images before and behind it come."""
+    """An image that breaks off in its data is reported once as broken; the images before and after it come."""
     image = jpeg(64, 48, seed=9)
     cut = image[: min(max(at, image.index(b"\xff\xda") + 20), len(image) - 2)]
     events = JpegStream().feed(between.join([IMAGES[0], cut, IMAGES[1], IMAGES[2]]), 1)
@@ -100,14 +100,14 @@ def test_a_truncated_image_costs_only_itself(at: int, between: bytes) -> None:
 @given(garbage=st.binary(max_size=2000))
 @settings(deadline=None)
 def test_images_behind_garbage_are_found(garbage: bytes) -> None:
-    """Behind any garbage images come again: all from the first one on that no spoiled length of the garbage covers."""
+    """After any garbage images come again: all from the first one on that no false segment length in the garbage covers."""
     stream = JpegStream()
     came = parts(stream, garbage + bytes(70_000) + b"".join(IMAGES))
     assert came == IMAGES
 
 
 def test_an_image_without_end_is_bounded() -> None:
-    """An image that never ends is given up at the limit of a link's payload, and images behind it come."""
+    """An image that never ends is given up at the limit of a link's payload, and the images after it come."""
     stream, endless = JpegStream(), IMAGES[0][:-2]
     stream.feed(endless, 1)
     broken = 0
@@ -119,7 +119,7 @@ def test_an_image_without_end_is_bounded() -> None:
 
 
 def test_ten_million_random_bytes() -> None:
-    """10^7 random bytes hold no more than an image's bytes, and the next good image comes within a segment's length."""
+    """During 10^7 random bytes no more than one image's bytes are held, and the next good image comes within a segment's length."""
     chance, stream = random.Random(4), JpegStream()
     for _ in range(100):
         stream.feed(chance.randbytes(100_000), 1)
@@ -130,7 +130,7 @@ def test_ten_million_random_bytes() -> None:
 
 
 def test_an_image_without_size_is_broken() -> None:
-    """A JPEG of no height, which some encoders write and fill in later, is told of as broken."""
+    """A JPEG of height 0, which some encoders write and fill in later, is reported as broken."""
     image = bytearray(IMAGES[0])
     at = image.index(b"\xff\xc0")
     image[at + 5 : at + 7] = b"\0\0"
@@ -149,7 +149,7 @@ SCAN = b"\xff\xda\x00\x08\x01\x01\x00\x00\x3f\x00entropy"
     ids=["plain", "filled up", "restarts", "a comment"],
 )
 def test_legal_markers_are_walked_over_byte_by_byte(markers: bytes) -> None:
-    """Fill bytes, restart markers and comments belong to an image; it is whole with its last byte, and none of it has passed by."""
+    """Fill bytes, restart markers and comments belong to an image. It is whole with its last byte, and no part of it is skipped."""
     image = SOI + markers + SCAN + EOI
     stream = JpegStream()
     events = [event for at in range(len(image)) for event in stream.feed(image[at : at + 1], at)]
@@ -171,7 +171,7 @@ def test_legal_markers_are_walked_over_byte_by_byte(markers: bytes) -> None:
     ids=["no marker, short", "no marker", "a code that is none", "a length of one", "another beginning"],
 )
 def test_illegal_markers_break_the_image_and_only_that(spoiled: bytes) -> None:
-    """Where no marker can be, the image that had begun is broken, and the next one is found."""
+    """An illegal marker breaks the image in progress; the next image is found."""
     stream = JpegStream()
     events = [*stream.feed(spoiled, 1), *stream.feed(IMAGES[0], 2)]
     assert [type(event) for event in events] == [Broken, Whole]
@@ -181,7 +181,7 @@ def test_illegal_markers_break_the_image_and_only_that(spoiled: bytes) -> None:
 
 
 def test_what_is_no_marker_is_told_with_its_first_byte() -> None:
-    """Where a marker has to stand and another byte comes the image is broken at once, not when more has come; the next one is whole."""
+    """If another byte comes where a marker must be, the image is broken at once, without waiting for more; the next one is whole."""
     stream = JpegStream()
     assert stream.feed(b"\xff\xd8\xff\xe0\0\4JF", 1) == []
     assert stream.feed(b"\x20", 2) == [Broken(FrameFault.NO_END)]

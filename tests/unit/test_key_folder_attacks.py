@@ -1,4 +1,4 @@
-"""A folder of keys whose owner was taken over, and root acting in it. Real users, real links."""
+"""Root works in a folder of keys whose owner has been compromised. Real users, real links."""
 
 import fcntl
 import os
@@ -31,7 +31,7 @@ pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="only root can act for
 
 @pytest.fixture
 def place() -> Iterator[Path]:
-    """A folder of root's, below which everybody may pass: pytest's own are closed to other users."""
+    """A folder of root's that everybody may pass through: pytest's own folders are closed to other users."""
     place = Path(tempfile.mkdtemp())
     place.chmod(0o755)
     (place / "secret").write_text(SECRET)
@@ -50,7 +50,7 @@ def folder(place: Path) -> Path:
 
 
 def as_nobody(what: Callable[[], None]) -> None:
-    """Do something as the service that was taken over."""
+    """Do something as the compromised service."""
     child = os.fork()
     if not child:
         try:
@@ -77,7 +77,7 @@ def is_as_it_was(secret: Path) -> bool:
 
 
 def test_what_root_writes_is_the_services(folder: Path) -> None:
-    """Key, peers and spent codes that root writes belong to the folder's owner, and root has its own rights again afterwards."""
+    """Key, peers and spent codes that root writes belong to the folder's owner. Afterwards root has its own rights again."""
     keys = KeyFolder(folder)
     keys.own()
     keys.add(Peer(name="phone", key=zmq.curve_keypair()[0].decode(), added=WHEN))
@@ -93,7 +93,7 @@ def test_what_root_writes_is_the_services(folder: Path) -> None:
 
 @pytest.mark.parametrize("name", ["key", "peers.json", "spent-codes"])
 def test_a_link_to_a_file_of_roots_is_neither_read_nor_written(place: Path, folder: Path, name: str) -> None:
-    """Whatever root does with the folder, the link's target stays as it is, and no word of it is told."""
+    """Whatever root does with the folder, the link's target is unchanged, and none of its content is shown."""
     secret = place / "secret"
     as_nobody(lambda: (folder / name).symlink_to(secret))
     keys = KeyFolder(folder)
@@ -114,7 +114,7 @@ def test_a_link_to_a_file_of_roots_is_neither_read_nor_written(place: Path, fold
 
 
 def test_the_command_survives_a_link_in_place_of_the_key(place: Path, folder: Path) -> None:
-    """`keys` tells of the link in one line (4); `keys --new` replaces the link, not its target."""
+    """`keys` reports the link in one line (4); `keys --new` replaces the link, not its target."""
     as_nobody(lambda: (folder / "key").symlink_to(place / "secret"))
     told = keys_command(folder)
     assert told.returncode == 4
@@ -127,7 +127,7 @@ def test_the_command_survives_a_link_in_place_of_the_key(place: Path, folder: Pa
 
 
 def test_names_foreseen_for_temporary_files_lead_nowhere(place: Path, folder: Path) -> None:
-    """Links under every name that a process and thread number would give are not written through: names are random."""
+    """Links at every name that a process and thread number would give are not written through: names are random."""
     pid, thread = os.getpid(), threading.get_native_id()
 
     def plant() -> None:
@@ -140,7 +140,7 @@ def test_names_foreseen_for_temporary_files_lead_nowhere(place: Path, folder: Pa
 
 
 def test_a_hard_link_to_a_file_of_roots_is_replaced_not_written(place: Path, folder: Path) -> None:
-    """Where the kernel lets anybody make hard links (protected_hardlinks=0), root's file keeps content and owner, and is not read."""
+    """If the kernel lets anybody make hard links (protected_hardlinks=0), root's file keeps its content and owner, and is not read."""
     os.link(place / "secret", folder / "key")
     with pytest.raises(UnavailableError, match="Permission denied"):
         KeyFolder(folder).own()
@@ -152,7 +152,7 @@ def test_a_hard_link_to_a_file_of_roots_is_replaced_not_written(place: Path, fol
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir], ids=["pipe", "folder"])
 @pytest.mark.timeout(30)
 def test_a_pipe_or_folder_under_a_files_name_is_one_line(folder: Path, name: str, make: Callable[[Path], None]) -> None:
-    """Root waits for nobody at the pipe's other end, and says which file is none."""
+    """Root does not wait for the other end of a pipe, and says which path is no file."""
     as_nobody(lambda: make(folder / name))
     keys = KeyFolder(folder)
     with pytest.raises(DataError, match=f"{name} is not a plain file"):
@@ -160,7 +160,7 @@ def test_a_pipe_or_folder_under_a_files_name_is_one_line(folder: Path, name: str
 
 
 def test_a_file_without_end_is_not_read(folder: Path) -> None:
-    """A file of a terabyte is refused after a megabyte."""
+    """Of a file of a terabyte no more than a megabyte is read; then it is refused."""
 
     def plant() -> None:
         with (folder / "peers.json").open("wb") as file:
@@ -173,7 +173,7 @@ def test_a_file_without_end_is_not_read(folder: Path) -> None:
 
 
 def test_names_in_the_folder_do_not_command_roots_terminal(folder: Path) -> None:
-    """A peer whose name holds an escape sequence is refused in a line that holds none."""
+    """A peer whose name holds an escape sequence is refused in a line without that sequence."""
     key = zmq.curve_keypair()[0].decode()
 
     def plant() -> None:
@@ -188,7 +188,7 @@ def test_names_in_the_folder_do_not_command_roots_terminal(folder: Path) -> None
 
 
 def test_a_folder_exchanged_for_a_link_is_acted_in_with_its_planters_rights(place: Path, folder: Path) -> None:
-    """In a folder of the service's own, `keys` leads to one of root's: root writes nothing there, though the folder at the end is root's."""
+    """In the service's own folder `keys` links to a folder of root's: root writes nothing there, although root owns the folder at the end."""
     (place / "roots").mkdir(mode=0o755)
     as_nobody(lambda: (folder / "keys").symlink_to(place / "roots"))
     with pytest.raises(UnavailableError, match="Permission denied"):
@@ -200,7 +200,7 @@ def test_a_folder_exchanged_for_a_link_is_acted_in_with_its_planters_rights(plac
 
 
 def test_a_link_of_roots_own_is_followed(place: Path, folder: Path) -> None:
-    """What root has linked (/var, systemd's private folders) leads to the service's folder as always; relative links and `..` too."""
+    """Root's own links (/var, systemd's private folders) lead to the service's folder as always; so do relative links and `..`."""
     (place / "absolute").symlink_to(folder)
     (place / "relative").symlink_to("service")
     own = KeyFolder(folder).own()
@@ -209,7 +209,7 @@ def test_a_link_of_roots_own_is_followed(place: Path, folder: Path) -> None:
 
 
 def test_root_does_not_pass_through_a_folder_where_anybody_may_exchange_things(place: Path) -> None:
-    """A folder of root's that all may write to and that is not sticky ends the way with one line; a sticky one (/tmp) does not."""
+    """A folder of root's that is world-writable and not sticky is refused in one line; a sticky one (/tmp) is not."""
     (place / "open").mkdir()
     (place / "open").chmod(0o777)
     with pytest.raises(UnavailableError, match="others may write"):
@@ -219,7 +219,7 @@ def test_root_does_not_pass_through_a_folder_where_anybody_may_exchange_things(p
 
 
 def test_a_link_that_leads_to_itself_is_one_line(folder: Path) -> None:
-    """Links in a circle end."""
+    """A circle of links is detected."""
     as_nobody(lambda: (folder / "a").symlink_to("a"))
     with pytest.raises(UnavailableError, match="Too many levels"):
         KeyFolder(folder / "a" / "b").own()
@@ -227,7 +227,7 @@ def test_a_link_that_leads_to_itself_is_one_line(folder: Path) -> None:
 
 @pytest.mark.timeout(60)
 def test_a_race_for_the_folder_gives_the_service_nothing(place: Path, folder: Path) -> None:
-    """While the service exchanges file and folder for links as fast as it can, root renews the key 300 times: root's files stay as they were."""
+    """The service exchanges file and folder for links as fast as it can while root renews the key 300 times: root's files are unchanged."""
     (place / "roots").mkdir(mode=0o755)
     real, keys = folder / "real", folder / "keys"
     as_nobody(lambda: real.mkdir(mode=0o700))
@@ -259,7 +259,7 @@ def test_a_race_for_the_folder_gives_the_service_nothing(place: Path, folder: Pa
 
 
 def test_a_lock_that_is_never_given_back_ends_in_one_line(folder: Path) -> None:
-    """A service that holds its folder's lock keeps root waiting for a while, not for ever."""
+    """A service that holds its folder's lock makes root wait for a while, not for ever."""
     descriptor = os.open(folder, os.O_RDONLY)
     fcntl.flock(descriptor, fcntl.LOCK_EX)
     try:
@@ -271,7 +271,7 @@ def test_a_lock_that_is_never_given_back_ends_in_one_line(folder: Path) -> None:
 
 
 def test_a_folder_that_is_open_survives_its_exchange(folder: Path) -> None:
-    """A file goes into the folder that was opened, also when another one has its name by then."""
+    """A file goes into the folder that was opened, even if another folder has that name by then."""
     as_nobody((folder / "keys").mkdir)
     as_nobody((folder / "elsewhere").mkdir)
     with opened_folder(folder / "keys") as opened:

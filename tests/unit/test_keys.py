@@ -24,12 +24,12 @@ def some_key() -> str:
 
 
 def mode(path: Path) -> int:
-    """Permissions of a file."""
+    """The permissions of a file."""
     return stat.S_IMODE(path.stat().st_mode)
 
 
 def test_a_key_is_made_once_and_for_its_owner_only(tmp_path: Path) -> None:
-    """The first use makes folder (0700) and key (0600) whatever the umask; later uses read the same one; the public key belongs to the secret one."""
+    """The first use makes the folder (0700) and the key (0600) whatever the umask. Later uses read the same key. The public key belongs to the secret one."""
     before = os.umask(0)
     try:
         own = KeyFolder(tmp_path / "a" / "b").own()
@@ -43,7 +43,7 @@ def test_a_key_is_made_once_and_for_its_owner_only(tmp_path: Path) -> None:
 
 
 def test_many_at_once_make_one_key(tmp_path: Path) -> None:
-    """Whoever comes first makes the key, all the others read that one."""
+    """The first process makes the key; all others read it."""
     seen: list[str] = []
     threads = [threading.Thread(target=lambda: seen.append(KeyFolder(tmp_path).own().public)) for _ in range(8)]
     for thread in threads:
@@ -55,7 +55,7 @@ def test_many_at_once_make_one_key(tmp_path: Path) -> None:
 
 
 def test_a_new_key_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
-    """`renew` gives another key, and it stays."""
+    """`renew` gives another key, which is kept."""
     folder = KeyFolder(tmp_path)
     old, new = folder.own(), folder.renew()
     assert new != old
@@ -66,7 +66,7 @@ def test_a_new_key_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
     "content", [b"", b"#" * 40 + b"\n", b"\xff" * 40, b"-----BEGIN PRIVATE KEY-----\n", b"0" * 39 + b"\n"]
 )
 def test_a_spoiled_key_file_is_one_line(tmp_path: Path, content: bytes) -> None:
-    """A key file that holds no key is named, with the remedy, and left as it is."""
+    """A key file without a key is named, with the remedy, and left unchanged."""
     (tmp_path / "key").write_bytes(content)
     (tmp_path / "key").chmod(0o600)
     with pytest.raises(DataError, match="key") as caught:
@@ -90,7 +90,7 @@ def test_a_file_that_others_may_read_is_refused(tmp_path: Path, name: str) -> No
     "text", ["", "{}", "[1]", '[{"name": "x"}]', "[" * 5000, '[{"name": 1, "key": "", "added": ""}]', "null"]
 )
 def test_a_spoiled_file_of_peers_is_one_line(tmp_path: Path, text: str) -> None:
-    """Whatever stands in the file of peers is a list of them or one DataError that names it."""
+    """Any content of the file of peers is a list of peers or one DataError that names the file."""
     (tmp_path / "peers.json").write_text(text)
     (tmp_path / "peers.json").chmod(0o600)
     folder = KeyFolder(tmp_path)
@@ -100,7 +100,7 @@ def test_a_spoiled_file_of_peers_is_one_line(tmp_path: Path, text: str) -> None:
 
 
 def test_peers_are_added_renewed_and_forgotten(tmp_path: Path) -> None:
-    """Names stay unique, a key that comes again takes the place of its old entry, and who is forgotten is gone."""
+    """Names stay unique, a key that comes again replaces its old entry, and a forgotten peer is gone."""
     folder, first, second = KeyFolder(tmp_path), some_key(), some_key()
     assert folder.add(Peer(name="phone", key=first, added=WHEN)).name == "phone"
     assert folder.add(Peer(name="phone", key=second, added=WHEN)).name == "phone-2"
@@ -116,7 +116,7 @@ def test_peers_are_added_renewed_and_forgotten(tmp_path: Path) -> None:
 
 
 def test_the_state_changes_with_the_file(tmp_path: Path) -> None:
-    """A listener that looks at the state misses no change of the peers."""
+    """The recorded state of the peers changes with every change of the file, so a listener misses none."""
     folder = KeyFolder(tmp_path)
     states = [folder.peers_state]
     for number in range(5):
@@ -128,7 +128,7 @@ def test_the_state_changes_with_the_file(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_cannot_be_used_is_one_line(tmp_path: Path) -> None:
-    """A file in the folder's place is named."""
+    """A file in place of the folder is named."""
     (tmp_path / "file").write_text("")
     with pytest.raises(UnavailableError, match="file"):
         KeyFolder(tmp_path / "file").own()
@@ -144,7 +144,7 @@ def test_where_keys_lie() -> None:
 
 
 def test_who_is_at_an_address() -> None:
-    """The one paired there last, else the one of that name, else the only one; with several and none that fits, nobody."""
+    """The peer paired there last, else the one of that name, else the only one; with several and no match, none."""
     bone = Peer(name="bone", key="", added=WHEN, address="tcp://192.168.7.2:5555")
     other = Peer(name="other", key="", added=WHEN, address="tcp://192.168.7.2:5555")
     far = Peer(name="far", key="", added=WHEN, address="tcp://far:5555")
@@ -157,7 +157,7 @@ def test_who_is_at_an_address() -> None:
 
 @given(st.text(max_size=200))
 def test_any_name_becomes_a_plain_one(name: str) -> None:
-    """What a stranger calls itself can neither break a line of the log nor be empty or long."""
+    """A stranger's name can neither break a line of the log nor be empty or long."""
     cleaned = clean_name(name)
     assert 1 <= len(cleaned) <= 64
     assert all(c.isascii() and (c.isalnum() or c in "._-") for c in cleaned)
@@ -165,7 +165,7 @@ def test_any_name_becomes_a_plain_one(name: str) -> None:
 
 @given(st.binary(min_size=32, max_size=32))
 def test_every_256_bits_are_a_key(raw: bytes) -> None:
-    """The form of a key is that of 32 bytes in Z85, by ZeroMQ's own encoder."""
+    """The form of a key is that of 32 bytes in Z85, as ZeroMQ encodes it."""
     text = z85.encode(raw).decode()
     assert is_key(text)
     assert not is_key(text[:-1])
@@ -174,7 +174,7 @@ def test_every_256_bits_are_a_key(raw: bytes) -> None:
 
 
 def test_the_codes_typed_last_are_kept(tmp_path: Path) -> None:
-    """Codes that were proved stay known to every later process, the newest 64 of them, for the owner only; a file that others may read is refused."""
+    """Every later process knows the newest 64 proved codes. Only the owner may read them; a file that others may read is refused."""
     assert KeyFolder(tmp_path / "k").spent_codes() == ()
     for number in range(70):
         KeyFolder(tmp_path / "k").spend(f"{number:06d}")

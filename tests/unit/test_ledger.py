@@ -37,7 +37,7 @@ KEYS = (
     "capture_ns outbox_ns propagation_ns pairing_ns queuing_ns processing_ns end_to_end_ns starvation_ns, stages_ns, time_skew_ns, "
     "offset_ns, uncertainty_ns, host_exposed_ns host_grabbed_ns"
 )
-"""The keys of delays.jsonl as the design lists them, and the host frame's own marks."""
+"""The keys of delays.jsonl as listed in the design, and the host frame's own marks."""
 
 
 @given(LEDGERS)
@@ -52,7 +52,7 @@ def test_delays_add_up_to_the_nanosecond(ledger: PairLedger) -> None:
 @given(LEDGERS)
 @settings(deadline=None)
 def test_starvation_is_the_idle_time_before_the_pair(ledger: PairLedger) -> None:
-    """Starvation of pair k is max(0, queued_k - done_(k-1)); the first pair, with its own queued_ns for that, starves nothing."""
+    """Starvation of pair k is max(0, queued_k - done_(k-1)); the first pair uses its own queued_ns as done, so its starvation is 0."""
     expected = ledger.queued_ns - ledger.previous_done_ns
     assert ledger.starvation_ns == max(0, expected)
     assert replace(ledger, previous_done_ns=ledger.queued_ns).starvation_ns == 0
@@ -61,7 +61,7 @@ def test_starvation_is_the_idle_time_before_the_pair(ledger: PairLedger) -> None
 @given(MARKS, TIMES_NS)
 @settings(deadline=None)
 def test_another_clock_keeps_the_differences(marks: BoardMarks, sent_ns: int) -> None:
-    """Moved to another clock, `sent` is what it was set to and the other marks keep their distance to it."""
+    """Moved to another clock, `sent` is the given stamp and the other marks keep their distance to it."""
     moved = marks.moved_to(sent_ns)
     assert moved.sent_ns == sent_ns
     assert moved.sent_ns - moved.grabbed_ns == marks.sent_ns - marks.grabbed_ns
@@ -71,7 +71,7 @@ def test_another_clock_keeps_the_differences(marks: BoardMarks, sent_ns: int) ->
 @given(LEDGERS)
 @settings(deadline=None)
 def test_json_has_exactly_the_agreed_keys(ledger: PairLedger) -> None:
-    """A line of delays.jsonl is one line with the keys of the design and integers that survive the round trip."""
+    """A line of delays.jsonl is one line with the design's keys and with integers that survive the round trip."""
     line = ledger.to_json()
     assert "\n" not in line
     record = json.loads(line)

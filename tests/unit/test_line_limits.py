@@ -1,4 +1,4 @@
-"""A line at its limits: as much as fits into one writing, a round trip measured anew, units nobody acknowledges, half a unit, a stranger's goodbye."""
+"""A line at its limits: as much as fits into one write, a new round trip measured, units nobody acknowledges, half a unit, a stranger's goodbye."""
 
 import struct
 
@@ -17,7 +17,7 @@ BOARD, HOST = LinkEnd.LISTENER, LinkEnd.DIALLER
 
 
 def test_one_writing_is_what_a_tty_takes_at_once() -> None:
-    """On a line of gigabytes a second a large frame leaves in pieces of 64 KB, beyond which none goes by more than one unit, and all of it leaves."""
+    """On a line of gigabytes a second a large frame leaves in pieces of 64 KB, never more than one unit beyond that at once, and all of it leaves."""
     cutter, deframer = Cutter(BOARD), Deframer(BOARD)
     frame = bytes(2_000_000)
     assert cutter.put(Lane.FRAMES, b"head", frame)
@@ -34,14 +34,14 @@ def test_one_writing_is_what_a_tty_takes_at_once() -> None:
 
 
 def test_the_round_trip_is_measured_anew_with_the_line_let_run_empty() -> None:
-    """Ten seconds after the least round trip was seen, no second unit may be under way until one alone has been acknowledged."""
+    """Ten seconds after the least round trip was measured, no second unit may be under way until one alone has been acknowledged."""
     window = Window()
     window.sent(0, 300, 0)
     assert window.acknowledged(0, 2 * MS)
     now_ns = 2 * MS
     window.sent(1, 300, now_ns)
     room = []
-    # A unit of 300 bytes each 11 ms, the next one always written before word of the last one comes.
+    # A unit of 300 bytes every 11 ms; the next one is always written before the last one is acknowledged.
     for number in range(2, 1001):
         now_ns += 11 * MS
         window.tick(now_ns)
@@ -51,13 +51,13 @@ def test_the_round_trip_is_measured_anew_with_the_line_let_run_empty() -> None:
     assert room == [True] * 909 + [False] * 90  # 909 units take ten seconds
     window.acknowledged(1000, now_ns + 11 * MS)
     window.sent(1001, 300, now_ns + 11 * MS)
-    window.acknowledged(1001, now_ns + 16 * MS)  # alone: its 5 ms are the line's round trip now
+    window.acknowledged(1001, now_ns + 16 * MS)  # alone: its 5 ms are now the line's round trip
     window.sent(1002, 300, now_ns + 17 * MS)
     assert window.has_room(200)
 
 
 def test_units_that_nobody_acknowledges_are_forgotten_at_last() -> None:
-    """Of 4100 units without an answer the oldest four are not remembered, so that a mute peer fills no memory; word of the fifth is still understood."""
+    """Of 4100 unanswered units the oldest four are forgotten, so that a mute peer fills no memory; an acknowledgement of the fifth is still understood."""
     window = Window()
     for number in range(4100):
         window.sent(number, 300, number * MS)
@@ -69,7 +69,7 @@ def test_units_that_nobody_acknowledges_are_forgotten_at_last() -> None:
     ("announced", "bodies"), [(10, [b"1234", b"5678901"]), (10, [b"1234", b"56789"]), (3, [b"1234"]), (5, [b"1234"])]
 )
 def test_a_packet_of_another_length_than_it_announced_is_none(announced: int, bodies: list[bytes]) -> None:
-    """Chunks that come to more or less than what the first one says make no packet; it is counted, and the next packet comes whole."""
+    """Chunks whose total differs from what the first one announces make no packet. The error is counted, and the next packet comes whole."""
     joiner = Joiner()
 
     def units(announced: int, bodies: list[bytes], number: int) -> list[Unit]:
@@ -90,7 +90,7 @@ def test_a_packet_of_another_length_than_it_announced_is_none(announced: int, bo
 
 
 def test_a_unit_whose_rest_was_lost_holds_nothing_up() -> None:
-    """What follows a unit that lost its rest is taken for its body; when the line has been silent for a while it is given after all, the loss told."""
+    """If the rest of a unit was lost, the bytes that follow are taken for its body. After some silence on the line they are passed on after all, and the loss is reported."""
     board, host = Duplex(BOARD, 1), Duplex(HOST, 2)
     events = []
     for now_ns in range(0, 10 * MS, MS):
@@ -111,7 +111,7 @@ def test_a_unit_whose_rest_was_lost_holds_nothing_up() -> None:
 
 
 def test_a_strangers_goodbye_ends_no_contact() -> None:
-    """A listener parts from the dialler that it has met, by that one's number: a goodbye of another, or of a life before, means nothing."""
+    """A listener parts only from the dialler that it has met, by that dialler's number: a goodbye from another one, or from an earlier life, has no effect."""
     listener, met, stranger = Contact(BOARD, 0), Contact(HOST, 7), Contact(HOST, 8)
     other_listener = Contact(BOARD, 0)
     for dialler, heard_by in ((met, listener), (stranger, other_listener)):

@@ -1,4 +1,4 @@
-"""Link URIs: what they mean, and which make no sense."""
+"""Link URIs: what they mean, and which are refused."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from common.peers import Peer
 )
 @settings(deadline=None)
 def test_tcp_addresses(port: int, host: str, *, listens: bool) -> None:
-    """Every port on every kind of host is taken as it stands, and without an option the role's default decides who listens."""
+    """Every port on every kind of host is taken as written. Without an option the role's default decides who listens."""
     address = f"tcp://{host}:{port}"
     assert parse_link(address, listens_by_default=listens) == LinkUri(address=address, listens=listens)
     assert parse_link(f"{address}?bind=1", listens_by_default=listens) == LinkUri(address=address, listens=True)
@@ -34,7 +34,7 @@ def test_ipc_addresses() -> None:
 
 
 def test_serial_ports() -> None:
-    """A serial port is named by its path; its speed and who plays the listener are options."""
+    """A serial port is named by its path; its speed and which side acts as listener are options."""
     assert parse_link("serial:/dev/ttyGS0", listens_by_default=True) == LinkUri(
         address="serial:/dev/ttyGS0", listens=True
     )
@@ -43,7 +43,7 @@ def test_serial_ports() -> None:
 
 
 def test_bluetooth_devices() -> None:
-    """A Bluetooth device is named by address or name, with or without a channel; whether strangers will do is an option."""
+    """A Bluetooth device is named by address or name, with or without a channel; an option decides whether strangers are accepted."""
     for address in ("rfcomm://*", "rfcomm://*/1", "rfcomm://AA:BB:CC:DD:EE:FF/30", "rfcomm://my%20board"):
         assert parse_link(address, listens_by_default=True) == LinkUri(address=address, listens=True)
         assert parse_link(f"{address}?connect=1&unpaired=1", listens_by_default=True) == LinkUri(
@@ -111,7 +111,7 @@ def test_bad_uris_are_named(uri: str) -> None:
 
 @pytest.mark.parametrize("address", ["tcp://*:5555", "tcp://127.0.0.1:5555/x", "ipc://" + "x" * 200])
 def test_addresses_that_cannot_be_dialled_are_refused(address: str) -> None:
-    """An address without a host, or one that the transport cannot take, is the user's mistake and told at once."""
+    """An address without a host, or one that the transport cannot take, is the user's mistake and reported at once."""
     with pytest.raises(SettingsError):
         open_link(LinkUri(address=address, listens=False))
 
@@ -137,7 +137,7 @@ def test_addresses_that_cannot_be_dialled_are_refused(address: str) -> None:
     ],
 )
 def test_what_other_machines_can_reach_asks_for_keys(uri: str, *, asks: bool) -> None:
-    """Tcp beyond loopback is for known keys unless it is said to be insecure; what only this machine reaches is open."""
+    """Beyond loopback tcp is for known keys only, unless the URI says insecure; what only this machine can reach is open."""
     assert needs_keys(parse_link(uri, listens_by_default=True)) is asks
 
 
@@ -152,7 +152,7 @@ def test_what_other_machines_can_reach_asks_for_keys(uri: str, *, asks: bool) ->
     ],
 )
 def test_a_link_on_anothers_door_is_refused(links: tuple[str, ...], tmp_path: Path) -> None:
-    """A board's link on the port behind a secured one's own, at the same address, is the user's mistake: nothing is opened."""
+    """A board's link on the door's port of a secured one, at the same address, is the user's mistake: nothing is opened."""
     with pytest.raises(SettingsError) as caught:
         open_links([parse_link(uri, listens_by_default=True) for uri in links], KeyFolder(tmp_path / "k"), board=True)
     assert "takes in new hosts" in str(caught.value)
@@ -161,13 +161,13 @@ def test_a_link_on_anothers_door_is_refused(links: tuple[str, ...], tmp_path: Pa
 
 @pytest.mark.parametrize("listens", [True, False])
 def test_without_keys_nothing_beyond_this_machine_is_opened(listens: bool) -> None:  # noqa: FBT001 - one of two values
-    """No caller that forgets the keys can open a link to other machines: it is refused, and insecure=1 is named."""
+    """A caller that forgets the keys cannot open a link to other machines: it is refused, and insecure=1 is named."""
     with pytest.raises(SettingsError, match="insecure=1"):
         open_link(LinkUri(address="tcp://192.0.2.1:5555", listens=listens))
 
 
 def test_an_unknown_board_is_named_with_the_command_that_helps(tmp_path: Path) -> None:
-    """Dialling a board that is no peer says how to pair; with several peers it lists them."""
+    """Dialling a board that is no peer gives an error that says how to pair; with several peers it lists them."""
     keys = KeyFolder(tmp_path)
     with pytest.raises(UnavailableError, match=r"phone-host pair --link tcp://192\.0\.2\.1:5555"):
         open_link(LinkUri(address="tcp://192.0.2.1:5555", listens=False), keys)
@@ -179,7 +179,7 @@ def test_an_unknown_board_is_named_with_the_command_that_helps(tmp_path: Path) -
 
 @pytest.mark.parametrize("host", ["192.0.2.1", "no-such-host.invalid"])
 def test_an_address_of_another_machine_cannot_be_listened_on(host: str) -> None:
-    """Whoever listens on an address that this machine does not have is told so, once and with the remedy (192.0.2.0/24 is nobody's, RFC 5737)."""
+    """Listening on an address that this machine does not have gives one message with the remedy (192.0.2.0/24 is nobody's, RFC 5737)."""
     uri = parse_link(f"tcp://{host}:5555?insecure=1", listens_by_default=True)
     with pytest.raises(UnavailableError, match=r" \([A-Za-z ]+\): give an address of this machine, or \* for all$"):
         open_link(uri)
@@ -195,5 +195,5 @@ def test_an_address_of_another_machine_cannot_be_listened_on(host: str) -> None:
     ],
 )
 def test_what_zeromq_has_bound_can_be_bound_by_others(bound: str, plain: str) -> None:
-    """An IPv4 address on a socket of both versions is given as IPv4: the door behind it is a socket of one."""
+    """An IPv4 address on a dual-stack socket is given as IPv4, because the door behind it has an IPv4-only socket."""
     assert plain_endpoint(bound) == plain

@@ -1,4 +1,4 @@
-"""Folders of results into which others have put things: links, pipes, folders of their own."""
+"""Results folders into which others have put things: links, pipes, folders of their own."""
 
 import os
 import signal
@@ -21,7 +21,7 @@ FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
 
 
 def earlier_run(folder: Path) -> None:
-    """What a run of three pairs leaves, the last of them killed half-way."""
+    """What a run of three pairs leaves if it is killed in the middle of the last one."""
     results = FileSink(folder, 1)
     assert results._own is not None
     for name in ("pair-000000", "pair-1000000"):
@@ -46,7 +46,7 @@ def tree(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_later_run_removes_what_an_earlier_one_left_and_nothing_else(tmp_path: Path) -> None:
-    """Delays, report, page and pairs of the earlier run are gone, half-made ones too; a user's files and folders of like names stay."""
+    """The earlier run's delays, report, page and pairs are gone, half-made ones too; a user's files and folders with similar names stay."""
     earlier_run(tmp_path)
     mine = {"pair-000123-my-notes/a.txt": b"a", "pair-12/b": b"b", "report.json.bak": b"c", "notes.txt": b"d"}
     for name, content in mine.items():
@@ -60,7 +60,7 @@ def test_a_later_run_removes_what_an_earlier_one_left_and_nothing_else(tmp_path:
 
 
 def test_a_run_again_and_again_in_one_folder(tmp_path: Path) -> None:
-    """Each run takes the place of the one before, also after it was killed before its report."""
+    """Each run replaces the one before, even one that was killed before its report."""
     for number in range(3):
         FileSink(tmp_path, 1).close({"number": number})
     killed = FileSink(tmp_path, 1)
@@ -83,7 +83,7 @@ def plant_file(path: Path) -> None:
 
 
 def refused(out: Path, name: str) -> None:
-    """A run into this folder ends with one line that names what is in the way and the remedy; nothing is changed by then."""
+    """A run into this folder ends with one line that names what is in the way and the remedy; nothing has been changed."""
     before = tree(out.parent)
     with pytest.raises(UnavailableError, match=name) as caught:
         FileSink(out, 1)
@@ -109,7 +109,7 @@ def test_what_is_not_ours_ends_the_first_run(name: str, plant: Callable[[Path], 
 def test_a_link_or_pipe_in_place_of_ours_ends_a_later_run(
     name: str, plant: Callable[[Path], None], tmp_path: Path
 ) -> None:
-    """Also under a name that is listed as ours, a link is not: it is refused before anything is changed."""
+    """A link is not ours even under a name that is listed as ours: it is refused before anything is changed."""
     (tmp_path / "precious").write_text("precious")
     earlier_run(tmp_path / "out")
     (tmp_path / "out" / name).rename(tmp_path / "moved")
@@ -119,7 +119,7 @@ def test_a_link_or_pipe_in_place_of_ours_ends_a_later_run(
 
 @pytest.mark.parametrize("file", ["notes.txt", "left.png.bak", ".hidden"])
 def test_a_users_file_in_a_pair_of_ours_ends_the_run(file: str, tmp_path: Path) -> None:
-    """Notes that somebody has put into a saved pair stay, and so does the rest; so does what a link in it points at."""
+    """Notes that somebody put into a saved pair stay, and so does the rest of it; so do the targets of links in it."""
     earlier_run(tmp_path)
     (tmp_path / "pair-000000" / file).write_text("mine")
     before = tree(tmp_path)
@@ -135,7 +135,7 @@ def test_a_users_file_in_a_pair_of_ours_ends_the_run(file: str, tmp_path: Path) 
 
 
 def test_a_link_planted_while_the_run_goes_on_is_replaced(tmp_path: Path) -> None:
-    """A link under report.json or index.html that appears after the start is replaced by the report; its target stays as it is."""
+    """A link at report.json or index.html that appears after the start is replaced by the report; its target is unchanged."""
     precious, out = tmp_path / "precious", tmp_path / "out"
     precious.write_text("precious")
     results = FileSink(out, 1)
@@ -157,7 +157,7 @@ def test_every_writer_replaces_a_link(write: Callable[[Path], None], tmp_path: P
 
 
 def test_a_torn_last_line_of_the_list_counts_for_nothing(tmp_path: Path) -> None:
-    """A list whose last line was cut by a full disk names what stands before it; the next run mends it."""
+    """If a full disk cut the last line of a list, the list names what stands before it; the next run repairs it."""
     FileSink(tmp_path, 1).close({})
     with (tmp_path / LIST).open("a") as list_file:
         list_file.write("pair-0000")
@@ -166,7 +166,7 @@ def test_a_torn_last_line_of_the_list_counts_for_nothing(tmp_path: Path) -> None
 
 
 def test_what_another_verb_has_listed_stays(tmp_path: Path) -> None:
-    """A run leaves what it does not write itself, and it goes on being ours."""
+    """A run leaves files that it does not write itself, and they remain ours."""
     other = ListedFolder(tmp_path, "disparity.pfm")
     other.add("disparity.pfm", "report.json")
     other.close()
@@ -179,7 +179,7 @@ def test_what_another_verb_has_listed_stays(tmp_path: Path) -> None:
 
 
 def test_a_list_with_ways_out_of_the_folder_leads_nowhere(tmp_path: Path) -> None:
-    """Whoever writes the list can have results removed, nothing above the folder and nothing of another name."""
+    """Whoever writes the list can have results removed, but nothing above the folder and nothing with another name."""
     out = tmp_path / "out"
     FileSink(out, 1).close({})
     (tmp_path / "report.json").write_text("precious")
@@ -203,7 +203,7 @@ while True:
 
 
 def test_a_process_that_is_killed_leaves_one_whole_report(tmp_path: Path) -> None:
-    """Killed at any moment while it writes one report over the other, a process leaves the old one or the new one."""
+    """A process killed at any moment while it replaces one report by another leaves the old one or the new one."""
     report = tmp_path / "report.json"
     write_text(report, "b" * 3_000_000)
     for number in range(12):
@@ -218,7 +218,7 @@ def test_a_process_that_is_killed_leaves_one_whole_report(tmp_path: Path) -> Non
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
-    """A file in the folder's place, or a link to nowhere, is named with the remedy."""
+    """A file in place of the folder, or a dangling link, is named with the remedy."""
     (tmp_path / "file").write_text("")
     (tmp_path / "link").symlink_to("nowhere/at/all")
     for name in ("file", "link"):
@@ -227,7 +227,7 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
 
 
 def test_names_are_claimed_before_they_are_written(tmp_path: Path) -> None:
-    """A verb that writes single files refuses those of others before its work, replaces those of earlier runs, and is replaced itself."""
+    """A verb that writes single files refuses other people's files before its work and replaces those of earlier runs; later runs replace its own."""
     (tmp_path / "report.json").write_text("mine")
     with pytest.raises(UnavailableError, match=r"report\.json was not written by an earlier run"):
         claim(tmp_path, "report.json", "plot.svg")
@@ -240,7 +240,7 @@ def test_names_are_claimed_before_they_are_written(tmp_path: Path) -> None:
 
 
 def test_what_is_read_is_not_replaced(tmp_path: Path) -> None:
-    """Images or a rig that lie under a name which the results would take end the run before anything has changed; beside them they do no harm."""
+    """Images or a rig under a name that the results need end the run before anything is changed; beside the results they do no harm."""
     names = NAMES
     with pytest.raises(SettingsError, match=r"--camera .*pair-000003 lies inside --out"):
         spare_inputs(tmp_path, names, {"--camera": tmp_path / "pair-000003"})
@@ -251,7 +251,7 @@ def test_what_is_read_is_not_replaced(tmp_path: Path) -> None:
 
 
 def test_a_file_without_end_is_not_read(tmp_path: Path) -> None:
-    """A device, a pipe or a file longer than anything it could be is one line, at once and without memory."""
+    """A device, a pipe or a file that is far too long gives one line, at once and without using memory."""
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "sparse").touch()
     os.truncate(tmp_path / "sparse", 1 << 40)

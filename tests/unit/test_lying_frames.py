@@ -1,4 +1,4 @@
-"""Frames whose bytes, header and camera do not agree are refused before anything is decoded, each with its reason."""
+"""Frames whose bytes, header and camera contradict each other are refused before anything is decoded, each with its reason."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ def pair_of(
     pixel_format: PixelFormat = JPEG,
     own_px: tuple[int, int] = (64, 48),
 ) -> FramePair:
-    """A board's frame as it came, beside a sound one of the own camera."""
+    """A board's frame as it came, beside a sound one of the host's camera."""
     marks, stamp = BoardMarks(exposed_ns=1, grabbed_ns=1, sent_ns=1), Stamp(1, HOST_CLOCK)
     message = replace(
         FRAME,
@@ -91,7 +91,7 @@ LIES = {
 
 @pytest.mark.parametrize("case", LIES)
 def test_a_lie_is_refused_by_name(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever lies is refused as spoiled, with its reason and the frame's name, and no decoder sees it."""
+    """Every lying frame is refused as spoiled, with its reason and the frame's name, and no decoder sees it."""
     pair, fault = LIES[case]
     decodings: list[object] = []
     monkeypatch.setattr(cv2, "imdecode", lambda *given: decodings.append(given))  # to see that OpenCV is not called
@@ -102,7 +102,7 @@ def test_a_lie_is_refused_by_name(case: str, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_size_that_is_not_believed_has_a_class_of_its_own() -> None:
-    """Lies about sizes are ImageSizeErrors; they are data errors like all others."""
+    """Wrong sizes raise ImageSizeError; it is a DataError like all the others."""
     with pytest.raises(ImageSizeError) as caught:
         Pipeline(None, Side.LEFT, now.monotonic_ns).process(pair_of(jpeg(32, 24), SIZE, SIZE))
     assert isinstance(caught.value, DataError)
@@ -111,7 +111,7 @@ def test_a_size_that_is_not_believed_has_a_class_of_its_own() -> None:
 
 
 def test_the_limit_is_a_setting() -> None:
-    """A sound pair beyond the limit is refused, and taken with a higher one."""
+    """A sound pair beyond the limit is refused; with a higher limit it is taken."""
     size = (1200, 1000)
     pair = pair_of(jpeg(*size), size, size)
     with pytest.raises(ImageSizeError, match="limit is 1 MPx"):
@@ -121,13 +121,13 @@ def test_the_limit_is_a_setting() -> None:
 
 
 def test_a_smaller_image_of_a_lower_rung_is_still_enlarged() -> None:
-    """A board that sends the same view with fewer pixels is honest."""
+    """A board that sends the same view with fewer pixels is accepted."""
     done = Pipeline(None, Side.LEFT, now.monotonic_ns).process(pair_of(jpeg(32, 24), (32, 24), SIZE))
     assert done.pair.left.shape == (48, 64, 3)
 
 
 def test_sizes_that_do_not_fit_each_other_are_told_before_decoding(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a core two honest sizes that are no rectified pair are bad data, no spoiled images, and are told before decoding."""
+    """With a core two true sizes that make no rectified pair are bad data, not spoiled images, and are reported before decoding."""
     decodings: list[object] = []
     monkeypatch.setattr(cv2, "imdecode", lambda *given: decodings.append(given))  # to see that OpenCV is not called
     core = StereoCore(create_matcher(MatchSettings(MatcherName.SGBM, 16)))
@@ -139,7 +139,7 @@ def test_sizes_that_do_not_fit_each_other_are_told_before_decoding(monkeypatch: 
 
 
 def test_the_frame_before_may_lie_too() -> None:
-    """A lie in the frame before, which interpolation looks at, costs the interpolation only."""
+    """A lie in the previous frame, which interpolation uses, costs only the interpolation."""
     pair = pair_of(jpeg(*SIZE), SIZE, SIZE)
     before = pair_of(bombs.SMALL_BOMB, SIZE, SIZE).board
     marks = BoardMarks(exposed_ns=-33_000_000, grabbed_ns=-33_000_000, sent_ns=-33_000_000)

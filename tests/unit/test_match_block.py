@@ -14,13 +14,13 @@ from tests.support.planes import noise
 
 def slow_sad(left: NDArray[np.int64], right: NDArray[np.int64], x: int, y: int, d: int) -> int:
     """The definition: absolute differences over x-4 .. x+3, y-4 .. y+3, the images continued by their nearest pixel."""
-    # The right window is the same window d further left; pixel (x, y) stands at (x + 4, y + 4) of a continued image.
+    # The right window is the same window d further left; pixel (x, y) is at (x + 4, y + 4) of a continued image.
     here, there = left[y : y + 8, x : x + 8], right[y : y + 8, x - d : x - d + 8]
     return int(np.abs(here - there).sum())
 
 
 def continued(image: Image) -> NDArray[np.int64]:
-    """An image with four more pixels on each side, like their nearest."""
+    """An image with four more pixels on each side, equal to their nearest."""
     return np.pad(image.astype(np.int64), 4, mode="edge")
 
 
@@ -41,7 +41,7 @@ def slow_search(left_image: Image, right_image: Image, disparities: int) -> tupl
 @settings(deadline=None, max_examples=25)
 @given(data=st.data(), width=st.integers(1, 14), height=st.integers(1, 10), disparities=st.integers(1, 16))
 def test_search_is_the_definition_bit_for_bit(data: st.DataObject, width: int, height: int, disparities: int) -> None:
-    """Both views' whole-pixel winners equal the loops'; few grey levels make ties frequent."""
+    """Both views' whole-pixel winners equal the loops'; with few grey levels ties are frequent."""
     levels = arrays(np.uint8, (height, width), elements=st.sampled_from([0, 1, 2, 255]))
     left, right = data.draw(levels), data.draw(levels)
     winners = search(left, right, disparities)
@@ -51,7 +51,7 @@ def test_search_is_the_definition_bit_for_bit(data: st.DataObject, width: int, h
 
 
 def test_strips_leave_no_seam() -> None:
-    """An image taller than two strips gives the loops' winners on every row."""
+    """An image taller than two strips has the loops' winners on every row."""
     left, right = noise(12, 2 * STRIP_ROWS + 5, seed=1), noise(12, 2 * STRIP_ROWS + 5, seed=2)
     winners = search(left, right, 6)
     left_px, right_px = slow_search(left, right, 6)
@@ -62,7 +62,7 @@ def test_strips_leave_no_seam() -> None:
 @settings(deadline=None, max_examples=10)
 @given(seed=st.integers(0, 10_000), shift=st.integers(0, 5))
 def test_match_is_winners_checked_and_refined(seed: int, shift: int) -> None:
-    """A value stands where the right pixel points back to within 1 px, and lies within half a pixel of the winner."""
+    """A value exists where the right pixel points back to within 1 px, and lies within half a pixel of the winner."""
     left = noise(24, 12, seed)
     right = np.where(noise(24, 12, seed + 1) < 60, noise(24, 12, seed + 2), np.roll(left, -shift, axis=1))
     disparity = BlockMatcher(8).match(RectifiedPair(left, right))
@@ -76,7 +76,7 @@ def test_match_is_winners_checked_and_refined(seed: int, shift: int) -> None:
 
 
 def test_left_right_check_by_hand() -> None:
-    """Pixel 3 points to right pixel 1, which points back exactly; pixel 4 to right pixel 2, which points 2 px beside it."""
+    """Pixel 3 points to right pixel 1, which points back exactly; pixel 4 points to right pixel 2, which misses it by 2 px."""
     left_px = np.array([[0, 0, 0, 2, 2]], np.int32)
     right_px = np.array([[0, 2, 4, 0, 0]], np.int32)
     assert points_back(left_px, right_px)[0, 3:].tolist() == [True, False]
@@ -85,7 +85,7 @@ def test_left_right_check_by_hand() -> None:
 @settings(deadline=None)
 @given(at=st.floats(1.5, 3.49), slope=st.integers(100, 2000))
 def test_v_shaped_costs_are_refined_exactly(at: float, slope: int) -> None:
-    """For costs slope * |d - at| the refined winner is `at`, up to the costs being whole numbers."""
+    """For costs slope * |d - at| the refined winner is `at`, up to the rounding of costs to whole numbers."""
     cost = [round(slope * abs(d - at)) for d in range(6)]
     winner = cost.index(min(cost))
     keys = np.full((8, 1, 1), np.iinfo(np.int32).max, np.int32)
@@ -95,13 +95,13 @@ def test_v_shaped_costs_are_refined_exactly(at: float, slope: int) -> None:
 
 
 def test_ends_of_the_range_stay_whole() -> None:
-    """Where only one neighbour was searched there is nothing to fit: the value is a whole number."""
+    """If only one neighbour was searched there is nothing to fit: the value is a whole number."""
     left = noise(40, 20, seed=3)
     disparity = BlockMatcher(4).match(RectifiedPair(left, np.roll(left, -3, axis=1)))
     assert (disparity[:, 10:-10] == 3).all()
 
 
 def test_no_whole_window_no_value() -> None:
-    """An image lower than the window of 8 rows holds no whole window: all NaN."""
+    """An image with fewer rows than the window's 8 holds no whole window: all NaN."""
     image = noise(40, 7)
     assert np.isnan(BlockMatcher(4).match(RectifiedPair(image, image))).all()

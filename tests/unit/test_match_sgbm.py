@@ -1,4 +1,4 @@
-"""What the default matcher promises beyond the contract of all matchers: it bears unlike cameras and a tired calibration."""
+"""What the default matcher promises beyond every matcher's contract: it copes with unlike cameras and an imprecise calibration."""
 
 import numpy as np
 import pytest
@@ -23,14 +23,14 @@ def test_exposure_and_vertical_drift_cost_little(vertical_px: float, gain: float
 
 
 def test_what_the_right_image_does_not_show_has_no_value() -> None:
-    """With a disparity of about 20, the 19 leftmost columns have no partner inside the right image and get none."""
+    """With a disparity of about 20, the 19 leftmost columns have no partner inside the right image and get no disparity."""
     disparity = SgbmMatcher(64).match(plane(slope_x=0.0, slope_y=0.0).pair)
     assert np.isnan(disparity[:, :19]).all()
     assert np.isfinite(disparity[:, 24:-4]).mean() > 0.95
 
 
 def test_more_than_opencv_can_hold_is_refused() -> None:
-    """More than 2032 disparities on an image as wide would overflow; on a narrower image they are simply not there."""
+    """More than 2032 disparities would overflow on an image that wide and are refused; a narrower image cannot have as many."""
     wide, narrow = noise(2100, 2), noise(300, 8)
     with pytest.raises(SettingsError, match="2032"):
         SgbmMatcher(2100).match(RectifiedPair(wide, wide))

@@ -1,4 +1,4 @@
-"""Image motion: shifts that are known because the images were moved by just that."""
+"""Image motion: the shifts are known because the images were moved by exactly that."""
 
 import cv2
 import numpy as np
@@ -23,13 +23,13 @@ def view(image: Image, x_px: int, y_px: int) -> Image:
 
 @pytest.mark.parametrize(("x_px", "y_px"), [(0, 0), (2, 0), (-6, 0), (0, 10), (12, -9), (30, 0)])
 def test_a_moved_view_has_moved_by_just_that(x_px: int, y_px: int) -> None:
-    """The length of the shift comes out within a third of a pixel, in any direction."""
+    """The length of the shift is measured within a third of a pixel, in any direction."""
     image = texture()
     assert fast_shift_px(view(image, 0, 0), view(image, x_px, y_px)) == pytest.approx(np.hypot(x_px, y_px), abs=0.35)
 
 
 def test_an_object_before_a_still_background_counts() -> None:
-    """A quarter of the image that moves sets the figure: its depth would be wrong."""
+    """If a quarter of the image moves, that quarter sets the value: its depth would be wrong."""
     behind, before = texture(), texture(seed=5)
     first, second = view(behind, 0, 0).copy(), view(behind, 0, 0).copy()
     first[120:360, 160:480] = view(before, 0, 0)[120:360, 160:480]
@@ -38,13 +38,13 @@ def test_an_object_before_a_still_background_counts() -> None:
 
 
 def test_a_blank_wall_tells_nothing() -> None:
-    """Where there is nothing to follow the answer is NaN, not 0."""
+    """If there is nothing to follow, the answer is NaN, not 0."""
     blank = np.full((480, 640), 128, np.uint8)
     assert np.isnan(fast_shift_px(blank, blank))
 
 
 def test_colour_and_noise_make_no_motion() -> None:
-    """A still scene with the noise of a camera stays below 0.1 px: 3 px/s at 30 frames a second."""
+    """A still scene with camera noise gives less than 0.1 px: 3 px/s at 30 frames a second."""
     rng = np.random.default_rng(1)
     still = cv2.cvtColor(view(texture(), 0, 0), cv2.COLOR_GRAY2BGR)
     noisy = [np.clip(still + rng.normal(0, 3, still.shape), 0, 255).astype(np.uint8) for _ in range(2)]
@@ -52,7 +52,7 @@ def test_colour_and_noise_make_no_motion() -> None:
 
 
 def test_speed_is_shift_by_time_between_consecutive_frames() -> None:
-    """4 px in 1/20 s are 80 px/s; one measurement in half a second at most; frames far apart or out of order tell nothing."""
+    """4 px in 1/20 s are 80 px/s. There is at most one measurement in half a second. Frames far apart or out of order give none."""
     image, meter = texture(), MotionMeter()
     assert np.isnan(meter.px_s)
     for number in range(40):
@@ -69,7 +69,7 @@ def test_speed_is_shift_by_time_between_consecutive_frames() -> None:
 
 
 def test_nothing_is_measured_on_a_blank_wall() -> None:
-    """Where there is no corner the speed stays unknown, also where the second image has nothing of the first."""
+    """Without a corner the speed stays unknown; so does it if the second image shows nothing of the first."""
     blank = np.full((120, 160), 128, np.uint8)
     assert np.isnan(fast_shift_px(blank, blank))
     chance = np.random.default_rng(1)
@@ -78,7 +78,7 @@ def test_nothing_is_measured_on_a_blank_wall() -> None:
 
 
 def test_a_moment_without_anything_to_follow_leaves_the_speed_as_it_was() -> None:
-    """A hand before the lens says nothing: the speed measured before stays, and no NaN spoils the median."""
+    """A hand before the lens gives no measurement: the earlier speed stays, and no NaN spoils the median."""
     image, blank = texture(), np.full((480, 640), 128, np.uint8)
     meter = MotionMeter()
     for number, shown in enumerate([view(image, 0, 0), view(image, 6, 0), blank, blank]):

@@ -1,4 +1,4 @@
-"""The board's outbox: one waiting frame, and an account that never loses one."""
+"""The board's outbox: one waiting frame, and counts that never lose one."""
 
 from enum import Enum, auto
 
@@ -25,7 +25,7 @@ class Act(Enum):
 
 
 def frame(sequence: int) -> Frame:
-    """A frame that is told apart by its number."""
+    """A frame that is recognized by its number."""
     stamp = Stamp(sequence, "board")
     return Frame(
         sequence=sequence,
@@ -72,7 +72,7 @@ def test_no_frame_is_lost_from_the_account(acts: list[Act]) -> None:
 
 @pytest.mark.parametrize("reason", DropReason)
 def test_each_drop_has_its_reason(reason: DropReason) -> None:
-    """Each way to lose a frame is counted under its own name, once."""
+    """Each way to lose a frame is counted once, under its own name."""
     outbox = Outbox()
     match reason:
         case DropReason.SPOILED:

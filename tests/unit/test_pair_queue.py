@@ -1,4 +1,4 @@
-"""The meeting point of the host's threads: nothing is lost from its account, whoever is faster."""
+"""The meeting point of the host's threads: it accounts for everything, whichever thread is faster."""
 
 import threading
 from collections.abc import Callable
@@ -24,7 +24,7 @@ PERIOD_NS = 33 * MS
 
 
 def board_frame(sequence: int, exposed_ns: int, received_ns: int | None = None) -> BoardFrame:
-    """A frame that the board exposed at this time of the host's clock."""
+    """A frame that the board exposed at this time on the host's clock."""
     marks = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=exposed_ns, sent_ns=exposed_ns)
     message = replace(
         FRAME,
@@ -43,7 +43,7 @@ def board_frame(sequence: int, exposed_ns: int, received_ns: int | None = None) 
 
 
 def host_frame(sequence: int, exposed_ns: int, payload: bytes = b"") -> Frame:
-    """A frame of the own camera."""
+    """A frame of the host's camera."""
     stamp = Stamp(exposed_ns, HOST_CLOCK)
     return Frame(
         sequence=sequence,
@@ -58,21 +58,21 @@ def host_frame(sequence: int, exposed_ns: int, payload: bytes = b"") -> Frame:
 
 
 def camera_of(period_ns: int, pacing: Pacing = Pacing.CLOCK) -> CameraDescription:
-    """A board's camera of that period."""
+    """A board's camera with that period."""
     return CameraDescription(
         name="board's", width_px=640, height_px=480, pixel_format=PixelFormat.MJPEG, period_ns=period_ns, pacing=pacing
     )
 
 
 def queue_of(depth: int = 1, overflow: Overflow = Overflow.DROP_OLDEST) -> PairQueue:
-    """A queue whose board session has begun."""
+    """A queue after the start of a board session."""
     queue = PairQueue(FifoSettings(depth, overflow), None, PERIOD_NS)
     queue.begin(camera_of(PERIOD_NS))
     return queue
 
 
 def check(counts: PairCounts) -> None:
-    """Both laws of conservation, and that of the host's own frames."""
+    """Both laws of conservation, and the one for the host's own frames."""
     assert counts.received == counts.paired + sum(n for _, n in counts.board_orphans) + counts.held_board
     assert counts.host_frames == counts.paired + sum(n for _, n in counts.host_orphans) + counts.held_host
     assert counts.paired == counts.taken + counts.dropped + counts.waiting
@@ -85,7 +85,7 @@ def check(counts: PairCounts) -> None:
 )
 @settings(deadline=None, max_examples=100)
 def test_account_holds_after_every_call(depth: int, overflow: Overflow, acts: list[tuple[str, int]]) -> None:
-    """After any call, also for doubled, late and missing frames and new sessions, every frame and pair is accounted for."""
+    """After any call, also with repeated, late and missing frames and with new sessions, every frame and pair is accounted for."""
     queue = queue_of(depth, overflow)
     start_ns = now.monotonic_ns()
     board = host = 0
@@ -119,7 +119,7 @@ def test_account_holds_after_every_call(depth: int, overflow: Overflow, acts: li
 
 @pytest.mark.parametrize("side", ["board", "host"])
 def test_tiny_frames_are_bounded_in_number(side: str) -> None:
-    """Ten thousand frames of no bytes find no partner: of each side 4096 are held, the older ones are given up by name."""
+    """Ten thousand frames without bytes find no partner: 4096 of each side are held, and the older ones are dropped with their reason."""
     queue = queue_of()
     start_ns = now.monotonic_ns()
     for number in range(10_000):
@@ -134,7 +134,7 @@ def test_tiny_frames_are_bounded_in_number(side: str) -> None:
 
 
 def test_no_frame_from_before_a_doubt_meets_one_from_after() -> None:
-    """Frames of both sides that wait when the clock is in doubt are given up by name, and the next two are paired."""
+    """Frames of both sides that wait when the clock comes into doubt are dropped with their reason, and the next two are paired."""
     queue = queue_of()
     start_ns = now.monotonic_ns()
     queue.add_host(host_frame(0, start_ns))
@@ -152,7 +152,7 @@ def test_no_frame_from_before_a_doubt_meets_one_from_after() -> None:
 
 
 def in_threads(*works: Callable[[], None]) -> Callable[[], None]:
-    """Start each work in a thread of its own; what is given waits for all of them and raises the first failure."""
+    """Start each task in a thread of its own; the returned function waits for all of them and raises the first failure."""
     failures: list[BaseException] = []
 
     def guarded(work: Callable[[], None]) -> None:
@@ -175,9 +175,9 @@ def in_threads(*works: Callable[[], None]) -> Callable[[], None]:
 
 @pytest.mark.parametrize("overflow", Overflow)
 def test_account_holds_between_real_threads(overflow: Overflow) -> None:
-    """Two threads feed, one takes, one reads the account: it holds at every look, and pairs come out in order, right and once."""
+    """Two threads feed, one takes, one reads the counts: these add up at every reading, and pairs come out in order, correct and once."""
     queue = queue_of(3, overflow)
-    start_ns = now.monotonic_ns() + 3600 * 1000 * MS  # nothing is given up for its age, however slowly the threads go
+    start_ns = now.monotonic_ns() + 3600 * 1000 * MS  # nothing is dropped for its age, however slow the threads are
     taken: list[FramePair] = []
     fed = threading.Event()
     of_board, of_host = ([i for i in range(400) if i % lost] for lost in (7, 11))  # each side loses some
@@ -212,7 +212,7 @@ def test_account_holds_between_real_threads(overflow: Overflow) -> None:
 
 
 def test_host_frames_are_bounded_in_bytes() -> None:
-    """Own frames that wait for a slow link take at most 64 MB; the oldest ones give way, with that reason."""
+    """The host's frames that wait for a slow link take at most 64 MB; the oldest ones are dropped, with that reason."""
     queue = queue_of()
     start_ns = now.monotonic_ns()
     payload = bytes(5 * 2**20)
@@ -226,7 +226,7 @@ def test_host_frames_are_bounded_in_bytes() -> None:
 
 
 def test_host_frames_wait_as_long_as_the_link_delays() -> None:
-    """A host frame is kept for two seconds at first; once a delay of 10 s has been measured, for that long."""
+    """A host frame is held for two seconds at first, and for 10 s once a delay of 10 s has been measured."""
     queue = queue_of()
     now_ns = now.monotonic_ns()
     queue.add_host(host_frame(0, now_ns - 3000 * MS))
@@ -237,7 +237,7 @@ def test_host_frames_wait_as_long_as_the_link_delays() -> None:
 
 
 def test_a_link_that_becomes_slow_finds_the_partners_still_there() -> None:
-    """After 300 frames that came at once one that takes 1.5 s is paired with the host frame of its own moment, not with a worse one that came later."""
+    """After 300 frames without delay, one that takes 1.5 s is paired with the host frame of its own moment, not with a worse one that came later."""
     queue = queue_of()
     start_ns = now.monotonic_ns() - 300 * PERIOD_NS - 1500 * MS
     for i in range(300):
@@ -256,7 +256,7 @@ def test_a_link_that_becomes_slow_finds_the_partners_still_there() -> None:
 
 
 def test_a_new_session_orphans_what_the_old_one_left() -> None:
-    """Board frames held from an earlier session end as orphans with that reason; own frames stay for the new one."""
+    """Board frames held from an earlier session end as orphans with that reason; the host's frames stay for the new one."""
     queue = queue_of()
     start_ns = now.monotonic_ns()
     queue.add_board(board_frame(5, start_ns + 5 * PERIOD_NS))
@@ -266,12 +266,12 @@ def test_a_new_session_orphans_what_the_old_one_left() -> None:
     queue.add_host(host_frame(5, start_ns + 5 * PERIOD_NS))
     assert queue.counts.held_host == 1
     queue.begin(camera_of(PERIOD_NS))
-    queue.add_board(board_frame(0, start_ns + 5 * PERIOD_NS))  # older than the last one of the session before
+    queue.add_board(board_frame(0, start_ns + 5 * PERIOD_NS))  # older than the last frame of the earlier session
     assert queue.counts.paired == 1
 
 
 def test_own_frames_before_any_board_are_counted_not_kept() -> None:
-    """Without a board nothing is kept: own frames are orphans with that reason."""
+    """Without a board nothing is held: the host's frames are orphans with that reason."""
     queue = PairQueue(FifoSettings(), None, PERIOD_NS)
     queue.add_host(host_frame(0, 0, bytes(100)))
     assert dict(queue.counts.host_orphans) == {"no_board": 1}
@@ -279,7 +279,7 @@ def test_own_frames_before_any_board_are_counted_not_kept() -> None:
 
 
 def test_places_held_by_frames_without_partner_are_not_free() -> None:
-    """With blocking overflow a place that a held board frame will need is not granted again."""
+    """With blocking overflow a place that a held board frame will need is not granted again as credit."""
     queue = queue_of(2, Overflow.BLOCK)
     start_ns = now.monotonic_ns()
     assert queue.free_slots() == 2
@@ -292,7 +292,7 @@ def test_places_held_by_frames_without_partner_are_not_free() -> None:
 
 
 def test_the_end_releases_a_waiting_worker() -> None:
-    """A worker that waits for a pair is let go when there will be none any more."""
+    """A worker that waits for a pair is released when there will be no more pairs."""
     queue = queue_of()
     ended: list[FramePair | None] = []
     worker = threading.Thread(target=lambda: ended.append(queue.take()))
@@ -305,7 +305,7 @@ def test_the_end_releases_a_waiting_worker() -> None:
 
 @pytest.mark.parametrize("offset_ns", [-11 * MS, 0, 14 * MS])
 def test_a_time_offset_is_taken_out_before_pairing(offset_ns: int) -> None:
-    """Two cameras whose stamps of one moment differ by a known time pair as if they agreed, and the board's own marks stay as they were."""
+    """Two cameras whose stamps of one moment differ by a known time pair as if they agreed, and the board's own marks are unchanged."""
     queue = PairQueue(FifoSettings(1, Overflow.DROP_OLDEST), 5 * MS, PERIOD_NS, time_offset_ns=offset_ns)
     queue.begin(camera_of(PERIOD_NS))
     start_ns = now.monotonic_ns()
@@ -318,7 +318,7 @@ def test_a_time_offset_is_taken_out_before_pairing(offset_ns: int) -> None:
 
 
 def test_a_better_clock_estimate_moves_no_label() -> None:
-    """Images shown on demand are paired by number, however far the clock's estimate moves from one to the next."""
+    """Images shown on demand are paired by number, however far the clock's estimate moves between two of them."""
     demand = DemandClock(Pacing.DEMAND)
     queue = PairQueue(FifoSettings(9, Overflow.DROP_NEWEST), None, 2 * MS, demand=demand)
     queue.begin(camera_of(2 * MS, Pacing.DEMAND))
@@ -337,14 +337,14 @@ def test_a_better_clock_estimate_moves_no_label() -> None:
 
 
 def test_tolerance_and_patience_follow_the_boards_rate() -> None:
-    """Half of the longer period is the tolerance at every moment; a frame that was too far from its neighbour finds it once the period is longer."""
+    """The tolerance is always half of the longer period; a frame that was too far from its neighbour is paired with it once the period is longer."""
     queue = queue_of()
     start_ns = now.monotonic_ns()
     assert queue.tolerance_ns == PERIOD_NS // 2
     queue.add_board(board_frame(0, start_ns + 30 * MS))
     queue.change_period(4 * PERIOD_NS)
     assert queue.tolerance_ns == 2 * PERIOD_NS
-    assert queue.counts.held_board == 1  # it goes on waiting
+    assert queue.counts.held_board == 1  # it still waits
     queue.add_host(host_frame(0, start_ns + 40 * MS))
     assert queue.counts.paired == 1
     queue.change_period(PERIOD_NS)
@@ -356,7 +356,7 @@ def test_tolerance_and_patience_follow_the_boards_rate() -> None:
 
 
 def test_a_tolerance_that_was_given_stays() -> None:
-    """What the user asked for does not follow the rate."""
+    """A tolerance that the user asked for does not follow the rate."""
     queue = PairQueue(FifoSettings(1, Overflow.DROP_OLDEST), 3 * MS, PERIOD_NS)
     queue.begin(camera_of(PERIOD_NS))
     queue.change_period(4 * PERIOD_NS)

@@ -19,14 +19,14 @@ Outcomes = list[Outcome[int, int]]
 
 @dataclass(slots=True)
 class Account:
-    """Everything that left a pairing; frames are their own stamps here, numbered so that doubles are told apart."""
+    """Everything that left a pairing. Frames are their own stamps here, numbered so that repeated ones can be distinguished."""
 
     pairs: list[tuple[int, int]] = field(default_factory=list)
     board: list[int] = field(default_factory=list)
     host: list[int] = field(default_factory=list)
 
     def take(self, outcomes: Outcomes) -> int:
-        """Note what left; gives the number of pairs."""
+        """Record what left; returns the number of pairs."""
         before = len(self.pairs)
         for outcome in outcomes:
             match outcome:
@@ -42,14 +42,14 @@ class Account:
 
 
 def rising(least_ns: int, most_ns: int, size: int = 25) -> st.SearchStrategy[list[int]]:
-    """Streams of stamps whose distances lie between these."""
+    """Streams of stamps whose distances lie between these limits."""
     gaps = st.lists(st.integers(least_ns, most_ns), max_size=size)
     return gaps.map(lambda steps: list(accumulate(steps)))
 
 
 @st.composite
 def merged(draw: st.DrawFn, board: list[int], host: list[int]) -> list[tuple[bool, int]]:
-    """The frames of both streams, (from the board?, stamp), in a random order of arrival that keeps each stream's own."""
+    """The frames of both streams, (from the board?, stamp), in a random order of arrival that preserves each stream's order."""
     turns = draw(st.permutations([True] * len(board) + [False] * len(host)))
     streams = {True: iter(board), False: iter(host)}
     return [(turn, next(streams[turn])) for turn in turns]
@@ -74,7 +74,7 @@ def sparse_streams(draw: st.DrawFn) -> tuple[int, list[int], list[int], list[tup
 def test_every_frame_leaves_once_and_every_pair_is_sound(
     tolerance_ns: int, board_period_ns: int, host_period_ns: int, acts: list[tuple[str, int, int]]
 ) -> None:
-    """For any streams, also doubled and disordered ones, pairs are unique, ordered and within tolerance; none is lost at any step."""
+    """For any streams, also with repeated and disordered frames, pairs are unique, ordered and within tolerance; no frame is lost at any step."""
     pairing: Pairing[tuple[int, int], tuple[int, int]] = Pairing(
         PairingSettings(tolerance_ns, board_period_ns, host_period_ns)
     )
@@ -126,7 +126,7 @@ def test_every_frame_leaves_once_and_every_pair_is_sound(
 def test_sparse_streams_are_paired_best_at_once_and_in_any_order_of_arrival(
     streams: tuple[int, list[int], list[int], list[tuple[bool, int]]],
 ) -> None:
-    """Frames further apart than twice the tolerance: as many pairs as possible with the least skew, each at its second frame's arrival."""
+    """With frames further apart than twice the tolerance there are as many pairs as possible with the least skew, each formed when its second frame arrives."""
     pair_at_once(streams)
 
 
@@ -141,7 +141,7 @@ def test_many_sparse_streams_are_paired_best_at_once(
 
 
 def pair_at_once(streams: tuple[int, list[int], list[int], list[tuple[bool, int]]]) -> None:
-    """Pair, and compare each moment and the whole with the best there is."""
+    """Form the pairs, and compare each moment and the whole with the optimum."""
     tolerance_ns, board, host, arrivals = streams
     pairing: Pairing[int, int] = Pairing(PairingSettings(tolerance_ns, 2 * tolerance_ns + 1, 2 * tolerance_ns + 1))
     account = Account()
@@ -170,7 +170,7 @@ def pair_at_once(streams: tuple[int, list[int], list[int], list[tuple[bool, int]
 def test_of_two_rates_each_slow_frame_gets_the_nearest_fast_one(
     periods_ns: tuple[int, int], phase_ns: int, board_delay_ns: int, host_delay_ns: int
 ) -> None:
-    """With 15 against 30 frames per second, whatever the phase and the link's delay, each frame of the slower camera gets the nearest."""
+    """At 15 against 30 frames per second, whatever the phase and the link's delay, each frame of the slower camera gets the nearest frame."""
     board_period_ns, host_period_ns = periods_ns
     board = [phase_ns + i * board_period_ns for i in range(2 * 10**9 // board_period_ns)]
     host = [i * host_period_ns for i in range(2 * 10**9 // host_period_ns)]
@@ -194,7 +194,7 @@ def test_of_two_rates_each_slow_frame_gets_the_nearest_fast_one(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cameras:
-    """Two equally fast cameras: tolerance in periods, jitter and transport delays at random."""
+    """Two equally fast cameras with a random tolerance (in periods), jitter and transport delays."""
 
     tolerance: float
     phase: float
@@ -214,7 +214,7 @@ class Cameras:
 
 
 def paired(cameras: Cameras) -> tuple[list[tuple[int, int]], int]:
-    """What our pairing makes of them: pairs, and the longest time from the arrival of a pair's later frame to its forming."""
+    """The pairs that our pairing forms, and the longest time from the arrival of a pair's later frame to its forming."""
     _, _, arrivals = cameras.streams()
     pairing: Pairing[int, int] = Pairing(PairingSettings(round(cameras.tolerance * PERIOD_NS), PERIOD_NS, PERIOD_NS))
     account, longest_ns = Account(), 0
@@ -237,16 +237,16 @@ def paired(cameras: Cameras) -> tuple[list[tuple[int, int]], int]:
 def test_dense_streams_lose_hardly_a_pair_and_wait_a_period_at_most(
     tolerance: float, phase: float, loss: float, seed: int
 ) -> None:
-    """Whatever the tolerance, the phase and the losses: at least 98 % of the optimum's pairs over five seconds, and no wait beyond a period.
+    """Whatever the tolerance, phase and losses: at least 98 % of the optimum's pairs over five seconds, and no wait beyond a period.
 
-    Where phase and tolerance both are half a period to within the jitter, now this neighbour is near enough, now the other. Who knows the future changes
-    sides each time; ours keeps one side, so that the partner does not flip, and finds at least 92 %.
+    Where phase and tolerance are both half a period to within the jitter, sometimes one neighbour is near enough, sometimes the other. The optimum, which
+    knows the future, changes sides each time. Our pairing keeps one side, so that the partner does not flip, and finds at least 92 %.
     """
     cameras = Cameras(tolerance=tolerance, phase=phase, loss=loss, seed=seed)
     board, host, _ = cameras.streams()
     pairs, longest_ns = paired(cameras)
     best = best_score(board, host, round(tolerance * PERIOD_NS))
-    jitter = MS / PERIOD_NS  # of a difference of two stamps
+    jitter = MS / PERIOD_NS  # of the difference of two stamps
     undecided = abs(phase - 0.5) <= jitter and abs(tolerance - 0.5) <= jitter
     assert len(pairs) >= (0.92 if undecided else 0.98) * best.pairs - 1
     assert longest_ns <= PERIOD_NS + MS
@@ -255,7 +255,7 @@ def test_dense_streams_lose_hardly_a_pair_and_wait_a_period_at_most(
 @given(st.floats(0.1, 0.48), st.floats(0, 1), st.sampled_from([0.0, 0.1]), st.integers(0, 2**32))
 @settings(deadline=None, max_examples=50)
 def test_no_pair_is_one_that_the_optimum_forbids(tolerance: float, phase: float, loss: float, seed: int) -> None:
-    """With frames further apart than twice the tolerance every pair belongs to the best pairing, and none has waited."""
+    """With frames further apart than twice the tolerance every pair belongs to the optimum, and none has waited."""
     cameras = Cameras(tolerance=tolerance, phase=phase, loss=loss, seed=seed)
     board, host, _ = cameras.streams()
     pairs, longest_ns = paired(cameras)
@@ -266,7 +266,7 @@ def test_no_pair_is_one_that_the_optimum_forbids(tolerance: float, phase: float,
 @pytest.mark.long
 @pytest.mark.parametrize("tolerance", [0.55, 0.6, 0.75])
 def test_at_half_a_period_the_partner_does_not_flip(tolerance: float) -> None:
-    """Cameras exactly half a period apart: jitter favours now the previous, now the next frame, but all pairs stay with one of the two."""
+    """Cameras exactly half a period apart: jitter favours sometimes the previous, sometimes the next frame, but all pairs keep to one of the two."""
     for seed in range(20):
         pairs, _ = paired(Cameras(tolerance=tolerance, phase=0.5, loss=0.0, seed=seed))
         assert len({board > host for board, host in pairs}) == 1
@@ -274,7 +274,7 @@ def test_at_half_a_period_the_partner_does_not_flip(tolerance: float) -> None:
 
 
 def test_after_an_outage_the_nearer_alignment_is_taken() -> None:
-    """A board that was away for a second begins anew with the nearer partner, not with the one that happened to be first."""
+    """After a second without frames from the board, pairing starts again with the nearer partner, not with the one that happened to be first."""
     pairing: Pairing[int, int] = Pairing(PairingSettings(25, 33, 33))
     account = Account()
     for k in range(60):
@@ -286,7 +286,7 @@ def test_after_an_outage_the_nearer_alignment_is_taken() -> None:
 
 
 def undecided() -> Pairing[int, int]:
-    """At 100 ms a host frame of 0 ms and a board frame of 30 ms; the next host frame, due at 33 ms, has not come."""
+    """The state at 100 ms: a host frame of 0 ms and a board frame of 30 ms are held; the next host frame, due at 33 ms, has not come."""
     pairing: Pairing[int, int] = Pairing(PairingSettings(33 * MS, 66 * MS, 33 * MS))
     assert pairing.add_host(0, 0, 90 * MS) == []
     assert pairing.add_board(30 * MS, 30, 100 * MS) == []
@@ -294,26 +294,26 @@ def undecided() -> Pairing[int, int]:
 
 
 def test_a_better_partner_is_waited_for_and_taken() -> None:
-    """A nearer frame that comes in time is taken, and the other one goes without."""
+    """A nearer frame that comes in time is taken, and the other one stays unpaired."""
     outcomes = undecided().add_host(33 * MS, 33, 110 * MS)
     assert outcomes == [HostOrphan(0, OrphanReason.NO_PARTNER), Paired(30, 33, -3 * MS)]
 
 
 def test_a_better_partner_is_not_waited_for_beyond_a_period() -> None:
-    """When the nearer frame does not come within one period of the slower camera, the one that is there is taken."""
+    """If the nearer frame does not come within one period of the slower camera, the available one is taken."""
     pairing = undecided()
     assert pairing.decide(166 * MS - 1) == []
     assert pairing.decide(166 * MS) == [Paired(30, 0, 30 * MS)]
 
 
 def test_the_end_of_the_streams_ends_the_waiting() -> None:
-    """When no frame will follow, a waiting pair within tolerance is formed."""
+    """If no frame will follow, a waiting pair within tolerance is formed."""
     assert undecided().finish() == [Paired(30, 0, 30 * MS)]
 
 
 @pytest.mark.parametrize("way", ["evicted", "restarted"])
 def test_a_new_head_has_the_whole_patience(way: str) -> None:
-    """The time that one pair of heads has waited is not charged to the next."""
+    """The time that one pair of heads has waited does not count for the next."""
     pairing = undecided()
     if way == "evicted":
         pairing.evict_board(31 * MS)
@@ -325,7 +325,7 @@ def test_a_new_head_has_the_whole_patience(way: str) -> None:
 
 
 def test_frames_that_come_back_or_late_are_out_of_order() -> None:
-    """A frame not newer than the last one of its stream is an orphan with that reason, and leaves the others alone."""
+    """A frame that is not newer than the last one of its stream is an orphan with that reason, and does not affect the others."""
     pairing: Pairing[int, int] = Pairing(PairingSettings(5, 100, 100))
     pairing.add_board(100, 1, 0)
     assert pairing.add_board(100, 2, 0) == [BoardOrphan(2, OrphanReason.OUT_OF_ORDER)]

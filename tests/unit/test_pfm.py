@@ -49,7 +49,7 @@ def test_big_endian_is_read(tmp_path: Path) -> None:
     [b"", b"P5\n2 2\n255\n", b"PF\n1 1\n-1\n" + bytes(12), b"Pf\n2 2\n-1\n" + bytes(15), b"Pf\n2 2\n0\n" + bytes(16)],
 )
 def test_bad_files_are_named(tmp_path: Path, content: bytes) -> None:
-    """A file that is no whole one-channel PFM is refused by name."""
+    """A file that is not a whole one-channel PFM is refused by name."""
     path = tmp_path / "bad.pfm"
     path.write_bytes(content)
     with pytest.raises(DataError, match=r"bad\.pfm"):
@@ -63,12 +63,12 @@ def test_missing_file_is_named(tmp_path: Path) -> None:
 
 
 def test_a_write_that_fails_half_way_leaves_the_old_file_and_no_other(tmp_path: Path) -> None:
-    """When the operating system refuses more bytes, the caller gets its OSError and no half file stays."""
+    """If the operating system refuses more bytes, the caller gets its OSError and no partial file is left."""
     path = tmp_path / "d.pfm"
     write_pfm(path, np.zeros((1, 1), dtype=np.float32))
     before = path.read_bytes()
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    # A real limit of the kernel (EFBIG), which fails as a full disk (ENOSPC) does.
+    # A real limit of the kernel (EFBIG); it fails as a full disk (ENOSPC) does.
     resource.setrlimit(resource.RLIMIT_FSIZE, (2**20, hard))
     try:
         with pytest.raises(OSError, match="too large"):

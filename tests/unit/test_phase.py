@@ -1,4 +1,4 @@
-"""The phase of two cameras: measured from stamps, steered to 0 with cameras of every obstinacy, on simulated time."""
+"""The phase of two cameras: measured from stamps, and steered to 0 with cameras that obey well, badly or not at all, on simulated time."""
 
 import math
 import random
@@ -24,7 +24,7 @@ def measured(
     host_ns: int = PERIOD_NS,
     late_ns: int = 0,
 ) -> Phase | None:
-    """The phase of two cameras, of which the board's exposes `skew_ns` after the host's and drifts away; its frames come `late_ns` later."""
+    """The phase of two cameras. The board's exposes `skew_ns` after the host's and drifts away; its frames come `late_ns` later."""
     meter = PhaseMeter(board_ns, host_ns)
     start_ns = 10**12
     arrivals = [(start_ns + k * host_ns, start_ns + k * host_ns, True) for k in range(int(seconds * 1e9 / host_ns))]
@@ -39,7 +39,7 @@ def measured(
 @given(st.floats(-0.5, 0.4999), st.floats(-300e-6, 300e-6), st.integers(0, 2000))
 @settings(deadline=None, max_examples=60)
 def test_phase_and_drift_are_found(part: float, drift: float, late_ms: int) -> None:
-    """Whatever the phase, drift and the link's delay, both are known: the phase modulo the period, the drift to 1 ppm."""
+    """Whatever the phase, the drift and the link's delay, both are measured: the phase modulo the period, the drift to 1 ppm."""
     phase = measured(part * PERIOD_NS, drift, late_ns=late_ms * MS)
     assert phase is not None
     now_ns = part * PERIOD_NS + drift * (10e9 - 8 * PERIOD_NS)
@@ -52,7 +52,7 @@ def test_phase_and_drift_are_found(part: float, drift: float, late_ms: int) -> N
 
 
 def test_half_the_rate_has_a_phase_and_other_ratios_have_none() -> None:
-    """15 fps beside 30 stand to each other within the shorter period; 24 beside 30 run through all phases and have none."""
+    """15 fps against 30 have a phase within the shorter period; 24 against 30 run through all phases and have none."""
     phase = measured(9 * MS, 0.0, board_ns=2 * PERIOD_NS)
     assert phase is not None
     assert phase.period_ns == PERIOD_NS
@@ -62,7 +62,7 @@ def test_half_the_rate_has_a_phase_and_other_ratios_have_none() -> None:
 
 
 def test_little_is_known_early() -> None:
-    """Before half a second there is no phase, before five no drift."""
+    """Before half a second there is no phase, before five seconds no drift."""
     assert measured(5 * MS, 1e-4, seconds=0.3) is None
     early = measured(5 * MS, 1e-4, seconds=2)
     assert early is not None
@@ -75,10 +75,10 @@ class Pair:
     """Two cameras and a controller on simulated time, frames arriving 50 ms after exposure.
 
     Attributes:
-        skew_ns: the board's exposures after the host's.
-        drift: of that, per ns.
-        scatter_ns: by so much a steered camera misses.
-        follows: whether it takes notice at all.
+        skew_ns: how long after the host's the board's exposures come.
+        drift: change of that skew, per ns.
+        scatter_ns: by how much a steered camera misses.
+        follows: whether it responds to corrections at all.
     """
 
     controller: PhaseController
@@ -118,7 +118,7 @@ class Pair:
 )
 @pytest.mark.parametrize("skew_ms", [-16.0, -7.0, 5.0, 16.6])
 def test_any_phase_is_steered_to_a_few_ms(ways: tuple[Steering, Steering], skew_ms: float) -> None:
-    """Whichever camera can be steered, any phase is below 4 ms within seconds, though restarts miss by a ms, and stays there."""
+    """Whichever camera can be steered, any phase is below 4 ms within seconds, although restarts miss by a ms, and stays there."""
     scatter_ns = 1.0 * MS if Steering.RESTART in ways else 0.0
     pair = Pair(PhaseController(*ways, has_phase=True), skew_ms * MS, scatter_ns=scatter_ns)
     pair.run(10, random.Random(3))
@@ -132,7 +132,7 @@ def test_any_phase_is_steered_to_a_few_ms(ways: tuple[Steering, Steering], skew_
 
 
 def test_a_small_phase_is_left_alone() -> None:
-    """Within 4 ms nothing is steered: each restart costs frames."""
+    """Within 4 ms nothing is steered, because each restart costs frames."""
     pair = Pair(PhaseController(Steering.RESTART, Steering.RESTART, has_phase=True), 3.0 * MS)
     pair.run(5, random.Random(1))
     assert not pair.corrections
@@ -140,7 +140,7 @@ def test_a_small_phase_is_left_alone() -> None:
 
 
 def test_slow_drift_is_corrected_again_and_again() -> None:
-    """Cameras 100 ppm apart are kept within 5 ms for ten minutes by a correction every 40 s or so, without giving up."""
+    """Cameras that differ by 100 ppm are kept within 5 ms for ten minutes by a correction every 40 s or so, and the controller does not give up."""
     pair = Pair(
         PhaseController(Steering.RESTART, Steering.NONE, has_phase=True), 12.0 * MS, drift=100e-6, scatter_ns=0.5 * MS
     )
@@ -153,7 +153,7 @@ def test_slow_drift_is_corrected_again_and_again() -> None:
 
 @pytest.mark.parametrize(("follows", "drift"), [(False, 0.0), (True, 3000e-6)])
 def test_a_camera_that_does_not_follow_is_given_up_in_words(follows: bool, drift: float) -> None:  # noqa: FBT001
-    """A sensor that runs on through restarts, or drifts away faster than it can be steered, is left alone after six attempts, and the report says so."""
+    """A sensor that ignores restarts, or drifts away faster than it can be steered, is left alone after six attempts, and the report says so."""
     pair = Pair(
         PhaseController(Steering.RESTART, Steering.NONE, has_phase=True), 12.0 * MS, drift=drift, follows=follows
     )
@@ -166,7 +166,7 @@ def test_a_camera_that_does_not_follow_is_given_up_in_words(follows: bool, drift
 
 
 def test_a_camera_that_falls_silent_is_given_up() -> None:
-    """When no frame comes after a correction for ten seconds the controller says so, and steers no more."""
+    """If no frame comes for ten seconds after a correction, the controller says so and stops steering."""
     controller = PhaseController(Steering.GRID, Steering.NONE, has_phase=True)
     phase = Phase(time_skew_ns=12.0 * MS, period_ns=PERIOD_NS, drift=math.nan, first_ns=0)
     assert controller.update(MS, phase) is not None
@@ -182,7 +182,7 @@ def test_a_camera_that_falls_silent_is_given_up() -> None:
     ],
 )
 def test_what_cannot_be_steered_is_said_at_once(ways: tuple[Steering, Steering], has_phase: bool, words: str) -> None:  # noqa: FBT001
-    """Without a camera that can be steered, or a phase at all, nothing is tried and the reason is given."""
+    """Without a steerable camera, or without a phase, nothing is tried and the reason is given."""
     controller = PhaseController(*ways, has_phase=has_phase)
     assert (
         controller.update(10**9, Phase(time_skew_ns=12.0 * MS, period_ns=PERIOD_NS, drift=0.0, first_ns=10**9)) is None
@@ -192,7 +192,7 @@ def test_what_cannot_be_steered_is_said_at_once(ways: tuple[Steering, Steering],
 
 
 def test_frames_from_before_a_correction_say_nothing() -> None:
-    """A phase that rests on frames exposed before the last correction took hold leads to no other one."""
+    """A phase measured on frames from before the last correction took effect causes no further correction."""
     controller = PhaseController(Steering.GRID, Steering.NONE, has_phase=True)
     start_ns = 10**12
     assert (
@@ -207,7 +207,7 @@ def test_frames_from_before_a_correction_say_nothing() -> None:
 
 
 def corrected(controller: PhaseController, now_ns: int, times: int) -> int:
-    """Let corrections that change nothing follow each other, two seconds apart; gives when the last one was made."""
+    """Make corrections without effect, two seconds apart; returns when the last one was made."""
     for _ in range(times):
         now_ns += 2000 * MS
         assert (
@@ -220,7 +220,7 @@ def corrected(controller: PhaseController, now_ns: int, times: int) -> int:
 
 
 def test_six_corrections_in_vain_are_enough() -> None:
-    """A camera whose phase six corrections have left at 12 ms is steered no more, and what to do instead is said; the phase before is the first one."""
+    """A camera whose phase six corrections have left at 12 ms is steered no more, and advice is given; the reported phase before is that before the first one."""
     controller = PhaseController(Steering.GRID, Steering.NONE, has_phase=True)
     now_ns = corrected(controller, 10**12, 6) + 2000 * MS
     assert (
@@ -235,7 +235,7 @@ def test_six_corrections_in_vain_are_enough() -> None:
 
 
 def test_a_camera_that_stayed_in_step_has_all_its_tries_again() -> None:
-    """Five corrections, ten seconds in step, then five more: a camera that drifts slowly is not given up for corrections of long ago."""
+    """Five corrections, ten seconds in step, then five more: a camera that drifts slowly is not given up because of old corrections."""
     controller = PhaseController(Steering.GRID, Steering.NONE, has_phase=True)
     now_ns = corrected(controller, 10**12, 5)
     for _ in range(12):

@@ -1,4 +1,4 @@
-"""The delay benchmark's own plots: what is drawn stands where the numbers say."""
+"""The delay benchmark's own plots: everything is drawn where the numbers put it."""
 
 import math
 import re
@@ -26,7 +26,7 @@ def numbers(path: str) -> list[float]:
 
 
 def test_dots_and_line_stand_at_their_bytes_and_delays() -> None:
-    """Frames on a line: every dot lies on the drawn line, and the line begins at zero bytes at the latency."""
+    """For frames on a line every dot lies on the drawn line, and at zero bytes the line is at the latency."""
     size = np.linspace(10_000.0, 50_000.0, 30)
     scatter = Scatter(
         size_bytes=size,
@@ -43,12 +43,12 @@ def test_dots_and_line_stand_at_their_bytes_and_delays() -> None:
     for x, y in dots:
         assert y == pytest.approx(y0 + (x - x0) / (x1 - x0) * (y1 - y0), abs=0.3)
     assert dots == sorted(dots, key=lambda dot: dot[0])
-    # 52 px is where the axis of the delays stands.
+    # The axis of the delays is at 52 px.
     assert x0 == 52.0
 
 
 def test_a_frame_held_up_for_long_is_marked_at_the_top() -> None:
-    """One delay a thousand times the others does not flatten them: it is a triangle with its own value, the rest keep their room."""
+    """One delay a thousand times the others does not flatten them: it becomes a triangle with its value, and the others keep their space."""
     size = np.linspace(10_000.0, 50_000.0, 100)
     delay = 1 * MS + 100.0 * size
     delay[50] = 5000.0 * MS
@@ -66,7 +66,7 @@ def test_a_frame_held_up_for_long_is_marked_at_the_top() -> None:
 
 
 def test_frames_of_one_size_have_no_line() -> None:
-    """Without two sizes there are dots and no line."""
+    """With fewer than two sizes there are dots and no line."""
     size, delay = np.full(9, 30_000.0), np.arange(9.0) * MS
     root = svg(
         against_bytes(Scatter(size_bytes=size, delay_ns=delay, number=(0,) * 9, fit=fit_delay(size, delay)), 400)
@@ -76,7 +76,7 @@ def test_frames_of_one_size_have_no_line() -> None:
 
 
 def test_a_pairs_bars_are_as_long_as_its_delays() -> None:
-    """Delays of 10, 20, 40, 10, 20 and 100 ms are bars of these lengths on one scale, each beginning where the one before ends."""
+    """Delays of 10, 20, 40, 10, 20 and 100 ms are bars of these lengths on one scale; each begins where the one before ends."""
     board = BoardMarks(exposed_ns=0, grabbed_ns=10 * MS, sent_ns=30 * MS)
     ledger = replace(
         LEDGER,
@@ -119,7 +119,7 @@ def test_no_pairs_are_said() -> None:
 
 
 def test_what_is_foretold_rightly_stands_on_the_line() -> None:
-    """Equal figures lie on the diagonal, a prediction too long above it, one too short below."""
+    """Equal figures lie on the diagonal. A prediction that is too long lies above it, one that is too short below."""
     points = [
         Compared(name="a", measured_ns=1e7, predicted_ns=1e7, number=0),
         Compared(name="b", measured_ns=1e8, predicted_ns=2e8, number=1),
@@ -133,14 +133,14 @@ def test_what_is_foretold_rightly_stands_on_the_line() -> None:
         x, y = float(dot.get("cx", "nan")), float(dot.get("cy", "nan"))
         off.append(y0 + (x - x0) / (x1 - x0) * (y1 - y0) - y)
     assert abs(off[0]) < 0.2
-    # Twice is log(2) / log(span) of the height.
+    # A factor of two is log(2) / log(span) of the height.
     span = math.log(1.25 * 1e9 / (0.8 * 1e7))
     assert off[1] == pytest.approx(math.log(2.0) / span * (y0 - y1), abs=0.3)
     assert off[2] == pytest.approx(math.log(0.4) / span * (y0 - y1), abs=0.3)
 
 
 def test_things_by_the_dozen_have_marks_of_their_own() -> None:
-    """Of 32 interfaces no two are drawn alike, and the legend shows each one's mark as the plot does."""
+    """No two of 32 interfaces are drawn alike, and the legend shows each one's mark as in the plot."""
     points = [
         Compared(name=f"interface {number}", measured_ns=1e7 * (number + 1), predicted_ns=1e8, number=number)
         for number in range(32)

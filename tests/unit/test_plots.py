@@ -1,4 +1,4 @@
-"""Plots: numbers stand where the data say, nothing is made up."""
+"""Plots: numbers are where the data put them, and nothing is invented."""
 
 import math
 import re
@@ -33,7 +33,7 @@ def titles(root: ET.Element) -> list[str]:
 @settings(deadline=None, max_examples=50)
 @given(parts=st.lists(st.floats(1.0, 1e9), min_size=1, max_size=6), width=st.integers(300, 1200))
 def test_budget_bars_have_the_lengths_of_their_parts(parts: list[float], width: int) -> None:
-    """The parts of the longest bar fill the width, side by side, each as long as its share."""
+    """The parts of the longest bar fill the width, side by side; each is as long as its share."""
     row = Budget("all", tuple(Share(f"p{index}", value, index) for index, value in enumerate(parts)))
     bars = svg(budgets([row], width)).findall("rect")
     edge = 0.0
@@ -50,7 +50,7 @@ def test_several_budgets_share_one_axis() -> None:
 
 
 def test_stacked_columns_reach_their_sums() -> None:
-    """Each layer starts where the one below ends, and heights are proportional to values."""
+    """Each layer starts where the one below it ends, and heights are proportional to values."""
     layers = [
         Quantity(label="a", values_ns=np.array([10e6, 20e6]), colour=0),
         Quantity(label="b", values_ns=np.array([30e6, 20e6]), colour=1),
@@ -59,7 +59,7 @@ def test_stacked_columns_reach_their_sums() -> None:
     lower, upper = (
         [float(v) for v in re.findall(r"V([\d.]+)", path.get("d", ""))] for path in root.findall("path[@style]")
     )
-    # (top, bottom) of both columns: totals of 40 ms reach the top of the frame at y = 24, zero is at y = 260 - 34 = 226.
+    # (top, bottom) of both columns: a total of 40 ms reaches the top of the frame at y = 24; zero is at y = 260 - 34 = 226.
     height = 226.0 - 24.0
     assert lower == pytest.approx([226 - height / 4, 226.0, 226 - height / 2, 226.0], abs=0.06)
     assert upper == pytest.approx([24.0, 226 - height / 4, 24.0, 226 - height / 2], abs=0.06)
@@ -67,7 +67,7 @@ def test_stacked_columns_reach_their_sums() -> None:
 
 
 def test_many_pairs_become_means_that_still_add_up() -> None:
-    """Beyond one pair for three pixels, columns are means over slices of time, weighted they give the mean of all."""
+    """With more than one pair per three pixels, columns are means over slices of time; their weighted mean is the mean of all."""
     count = 5000
     values = np.random.default_rng(1).uniform(1e6, 9e6, count)
     root = svg(stacked_over_time(np.arange(count) / 30.0, [Quantity(label="a", values_ns=values, colour=0)], 500))
@@ -84,7 +84,7 @@ def test_many_pairs_become_means_that_still_add_up() -> None:
 
 
 def test_a_gap_in_time_stays_a_gap() -> None:
-    """A pause in the stream shows as empty room, not as a column stretched over it."""
+    """A pause in the stream shows as a gap, not as a column stretched across it."""
     time_s = np.concatenate([np.arange(10.0), 100.0 + np.arange(10.0)])
     root = svg(stacked_over_time(time_s, [Quantity(label="a", values_ns=np.ones(20), colour=0)], 500))
     widths = [float(hit.get("width", "nan")) for hit in root.findall("rect")]
@@ -105,7 +105,7 @@ def test_an_outlier_is_cut_off_and_marked() -> None:
 
 
 def test_strips_show_the_percentiles() -> None:
-    """Bar, median line and numbers stand at the percentiles of the data on the logarithmic axis."""
+    """Bar, median line and numbers are at the percentiles of the data on the logarithmic axis."""
     values = np.arange(0.0, 1001.0) * 1000.0  # 0 to 1 ms in steps of 1 µs: percentile p is p * 10 µs
     root = svg(
         distributions([Strips("tcp", (Quantity(label="queuing", values_ns=values, colour=4, meaning="waiting"),))], 520)
@@ -127,7 +127,7 @@ def test_strips_show_the_percentiles() -> None:
 
 
 def test_what_was_not_measured_is_not_drawn() -> None:
-    """Only NaN gives `not measured` or an empty plot; NaN among numbers is left out."""
+    """Only-NaN data give `not measured` or an empty plot; NaN among numbers is left out."""
     nothing = Quantity(label="offset", values_ns=np.full(5, np.nan), colour=0)
     assert "not measured" in distributions([Strips("", (nothing,))], 400)
     assert "no pairs" in over_time(np.arange(5.0), nothing, 400)
@@ -138,7 +138,7 @@ def test_what_was_not_measured_is_not_drawn() -> None:
 
 
 def test_signed_values_stand_on_both_sides_of_zero() -> None:
-    """Equal skews of either sign stand equally far from the zero line, and later pairs further right."""
+    """Equal skews of either sign are equally far from the zero line, and later pairs are further right."""
     skew = Quantity(label="time skew", values_ns=np.array([-2e5, 2e5, 0.0]), colour=5)
     root = svg(over_time(np.array([0.0, 1.0, 2.0]), skew, 400, band_ns=np.full(3, 5e4)))
     x, y = zip(
@@ -150,7 +150,7 @@ def test_signed_values_stand_on_both_sides_of_zero() -> None:
 
 
 def test_extremes_survive_thinning() -> None:
-    """With more pairs than can be told apart, the least and the greatest value are still drawn."""
+    """With more pairs than the plot can show singly, the least and the greatest value are still drawn."""
     values = np.zeros(10_000)
     values[1234], values[4321] = 5e6, -7e6
     drawn = " ".join(titles(svg(over_time(np.arange(10_000.0), Quantity(label="a", values_ns=values, colour=0), 340))))
@@ -174,14 +174,14 @@ def test_extremes_survive_thinning() -> None:
     ],
 )
 def test_durations_have_three_digits(ns: float, text: str) -> None:
-    """A duration reads with three significant digits in the fitting unit."""
+    """A duration is shown with three significant digits in the appropriate unit."""
     assert duration_text(ns).replace("\u202f", " ") == text
 
 
 @settings(deadline=None, max_examples=200)
 @given(low=st.floats(-1e9, 1e9), width=st.floats(1e-3, 1e9), count=st.integers(2, 12))
 def test_ticks_are_round_and_inside(low: float, width: float, count: int) -> None:
-    """Ticks lie in the interval, are evenly spaced by 1, 2 or 5 times a power of ten, and are neither many nor missing."""
+    """Ticks lie in the interval, are evenly spaced by 1, 2 or 5 times a power of ten, and are neither too many nor too few."""
     high = low + width
     found = ticks(low, high, count)
     assert len(found) <= count + 2
@@ -196,7 +196,7 @@ def test_ticks_are_round_and_inside(low: float, width: float, count: int) -> Non
 @settings(deadline=None)
 @given(value=st.floats(1e3, 1e9))
 def test_scales_keep_order_and_ends(value: float) -> None:
-    """Scales map their ends to their ends, keep values in between, and clamp what lies outside."""
+    """Scales map their ends to their ends, map values in between to between, and clamp what lies outside."""
     for scale in (
         Linear(low=1e3, high=1e9, start_px=10.0, end_px=110.0),
         Log(low=1e3, high=1e9, start_px=10.0, end_px=110.0),

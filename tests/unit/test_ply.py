@@ -30,7 +30,7 @@ def test_file_holds_a_header_and_packed_vertices_of_the_finite_points(tmp_path: 
 
 
 def test_round_trip_with_grey_colours(tmp_path: Path) -> None:
-    """Grey becomes equal red, green and blue, and the reader gives back what was written."""
+    """Grey becomes equal red, green and blue, and the reader returns what was written."""
     path = tmp_path / "c.ply"
     write_ply(path, _CLOUD, np.array([[7, 0], [0, 9]], dtype=np.uint8))
     cloud = read_ply(path)
@@ -46,7 +46,7 @@ def test_no_finite_point_gives_an_empty_cloud(tmp_path: Path) -> None:
 
 
 def test_colours_of_another_size_are_refused(tmp_path: Path) -> None:
-    """A cloud never gets colours of another image, and no file appears."""
+    """A cloud is never coloured from an image of another size, and then no file appears."""
     with pytest.raises(ValueError, match="differ in size"):
         write_ply(tmp_path / "c.ply", _CLOUD, np.zeros((3, 3), dtype=np.uint8))
     assert list(tmp_path.iterdir()) == []
@@ -54,7 +54,7 @@ def test_colours_of_another_size_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("cut", [0, 20, -1])
 def test_bad_files_are_named(tmp_path: Path, cut: int) -> None:
-    """An empty file, a cut header and a cut body are refused by name."""
+    """An empty file, a truncated header and a truncated body are refused by name."""
     path = tmp_path / "bad.ply"
     write_ply(path, _CLOUD, _BGR)
     path.write_bytes(path.read_bytes()[:cut])

@@ -58,7 +58,7 @@ def test_package_list_is_the_tree() -> None:
 
 
 def test_package_data_reach_the_wheel() -> None:
-    """Every other file inside a package (pages, py.typed) is covered by a package-data pattern, else the wheel would lack it."""
+    """Every other file in a package (pages, py.typed) is covered by a package-data pattern; otherwise the wheel would lack it."""
     patterns: dict[str, list[str]] = pyproject()["tool"]["setuptools"]["package-data"]
     left_out = []
     for package in pyproject()["tool"]["setuptools"]["packages"]:
@@ -71,13 +71,13 @@ def test_package_data_reach_the_wheel() -> None:
 
 @pytest.mark.parametrize("package", TOP_PACKAGES)
 def test_packages_are_typed(package: str) -> None:
-    """Each package carries the marker that lets type checkers read its annotations."""
+    """Each package has the marker that lets type checkers read its annotations."""
     assert (ROOT / package / "py.typed").is_file()
 
 
 @pytest.mark.parametrize("name", ["dev.txt", "bench.txt", "docs.txt", "fuzz.txt"])
 def test_pins_have_hashes_and_no_address(name: str) -> None:
-    """Every requirement is one exact version with hashes, and no line names an index or a path of some machine."""
+    """Every requirement is one exact version with hashes, and no line names an index or a local path."""
     text = (ROOT / "requirements" / name).read_text(encoding="utf-8")
     assert not re.search(r"://|--index|--extra-index|--find-links|^-|@|(^|\s)/", text, re.MULTILINE)
     for line in pinned(name):
@@ -87,7 +87,7 @@ def test_pins_have_hashes_and_no_address(name: str) -> None:
 
 @pytest.mark.parametrize("markers", MARKERS_OF_LINUX, ids=lambda markers: markers["python_version"])
 def test_pins_satisfy_the_ranges(markers: dict[str, str]) -> None:
-    """For each Python version every dependency, extra and build requirement has exactly one pin, and it lies in its range."""
+    """For each Python version every dependency, extra and build requirement has exactly one pin, which lies in its range."""
     project = pyproject()["project"]
     extras = project["optional-dependencies"]
     ranges = [*pyproject()["build-system"]["requires"], *project["dependencies"]]
@@ -105,7 +105,7 @@ def test_pins_satisfy_the_ranges(markers: dict[str, str]) -> None:
 
 @pytest.mark.parametrize("name", ["bench.txt", "docs.txt", "fuzz.txt"])
 def test_other_pins_agree_with_the_rest(name: str) -> None:
-    """What benchmarks and fuzzing add never changes the version of a package the product was tested with."""
+    """The requirements of benchmarks and fuzzing never change the version of a package that the product was tested with."""
     tested = {str(without_hashes(line)).split(";")[0].strip() for line in pinned("dev.txt")}
     names = {Requirement(text).name for text in tested}
     for requirement in map(without_hashes, pinned(name)):
@@ -113,7 +113,7 @@ def test_other_pins_agree_with_the_rest(name: str) -> None:
 
 
 def test_only_one_opencv_is_pinned() -> None:
-    """Two OpenCV distributions overwrite each other's files, so exactly one is ever installed."""
+    """Two OpenCV distributions overwrite each other's files, so exactly one is installed."""
     names = {
         without_hashes(line).name for name in ("dev.txt", "bench.txt", "docs.txt", "fuzz.txt") for line in pinned(name)
     }
@@ -121,17 +121,17 @@ def test_only_one_opencv_is_pinned() -> None:
 
 
 def test_licence_is_apache_2() -> None:
-    """The licence file is the unaltered Apache-2.0 text, and the metadata say the same."""
-    # The digest of the text the Apache Software Foundation publishes as LICENSE-2.0.txt.
+    """The licence file is the unaltered Apache-2.0 text, and the metadata name the same licence."""
+    # The digest of the text that the Apache Software Foundation publishes as LICENSE-2.0.txt.
     published = "cfc7749b96f63bd31c3c42b5c471bf756814053e847c10f3eb003417bc523d30"
     assert hashlib.sha256((ROOT / "LICENSE").read_bytes()).hexdigest() == published
     assert pyproject()["project"]["license"] == "Apache-2.0"
 
 
 def test_version_has_one_source() -> None:
-    """The version stands in common/versions.py only: pyproject.toml takes it from there, the installed metadata repeat it, no other module states its own.
+    """The version is in common/versions.py only: pyproject.toml takes it from there, the installed metadata repeat it, and no other module states a version.
 
-    Where the metadata are older, the environment is: `make venv`, or `pip install -e . --no-deps`.
+    Older metadata mean an outdated environment: run `make venv`, or `pip install -e . --no-deps`.
     """
     project = pyproject()
     assert project["project"]["dynamic"] == ["version"]
@@ -144,7 +144,7 @@ def test_version_has_one_source() -> None:
 
 
 def test_board_loads_only_what_debian_gives_it() -> None:
-    """Importing every module of common and board_agent, save the one that speaks to BlueZ, loads no package but pyzmq, msgpack and pyserial, and no asyncio."""
+    """Importing every module of common and board_agent, except the one that talks to BlueZ, loads no package but pyzmq, msgpack and pyserial, and no asyncio."""
     modules = [name for name in modules_in_tree("common", "board_agent") if name != "common.link.bluez"]
     code = (
         "import importlib, sys\n"
@@ -161,7 +161,7 @@ def test_board_loads_only_what_debian_gives_it() -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_commands_ignore_a_foreign_common(command: str, tmp_path: Path) -> None:
-    """A command started from a folder that holds somebody else's `common` package uses our own."""
+    """A command started in a folder that holds a foreign `common` package uses our own."""
     foreign = tmp_path / "common"
     foreign.mkdir()
     (foreign / "__init__.py").write_text("raise RuntimeError('the foreign common was imported')\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Which frames are believed at once, which have to wait for an echo, and which never are."""
+"""Which frames are believed at once, which wait for an echo, and which are never believed."""
 
 import pytest
 from hypothesis import given
@@ -28,7 +28,7 @@ NOW_NS = 500 * SECOND_NS
     ],
 )
 def test_marks_that_cannot_be(exposed_ms: int, grabbed_ms: int, sent_ms: int, reason: Disbelief | None) -> None:
-    """With the moment of arrival known to 2 ms: nothing is sent after that, exposed after it was grabbed, or older than a minute."""
+    """With the time of arrival known to 2 ms: nothing is sent after it, exposed after it was grabbed, or older than a minute."""
     marks = BoardMarks(
         exposed_ns=NOW_NS + exposed_ms * MS, grabbed_ns=NOW_NS + grabbed_ms * MS, sent_ns=NOW_NS + sent_ms * MS
     )
@@ -37,7 +37,7 @@ def test_marks_that_cannot_be(exposed_ms: int, grabbed_ms: int, sent_ms: int, re
 
 @given(st.integers(-(2**62), 2**62))
 def test_labels_may_lie_anywhere_but_at_the_ends(exposed_ns: int) -> None:
-    """Stamps of images shown on demand are believed unless a difference of two would not fit into 64 bits; when they were sent is no label."""
+    """Stamps of images shown on demand are believed unless the difference of two exceeds 64 bits; the time of sending is no label."""
     marks = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=NOW_NS - 2, sent_ns=NOW_NS - 1)
     far = abs(NOW_NS - exposed_ns) >= LABELS_NS
     assert disbelief(marks, NOW_NS, 0, labelled=True) is (Disbelief.PAST if far else None)
@@ -60,7 +60,7 @@ def opened(transits_ms: list[float]) -> Quarantine[int]:
 
 
 def test_the_first_frame_waits_for_an_echo() -> None:
-    """Before anything is proven nothing passes; an echo from before the frame's sending proves nothing."""
+    """Before anything is proven no frame passes; an echo from before the frame's sending proves nothing."""
     quarantine: Quarantine[str] = Quarantine()
     assert not quarantine.arrived("first", 1000, 3 * MS, PERIOD_NS, NOW_NS)
     assert not quarantine.arrived("second", 2000, 3 * MS, PERIOD_NS, NOW_NS), "order is kept"
@@ -78,7 +78,7 @@ def test_the_first_frame_waits_for_an_echo() -> None:
     st.booleans(),
 )
 def test_no_step_of_two_periods_passes(recent_ms: list[float], true_ms: float, periods: float, back: bool) -> None:  # noqa: FBT001 - drawn
-    """Where frames take up to half a period, a clock that steps by two periods or more, either way, holds the next frame up."""
+    """If frames take up to half a period, a step of the clock by two periods or more, either way, holds up the next frame."""
     step_ns = round(periods * PERIOD_NS)
     transit_ns: int = round(true_ms * MS) + (step_ns if back else -step_ns)
     assert not opened(recent_ms).arrived(7, 10**6, transit_ns, PERIOD_NS, NOW_NS)
@@ -86,12 +86,12 @@ def test_no_step_of_two_periods_passes(recent_ms: list[float], true_ms: float, p
 
 @given(st.lists(st.floats(0, 16), min_size=1, max_size=40), st.floats(0, 16))
 def test_a_steady_link_holds_nothing_up(recent_ms: list[float], transit_ms: float) -> None:
-    """Where frames take up to half a period and no clock steps every frame passes at once."""
+    """If frames take up to half a period and no clock steps, every frame passes at once."""
     assert opened(recent_ms).arrived(7, 10**6, round(transit_ms * MS), PERIOD_NS, NOW_NS)
 
 
 def test_an_unsteady_link_waits_each_time() -> None:
-    """Where frames take 500 to 900 ms no frame passes without an echo: a step of two periods would not be seen."""
+    """If frames take 500 to 900 ms, no frame passes without an echo: a step of two periods would not be seen."""
     quarantine = opened([500, 900, 700, 650])
     for transit_ms in (500, 650, 700, 900):
         assert not quarantine.arrived(transit_ms, 10**6, transit_ms * MS, PERIOD_NS, NOW_NS)
@@ -99,7 +99,7 @@ def test_an_unsteady_link_waits_each_time() -> None:
 
 
 def test_a_doubt_drops_what_waits() -> None:
-    """Frames that waited for an echo are given back to be counted, and the next frame has to wait again."""
+    """Frames that waited for an echo are returned to be counted, and the next frame has to wait again."""
     quarantine = opened([3, 3, 3])
     quarantine.arrived(8, 10**6, 900 * MS, PERIOD_NS, NOW_NS)
     assert quarantine.void() == [8]
@@ -108,7 +108,7 @@ def test_a_doubt_drops_what_waits() -> None:
 
 
 def test_nobody_waits_for_ever() -> None:
-    """Where no echo comes frames are given up after ten seconds, the oldest first."""
+    """Without an echo frames are given up after ten seconds, the oldest first."""
     quarantine: Quarantine[int] = Quarantine()
     for number in range(3):
         assert not quarantine.arrived(number, number, 3 * MS, PERIOD_NS, NOW_NS + number * SECOND_NS)
@@ -118,7 +118,7 @@ def test_nobody_waits_for_ever() -> None:
 
 
 def test_frames_since_the_last_echo_are_suspect() -> None:
-    """After a step the report names the frames that no echo had proven, and no others."""
+    """After a step the report names exactly the frames that no echo had proven."""
     unproven = Unproven()
     assert unproven.stepped() is None
     for number in range(10, 20):

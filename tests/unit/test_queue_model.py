@@ -1,4 +1,4 @@
-"""The queueing model against results of queueing theory."""
+"""The queueing model against known results of queueing theory."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -20,7 +20,7 @@ def constant(value: float) -> np.ndarray:
 
 
 def setting(period_ms: float = 20.0, service_ms: float = 5.0, fifo: FifoSettings | None = None) -> Setting:
-    """Everything constant: capture 1 ms, latency 1 ms, 10 000 bytes at 1 us each, pairing and waking at once."""
+    """Everything constant: capture 1 ms, latency 1 ms, 10 000 bytes at 1 us each, pairing and waking take no time."""
     return Setting(
         period_ns=period_ms * MS,
         size_bytes=constant(10_000.0),
@@ -51,7 +51,7 @@ def test_waits_follow_lindleys_recursion(steps: list[tuple[int, int]]) -> None:
     st.integers(1, 4),
 )
 def test_who_gives_way_does_not_change_how_many(steps: list[tuple[int, int]], depth: int) -> None:
-    """How many wait at any moment does not depend on which one gives way; so both policies drop equally many and are busy at the same times."""
+    """The number of waiting pairs does not depend on which one is dropped, so both policies drop equally many and are busy at the same times."""
     queued = np.cumsum([gap for gap, _ in steps]).astype(float)
     service = np.array([float(length) for _, length in steps])
     oldest = serve(queued_ns=queued, service_ns=service, depth=depth, overflow=Overflow.DROP_OLDEST)
@@ -99,7 +99,7 @@ def test_loss_of_a_full_queue_under_poisson_arrivals(load: float, depth: int) ->
 
 
 def test_a_processor_faster_than_the_camera_starves() -> None:
-    """D/D/1 below capacity: nobody waits, the worker idles for period - service, every delay is what was put in."""
+    """D/D/1 below capacity: nothing waits, the worker idles for period - service, and every delay is what was put in."""
     made = predict(setting(), 100, np.random.default_rng(0))
     assert made.pairs_per_s == pytest.approx(50.0)
     assert (made.replaced_share, made.dropped_share) == (0.0, 0.0)
@@ -112,7 +112,7 @@ def test_a_processor_faster_than_the_camera_starves() -> None:
 @pytest.mark.parametrize("policy", list(Overflow))
 @pytest.mark.parametrize("depth", [1, 3])
 def test_a_processor_slower_than_the_camera_sets_the_rate(policy: Overflow, depth: int) -> None:
-    """D/D/1 above capacity: the rate is 1 / service, the worker never idles, and what is too much is lost before the link or in the FIFO."""
+    """D/D/1 above capacity: the rate is 1 / service, the worker never idles, and the excess is lost before the link or in the FIFO."""
     made = predict(setting(20.0, 50.0, FifoSettings(depth, policy)), 2000, np.random.default_rng(0))
     assert made.starvation_ns[5:].max() <= (0.0 if policy is not Overflow.BLOCK or depth > 1 else 50 * MS)
     lost = 1.0 - (1.0 - made.replaced_share) * (1.0 - made.dropped_share)
@@ -123,27 +123,27 @@ def test_a_processor_slower_than_the_camera_sets_the_rate(policy: Overflow, dept
         assert lost == pytest.approx(1.0 - 20.0 / 50.0, abs=0.01)
         assert made.replaced_share == 0.0
     if policy is Overflow.DROP_OLDEST:
-        # The pair that is taken is among the newest `depth`: none is older than depth periods when it is taken.
+        # The pair that is taken is among the newest `depth`: none is older than depth periods then.
         assert made.queuing_ns.max() <= depth * 20 * MS + 1
     if policy is Overflow.DROP_NEWEST:
-        # A full queue is served in order: depth services, less what was left of the period in which it came.
+        # A full queue is served in order: depth services, less the rest of the period in which the pair came.
         assert made.queuing_ns.max() <= depth * 50 * MS + 1
         assert made.queuing_ns[5:].min() >= (depth * 50 - 20) * MS - 1
 
 
 def test_a_link_slower_than_the_camera_sets_the_rate_and_replaces_frames() -> None:
-    """With 100 ms a frame on the line and one frame under way, a frame follows the one before by 100 ms and twice the latency, the rest is replaced."""
+    """With 100 ms of line time per frame and one frame under way, frames follow each other by 100 ms and twice the latency; the rest are replaced."""
     slow = LinkModel(latency_ns=1 * MS, ns_per_byte=10_000.0, spread_ns=constant(0.0), self_paced=False)
     made = predict(replace(setting(), link=slow), 3000, np.random.default_rng(0))
     assert made.pairs_per_s == pytest.approx(1000.0 / 102.0, rel=0.01)
     assert made.replaced_share == pytest.approx(1.0 - 20.0 / 102.0, abs=0.01)
-    # The newest frame leaves: it waits for less than a period.
+    # The newest frame leaves: it has waited for less than a period.
     assert made.outbox_ns.max() <= 20 * MS
     assert np.allclose(made.propagation_ns, 101 * MS)
 
 
 def test_a_self_paced_link_is_never_idle_under_load() -> None:
-    """Where credit runs one frame ahead and the board waits for the line, frames follow each other by their time on the line alone."""
+    """If credit runs one frame ahead and the board waits for the line, frames follow each other by their line time alone."""
     slow = LinkModel(latency_ns=5 * MS, ns_per_byte=10_000.0, spread_ns=constant(0.0), self_paced=True)
     made = predict(replace(setting(), link=slow), 3000, np.random.default_rng(0))
     assert made.pairs_per_s == pytest.approx(10.0, rel=0.01)
@@ -161,7 +161,7 @@ def test_a_self_paced_link_is_never_idle_under_load() -> None:
 def test_delays_add_up_and_order_is_kept(
     period_ms: float, service_ms: list[float], spread_ms: list[float], fifo: FifoSettings, self_paced: object
 ) -> None:
-    """For any setting end-to-end is the sum of the delays, no delay is negative, and shares are shares."""
+    """For any setting end-to-end is the sum of the delays, no delay is negative, and shares are between 0 and 1."""
     link = LinkModel(
         latency_ns=1 * MS, ns_per_byte=500.0, spread_ns=np.array(spread_ms) * MS, self_paced=bool(self_paced)
     )

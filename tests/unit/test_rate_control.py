@@ -1,4 +1,4 @@
-"""The ladder of a camera's modes, and the choice among them: on simulated links of any rate, on simulated time."""
+"""The ladder of a camera's modes, and the choice among them, on simulated links of any rate and on simulated time."""
 
 import random
 from dataclasses import dataclass, field, replace
@@ -38,19 +38,19 @@ def size_bytes(mode: Mode) -> float:
 
 
 def load(mode: Mode) -> float:
-    """What a mode asks of the link, bytes/s."""
+    """What a mode needs of the link, bytes/s."""
     return size_bytes(mode) * S / mode.period_ns
 
 
 @dataclass
 class Street:
-    """A camera, its outbox and a link of some rate, at one time.
+    """A camera, its outbox and a link of some rate, on one clock.
 
     Attributes:
         modes: the ladder.
         bytes_per_s: what the link carries.
-        spread: by which share sizes differ from their mean.
-        steps: when the mode changed and to which index.
+        spread: by which share sizes vary around their mean.
+        steps: when the mode changed, and to which index.
     """
 
     modes: tuple[Mode, ...]
@@ -84,7 +84,7 @@ class Street:
                 self.steps.append((self.now_ns, self.control.rung.index))
 
     def mostly(self, seconds: float) -> int:
-        """Run on; gives the rung on which most of the time went by."""
+        """Run on; returns the rung that was in use for most of the time."""
         begin_ns, before = self.now_ns, self.control.rung.index
         done = len(self.steps)
         self.run(seconds)
@@ -99,7 +99,7 @@ MODES = ladder(OFFERS, {Way.QUALITY, Way.RATE}, 2.5)
 
 
 def test_quality_gives_way_before_the_rate() -> None:
-    """The ladder goes through the qualities at the full rate, then the rates down to the least, then the sizes if they may be lowered; each asks less."""
+    """The ladder lowers first the quality at the full rate, then the rate to its minimum, then the size if that is allowed; each rung needs less."""
     periods, qualities = OFFERS.periods_ns, OFFERS.qualities
     assert [(mode.period_ns, mode.quality) for mode in MODES] == [
         (periods[0], qualities[0]),
@@ -124,7 +124,7 @@ def test_quality_gives_way_before_the_rate() -> None:
 
 
 def test_what_gives_way_is_read_from_names() -> None:
-    """Names are read in any order, and an unknown one is refused by name."""
+    """Names are taken in any order, and an unknown one is refused by name."""
     assert ways(["rate", "quality"]) == {Way.QUALITY, Way.RATE}
     assert ways([]) == frozenset()
     with pytest.raises(SettingsError, match="'colour'"):
@@ -135,7 +135,7 @@ def test_what_gives_way_is_read_from_names() -> None:
 @settings(max_examples=60, deadline=None)
 @given(st.floats(10_000, 1_200_000), st.floats(0, 0.3), st.integers(0, 99))
 def test_a_constant_link_is_found_out_and_left_in_peace(bytes_per_s: float, spread: float, seed: int) -> None:
-    """On a link of any constant rate the camera ends on the highest rung that the link carries, or the lowest, and seldom leaves it."""
+    """On a link of any constant rate the camera ends on the highest rung that the link carries, or on the lowest, and seldom leaves it."""
     street = Street(MODES, bytes_per_s, spread, seed=seed)
     street.run(120)
     kept = street.mostly(600)
@@ -143,7 +143,7 @@ def test_a_constant_link_is_found_out_and_left_in_peace(bytes_per_s: float, spre
     overloaded = [index for index, mode in enumerate(MODES) if load(mode) * 0.8 >= bytes_per_s]
     assert kept <= (carried[0] if carried else len(MODES) - 1)
     assert kept >= min((overloaded[-1] + 1) if overloaded else 0, len(MODES) - 1)
-    # In any minute at most the way down once, and three trials of a step up that fail.
+    # In any minute there are at most the way down once, and three failed trials.
     times = [time_ns for time_ns, _ in street.steps]
     for first, time_ns in enumerate(times):
         within = sum(1 for later_ns in times[first:] if later_ns < time_ns + 60 * S)
@@ -155,7 +155,7 @@ def test_a_constant_link_is_found_out_and_left_in_peace(bytes_per_s: float, spre
 @settings(max_examples=30, deadline=None)
 @given(st.sampled_from([20_000.0, 60_000.0, 150_000.0]), st.floats(0, 0.2), st.integers(0, 99))
 def test_trials_become_rare(bytes_per_s: float, spread: float, seed: int) -> None:
-    """On a link whose rungs are far from its rate there are at most four failed trials in the ten minutes that follow the first five."""
+    """On a link whose rate is far from every rung's there are at most four failed trials in the ten minutes after the first five trials."""
     street = Street(MODES, bytes_per_s, spread, seed=seed)
     street.run(300)
     before = len(street.steps)
@@ -165,7 +165,7 @@ def test_trials_become_rare(bytes_per_s: float, spread: float, seed: int) -> Non
 
 @pytest.mark.parametrize("slow_s", [20.0, 60.0, 600.0])
 def test_it_recovers_with_the_link(slow_s: float) -> None:
-    """A link that is slow for a while and fast again has all of its camera again, within the longest time between two trials and 15 s for each rung."""
+    """After a slow time on the link the camera is back at full mode within the longest time between two trials plus 15 s for each rung."""
     street = Street(MODES, 20_000.0)
     street.run(slow_s)
     assert street.control.rung.index >= 3
@@ -178,7 +178,7 @@ def test_it_recovers_with_the_link(slow_s: float) -> None:
 
 
 def test_a_new_link_is_tried_soon() -> None:
-    """However long the trials of the old link were apart, on a new one the first follows within ten seconds; the rung stays till then."""
+    """However far apart the trials on the old link were, on a new link the first one follows within ten seconds; until then the rung stays."""
     street = Street(MODES, 20_000.0)
     street.run(600)
     kept = street.control.rung.index
@@ -190,7 +190,7 @@ def test_a_new_link_is_tried_soon() -> None:
 
 
 def test_a_hiccup_changes_nothing() -> None:
-    """A fast link that stands still for 0.8 s now and then keeps its camera as it is."""
+    """On a fast link that stalls for 0.8 s now and then the mode is unchanged."""
     street = Street(MODES, 1e7)
     for _ in range(20):
         street.run(7)
@@ -199,7 +199,7 @@ def test_a_hiccup_changes_nothing() -> None:
 
 
 def test_without_a_link_nothing_changes() -> None:
-    """While no host takes frames the rung stays, however many are dropped."""
+    """While no host takes frames, the rung stays, however many frames are dropped."""
     street = Street(MODES, 1e7, link=None)
     street.run(60)
     assert street.steps == []

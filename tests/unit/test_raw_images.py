@@ -1,4 +1,4 @@
-"""Raw camera images become the images that they show."""
+"""Raw camera images are converted to the images that they show."""
 
 import cv2
 import numpy as np
@@ -28,7 +28,7 @@ def _nv12(y: int, u: int, v: int) -> bytes:
 
 @pytest.mark.parametrize(("encode", "pixel_format"), [(_yuyv, PixelFormat.YUYV), (_nv12, PixelFormat.NV12)])
 def test_colours_by_the_standard(encode: object, pixel_format: PixelFormat) -> None:
-    """Black, white and red of BT.601 come out as black, white and red, within rounding."""
+    """BT.601's black, white and red become black, white and red, within rounding."""
     assert callable(encode)
     for yuv, bgr in (
         ((_BLACK_Y, _NEUTRAL, _NEUTRAL), (0, 0, 0)),
@@ -51,7 +51,7 @@ def test_grey_is_taken_as_it_is() -> None:
 @pytest.mark.parametrize("pixel_format", [PixelFormat.YUYV, PixelFormat.NV12, PixelFormat.GREY])
 @pytest.mark.parametrize("excess", [-1, 1])
 def test_another_length_is_refused(pixel_format: PixelFormat, excess: int) -> None:
-    """A byte too few or too many is an error that names the frame and both lengths."""
+    """One byte too few or too many is an error that names the frame and both lengths."""
     whole = {PixelFormat.YUYV: 2, PixelFormat.NV12: 1.5, PixelFormat.GREY: 1}[pixel_format] * _WIDTH * _HEIGHT
     with pytest.raises(DataError, match=rf"frame 3 has {int(whole) + excess} bytes.*has {int(whole)}"):
         decode_raw(_image(bytes(int(whole) + excess), pixel_format))
@@ -72,7 +72,7 @@ def test_a_raw_and_an_encoded_frame_make_a_pair() -> None:
 def test_a_size_that_a_format_cannot_have_is_refused(
     pixel_format: PixelFormat, size_px: tuple[int, int], size_bytes: int
 ) -> None:
-    """Two pixels share their colour in YUYV, two by two in NV12: an odd side cannot be, however many bytes came."""
+    """Two pixels share their colour in YUYV, two by two in NV12, so an odd side is refused, whatever the number of bytes."""
     with pytest.raises(DataError, match=rf"frame 9 is {size_px[0]}x{size_px[1]}, which {pixel_format.value} cannot be"):
         decode_raw(
             EncodedImage(

@@ -1,4 +1,4 @@
-"""What the host knows of a board over its lives: nothing of one is believed of the next."""
+"""What the host knows of a board over several sessions: nothing known of one is assumed of the next."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -42,7 +42,7 @@ from tests.support.unkept import Unkept
 
 
 def test_an_account_from_before_the_goodbye_is_not_the_last_one() -> None:
-    """A leaving host waits for the board's answer: an account that was under way behind the last frame then, and frames after it, do not end the wait."""
+    """A leaving host waits for the board's answer. Counts that were then under way behind the last frame, and later frames, do not end the wait."""
     talk = Talk()
     talk.run(60)
     assert talk.reception.leave(talk.now_ns)
@@ -57,7 +57,7 @@ def test_an_account_from_before_the_goodbye_is_not_the_last_one() -> None:
 
 
 def test_a_goodbye_says_nothing_of_the_next_life() -> None:
-    """After a board's orderly goodbye its next life's tail is unknown until that has said goodbye, too."""
+    """After a board's orderly goodbye the tail of its next session is unknown until that one has said goodbye, too."""
     talk = Talk()
     talk.run()
     talk.reception.receive(NAMES[Lane.FRAMES], Bye(BoardCounts()), talk.now_ns)
@@ -74,7 +74,7 @@ def test_a_goodbye_says_nothing_of_the_next_life() -> None:
 
 
 def test_a_leaving_host_greets_nobody() -> None:
-    """Once it has said goodbye a host answers no knock: a new hello would keep the board from the next host."""
+    """After its goodbye a host answers no knock: a new hello would keep the board from the next host."""
     talk = Talk()
     talk.run()
     talk.reception.leave(talk.now_ns)
@@ -85,7 +85,7 @@ def test_a_leaving_host_greets_nobody() -> None:
 
 @pytest.mark.parametrize("dialled", [True, False])
 def test_a_strangers_refusal_ends_no_waiting(*, dialled: bool) -> None:
-    """Three bytes of another version, or a refusal, count from the board that was called, and from no caller."""
+    """Three bytes of another version, or a refusal, count if they come from the board that was called, and from no caller."""
     talk = Talk(dialled=dialled)
     talk.reception.refuse_version(NAMES[Lane.CONTROL], 4, talk.now_ns)
     assert talk.reception.refused(talk.now_ns) == (BoardRefusal(RefusalReason.VERSION, 4) if dialled else None)
@@ -110,7 +110,7 @@ def test_a_strangers_refusal_ends_no_waiting(*, dialled: bool) -> None:
     ],
 )
 def test_a_frame_that_cannot_be_is_dropped_by_name(changes: dict[str, object], reason: Disbelief) -> None:
-    """One false frame is counted by its reason, and the honest ones after it are taken as ever."""
+    """One false frame is counted by its reason, and the honest ones after it are taken as usual."""
     talk = Talk()
     talk.run()
     for _ in range(2):
@@ -131,7 +131,7 @@ def test_a_frame_that_cannot_be_is_dropped_by_name(changes: dict[str, object], r
 
 
 def test_frames_wait_while_an_echo_lies_and_come_back_by_themselves() -> None:
-    """A whole wave an hour off costs the frames until the next one, by name; no step is told."""
+    """A whole wave that is an hour off costs the frames until the next wave, counted by reason; no step is reported."""
     talk = Talk()
     talk.run(40)
     talk.show(talk.frame())
@@ -162,26 +162,26 @@ class Choosy(Unkept):
         self.periods_ns: list[int] = []
 
     def begin(self, camera: CameraDescription) -> None:
-        """A life of the board begins."""
+        """A session of the board begins."""
         self.periods_ns.append(camera.period_ns)
 
     def objection(self, frame: BoardFrame) -> Disbelief | None:
-        """Whether the number is odd."""
+        """An objection if the number is odd."""
         return Disbelief.PAST if frame.message.sequence % 2 else None
 
     def add_board(self, frame: BoardFrame) -> None:
-        """Note the number."""
+        """Note the frame's number."""
         self.taken.append(frame.message.sequence)
 
 
 def test_a_sink_gets_what_it_does_not_object_to() -> None:
-    """A frame that the sink has no use for is dropped and counted by the sink's reason; each life is told once, before its frames."""
+    """A frame that the sink does not want is dropped and counted by the sink's reason. Each session is announced to it once, before its frames."""
     sink = Choosy()
     talk = Talk(sink=sink)
     talk.run()
     for _ in range(4):
         talk.show(talk.frame())
-        talk.run()  # until an echo has proven it
+        talk.run()  # until an echo has proven the frame
     assert sink.taken == [0, 2]
     assert dict(talk.reception.account.disbelieved) == {Disbelief.PAST: 2}
     assert sink.periods_ns == [CAMERA.period_ns]
@@ -189,7 +189,7 @@ def test_a_sink_gets_what_it_does_not_object_to() -> None:
 
 @pytest.mark.parametrize(("sink", "leave"), [(NoFrames(), 0), (Unkept(3), 3)])
 def test_a_board_sends_what_the_sink_has_room_for(sink: FrameSink, leave: int) -> None:
-    """The board's leave goes as far as the sink's room, and the clock is learnt also where there is none."""
+    """The board's credit goes as far as the sink's room; the clock is learnt even without room."""
     talk = Talk(sink=sink)
     talk.run()
     sent = 0
@@ -202,7 +202,7 @@ def test_a_board_sends_what_the_sink_has_room_for(sink: FrameSink, leave: int) -
 
 
 def test_labels_beside_a_clock_are_dropped_by_name() -> None:
-    """A board on demand has no part in a run whose own camera has a clock; with nothing else in the frame that is wrong, that is the reason."""
+    """A board on demand cannot take part in a run whose own camera has a clock. If nothing else is wrong with the frame, that is the reason."""
     talk = Talk(camera=replace(CAMERA, pacing=Pacing.DEMAND))
     talk.run()
     talk.show(talk.frame())
@@ -211,7 +211,7 @@ def test_labels_beside_a_clock_are_dropped_by_name() -> None:
 
 
 def test_a_frame_older_than_its_partners_is_dropped_and_the_next_one_awaited() -> None:
-    """Own frames are kept for two seconds and two periods; a frame that is older has no partner, and lets them be kept for longer."""
+    """The host's frames are kept for two seconds and two periods. A board frame that is older finds no partner, and makes the host keep them longer."""
     talk = Talk()
     talk.run(300)
     for _ in range(2):
@@ -228,7 +228,7 @@ def test_a_frame_older_than_its_partners_is_dropped_and_the_next_one_awaited() -
 
 
 class TwoLinks(Talk):
-    """The same over two links to one board."""
+    """The same test world over two links to one board."""
 
     def __init__(self, *, sink: FrameSink | None = None, camera: CameraDescription = CAMERA) -> None:
         super().__init__(sink=sink, camera=camera)
@@ -238,7 +238,7 @@ class TwoLinks(Talk):
 
 
 def test_a_broken_link_costs_a_change_and_no_session() -> None:
-    """When the carrier breaks the other link takes over: counted as lost and as a switch, in the same session."""
+    """If the carrier breaks, the other link takes over. That is counted as lost and as a switch, in the same session."""
     talk = TwoLinks()
     talk.run(60)
     assert [tally.is_up for tally in talk.reception.account.links] == [True, True]
@@ -256,7 +256,7 @@ def test_a_broken_link_costs_a_change_and_no_session() -> None:
 
 
 def test_links_to_two_boards_are_an_error_unless_one_was_moved() -> None:
-    """A second link that leads to another board from the beginning is refused with the remedy; one that was right before is only told."""
+    """A second link that leads to another board from the beginning is refused with the remedy; one that was right before is only reported."""
     talk = TwoLinks()
     other = BoardHello(
         session="other",
@@ -277,7 +277,7 @@ def test_links_to_two_boards_are_an_error_unless_one_was_moved() -> None:
 
 
 def test_a_link_that_is_turned_away_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
-    """While one link carries, a refusal on the other is one line of the log, however often it comes, and the run goes on."""
+    """While one link carries, a refusal on the other is one line in the log, however often it comes, and the run continues."""
     talk = TwoLinks()
     talk.run(60)
     for _ in range(5):
@@ -290,14 +290,14 @@ def test_a_link_that_is_turned_away_is_told_once(caplog: pytest.LogCaptureFixtur
 
 @pytest.mark.parametrize("reason", RefusalReason)
 def test_every_refusal_has_a_remedy(reason: RefusalReason) -> None:
-    """Whatever a board refuses for, the user is told what to do."""
+    """For every refusal by a board the user gets advice."""
     problem, remedy = refusal_text(BoardRefusal(reason))
     assert "board" in problem
     assert remedy
 
 
 def test_nonsense_is_counted_and_told_ever_more_seldom(caplog: pytest.LogCaptureFixture) -> None:
-    """Of a hundred messages that are none all are counted, and seven fill the log: the 1st, 2nd, 4th ... 64th."""
+    """Of a hundred invalid messages all are counted, and seven are logged: the 1st, 2nd, 4th ... 64th."""
     talk = Talk()
     talk.run()
     for _ in range(99):
@@ -308,7 +308,7 @@ def test_nonsense_is_counted_and_told_ever_more_seldom(caplog: pytest.LogCapture
 
 
 def test_a_board_that_steps_to_a_lower_rate_is_gone_by() -> None:
-    """After the board has told of another rung its period is the rung's, for pairing and for the reports."""
+    """After the board has reported another rung, pairing and reports use that rung's period."""
     talk = Talk()
     talk.run()
     rung = Rung(index=2, last=3, period_ns=2 * CAMERA.period_ns)
@@ -328,7 +328,7 @@ UPSETS: dict[str, Callable[[Talk], None]] = {
 
 @pytest.mark.parametrize("upset", UPSETS)
 def test_a_host_that_slept_believes_no_clock_until_an_echo_has_come(upset: str) -> None:
-    """After a sleep, or where one cannot be excluded, there is no estimate; the next echoes bring it back."""
+    """After a sleep, or if one cannot be excluded, there is no estimate; the next echoes restore it."""
     talk = Talk()
     talk.run(60)
     known = [talk.reception.estimate is not None]
@@ -339,7 +339,7 @@ def test_a_host_that_slept_believes_no_clock_until_an_echo_has_come(upset: str) 
 
 
 def test_a_board_that_vanished_leaves_an_open_end() -> None:
-    """Silence ends the contact: no link is up, nobody is connected, and what the board sent last is not known."""
+    """Silence ends the contact: no link is up, nobody is connected, and what the board sent last is unknown."""
     talk = Talk()
     talk.run(60)
     assert talk.reception.carrier == "tcp"

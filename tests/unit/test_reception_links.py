@@ -1,4 +1,4 @@
-"""What the host makes of two links to one board: which carries, what becomes of one whose frames are stuck; and what it does before there is any board."""
+"""How the host handles two links to one board: which one carries, what happens to one whose frames are stuck; and what it does before it has met a board."""
 
 from dataclasses import replace
 
@@ -13,11 +13,11 @@ LANES = [{lane: connection_name(link, lane.name.encode()) for lane in Lane} for 
 
 
 class TwoLines:
-    """A reception and a board that answers at once, but for the time that an echo takes on each line; they share a clock.
+    """A reception, and a board that answers at once, apart from each line's round trip; they share a clock.
 
     Attributes:
-        round_trips_ns: of the lines.
-        mute: connections over which nothing comes back.
+        round_trips_ns: of each line.
+        mute: connections on which no answer comes.
     """
 
     def __init__(self, *round_trips_ns: int) -> None:
@@ -30,7 +30,7 @@ class TwoLines:
         self.board = BoardSession("life", "boot", CAMERA)
 
     def run(self, duration_ns: int) -> list[str]:
-        """Let both talk; gives the names of the links that carried, in order."""
+        """Let both talk; returns the names of the links that carried, in order."""
         carriers = [self.reception.carrier]
         for _ in range(duration_ns // (20 * MS)):
             self.now_ns += 20 * MS
@@ -51,7 +51,7 @@ class TwoLines:
 
 
 def test_the_swifter_line_comes_to_carry() -> None:
-    """Of two lines the first one carries at once; where its echoes take 400 ms and the other one's 1 ms, the frames move over, in the same session."""
+    """Of two lines the first one carries at once. If its echoes take 400 ms and the other one's 1 ms, the stream switches, in the same session."""
     lines = TwoLines(400 * MS, MS)
     assert lines.run(10_000 * MS) == ["", "tcp", "ipc"]
     assert lines.board.carrier == 1
@@ -59,7 +59,7 @@ def test_the_swifter_line_comes_to_carry() -> None:
 
 
 def test_a_line_whose_frames_are_stuck_stays_in_the_choice() -> None:
-    """Where no answer comes over the preferred line's lane for frames the other one carries, and the first one is up still: mended, it carries again."""
+    """If no answer comes on the preferred link's lane for frames, the other link carries, and the first one still counts as up; once repaired, it carries again."""
     lines = TwoLines(MS, MS)
     lines.mute = {LANES[0][Lane.FRAMES]}
     assert lines.run(2_000 * MS)[-1] == "ipc"
@@ -71,7 +71,7 @@ def test_a_line_whose_frames_are_stuck_stays_in_the_choice() -> None:
 
 
 def test_without_a_board_nobody_is_steered() -> None:
-    """A correction for a camera that nobody has met yet goes nowhere; once its board is there, one does."""
+    """A correction before any board has been met is dropped; once the board is there, a correction is sent."""
     lines = TwoLines(MS, MS)
     lines.reception.steer(5 * MS, lines.now_ns)
     assert lines.said == []
@@ -83,7 +83,7 @@ def test_without_a_board_nobody_is_steered() -> None:
 
 
 def test_a_leave_that_was_taken_before_any_frame_has_an_open_end() -> None:
-    """A board that greeted, but over whose lanes for frames nothing ever came: the account holds one session without a name, with nothing counted."""
+    """A board greeted, but nothing ever came on its lanes for frames: the account holds one session without a name, with zero counts."""
     lines = TwoLines(MS, MS)
     lines.mute = {lanes[Lane.FRAMES] for lanes in LANES}
     assert set(lines.run(500 * MS)) == {""}

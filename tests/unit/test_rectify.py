@@ -16,7 +16,7 @@ from tests.support.rigs import points_seen_by_both, unlike_rig
 
 
 def test_points_lie_on_one_row_and_their_disparity_gives_their_depth() -> None:
-    """Through full distortion: |y left - y right| < 0.01 px and z = f b / d, for every point both cameras see."""
+    """With full distortion: |y left - y right| < 0.01 px and z = f b / d, for every point that both cameras see."""
     rig = unlike_rig()
     rectification = rectify_rig(rig)
     geometry = rectification.geometry
@@ -30,7 +30,7 @@ def test_points_lie_on_one_row_and_their_disparity_gives_their_depth() -> None:
 
 
 def test_published_matrices_agree_with_each_other() -> None:
-    """P1 and P2 project as the rectified points do, and Q brings a pixel with its disparity back to the point."""
+    """P1 and P2 project as the rectified points do, and Q maps a pixel with its disparity back to the point."""
     rig = unlike_rig()
     r = rectify_rig(rig)
     seen = points_seen_by_both(rig, 200, seed=2)
@@ -51,7 +51,7 @@ def test_published_matrices_agree_with_each_other() -> None:
 def test_every_pixel_of_the_window_comes_from_inside_both_images(
     centre_m: tuple[float, float, float], turn: float
 ) -> None:
-    """White images stay white to the last corner: no black border that a matcher would take for texture."""
+    """White images stay white to the last corner: there is no black border that a matcher would take for texture."""
     rig = unlike_rig(centre_m, turn)
     rectifier = Rectifier(rig)
     pair = rectifier.rectify(np.full((480, 640), 255, np.uint8), np.full((720, 1280), 255, np.uint8))
@@ -63,7 +63,7 @@ def test_every_pixel_of_the_window_comes_from_inside_both_images(
 
 
 def _source_margin_px(model: CameraModel, rotation: np.ndarray, r: Rectification) -> float:
-    """How far inside the camera's image the window's outermost source pixel lies: one on its border, as the map does not fold."""
+    """How far inside the camera's image the window's outermost source pixel lies: it is on the border, as the map does not fold."""
     columns, rows = np.meshgrid(np.arange(r.width_px), np.arange(r.height_px))
     border = np.ones(columns.shape, dtype=bool)
     border[1:-1, 1:-1] = False
@@ -76,7 +76,7 @@ def _source_margin_px(model: CameraModel, rotation: np.ndarray, r: Rectification
 
 
 def test_window_keeps_most_of_the_common_view() -> None:
-    """The window is no keyhole: it spans at least 85 % of the narrower view in both directions."""
+    """The window is not too small: it spans at least 85 % of the narrower view in both directions."""
     rectification = rectify_rig(unlike_rig(turn=0.2))
     # Left: 640 / 525 = 1.22 wide. Right: 720 / 1128 = 0.638 high; at the common f = 526 that is 641 x 336 px.
     assert rectification.width_px > 0.85 * 640 * 0.9  # the left lens bends its sides inwards by a tenth
@@ -84,7 +84,7 @@ def test_window_keeps_most_of_the_common_view() -> None:
 
 
 def test_images_of_a_textured_plane_agree() -> None:
-    """The remapped images of a fronto-parallel plane are one image shifted by its disparity, to a few grey levels."""
+    """The remapped images of a fronto-parallel plane are one image shifted by its disparity, within a few grey levels."""
     rig = unlike_rig()
     rectifier = Rectifier(rig)
     depth_m = 1.0
@@ -102,7 +102,7 @@ def test_images_of_a_textured_plane_agree() -> None:
 
 
 def _render_plane(rig: Rig, side: Side, rectifier: Rectifier, depth_m: float) -> Image:
-    """The camera's view of a smooth texture on a plane at z = depth in the rectified left axes, ray by ray."""
+    """The camera's view of a smooth texture on a plane at z = depth in the rectified left axes, computed ray by ray."""
     model = rig.left if side is Side.LEFT else rig.right
     r = rectifier.rectification
     rotation = r.R_left if side is Side.LEFT else r.R_right
@@ -120,7 +120,7 @@ def _render_plane(rig: Rig, side: Side, rectifier: Rectifier, depth_m: float) ->
 
 
 def test_colour_passes_and_a_finer_camera_is_averaged_down() -> None:
-    """A 1-px checkerboard of the camera with twice the resolution becomes grey, not a moire pattern."""
+    """A 1-px checkerboard from the camera with twice the resolution becomes grey, not a moire pattern."""
     rig = unlike_rig(turn=0)
     board = (np.indices((720, 1280)).sum(axis=0) % 2 * 255).astype(np.uint8)
     pair = Rectifier(rig).rectify(np.zeros((480, 640, 3), np.uint8), np.dstack([board] * 3))
@@ -130,7 +130,7 @@ def test_colour_passes_and_a_finer_camera_is_averaged_down() -> None:
 
 
 def test_swapped_sides_are_told() -> None:
-    """A right camera that stands on the left is refused with the remedy."""
+    """A right camera that is on the left is refused with the remedy."""
     with pytest.raises(DataError, match="swap LEFT and RIGHT"):
         rectify_rig(unlike_rig((-0.1, 0.0, 0.0)))
 
@@ -139,19 +139,19 @@ def test_swapped_sides_are_told() -> None:
     ("centre_m", "where"), [((0.01, 0.1, 0.0), "above or below"), ((0.01, 0.0, 0.1), "in front of or behind")]
 )
 def test_cameras_not_side_by_side_are_told(centre_m: tuple[float, float, float], where: str) -> None:
-    """A vertical or a tandem rig is refused in words."""
+    """A vertical or tandem rig is refused with an explanation."""
     with pytest.raises(DataError, match=where):
         rectify_rig(unlike_rig(centre_m))
 
 
 def test_cameras_that_look_apart_are_told() -> None:
-    """Two views that hardly overlap are refused in words."""
+    """Two views that hardly overlap are refused with an explanation."""
     with pytest.raises(DataError, match="overlap"):
         rectify_rig(unlike_rig(turn=18))
 
 
 def test_an_image_of_another_size_is_told() -> None:
-    """A frame of another resolution than the calibration's is refused with side and both sizes."""
+    """A frame of another resolution than the calibration's is refused; the error names the side and both sizes."""
     rectifier = Rectifier(unlike_rig())
     with pytest.raises(DataError, match=r"right image is 640x480 px, .*1280x720"):
         rectifier.rectify(np.zeros((480, 640), np.uint8), np.zeros((480, 640), np.uint8))
@@ -164,7 +164,7 @@ def test_cameras_in_one_place_are_told() -> None:
 
 
 def test_a_distortion_that_folds_inside_the_image_is_told() -> None:
-    """A lens model whose radius falls before the corner is no lens: the error names the camera."""
+    """A lens model whose radius decreases before the corner is not a lens: the error names the camera."""
     rig = unlike_rig()
     rig.left.distortion[:] = (-3.0, 0.0, 0.0, 0.0, 0.0)
     with pytest.raises(DataError, match="left"):
@@ -173,7 +173,7 @@ def test_a_distortion_that_folds_inside_the_image_is_told() -> None:
 
 @pytest.mark.parametrize(("outwards_deg", "words"), [(70, "overlap by 0x"), (80, "left camera looks too far aside")])
 def test_cameras_that_look_to_opposite_sides_are_told(outwards_deg: float, words: str) -> None:
-    """Two cameras turned outwards, each by so much that it sees points behind the common view, are refused in words: not their lenses are to blame."""
+    """Two cameras turned so far outwards that each sees points behind the common view are refused with an explanation that does not blame their lenses."""
     half = np.asarray(cv2.Rodrigues(np.array([0.0, math.radians(outwards_deg), 0.0]))[0], np.float64)
     rig = replace(unlike_rig(), R_right_left=half @ half, t_right_left_m=-half @ np.array([0.1, 0.0, 0.0]))
     with pytest.raises(DataError, match=words) as caught:

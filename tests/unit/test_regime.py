@@ -1,4 +1,4 @@
-"""Which queueing regime holds: known arrival and processing times give the known regime, and remedies whose figures add up."""
+"""Which queueing regime holds: known arrival and processing times give the known regime, and remedies whose figures are correct."""
 
 import re
 from dataclasses import replace
@@ -15,7 +15,7 @@ NAN = float("nan")
 
 
 def figures(*, period_ms: float, arrival_ms: float, processing_ms: float, match_ms: float = 0.0) -> RunFigures:
-    """A steady run: pairs are offered every `arrival_ms`; a processor that is slower drops the rest."""
+    """A steady run: a pair is offered every `arrival_ms`; a slower processor drops the rest."""
     interval_ms = max(arrival_ms, processing_ms)
     return RunFigures(
         pairs=300,
@@ -37,12 +37,12 @@ def numbers(text: str) -> list[float]:
 
 
 def test_a_slow_link_starves_the_processor() -> None:
-    """The paper's first case: 30 a second from the cameras, 10 through the link, 20 ms of work: it idles for 80 % of the time."""
+    """The paper's first case: 30 a second from the cameras, 10 through the link, 20 ms of work: the processor idles for 80 % of the time."""
     judgement = judge(figures(period_ms=100 / 3, arrival_ms=100, processing_ms=20))
     assert judgement.regime is Regime.STARVED_BY_LINK
     assert "80 %" in judgement.sentence
     smaller, link, fewer = judgement.remedies
-    # A third of the bytes comes three times as often; 50 KB at 30 a second are 1.5 MB/s, the link carries a third of that.
+    # With a third of the bytes frames come three times as often: 50 KB at 30 a second are 1.5 MB/s, and the link carries a third of that.
     assert numbers(smaller)[:2] == [16.7, 50.0]
     assert numbers(link) == [1.5, 0.5]
     assert "fps=10" in fewer
@@ -55,13 +55,13 @@ def test_a_slow_processor_has_a_backlog() -> None:
     assert "100 %" in judgement.sentence
     smaller, matcher, fewer = judgement.remedies
     share = numbers(smaller)[0] / 100
-    assert 80 * share**3 + 20 * share**2 == pytest.approx(100 / 3, rel=0.03)  # the share is told in whole per cent
+    assert 80 * share**3 + 20 * share**2 == pytest.approx(100 / 3, rel=0.03)  # the share is given in whole per cent
     assert numbers(matcher) == [pytest.approx(100 / 3 - 20, abs=0.05), 80.0]
     assert "fps=10" in fewer
 
 
 def test_a_backlog_behind_a_slow_link_names_what_the_link_brings() -> None:
-    """Cameras show 30 a second, the link brings 15, each takes 100 ms: 15 are offered, and a matcher must get by with 66.7 ms."""
+    """The cameras show 30 a second, the link brings 15, each pair takes 100 ms: 15 are offered, and the matcher must get by with 66.7 ms."""
     run = figures(period_ms=100 / 3, arrival_ms=200 / 3, processing_ms=100, match_ms=80)
     judgement = judge(run)
     assert judgement.regime is Regime.BACKLOG
@@ -70,27 +70,27 @@ def test_a_backlog_behind_a_slow_link_names_what_the_link_brings() -> None:
 
 
 def test_a_fifo_that_blocks_hides_what_the_cameras_offer() -> None:
-    """With `block` the board sends no more than is taken: what the processor misses is told from the cameras' rate."""
+    """With `block` the board sends no more than is taken: the processor's shortfall is computed from the cameras' rate."""
     run = replace(figures(period_ms=100 / 3, arrival_ms=100, processing_ms=100), overflow=Overflow.BLOCK)
     assert "30 pairs arrive per second" in judge(run).sentence
 
 
 def test_a_processor_that_just_keeps_up_is_not_said_to_drop() -> None:
-    """95 ms of work for a pair every 100 ms: it is busy, and nothing waits for good."""
+    """With 95 ms of work for a pair every 100 ms the processor is busy, and no backlog remains."""
     judgement = judge(figures(period_ms=100, arrival_ms=100, processing_ms=95))
     assert judgement.regime is Regime.BACKLOG
     assert "dropped" not in judgement.sentence
 
 
 def test_a_processor_that_keeps_up_waits_for_the_cameras() -> None:
-    """With 10 ms of work for each of 30 pairs a second nothing is wrong, and the room that is left is told."""
+    """With 10 ms of work for each of 30 pairs a second nothing is wrong, and the spare capacity is reported."""
     judgement = judge(figures(period_ms=100 / 3, arrival_ms=100 / 3, processing_ms=10))
     assert judgement.regime is Regime.STARVED_BY_CAMERAS
     assert "3.3 times as much work" in judgement.remedies[0]
 
 
 def test_frames_without_partner_are_told_from_a_slow_link() -> None:
-    """When all board frames arrive and only every third is paired, the link is not to blame."""
+    """If all board frames arrive and only every third is paired, the link is not to blame."""
     run = replace(figures(period_ms=100 / 3, arrival_ms=100, processing_ms=20), received=3.0)
     judgement = judge(run)
     assert judgement.regime is Regime.STARVED_BY_PAIRING
@@ -99,7 +99,7 @@ def test_frames_without_partner_are_told_from_a_slow_link() -> None:
 
 
 def test_images_on_demand_are_never_slow() -> None:
-    """Without a rate of the cameras there is no arrival to be too slow."""
+    """If the cameras' rate is unknown, arrival cannot be called too slow."""
     run = replace(figures(period_ms=30, arrival_ms=100, processing_ms=20), period_ns=0)
     assert judge(run).regime is Regime.STARVED_BY_CAMERAS
 
@@ -134,13 +134,13 @@ def test_images_on_demand_are_never_slow() -> None:
     ],
 )
 def test_nothing_is_said_of_too_few_pairs(run: RunFigures) -> None:
-    """Below ten pairs no regime is named."""
+    """With fewer than ten pairs no regime is named."""
     assert judge(run).regime is Regime.UNKNOWN
 
 
 @given(st.floats(1, 1000), st.floats(1, 5), st.floats(1, 2000), st.floats(0, 1))
 def test_the_slower_side_is_always_blamed(period_ms: float, slower: float, processing_ms: float, match: float) -> None:
-    """A processor slower than arrival is a backlog, one far faster starves; every remedy is a sentence with finite numbers."""
+    """A processor slower than arrival gives a backlog, one far faster starves; every remedy is a sentence with finite numbers."""
     arrival_ms = period_ms * slower
     judgement: Judgement = judge(
         figures(period_ms=period_ms, arrival_ms=arrival_ms, processing_ms=processing_ms, match_ms=match * processing_ms)

@@ -1,4 +1,4 @@
-"""Replay's own rules: order of names, globs, the image of a moment, options of its URI."""
+"""Replay's own rules: order of names, globs, the image of a moment, options of the URI."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -24,7 +24,7 @@ def names(pattern: str) -> list[str]:
 
 
 def fill(folder: Path, *wanted: str) -> Path:
-    """Put small different JPEGs of these names there."""
+    """Write small, different JPEGs with these names there."""
     folder.mkdir(exist_ok=True)
     for seed, name in enumerate(wanted):
         (folder / name).write_bytes(jpeg(seed=seed))
@@ -34,7 +34,7 @@ def fill(folder: Path, *wanted: str) -> Path:
 @given(st.lists(st.integers(0, 10**6), unique=True, max_size=20))
 @settings(deadline=None)
 def test_numbers_in_names_count_as_numbers(numbers: list[int]) -> None:
-    """Names that differ in a number only are in the order of that number."""
+    """Names that differ only in a number are in the order of that number."""
     paths = [Path(f"frame{number}.jpg") for number in numbers]
     assert sorted(paths, key=name_order) == [Path(f"frame{number}.jpg") for number in sorted(numbers)]
 
@@ -49,14 +49,14 @@ def test_any_names_have_one_order(texts: list[str]) -> None:
 
 
 def test_a_folder_shows_its_images_in_name_order(tmp_path: Path) -> None:
-    """frame2 comes before frame10, and what is no image by its name is left out."""
+    """frame2 comes before frame10, and files without an image's name are left out."""
     fill(tmp_path, "frame10.jpg", "frame2.JPG", "frame1.png")
     (tmp_path / "notes.txt").write_text("no image")
     assert names(str(tmp_path)) == ["frame1.png", "frame2.JPG", "frame10.jpg"]
 
 
 def test_globs_and_single_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A glob shows what it matches, absolute or relative, across folders with **; a file shows itself."""
+    """A glob shows its matches, absolute or relative, across folders with **; a single file shows itself."""
     fill(tmp_path, "l1.jpg", "l2.jpg", "r1.jpg")
     fill(tmp_path / "sub", "l3.jpg")
     assert names(f"{tmp_path}/l*.jpg") == ["l1.jpg", "l2.jpg"]
@@ -68,7 +68,7 @@ def test_globs_and_single_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_folder_with_glob_letters_in_its_name_is_a_folder(tmp_path: Path) -> None:
-    """An existing folder is taken as it is called."""
+    """An existing folder is taken literally, even if its name looks like a glob."""
     assert names(str(fill(tmp_path / "run[1]", "a.jpg"))) == ["a.jpg"]
 
 
@@ -84,7 +84,7 @@ def test_a_folder_with_glob_letters_in_its_name_is_a_folder(tmp_path: Path) -> N
     ],
 )
 def test_nothing_to_show_is_named(tmp_path: Path, path: str, error: type[Exception]) -> None:
-    """A missing folder is unavailable, one without images is bad data, no path or no glob is a wrong setting."""
+    """A missing folder is unavailable, a folder without images is bad data, and a missing path or invalid glob is a wrong setting."""
     pattern = path.format(tmp_path)
     with pytest.raises(error, match="replay") as caught:
         find_images(pattern)
@@ -100,7 +100,7 @@ def test_nothing_to_show_is_named(tmp_path: Path, path: str, error: type[Excepti
 def test_the_image_of_a_moment(
     tmp_path_factory: pytest.TempPathFactory, fps: Fraction, start_ns: int, steps_ns: list[int]
 ) -> None:
-    """Image number k is exposed at k / fps and shown from then on: the newest one read is floor(t * fps), never one of the future."""
+    """Image number k is exposed at k / fps and available from then on: a read returns floor(t * fps) as the newest, never a future image."""
     folder = tmp_path_factory.getbasetemp() / "moments"
     if not folder.exists():
         fill(folder, "0.jpg", "1.jpg", "2.jpg")
@@ -111,7 +111,7 @@ def test_the_image_of_a_moment(
         now_ns += step_ns
         grabs = camera.read(now_ns)
         for grab in grabs:
-            if isinstance(grab, Skipped):  # after a long pause, the older ones by their number
+            if isinstance(grab, Skipped):  # after a long pause; skipped images are reported by number
                 continue
             assert isinstance(grab, Frame)
             number = round(grab.exposed.ns * fps / 10**9)
@@ -146,7 +146,7 @@ def test_the_image_of_a_moment(
     ],
 )
 def test_bad_camera_uris_are_refused(tmp_path: Path, uri: str) -> None:
-    """A camera URI that makes no sense is a SettingsError in one line, whatever the folder holds."""
+    """A meaningless camera URI is a SettingsError in one line, whatever the folder holds."""
     fill(tmp_path, "a.jpg")
     with pytest.raises(SettingsError) as caught:
         open_camera(uri.format(tmp_path), "host", 0)
@@ -154,7 +154,7 @@ def test_bad_camera_uris_are_refused(tmp_path: Path, uri: str) -> None:
 
 
 def test_options_reach_the_camera(tmp_path: Path) -> None:
-    """Rate, pacing, size and encoding of a replay stand in its description, and a `?` of a glob is no option."""
+    """Rate, pacing, size and encoding of a replay are in its description, and the `?` of a glob starts no option."""
     fill(tmp_path, "a1.jpg", "a2.jpg")
     camera = open_camera(f"replay:{tmp_path}/a?.jpg?fps=30000/1001&pace=demand", "host", 0)
     description = camera.description
@@ -165,7 +165,7 @@ def test_options_reach_the_camera(tmp_path: Path) -> None:
 
 
 def test_a_long_stall_costs_bounded_work(tmp_path: Path) -> None:
-    """After an hour without a read the newest images come, few of them, and sequence numbers tell how many were passed over."""
+    """After an hour without a read only a few images come, the newest ones, and sequence numbers show how many were skipped."""
     camera = ReplayCamera(ReplaySettings(path=str(fill(tmp_path, "a.jpg")), fps=Fraction(30), loop=True), 0)
     grabs = camera.read(3600 * 10**9)
     assert len(grabs) <= 65
@@ -176,7 +176,7 @@ def test_a_long_stall_costs_bounded_work(tmp_path: Path) -> None:
 
 
 def test_a_phase_puts_every_exposure_later(tmp_path: Path) -> None:
-    """Of two replays of one folder the one with phase_ms shows the same images, each just so much later."""
+    """Of two replays of one folder the one with phase_ms shows the same images, each exactly that much later."""
     fill(tmp_path / "film", "0.jpg", "1.jpg", "2.jpg")
     shown = []
     for options in ("", "&phase_ms=12.5"):

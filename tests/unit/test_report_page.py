@@ -1,4 +1,4 @@
-"""The report page: all that was given stands on it, nothing comes from outside, nothing is made up."""
+"""The report page: it shows everything that it was given, loads nothing from outside, and invents nothing."""
 
 import base64
 import re
@@ -42,7 +42,7 @@ JPEG = cv2.imencode(".jpg", np.zeros((4, 4, 3), dtype=np.uint8))[1].tobytes()
 
 
 class Page(HTMLParser):
-    """Collects elements and text; `open` is empty at the end when every element was closed."""
+    """Collects elements and text; `open` is empty at the end if every element was closed."""
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
@@ -53,22 +53,22 @@ class Page(HTMLParser):
         self.close()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Notes an element and that it is open."""
+        """Records an element and that it is open."""
         self.elements.append((tag, dict(attrs)))
         if tag not in VOID:
             self.open.append(tag)
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Notes an element that closes itself."""
+        """Records an element that closes itself."""
         self.elements.append((tag, dict(attrs)))
 
     def handle_endtag(self, tag: str) -> None:
-        """Closes the innermost element, which must be this one."""
+        """Closes the innermost element, whose tag must match."""
         if tag not in VOID:
             assert self.open.pop() == tag
 
     def handle_data(self, data: str) -> None:
-        """Collects what is to be read."""
+        """Collects visible text."""
         if not self.open or self.open[-1] != "style":
             self.words += data
 
@@ -133,7 +133,7 @@ def test_page_of_no_pairs_says_so() -> None:
 
 
 def test_all_text_is_escaped() -> None:
-    """Text with markup, from any field, stands on the page as it is and makes no element."""
+    """Text with markup, in any field, is shown literally and makes no element."""
     evil = '<img src=x onerror="boom()">&"\''
     text = page(
         data(
@@ -151,7 +151,7 @@ def test_all_text_is_escaped() -> None:
     assert [attributes["src"] for tag, attributes in parsed.elements if tag == "img"] == [
         "data:image/png;base64," + base64.b64encode(PNG).decode()
     ]
-    # title twice, subtitle, sentence, four of the figure, the caption, three of the table, the note.
+    # title twice, subtitle, sentence, four of the figure, the caption, three of the table, the note
     assert parsed.words.count(evil) == 13
     assert evil in Page(legend([(evil, 0)])).words
     quantity = Quantity(label=evil, values_ns=np.ones(3), colour=0, meaning=evil)
@@ -165,7 +165,7 @@ def test_all_text_is_escaped() -> None:
 
 
 def test_pictures_are_the_bytes_given() -> None:
-    """A picture's data URI holds its very bytes with their kind; what is neither PNG nor JPEG is refused by its name."""
+    """A picture's data URI holds its exact bytes with their type; a file that is neither PNG nor JPEG is refused by name."""
     sources = [attributes["src"] for tag, attributes in Page(page(data(delay_series([])))).elements if tag == "img"]
     assert [str(source).split(";")[0] for source in sources] == ["data:image/jpeg", "data:image/png"]
     assert [base64.b64decode(str(source).split(",")[1]) for source in sources] == [JPEG, PNG]
@@ -174,7 +174,7 @@ def test_pictures_are_the_bytes_given() -> None:
 
 
 def test_figures_tables_and_notes_are_on_the_page() -> None:
-    """Every label, value, cell and note given is there; an empty table says `none`."""
+    """Every given label, value, cell and note is shown; an empty table says `none`."""
     parsed = Page(
         page(
             data(
@@ -189,7 +189,7 @@ def test_figures_tables_and_notes_are_on_the_page() -> None:
 
 
 def test_series_hold_what_the_ledgers_say() -> None:
-    """Columns hold each ledger's delays in ns; the six add up to end-to-end; time counts from the first pair done."""
+    """Columns hold each ledger's delays in ns; the six add up to end-to-end; time starts when the first pair was done."""
     series = delay_series([ledger(0), ledger(1, (2, 2, 3, 4, 5, 30), start_ms=40)])
     assert [quantity.label for quantity in series.delays] == [
         "capture",
@@ -210,7 +210,7 @@ def test_series_hold_what_the_ledgers_say() -> None:
 
 
 def test_means_of_the_delays_are_in_the_budget() -> None:
-    """The page's first bar names each delay's mean and its share of the whole."""
+    """The page's first bar gives each delay's mean and its share of the whole."""
     text = page(data(delay_series([ledger(0), ledger(1, (3, 2, 3, 4, 5, 40), start_ms=60)])))
     # Means 2, 2, 3, 4, 5, 30 ms: together 46 ms.
     shares = "capture: 2.00 ms, 4.3 %|outbox: 2.00 ms, 4.3 %|propagation: 3.00 ms, 6.5 %|pairing: 4.00 ms, 8.7 %"
@@ -219,7 +219,7 @@ def test_means_of_the_delays_are_in_the_budget() -> None:
 
 
 def test_document_knows_phones_and_darkness() -> None:
-    """Every page sets its width to the screen's and has colours for the dark."""
+    """Every page adapts its width to the screen, and has colours for dark mode."""
     text = document("t", "<p>x</p>")
     assert 'name="viewport"' in text
     assert "prefers-color-scheme:dark" in text

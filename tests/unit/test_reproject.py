@@ -40,7 +40,7 @@ def test_middlebury_motorcycle_numbers() -> None:
 )
 @settings(deadline=None, max_examples=100)
 def test_project_undoes_reproject(geometry: StereoGeometry, disparity: Disparity) -> None:
-    """Every pixel nearer than 1e30 m comes back to its place and disparity; all others are NaN in all three."""
+    """Every pixel nearer than 1e30 m is mapped back to its place and disparity; all others are NaN in all three."""
     cloud = reproject(disparity, geometry)
     assert cloud.dtype == np.float32
     with np.errstate(invalid="ignore"):
@@ -79,7 +79,7 @@ def test_disparities_reach_the_nearest_depth(near_m: float, expected: int) -> No
 
 
 def test_nearest_depth_is_that_of_the_largest_disparity() -> None:
-    """N = 105 with f b = 52.5 reaches down to 0.5 m."""
+    """With f b = 52.5, N = 105 reaches down to 0.5 m."""
     assert nearest_depth_m(StereoGeometry(focal_px=525, baseline_m=0.1, cx_px=320, cy_px=240), 105) == pytest.approx(
         0.5
     )

@@ -1,4 +1,4 @@
-"""RFCOMM where there is no Bluetooth, and units that fill its frames. The link itself is tested in the guest (tests/vm/test_bluetooth.py)."""
+"""RFCOMM on a machine without Bluetooth, and units that fill its frames. The link itself is tested in the guest (tests/vm/test_bluetooth.py)."""
 
 import subprocess
 import sys
@@ -19,7 +19,7 @@ from tests.support.devices import MissingError, adapters
     "uri", ["rfcomm://*/1", "rfcomm://AA:BB:CC:DD:EE:FF/1?connect=1", "rfcomm://my%20board?connect=1"]
 )
 def test_a_machine_without_bluetooth_says_so(uri: str) -> None:
-    """Without Bluetooth in Python, in the kernel, or in the machine either side gets one line with the remedy, and exit 3."""
+    """If Python, the kernel or the machine lacks Bluetooth, either side prints one line with the remedy and exits with 3."""
     try:
         if adapters():
             pytest.skip("this machine has Bluetooth")
@@ -34,7 +34,7 @@ def test_a_machine_without_bluetooth_says_so(uri: str) -> None:
 
 @pytest.mark.parametrize("link", ["rfcomm://*", "rfcomm://my%20board?connect=1"])
 def test_a_python_without_bluetooth_says_so(link: str, tmp_path: Path) -> None:
-    """board-agent run by a Python that was built without Bluetooth sockets ends with one line that says so and what to do, exit 3."""
+    """With a Python built without Bluetooth sockets, board-agent run prints one line that says so and what to do, and exits with 3."""
     (tmp_path / "1.pgm").write_bytes(b"P5 2 2 255\nabcd")
     script = f"""
 import socket, sys
@@ -53,7 +53,7 @@ sys.exit(main(["run", "--camera", "replay:{tmp_path}?fps=10&loop=1", "--link", "
 
 
 def test_what_cannot_be_dialled_or_listened_on() -> None:
-    """To dial takes a device, to listen none or an adapter's address."""
+    """Dialling needs a device; listening needs nothing or an adapter's address."""
     with pytest.raises(SettingsError):
         open_link(parse_link("rfcomm://*/1?connect=1", listens_by_default=True))
     with pytest.raises(SettingsError):
@@ -62,7 +62,7 @@ def test_what_cannot_be_dialled_or_listened_on() -> None:
 
 @given(st.integers(100, 4096), st.integers(1, 1008))
 def test_units_fill_frames(unit_bytes: int, frame_bytes: int) -> None:
-    """A unit is so many whole frames, or an even part of one that is not much larger than it was to be."""
+    """A unit is a whole number of frames, or an even part of one that is not much larger than requested."""
     filled = fill(unit_bytes, frame_bytes)
     if unit_bytes >= frame_bytes:
         assert filled % frame_bytes == 0
@@ -73,6 +73,6 @@ def test_units_fill_frames(unit_bytes: int, frame_bytes: int) -> None:
 
 
 def test_units_of_a_bluetooth_link() -> None:
-    """The smallest unit is a third of RFCOMM's frame, which leaves it in three equal parts; the largest is four frames."""
+    """The smallest unit is a third of RFCOMM's frame, which is sent as three equal parts; the largest is four frames."""
     assert fill(267, FRAME_BYTES) == 336
     assert fill(4096, FRAME_BYTES) == 4 * FRAME_BYTES

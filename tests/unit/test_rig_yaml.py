@@ -1,4 +1,4 @@
-"""rig.yaml: round trip, other readers, and every kind of bad file."""
+"""rig.yaml: round trip, other readers, and every kind of invalid file."""
 
 import re
 from pathlib import Path
@@ -25,7 +25,7 @@ def _written(tmp_path: Path, **changes: object) -> Path:
 
 
 def test_round_trip(tmp_path: Path) -> None:
-    """Every number of the rig comes back to the bit."""
+    """Every number of the rig comes back bit for bit."""
     rig = unlike_rig()
     back = read_rig(_written(tmp_path, board_side=Side.RIGHT, rms_left_px=0.125, rms_stereo_px=0.25))
     for camera, expected in ((back.left, rig.left), (back.right, rig.right)):
@@ -55,7 +55,7 @@ def test_opencv_reads_the_keys_of_the_contract(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("key", ["M1", "D2", "R", "T", "left_image_width", "right_image_height"])
 def test_a_missing_key_is_named(tmp_path: Path, key: str) -> None:
-    """A file without a key is refused with the key and the file in the message."""
+    """A file that lacks a key is refused; the message names the key and the file."""
     path = _written(tmp_path)
     path.write_text(re.sub(rf"^{key}:", f"no_{key}:", path.read_text(), flags=re.MULTILINE))
     with pytest.raises(DataError, match=rf"rig\.yaml: {key} is missing"):
@@ -74,7 +74,7 @@ def test_a_missing_key_is_named(tmp_path: Path, key: str) -> None:
     ],
 )
 def test_a_value_that_makes_no_sense_is_named(tmp_path: Path, field: str, value: np.ndarray, message: str) -> None:
-    """A matrix of the wrong shape, with NaN, or of the wrong kind is refused by key."""
+    """A matrix of the wrong shape or type, or with NaN, is refused by key."""
     with pytest.raises(DataError, match=message):
         read_rig(_written(tmp_path, **{field: value}))
 
@@ -90,7 +90,7 @@ def test_a_value_that_makes_no_sense_is_named(tmp_path: Path, field: str, value:
     ],
 )
 def test_an_edited_file_is_checked(tmp_path: Path, old: str, new: str, message: str) -> None:
-    """What a text editor can break is named by key."""
+    """Whatever a text editor can break is named by key."""
     path = _written(tmp_path)
     text = path.read_text()
     assert old in text
@@ -103,7 +103,7 @@ def test_an_edited_file_is_checked(tmp_path: Path, old: str, new: str, message: 
     "content", [b"", b"hello", b'{"M1": 1}', b"%YAML:1.0\nM1: [", b"%YAML:1.0\n---\n- 1\n", b"\xff\xfe\x00"]
 )
 def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
-    """What is no FileStorage YAML is refused in one line, by name."""
+    """A file that is no FileStorage YAML is refused in one line, by name."""
     path = tmp_path / "rig.yaml"
     path.write_bytes(content)
     with pytest.raises(DataError, match=r"rig\.yaml is not a calibration file"):
@@ -117,7 +117,7 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 
 
 def test_a_time_offset_comes_back_and_leaves_all_else(tmp_path: Path) -> None:
-    """A measured offset is read as it was written, other lines stay as they were, and without the keys nothing counts as measured."""
+    """A measured offset is read as it was written, other lines are unchanged, and without the keys nothing counts as measured."""
     path = _written(tmp_path, time_offset=TimeOffset(-12_345_678_901 // 10, 250_001))
     assert read_rig(path).time_offset == TimeOffset(-1_234_567_891, 250_001)
     with path.open("a") as file:
@@ -136,7 +136,7 @@ def test_a_time_offset_comes_back_and_leaves_all_else(tmp_path: Path) -> None:
     [("time_offset_ns", "9.e9"), ("time_offset_uncertainty_ns", "0."), ("time_offset_uncertainty_ns", "-3.")],
 )
 def test_a_time_offset_of_no_use_is_named(tmp_path: Path, key: str, value: str) -> None:
-    """An offset of seconds or an uncertainty of nothing is refused with the key's name."""
+    """An offset of seconds or an uncertainty of zero is refused by key."""
     path = _written(tmp_path, time_offset=TimeOffset(1, 1))
     path.write_text(re.sub(rf"^{key}:.*$", f"{key}: {value}", path.read_text(), flags=re.MULTILINE))
     with pytest.raises(DataError, match=key):

@@ -1,4 +1,4 @@
-"""A run's summary and page: what was not measured is said so, never as a number that is none."""
+"""A run's summary and page: what was not measured is called so, and never shown as a number."""
 
 from dataclasses import replace
 from typing import Any
@@ -29,7 +29,7 @@ MS = 1_000_000
 
 
 def run(pairs: int) -> RunSnapshot:
-    """A run of some pairs, 50 ms apart, whose image motion nobody measured."""
+    """A run of some pairs, 50 ms apart, without a measurement of image motion."""
     delays = DelayStatistics()
     for number in range(pairs):
         at = number * 50 * MS
@@ -71,7 +71,7 @@ def run(pairs: int) -> RunSnapshot:
 
 @pytest.mark.parametrize("pairs", [0, 1, 30])
 def test_what_was_not_measured_is_no_number(pairs: int) -> None:
-    """Neither the summary nor the page of a run of no pair, of one or of many shows `nan` or `inf`."""
+    """Neither the summary nor the page of a run of no, one or many pairs shows `nan` or `inf`."""
     text = summary(run(pairs)) + run_page(run(pairs), None, Side.LEFT, ())
     assert not any(word in text for word in (" nan", "(nan", ">nan", " inf ", "nan<"))
 
@@ -83,7 +83,7 @@ def test_a_rate_needs_two_pairs() -> None:
 
 
 def test_the_phase_is_told_with_its_side() -> None:
-    """A board that exposes 5 ms earlier exposes before the host, and a phase that does not drift never comes round."""
+    """A board that exposes 5 ms earlier is shown as before the host, and a phase without drift has no beat."""
     assert phase_lines(Phase(time_skew_ns=-5.0 * MS, period_ns=50 * MS, drift=0.0, first_ns=0), None) == [
         "phase: the board exposes 5.0 of 50.0 ms before the host"
     ]
@@ -94,7 +94,7 @@ def test_the_phase_is_told_with_its_side() -> None:
 
 
 def test_a_late_frame_has_one_reason() -> None:
-    """A lost frame that came after all stays lost and is no stale one, so that what was sent is what was received and lost, to the frame."""
+    """A lost frame that came after all stays lost and is not stale, so that sent equals received plus lost, to the frame."""
     sent = BoardCounts(grabbed=10, sent=10)
     account = SessionAccount("s", BoardCounts(), sent, received=7, lost=3, late=2, duplicate=1)
     seen = replace(run(7), link=LinkAccount([account]))
@@ -110,7 +110,7 @@ def test_a_late_frame_has_one_reason() -> None:
 
 
 def test_only_stamps_that_nobody_knows_are_called_unmeasured() -> None:
-    """Cameras whose stamps say by definition when they exposed need no measuring; others are told how; what was measured is told."""
+    """Cameras whose stamps are exposure times by definition need no measurement. For others the report says how to measure. A measured offset is shown."""
     told = "cameras' stamps"
     assert f"{told} agree to" in summary(run(31))
     assert told not in summary(replace(run(31), stamps_exact=True))
@@ -119,7 +119,7 @@ def test_only_stamps_that_nobody_knows_are_called_unmeasured() -> None:
 
 
 def test_what_was_not_believed_is_told_everywhere() -> None:
-    """A step with its suspect frames, frames that were not believed and spoiled images stand by name in JSON, summary and page, and each raises a doubt."""
+    """JSON, summary and page name a step with its suspect frames, frames that were not believed, and spoiled images. Each raises a doubt."""
     account = SessionAccount("s", BoardCounts(), BoardCounts(), received=40)
     account.disbelieved[Disbelief.FUTURE] = 3
     account.disbelieved[Disbelief.CREDIT] = 2
@@ -139,7 +139,7 @@ def test_what_was_not_believed_is_told_everywhere() -> None:
 
 
 def test_everything_that_a_run_knows_is_told() -> None:
-    """Clock, phase, alignment, links, losses and what befell the camera stand in JSON and summary, with the numbers that were given."""
+    """JSON and summary show clock, phase, alignment, links, losses and camera events with the given numbers."""
     estimate = ClockEstimate(
         reference_ns=0,
         offset_ns=5_000,
@@ -214,7 +214,7 @@ def test_everything_that_a_run_knows_is_told() -> None:
 def test_stamps_that_are_arrivals_say_so(
     latency_ms: int | None, stated_ms: int | None, offset: TimeOffset, words: str
 ) -> None:
-    """Where the own camera's stamps are arrivals the summary tells what is known of its latency; jitter and what is left stand in JSON."""
+    """If the own camera's stamps are arrivals, the summary says what is known of its latency; JSON holds jitter and what remains."""
     latency_ns, stated_ns = (None if value is None else value * MS for value in (latency_ms, stated_ms))
     health = CameraHealth(jitter_ns=4 * MS, latency_ns=latency_ns, latency_uncertainty_ns=stated_ns)
     seen = replace(run(31), camera=health, time_offset=offset)
@@ -235,12 +235,12 @@ def test_stamps_that_are_arrivals_say_so(
     ],
 )
 def test_the_age_bound_follows_from_the_policy(text: str, bound: str) -> None:
-    """Processing takes 10 ms: a FIFO that keeps its pairs makes them wait that often; one that drops the oldest, for frames."""
+    """Processing takes 10 ms. In a FIFO that keeps its pairs they wait for multiples of that; in one that drops the oldest, for frame periods."""
     assert age_bound(replace(run(31), fifo=FifoSettings.parse(text))).startswith(bound)
 
 
 def test_what_was_not_used_is_told_once_each() -> None:
-    """Every place and reason of a run that lost something everywhere is there once, with its count, in JSON, summary and page alike."""
+    """In a run with losses everywhere JSON, summary and page each show every place and reason once, with its count."""
     account = SessionAccount(
         "s",
         BoardCounts(),

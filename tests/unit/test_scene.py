@@ -1,4 +1,4 @@
-"""Rendered scenes: the truth follows hand geometry, and the images show what the truth says."""
+"""Rendered scenes: the truth agrees with geometry done by hand, and the images agree with the truth."""
 
 import math
 from dataclasses import replace
@@ -56,7 +56,7 @@ def grey(image: NDArray[np.uint8]) -> NDArray[np.float32]:
 @settings(deadline=None, max_examples=25)
 @given(depth=depths, tilt=tilts)
 def test_plane_has_the_depth_of_the_formula(depth: float, tilt: float) -> None:
-    """A plane through (0, 0, z0) turned by `tilt` about y meets the ray (x, y, 1) at z0 / (1 + x tan(tilt))."""
+    """A plane through (0, 0, z0) turned by `tilt` about y intersects the ray (x, y, 1) at z0 / (1 + x tan(tilt))."""
     # A plane whose normal is (sin a, 0, cos a): x z sin a + (z - z0) cos a = 0.
     found = truth(plane_scene(depth, tilt), SMALL_VIEW)
     slope = (np.arange(160) - 79.5) / 200.0
@@ -68,7 +68,7 @@ def test_plane_has_the_depth_of_the_formula(depth: float, tilt: float) -> None:
 @settings(deadline=None, max_examples=25)
 @given(x=st.floats(-0.3, 0.3), y=st.floats(-0.2, 0.2), z=st.floats(0.6, 3.0), radius=st.floats(0.05, 0.3))
 def test_sphere_is_nearest_where_its_centre_is_seen(x: float, y: float, z: float, radius: float) -> None:
-    """The ray towards a ball's centre meets it one radius before the centre, and rays beside its outline miss it."""
+    """The ray towards a ball's centre hits it one radius before the centre, and rays just outside its outline miss it."""
     scene = Scene((Body("ball", Sphere(radius), (x, y, z)),))
     centre = np.array([x, y, z])
     distance = float(np.linalg.norm(centre))
@@ -76,11 +76,11 @@ def test_sphere_is_nearest_where_its_centre_is_seen(x: float, y: float, z: float
     view = RectifiedView(StereoGeometry(focal_px=200.0, baseline_m=0.1, cx_px=80.0, cy_px=60.0), 161, 121, turn)
     found = truth(scene, view)
     assert found.depth_m[60, 80] == pytest.approx(distance - radius, rel=1e-12)
-    # The outline stands at the angle asin(r / distance); (u, v) is that angle's tangent away from the middle.
+    # The outline is at the angle asin(r / distance); (u, v) is that angle's tangent away from the middle.
     v, u = np.mgrid[-60:61, -80:81] / 200.0
     outline = math.tan(math.asin(radius / distance))
     angle = np.hypot(u, v)
-    clear = np.abs(angle - outline) > 1e-12  # a ray along the very outline may round either way
+    clear = np.abs(angle - outline) > 1e-12  # a ray exactly along the outline may round either way
     assert np.array_equal(found.background[clear], (angle > outline)[clear])
 
 
@@ -91,10 +91,10 @@ def frame_with_third(z: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArr
 
 
 def test_box_shows_its_front_face() -> None:
-    """A box before the camera covers exactly the pixels of its front face, at the face's depth."""
+    """A box in front of the camera covers exactly the pixels of its front face, at the face's depth."""
     scene = Scene((Body("box", Box((0.4, 0.3, 0.2)), (0.0, 0.0, 1.1)),))
     found = truth(scene, SMALL_VIEW)
-    # Front face at z = 1.0: half sizes 0.2 and 0.15 m are 40 and 30 px about (79.5, 59.5).
+    # Front face at z = 1.0: half sizes of 0.2 and 0.15 m are 40 and 30 px around (79.5, 59.5).
     inside = np.zeros((120, 160), dtype=bool)
     inside[30:90, 40:120] = True
     assert np.array_equal(~found.background, inside)
@@ -102,13 +102,13 @@ def test_box_shows_its_front_face() -> None:
 
 
 def test_occluded_strip_is_as_wide_as_the_disparities_differ() -> None:
-    """Left of a box before a wall, the strip that only the left camera sees is d(box) - d(wall) pixels wide."""
+    """Left of a box in front of a wall, the strip that only the left camera sees is d(box) - d(wall) pixels wide."""
     scene = Scene((Body("wall", Plane(), (0.0, 0.0, 2.0)), Body("box", Box((0.4, 0.3, 0.2)), (0.0, 0.0, 1.1))))
     found = truth(scene, SMALL_VIEW)
-    # d(box) = 200 * 0.1 / 1 = 20 px, d(wall) = 10 px; the box's left edge stands at x = 39.5, its side is turned away.
+    # d(box) = 200 * 0.1 / 1 = 20 px, d(wall) = 10 px; the box's left edge is at x = 39.5, and its side faces away.
     row = 60
     assert np.array_equal(np.flatnonzero(found.hidden[row]), np.arange(30, 40))
-    # The wall left of x = 10 leaves the right image; nothing else is lost.
+    # The wall left of x = 10 is outside the right image; nothing else is lost.
     assert np.array_equal(np.flatnonzero(~found.visible[row]), np.concatenate([np.arange(10), np.arange(30, 40)]))
     assert found.body[row, 35] == 0
     assert found.body[row, 60] == 1
@@ -116,7 +116,7 @@ def test_occluded_strip_is_as_wide_as_the_disparities_differ() -> None:
 
 @pytest.mark.parametrize("t_s", [0.0, 1.7])
 def test_left_and_right_truth_agree(t_s: float) -> None:
-    """A left pixel moved by its disparity lands on a right ray whose own first hit is the same point."""
+    """A left pixel moved by its disparity is on a right ray whose own first hit is the same point."""
     scene = demo_scene().at(t_s)
     rig = unlike_rig()
     rectifier = Rectifier(rig).rectification
@@ -126,7 +126,7 @@ def test_left_and_right_truth_agree(t_s: float) -> None:
     v, u = np.nonzero(found.visible)
     chosen = np.random.default_rng(5).choice(v.size, 40, replace=False)
     for y, x in zip(v[chosen], u[chosen], strict=True):
-        # A right camera of one pixel, whose only ray passes through (x - d, y).
+        # A right camera of one pixel; its only ray passes through (x - d, y).
         geometry = view.geometry
         x_right = x - found.disparity_px[y, x]
         matrix = np.array(
@@ -150,7 +150,7 @@ def test_left_and_right_truth_agree(t_s: float) -> None:
 
 
 def test_unlike_cameras_are_unlike() -> None:
-    """The demo's cameras differ in size, focal length and distortion, stand 100 mm apart and are turned by 1 to 2 degrees."""
+    """The demo's cameras differ in size, focal length and distortion, are 100 mm apart and are turned by 1 to 2 degrees."""
     rig = unlike_rig()
     assert (rig.left.width_px, rig.left.height_px) != (rig.right.width_px, rig.right.height_px)
     assert rig.right.matrix[0, 0] / rig.left.matrix[0, 0] > 1.2
@@ -162,7 +162,7 @@ def test_unlike_cameras_are_unlike() -> None:
 
 @pytest.mark.parametrize("side", [0, 1])
 def test_rays_undo_the_distortion(side: int) -> None:
-    """Projecting a point on a pixel's ray gives that pixel back within a millionth of a pixel, corners included."""
+    """Projecting a point on a pixel's ray gives that pixel within a millionth of a pixel, corners included."""
     rig = unlike_rig()
     model, pose = (rig.left, rig.right)[side], rig_poses(rig)[side]
     rays = pixel_rays(model).reshape(3, -1)
@@ -172,49 +172,49 @@ def test_rays_undo_the_distortion(side: int) -> None:
 
 
 def test_points_behind_a_camera_have_no_pixel() -> None:
-    """A point behind the camera is seen nowhere."""
+    """A point behind the camera is not visible."""
     model = rectified_cameras(SMALL_VIEW)[0][0]
     assert np.isnan(project(np.array([[0.0], [0.0], [-1.0]]), model, Pose())).all()
 
 
 def test_images_of_both_cameras_show_the_same_surface() -> None:
-    """Seen through the truth, the right image equals the left within the error of reading it between its pixels."""
+    """Sampled through the truth, the right image equals the left within the interpolation error between its pixels."""
     scene = demo_scene().at(0.4)
     view = matched_view()
     found = truth(scene, view)
     left, right = (grey(render(scene, model, pose)) for model, pose in rectified_cameras(view))
     x, y = np.meshgrid(np.arange(640, dtype=np.float32), np.arange(480, dtype=np.float32))
     moved = cv2.remap(right, (x - found.disparity_px).astype(np.float32), y, cv2.INTER_CUBIC)
-    # Pixels at the border of two surfaces mix both; they are left out.
+    # Pixels at the border of two surfaces mix both, so they are left out.
     core = cv2.erode(found.visible.astype(np.uint8), np.ones((5, 5), dtype=np.uint8)).astype(bool)
     core &= cv2.morphologyEx(found.body, cv2.MORPH_GRADIENT, np.ones((5, 5), dtype=np.uint8)) == 0
     difference = np.abs(moved - left)[core]
     assert np.median(difference) < 1.5
     assert np.percentile(difference, 95) < 8.0
-    # The same comparison half a pixel aside is far worse: the images carry detail, and it is in its place.
+    # The same comparison half a pixel off is far worse: the images have detail, and it is in the right place.
     aside = cv2.remap(right, (x - found.disparity_px + 0.5).astype(np.float32), y, cv2.INTER_CUBIC)
     assert np.median(np.abs(aside - left)[core]) > 2.5 * np.median(difference)
 
 
 def test_each_camera_of_the_unlike_rig_sees_points_where_they_project() -> None:
-    """A small bright ball on a dark wall has its centre of light where its centre projects, in both cameras."""
+    """The centre of light of a small bright ball on a dark wall is where the ball's centre projects, in both cameras."""
     rig = unlike_rig()
     plain = Texture(light_bgr=(0.0, 0.0, 0.0), dark_bgr=(0.0, 0.0, 0.0))
     white = Texture(light_bgr=(1.0, 1.0, 1.0), dark_bgr=(1.0, 1.0, 1.0), contrast=0.0)
     for place in ((-0.25, 0.18, 1.0), (0.3, -0.2, 1.2)):
         scene = Scene((Body("wall", Plane(), (0.0, 0.0, 3.0), plain), Body("ball", Sphere(0.02), place, white)))
         for model, pose in zip((rig.left, rig.right), rig_poses(rig), strict=True):
-            # The lamp stands behind each camera, so that the whole disc is lit alike.
+            # The lamp is behind each camera, so that the whole disc is lit equally.
             light = replace(scene.light, lamp_bgr=(0.0, 0.0, 0.0), sky_bgr=(1.0, 1.0, 1.0))
             image = grey(render(replace(scene, light=light, void_bgr=(0.0, 0.0, 0.0)), model, pose))
             y, x = np.nonzero(image > 60)
             expected = project(np.array([place]).T, model, pose)[:, 0]
-            # A ball's image is an ellipse whose middle lies within r^2 tan / f of the centre's image: below 0.1 px here.
+            # A ball's image is an ellipse whose centre is within r^2 tan / f of the image of the ball's centre: below 0.1 px here.
             assert np.hypot(x.mean() - expected[0], y.mean() - expected[1]) < 0.25
 
 
 def test_sensors_limit_what_counts_as_visible() -> None:
-    """With the real cameras given, visible points project inside both of their images; others are not visible."""
+    """If the real cameras are given, visible points project inside both images; other points are not visible."""
     rig = unlike_rig()
     sensors = tuple(zip((rig.left, rig.right), rig_poses(rig), strict=True))
     view = RectifiedView(StereoGeometry(focal_px=262.5, baseline_m=0.1, cx_px=224.5, cy_px=174.5), 450, 350)
@@ -244,7 +244,7 @@ def test_doffs_shifts_disparity_and_right_camera() -> None:
 
 @pytest.mark.parametrize("t_s", [0.0, 0.5, 3.0, 7.9])
 def test_bodies_follow_their_paths(t_s: float) -> None:
-    """At time t a body stands at rest + a sin(2 pi t / T + phase) and has turned by rate * t about its axis."""
+    """At time t a body is at rest + a sin(2 pi t / T + phase) and has turned by rate * t about its axis."""
     path = Path(
         amplitude_m=(0.1, 0.0, 0.2),
         phase_rad=(0.0, 0.0, math.pi / 2.0),
@@ -260,7 +260,7 @@ def test_bodies_follow_their_paths(t_s: float) -> None:
 
 
 def test_texture_moves_with_its_body() -> None:
-    """A ball seen from a camera that moves along with it looks the same, up to rounding: light and texture are its own."""
+    """A ball looks the same to a camera that moves with it, up to rounding: light and texture move with it."""
     model = rectified_cameras(SMALL_VIEW)[0][0]
     first = Scene((Body("ball", Sphere(0.2), (0.0, 0.0, 1.0)),))
     second = Scene((Body("ball", Sphere(0.2), (0.25, -0.125, 1.5)),))
@@ -270,7 +270,7 @@ def test_texture_moves_with_its_body() -> None:
 
 
 def test_film_equals_single_renders() -> None:
-    """A frame of a film, with its cached background, equals the scene rendered from nothing at that time."""
+    """A frame of a film, with its cached background, equals the scene rendered from scratch for that time."""
     rig = small_rig()
     pose = rig_poses(rig)[0]
     film = Renderer(demo_scene(), rig.left, pose)
@@ -281,7 +281,7 @@ def test_film_equals_single_renders() -> None:
 
 
 def test_film_is_repeatable_and_periodic() -> None:
-    """Equal arguments give equal bytes, noise included; after one period the scene is back where it was."""
+    """Equal arguments give equal bytes, noise included; after one period the scene is the same again."""
     rig = small_rig()
     pose = rig_poses(rig)[1]
     one, two = (Renderer(demo_scene(), rig.right, pose, PHONE_LOOK) for _ in range(2))
@@ -310,7 +310,7 @@ def test_look_is_the_curve_it_says() -> None:
 
 
 def test_texture_does_not_alias() -> None:
-    """Moving the camera by half a pixel changes a wall's image as a shift does: no detail beyond what pixels can hold."""
+    """Moving the camera by half a pixel changes a wall's image as a shift does: there is no detail finer than pixels can hold."""
     view = matched_view()
     model, _ = rectified_cameras(view)[0]
     scene = plane_scene(2.0)
@@ -338,7 +338,7 @@ def test_texture_is_rich_on_every_body() -> None:
 @pytest.mark.parametrize("tilt_rad", [0.0, 0.3])
 @pytest.mark.parametrize(("depth_m", "limit"), [(1.0, 0.003), (2.0, 0.006)])
 def test_default_matcher_measures_planes_of_unlike_cameras(depth_m: float, limit: float, tilt_rad: float) -> None:
-    """Noise-free planes seen by the unlike rig: median |disparity error| <= 0.15 px, depth within 0.3 % at 1 m, 0.6 % at 2 m."""
+    """Noise-free planes seen by the demo's unlike cameras: median |disparity error| <= 0.15 px, depth within 0.3 % at 1 m, 0.6 % at 2 m."""
     # At 1 m the plane that faces the camera has a disparity of 52.5 px, between two pixels; the turned one has all fractions.
     error_px, relative = errors_of_default_matcher(plane_scene(depth_m, tilt_rad), (Look(), Look()))
     assert error_px <= 0.15
@@ -379,7 +379,7 @@ def test_finite_plane_is_seen_only_where_it_is() -> None:
 
 
 def test_a_poster_that_moves_close_by_is_drawn_as_if_it_stood_there() -> None:
-    """A wide plane that moves, so near that the ball around it holds the camera, gives the frame of a still one in its place; planes throw no shadows."""
+    """A wide moving plane, so near that its bounding ball holds the camera, gives the same frame as a still one in its place; planes cast no shadows."""
     base = Scene((Body("wall", Plane(), (0.0, 0.0, 2.5)), Body("ball", Sphere(0.2), (0.3, 0.2, 1.6))))
     swing = Path(
         amplitude_m=(0.1, 0.05, 0.0), phase_rad=(0.0, 0.0, 0.0), period_s=2.0, spin_axis=(0.0, 1.0, 0.0), spin_rad_s=0.0

@@ -1,4 +1,4 @@
-"""The time pattern's page: a browser draws what the reader of images knows, and nothing comes from outside."""
+"""The time pattern's page: the browser draws what the image reader expects, and nothing is loaded from outside."""
 
 import json
 import re
@@ -8,7 +8,7 @@ from phone_host.calibration.timing.screen_page import pattern_page
 
 
 def test_the_page_has_the_pattern_and_needs_nothing_else() -> None:
-    """Size, count and cells stand in the page as the reader expects them, and there is no address in it."""
+    """Size, count and cells in the page are those that the reader expects, and the page holds no address."""
     page = pattern_page()
     found = re.search(r"const p = (\{.*?\}), canvas", page)
     assert found is not None
@@ -21,7 +21,7 @@ def test_the_page_has_the_pattern_and_needs_nothing_else() -> None:
 
 
 def test_what_the_page_would_draw_is_read() -> None:
-    """Squares drawn from the page's own values, at the places where its script puts them, are read as the number."""
+    """Squares drawn from the page's own values, where its script puts them, are read as the number."""
     values = json.loads(re.search(r"const p = (\{.*?\}), canvas", pattern_page())[1])  # type: ignore[index]  # the test above
     unit, number = 12, 1234
     image = draw(0, unit)

@@ -1,4 +1,4 @@
-"""What the service manager is told (sd_notify(3)), against a real datagram socket."""
+"""Messages to the service manager (sd_notify(3)), with a real datagram socket."""
 
 import os
 import socket
@@ -21,7 +21,7 @@ def test_each_datagram_says_ready_alive_and_status() -> None:
 
 
 def test_without_watchdog_it_is_not_fed() -> None:
-    """Where no watchdog is asked for, WATCHDOG is not said."""
+    """Without a watchdog WATCHDOG is not sent."""
     assert ServiceState(None).alive(0, "x") == b"READY=1\nSTATUS=x"
 
 
@@ -29,7 +29,7 @@ def test_without_watchdog_it_is_not_fed() -> None:
 def test_the_watchdog_is_fed_in_time_by_any_loop_that_is_fast_enough(
     limit_ns: int, steps_ns: list[int], start_ns: int
 ) -> None:
-    """However a loop's rounds fall, while each takes less than half the limit the silence stays below the limit."""
+    """However long a loop's rounds take, if each takes less than half the limit, the silence stays below the limit."""
     state, now_ns, fed_ns = ServiceState(limit_ns), start_ns, start_ns
     state.alive(now_ns, "")
     for step_ns in steps_ns:
@@ -42,7 +42,7 @@ def test_the_watchdog_is_fed_in_time_by_any_loop_that_is_fast_enough(
 
 
 def test_a_status_is_one_line() -> None:
-    """A line break in the status can never smuggle in another word."""
+    """A line break in the status cannot inject another message."""
     assert ServiceState(None).stopping("a\nMAINPID=1\n b") == b"STOPPING=1\nSTATUS=a MAINPID=1 b"
 
 
@@ -60,7 +60,7 @@ def test_a_status_is_one_line() -> None:
 def test_the_watchdog_counts_only_for_the_process_it_is_meant_for(
     environment: dict[str, str], expected: int | None
 ) -> None:
-    """WATCHDOG_USEC is read as microseconds, unless WATCHDOG_PID names another process or it is no number."""
+    """WATCHDOG_USEC is read as microseconds, unless WATCHDOG_PID names another process or the value is no number."""
     assert watchdog_ns(environment, 42) == expected
 
 
@@ -74,13 +74,13 @@ def test_the_watchdog_counts_only_for_the_process_it_is_meant_for(
     ],
 )
 def test_paths_and_abstract_names_are_sockets(environment: dict[str, str], expected: str | None) -> None:
-    """A path stays a path, a leading @ becomes the zero byte of the abstract namespace, what is neither is left alone."""
+    """A path stays a path, a leading @ becomes the zero byte of the abstract namespace, and anything else is ignored."""
     assert socket_address(environment) == expected
 
 
 @pytest.mark.parametrize("kind", ["path", "abstract"])
 def test_datagrams_arrive(kind: str, tmp_path: Path) -> None:
-    """READY, watchdog, status and STOPPING reach a socket that listens where the environment says."""
+    """READY, watchdog, status and STOPPING reach a socket at the address in the environment."""
     path, shown = (str(tmp_path / "notify"),) * 2 if kind == "path" else (f"\0t{os.getpid()}", f"@t{os.getpid()}")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(path)
@@ -95,7 +95,7 @@ def test_datagrams_arrive(kind: str, tmp_path: Path) -> None:
 
 
 def test_an_absent_or_busy_service_manager_stops_nothing(tmp_path: Path) -> None:
-    """Without a manager nothing is due; one that is gone or does not read is not waited for."""
+    """Without a manager nothing is due; there is no wait for one that is gone or does not read."""
     assert not Notifier({}).due(10**18)
     gone = Notifier({"NOTIFY_SOCKET": str(tmp_path / "nowhere")})
     gone.alive(0, "x")
@@ -103,6 +103,6 @@ def test_an_absent_or_busy_service_manager_stops_nothing(tmp_path: Path) -> None
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(str(tmp_path / "notify"))
         notifier = Notifier({"NOTIFY_SOCKET": str(tmp_path / "notify")})
-        for _ in range(5000):  # far more than a socket's queue takes
+        for _ in range(5000):  # far more than a socket's queue holds
             notifier.alive(0, "x" * 500)
         notifier.close()

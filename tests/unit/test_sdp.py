@@ -1,4 +1,4 @@
-"""Bluetooth's directory of services: the question, real answers, and whatever a hostile peer may answer."""
+"""Bluetooth's service discovery: the query, real answers, and anything that a hostile peer may answer."""
 
 import random
 from xml.etree import ElementTree as ET
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from common.link.sdp import SERVICE_UUID, channel_in, query, record_xml
 
 _ANSWER = bytes.fromhex("0700010018001535133511090004350c35031901003505190003080700")
-"""What bluetoothd 5.66 said of a record with channel 7 (Debian 12, two virtual controllers)."""
+"""What bluetoothd 5.66 answered about a record with channel 7 (Debian 12, two virtual controllers)."""
 
 
 def test_the_channel_in_a_real_answer() -> None:
@@ -26,7 +26,7 @@ def test_no_service_is_channel_0() -> None:
 
 
 def test_the_question() -> None:
-    """It asks for attribute 4 of records of our UUID; lengths as in the core specification, volume 3, part B, 4.7.1."""
+    """The query asks for attribute 4 of records of our UUID; lengths as in the core specification, volume 3, part B, 4.7.1."""
     asked = query()
     assert asked[0] == 6
     assert int.from_bytes(asked[3:5], "big") == len(asked) - 5
@@ -36,7 +36,7 @@ def test_the_question() -> None:
 
 @given(st.binary(max_size=300))
 def test_any_answer_gives_a_channel_or_0(tail: bytes) -> None:
-    """Whatever a peer answers, the result is a channel that exists or 0."""
+    """For any answer of a peer the result is a valid channel or 0."""
     for answer in (tail, b"\x07" + tail, _ANSWER[:7] + tail):
         assert 0 <= channel_in(answer) <= 30
 
@@ -50,7 +50,7 @@ def test_deep_nesting_is_cut_off() -> None:
 
 
 def test_mutated_answers_never_crash() -> None:
-    """Of ten thousand answers with flipped bits every one gives a channel that exists or 0."""
+    """Each of ten thousand answers with flipped bits gives a valid channel or 0."""
     chance = random.Random(4)
     for _ in range(10_000):
         spoiled = bytearray(_ANSWER)

@@ -1,6 +1,6 @@
-"""Whole sentences of advice, one example of each: here alone their wording is fixed. Other tests ask for kinds and figures.
+"""Whole sentences of advice, one example of each. Only here is their wording fixed; other tests check kinds and figures.
 
-Where a wording was changed on purpose: `python -m tests.unit.test_sentences` writes sentences.txt anew; read its diff.
+After an intended change of wording run `python -m tests.unit.test_sentences`: it rewrites sentences.txt. Read its diff.
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ from phone_host.sync.fifo import Overflow
 MS: Final = 1_000_000
 FILE: Final = Path(__file__).with_name("sentences.txt")
 
-# 30 pairs whose cameras show one every 100 ms, whose link brings one every 100 ms, and whose processor takes 20 ms for each.
+# 30 pairs: the cameras show one every 100 ms, the link brings one every 100 ms, and the processor takes 20 ms for each.
 CALM: Final = RunFigures(
     pairs=30,
     interval_ns=100 * MS,
@@ -71,7 +71,7 @@ STAMPS: Final = {
 
 
 def sentences() -> Iterator[str]:
-    """All of them, each behind its name."""
+    """All sentences, each after its name."""
     for name, figures in REGIMES.items():
         judgement = judge(figures)
         yield f"regime, {name}: {judgement.sentence}"
@@ -107,7 +107,7 @@ def told(concern: Concern) -> str:
 
 
 def test_the_sentences_are_those_that_were_read_and_agreed_to() -> None:
-    """Each kind of advice reads as it stands in sentences.txt."""
+    """Each kind of advice reads as in sentences.txt."""
     assert "\n".join(sentences()).splitlines() == FILE.read_text(encoding="utf-8").splitlines()
 
 

@@ -1,4 +1,4 @@
-"""The port under a serial link: the speed that was asked for, and nothing that fails where pyserial knows no ports."""
+"""The port of a serial link: the requested speed is set, and nothing fails where pyserial cannot list ports."""
 
 import fcntl
 import os
@@ -20,7 +20,7 @@ _TERMIOS2 = struct.Struct("<4IB19s2I")
 
 @pytest.fixture
 def port() -> Iterator[str]:
-    """A pseudo terminal's path; it keeps the speed that it is given."""
+    """A pseudo terminal's path; the terminal keeps the speed that it is given."""
     master, slave = pty.openpty()
     yield os.ttyname(slave)
     os.close(master)
@@ -29,7 +29,7 @@ def port() -> Iterator[str]:
 
 @pytest.mark.parametrize("baud", [9600, 115_200, 3_000_000, 250_000, 1_234_567], ids="{} baud".format)
 def test_a_port_runs_at_the_asked_speed(port: str, baud: int) -> None:
-    """A port has the asked speed both ways, one of the standard's as any other (BOTHER), and is raw: no echo, no flow control by characters."""
+    """A port has the requested speed both ways, standard or not (BOTHER), and is raw: no echo, no flow control by characters."""
     line = SerialLine(port, baud)
     told = fcntl.ioctl(line.fileno(), _TCGETS2, bytes(_TERMIOS2.size))
     line.close()
@@ -57,7 +57,7 @@ print("serial.tools.list_ports" in sys.modules)
 
 
 def test_android_never_meets_the_imports_that_fail_there(port: str) -> None:
-    """Where the system calls itself android a port opens, a missing one is told, and pyserial's list of ports, which raises ImportError there, is not imported."""
+    """On a system that calls itself android a port opens and a missing one is reported. pyserial's port list, which raises ImportError there, is not imported."""
     done = subprocess.run(
         [sys.executable, "-c", _AS_ON_ANDROID, port], capture_output=True, text=True, check=True, timeout=60
     )

@@ -1,4 +1,4 @@
-"""Board and host sessions talking to each other through every misfortune of a link, on simulated time."""
+"""Board and host sessions talk to each other through every link failure, on simulated time."""
 
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -35,7 +35,7 @@ class What(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One misfortune, or some luck."""
+    """One failure, or a recovery."""
 
     what: What
     lane: Lane
@@ -57,7 +57,7 @@ EVENTS = st.lists(
 
 
 def happen(world: World, event: Event, seen: list[FrameMessage]) -> None:
-    """Let an event happen to the first host's link."""
+    """Apply an event to the first host's link."""
     host = world.hosts[0]
     match event.what:
         case What.DELIVER:
@@ -101,7 +101,7 @@ def chaos(events: list[Event], *, board_dials: bool, slots: int = 1, settled: bo
 def test_frames_flow_again_and_every_one_is_accounted_for(
     *, events: list[Event], board_dials: bool, slots: int, settled: bool
 ) -> None:
-    """Two seconds after any misfortune frames flow; then each sent frame of the session was received or is counted as lost."""
+    """Two seconds after any failure frames flow; then each frame sent in the session is received or counted as lost."""
     world = chaos(events, board_dials=board_dials, slots=slots, settled=settled)
     world.settle()
     host = world.hosts[0]
@@ -117,7 +117,7 @@ def test_frames_flow_again_and_every_one_is_accounted_for(
 
 @pytest.mark.parametrize("board_dials", [False, True])
 def test_a_board_that_has_slept_is_greeted_anew(*, board_dials: bool) -> None:
-    """After a sleep the host learns the clock anew in the same session, and a frame that was under way then is none of the new clock's."""
+    """After a sleep the host learns the clock again in the same session, and a frame that was under way then does not count for the new clock."""
     world = World(board_dials=board_dials)
     host = world.hosts[0]
     host.slots = 2
@@ -126,7 +126,7 @@ def test_a_board_that_has_slept_is_greeted_anew(*, board_dials: bool) -> None:
     world.pass_time(20 * MS)  # a frame leaves
     assert world.sent[session] == host.base_sent + before + 1
     world.sleep_board()
-    while host.boot_id != world.boot_id:  # the frames' lane is slow
+    while host.boot_id != world.boot_id:  # the lane for frames is slow
         world.pass_time(20 * MS)
         for to_board in (True, False):
             world.deliver(host, (0, Lane.CONTROL), to_board=to_board)
@@ -142,7 +142,7 @@ def test_a_board_that_has_slept_is_greeted_anew(*, board_dials: bool) -> None:
 @given(events=EVENTS, board_dials=st.booleans(), slots=st.integers(1, 4))
 @settings(deadline=None, max_examples=100)
 def test_frames_that_come_back_are_never_taken(*, events: list[Event], board_dials: bool, slots: int) -> None:
-    """A frame that a transport delivers again, of this session or one before, is told as stale, and the world's own rules hold."""
+    """A frame that a transport delivers again, from this session or an earlier one, is reported as stale, and the world's own rules hold."""
     world = chaos(events, board_dials=board_dials, slots=slots, settled=True)
     host = world.hosts[0]
     for session, index in list(host.arrived)[-20:]:
@@ -151,7 +151,7 @@ def test_frames_that_come_back_are_never_taken(*, events: list[Event], board_dia
         assert len(host.stale) == stale + 1
         stream = host.session._stream
         assert stream is not None
-        # Between a board's waking and its new greeting of the frames' lane its session's frames are of the clock before.
+        # Between a board's waking and its new hello on the lane for frames, its session's frames are of the earlier clock.
         is_now = session == host.board_session and stream.hello.boot_id == host.boot_id
         assert host.stale[-1].reason is (StaleReason.DUPLICATE if is_now else StaleReason.OLD_SESSION)
 
@@ -160,7 +160,7 @@ def test_frames_that_come_back_are_never_taken(*, events: list[Event], board_dia
 @pytest.mark.parametrize("lane", Lane)
 @pytest.mark.parametrize("lost_words", range(6))
 def test_one_broken_lane_and_the_words_about_it_lost(lane: Lane, lost_words: int, *, board_dials: bool) -> None:
-    """When one lane alone breaks and the next words on the other one, knocks among them, are lost, frames flow again within 2 s."""
+    """If one lane alone breaks and the next messages on the other one, knocks among them, are lost, frames flow again within 2 s."""
     world = World(board_dials=board_dials)
     world.settle(1000 * MS)
     host = world.hosts[0]
@@ -178,7 +178,7 @@ def test_one_broken_lane_and_the_words_about_it_lost(lane: Lane, lost_words: int
 
 @pytest.mark.parametrize("board_dials", [False, True])
 def test_a_lost_frame_does_not_take_its_credit_along(*, board_dials: bool) -> None:
-    """When the only frame for which there was credit is lost without a sound, more credit follows and the loss is counted."""
+    """If the only frame for which there was credit is lost silently, more credit follows and the loss is counted."""
     world = World(board_dials=board_dials)
     world.settle(1000 * MS)
     host = world.hosts[0]

@@ -1,4 +1,4 @@
-"""What board and host tell each other while frames flow, in single cases: echoes, accounts, rungs, wishes to steer; on simulated time."""
+"""Messages between board and host while frames flow, in single cases: echoes, accounts, rungs, corrections; on simulated time."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ from tests.support.session_world import CAMERA, World, frame
 
 
 def test_echoes_of_another_life_are_ignored() -> None:
-    """Answers to any wave since the link came up are clock echoes, late ones too, as a round trip may take longer than a wave; those of another life are not."""
+    """Answers to any wave since the link came up count as echoes, even late ones, as a round trip may take longer than a wave. Those of an earlier life do not."""
     world = World()
     world.settle(300 * MS)
     host = world.hosts[0]
@@ -63,7 +63,7 @@ def test_echoes_of_another_life_are_ignored() -> None:
 @given(st.integers(0, 2**62), st.integers(0, 2**62))
 @settings(deadline=None)
 def test_send_times_are_set_at_the_last_moment(then_ns: int, now_ns: int) -> None:
-    """Stamping sets a ping's t0, a pong's t2 and a frame's `sent` to now, keeps all else, and leaves other messages alone."""
+    """Stamping sets a ping's t0, a pong's t2 and a frame's `sent` to now, keeps everything else, and leaves other messages unchanged."""
 
     def stamped(message: Message, now_ns: int) -> Message:
         return decode(*encode_stamped(message, lambda: now_ns))
@@ -80,7 +80,7 @@ def test_send_times_are_set_at_the_last_moment(then_ns: int, now_ns: int) -> Non
 
 @pytest.mark.parametrize(("round_trip_ns", "echoes"), [(MS // 2, 3), (2 * MS, 8)])
 def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, echoes: int) -> None:
-    """In a young session a wave on a link with slow echoes has eight of them, on a swift one three, and in an old session always three."""
+    """In a young session a wave has eight echoes on a link with slow echoes and three on a fast one; in an old session always three."""
     world = World()
     world.settle(1500 * MS)
     host = world.hosts[0]
@@ -99,7 +99,7 @@ def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, e
 
 
 def test_swift_echoes_are_learnt_from_when_their_wave_has_ended() -> None:
-    """They are given with the last answer, a slow one among them gives all at once, a wave that is cut short gives its own when the next one begins; none outlives its connection."""
+    """A wave's echoes are given with the last answer; a slow one among them gives all at once; a wave that is cut short gives its own when the next one begins. None outlives its connection."""
     world = World()
     world.settle(300 * MS)
     host = world.hosts[0]
@@ -149,7 +149,7 @@ def test_swift_echoes_are_learnt_from_when_their_wave_has_ended() -> None:
 
 
 def test_a_wish_to_steer_is_given_once() -> None:
-    """What the host asks for reaches the board's camera once, never more than a period, and not again before half a second has passed."""
+    """The host's request reaches the board's camera once, as less than one period, and not again before half a second has passed."""
     world = World(board_dials=False)
     world.settle()
     host = world.hosts[0]
@@ -168,7 +168,7 @@ def test_a_wish_to_steer_is_given_once() -> None:
 
 @pytest.mark.parametrize(("apart_ns", "accounts"), [(33 * MS, 20), (900 * MS, 20), (1500 * MS, 10)])
 def test_accounts_are_rarer_where_frames_are_far_apart(apart_ns: int, accounts: int) -> None:
-    """In ten seconds the host is told twenty accounts, and ten where frames are more than a second apart, as on a line of 115200 baud."""
+    """In ten seconds the host gets twenty accounts, or ten if frames are more than a second apart, as on a line of 115200 baud."""
     board, control, now_ns = BoardSession("board", "boot", CAMERA), connection_name(0, b"control"), 10**12
     board.receive(control, HostHello("host", Lane.CONTROL), now_ns, BoardCounts())
     told, sent_ns = 0, now_ns
@@ -184,7 +184,7 @@ def test_accounts_are_rarer_where_frames_are_far_apart(apart_ns: int, accounts: 
 
 
 def test_the_host_is_told_once_of_each_rung() -> None:
-    """A camera that was set anew is told of at once, once, though accounts go over two lanes and repeat it; an account from before changes nothing."""
+    """A camera with new settings is reported at once and once, although accounts go over two lanes and repeat it; an earlier account changes nothing."""
     world = World()
     world.settle(500 * MS)
     host = world.hosts[0]
@@ -204,7 +204,7 @@ def test_the_host_is_told_once_of_each_rung() -> None:
 
 
 def test_a_host_that_comes_later_finds_the_camera_as_it_is() -> None:
-    """A hello describes the camera with the rung that it is on; the accounts that follow are no news."""
+    """A hello describes the camera with its present rung; the accounts that follow are no news."""
     world = World()
     world.settle(500 * MS)
     rung = Rung(index=2, last=3, changes=2, period_ns=132 * MS, quality=45)

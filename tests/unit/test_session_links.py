@@ -1,4 +1,4 @@
-"""One session over two links: cut, mended, chosen in any order, on simulated time. The world itself checks that frames come once and in order."""
+"""One session over two links that are cut, restored and chosen in any order, on simulated time. The world itself checks that frames come once and in order."""
 
 from dataclasses import dataclass, replace
 from enum import Enum, auto
@@ -60,7 +60,7 @@ class What(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One misfortune, some luck, or a choice of the host's."""
+    """One failure, a recovery, or a choice by the host."""
 
     what: What
     link: int
@@ -83,7 +83,7 @@ EVENTS = st.lists(
 
 
 def happen(world: World, event: Event) -> None:
-    """Let an event happen."""
+    """Apply an event."""
     host, place = world.hosts[0], (event.link, event.lane)
     match event.what:
         case What.DELIVER:
@@ -118,7 +118,7 @@ any_course = given(events=EVENTS, board_dials=st.booleans(), slots=st.integers(1
 def test_frames_flow_over_any_link_that_is_up(
     *, events: list[Event], board_dials: bool, slots: int, alive: int
 ) -> None:
-    """After any events, with one link dead without a sound or none, frames flow within silence and a second; each is received or lost."""
+    """After any events, with one link silently dead or none, frames flow within silence plus a second; each is received or lost."""
     run_course(events, board_dials=board_dials, slots=slots, alive=alive)
 
 
@@ -133,7 +133,7 @@ def test_frames_flow_over_any_link_that_is_up_in_many_courses(
 
 
 def run_course(events: list[Event], *, board_dials: bool, slots: int, alive: int) -> None:
-    """Let events happen, then see frames flow and be accounted for."""
+    """Apply events, then check that frames flow and are accounted for."""
     world = World(board_dials=board_dials, links=LINKS)
     world.hosts[0].slots = slots
     for event in events:
@@ -155,7 +155,7 @@ def run_course(events: list[Event], *, board_dials: bool, slots: int, alive: int
 
 
 def settled(*, board_dials: bool = False) -> World:
-    """A world in which frames come over link 0 and link 1 stands by."""
+    """A world in which frames come over link 0, and link 1 is on standby."""
     world = World(board_dials=board_dials, links=LINKS)
     world.settle(1000 * MS)
     host = world.hosts[0]
@@ -176,7 +176,7 @@ def with_second_link_lost() -> World:
 
 
 def shoot(world: World) -> None:
-    """Let the board have credit for one frame, and send it."""
+    """Give the board credit for one frame, and let it send that frame."""
     host = world.hosts[0]
     world._host_does(host, host.session.grant(1))
     carrier = host.session.carrier
@@ -190,7 +190,7 @@ def shoot(world: World) -> None:
 
 @pytest.mark.parametrize("board_dials", [False, True])
 def test_a_broken_link_costs_nothing_but_what_was_under_way(*, board_dials: bool) -> None:
-    """When the carrier breaks frames come over the other link: at once if the host is told, within STUCK_NS if the board is; one is lost."""
+    """If the carrier breaks, frames come over the other link: at once if the host is notified, within STUCK_NS if the board is; one is lost."""
     world = settled(board_dials=board_dials)
     host = world.hosts[0]
     before, lost, begin_ns = len(host.arrived), host.lost, world.now_ns
@@ -210,7 +210,7 @@ def test_a_broken_link_costs_nothing_but_what_was_under_way(*, board_dials: bool
 
 @pytest.mark.parametrize("board_dials", [False, True])
 def test_a_choice_moves_the_stream_at_the_cost_of_one_round_trip(*, board_dials: bool) -> None:
-    """The host's choice moves the stream to the other link and back in the same session; only the frame under way may be lost."""
+    """At the host's choice the stream switches to the other link and back in the same session; only the frame under way may be lost."""
     world = settled(board_dials=board_dials)
     host = world.hosts[0]
     for link in (1, 0, 1):
@@ -223,7 +223,7 @@ def test_a_choice_moves_the_stream_at_the_cost_of_one_round_trip(*, board_dials:
 
 
 def test_the_old_links_last_frame_comes_late() -> None:
-    """A frame that the old link still held when the new one overtook it is lost to pairing, told as late once and as a repetition then."""
+    """A frame on the old link that was overtaken on the new one is lost to pairing. It is reported late once, and after that as a repetition."""
     world = settled()
     host = world.hosts[0]
     shoot(world)
@@ -246,7 +246,7 @@ def test_the_old_links_last_frame_comes_late() -> None:
 
 
 def test_a_half_dead_link_is_given_up() -> None:
-    """A link whose control is heard and whose frames' lane leaves hello unanswered is told as stuck after STUCK_NS; the stream stays."""
+    """A link whose control lane works and whose lane for frames leaves hello unanswered is reported as stuck after STUCK_NS; the stream stays."""
     world = settled()
     host = world.hosts[0]
     world.cut.add((1, Lane.FRAMES))
@@ -262,7 +262,7 @@ def test_a_half_dead_link_is_given_up() -> None:
 
 
 def test_a_link_that_comes_up_later_stands_by() -> None:
-    """A link that works only after a while is greeted then and takes no frame unless it is chosen; then it does."""
+    """A link that starts to work later is greeted then, and carries no frame unless it is chosen; then it does."""
     world = World(links=LINKS)
     world.cut_link(0)
     world.settle(2000 * MS)
@@ -277,7 +277,7 @@ def test_a_link_that_comes_up_later_stands_by() -> None:
 
 
 def test_another_board_on_the_second_link_is_told_and_left_alone() -> None:
-    """A link that leads to another board while ours is alive is told within two seconds, is said goodbye to, and no frame of it is taken."""
+    """A link that leads to another board while ours is alive is reported within two seconds and gets a goodbye; none of its frames is taken."""
     world = with_second_link_lost()
     host = world.hosts[0]
     other = BoardHello(session="other", boot_id="another boot", camera=CAMERA, counts=BoardCounts(), rung=Rung())
@@ -303,7 +303,7 @@ def test_another_board_on_the_second_link_is_told_and_left_alone() -> None:
 
 
 def test_a_busy_board_on_the_second_link_is_asked_calmly() -> None:
-    """A link whose board is busy with somebody else is told with its number and asked again every five seconds, while the first one carries."""
+    """A link whose board is busy with another host is reported with its number and asked again every five seconds, while the first link carries."""
     world = with_second_link_lost()
     host = world.hosts[0]
     ours, other = host.names[0, Lane.CONTROL], host.names[1, Lane.CONTROL]
@@ -323,7 +323,7 @@ def test_a_busy_board_on_the_second_link_is_asked_calmly() -> None:
 
 @pytest.mark.parametrize("same_host", [False, True])
 def test_a_hello_on_the_wrong_lane_harms_no_other_host(*, same_host: bool) -> None:
-    """A board that dials tells of the right lane; the stream of a host goes on whatever a second one says, which is told that the board is busy."""
+    """A board that dials announces the right lane. A host's stream continues whatever a second host says; the second one is told that the board is busy."""
     lanes = tuple((lane, connection_name(0, lane.name.encode())) for lane in Lane)
     board = BoardSession("session", "boot", CAMERA, lanes)
     names, now_ns, counts = dict(lanes), 10**9, BoardCounts()
@@ -343,7 +343,7 @@ def test_a_hello_on_the_wrong_lane_harms_no_other_host(*, same_host: bool) -> No
 
 
 def test_a_goodbye_is_said_on_every_link() -> None:
-    """A leaving host says goodbye on all open links, and the board's last account comes behind its last frame, once."""
+    """A leaving host says goodbye once on all open links, and the board's last account comes once, after its last frame."""
     world = settled()
     host = world.hosts[0]
     farewell = host.session.leave()
@@ -356,7 +356,7 @@ def test_a_goodbye_is_said_on_every_link() -> None:
 
 
 def test_a_standby_costs_few_words() -> None:
-    """A link that carries no frames gets no credit and no account, and after ten seconds one wave of three echoes a second."""
+    """A link that carries no frames gets no credit and no account; after ten seconds it gets one wave of three echoes a second."""
     world = settled()
     world.settle(12_000 * MS)
     said: list[object] = []

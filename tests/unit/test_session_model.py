@@ -1,4 +1,4 @@
-"""Whatever happens to clocks, programs and wires, in any order: no pair of images of different moments, and every frame accounted for."""
+"""Whatever happens to clocks, programs and links, in any order: no pair has images of different moments, and every frame is accounted for."""
 
 import hypothesis.strategies as st
 import pytest
@@ -19,7 +19,7 @@ NEAR_NS = st.integers(5 * MS, 2 * PERIOD_NS - 1)
 
 
 class Happenings(RuleBasedStateMachine):
-    """Everything that may happen between two machines."""
+    """Every event that may happen between two machines."""
 
     world: SteppingWorld
     usual: int
@@ -30,7 +30,7 @@ class Happenings(RuleBasedStateMachine):
         seed=st.integers(0, 99),
     )
     def begin(self, latency_ns: int, jitter: float, seed: int) -> None:
-        """Two machines that have met."""
+        """Two machines that have exchanged hellos."""
         self.world = SteppingWorld(latency_ns, jitter, seed)
         self.world.run(2500 * MS)
         before = self.world.witness.pairs
@@ -38,7 +38,7 @@ class Happenings(RuleBasedStateMachine):
         self.usual = self.world.witness.pairs - before
 
     def machine(self, *, of_board: bool) -> Machine:
-        """One of the two."""
+        """One of the two machines."""
         return self.world.board if of_board else self.world.host
 
     @rule(duration_ns=st.integers(20 * MS, 1500 * MS))
@@ -53,7 +53,7 @@ class Happenings(RuleBasedStateMachine):
 
     @rule(by_ns=NEAR_NS, back=st.booleans())
     def the_boards_clock_steps_a_little(self, *, by_ns: int, back: bool) -> None:
-        """By less than two periods, either way; two steps between two echoes could undo each other, and nobody would ever know."""
+        """By less than two periods, either way; two steps between two echoes could cancel, and nobody would ever know."""
         if not self.world.witness.unsettled:
             self.world.step(self.world.board, -by_ns if back else by_ns)
 
@@ -65,7 +65,7 @@ class Happenings(RuleBasedStateMachine):
 
     @rule(of_board=st.booleans(), duration_ns=st.one_of(FAR_NS, NEAR_NS), told=st.booleans())
     def a_machine_sleeps(self, *, of_board: bool, duration_ns: int, told: bool) -> None:
-        """Its clock stands still; its kernel tells, or does not. What no echo can have proven before the clock's life ends nobody can judge."""
+        """Its clock stands still; its kernel reports that, or does not. If no echo can have proven it before the clock's life ends, nobody can judge it."""
         if self.world.witness.unsettled or self.world.reception.estimate is None:
             return
         self.world.sleep(self.machine(of_board=of_board), duration_ns, told=told)
@@ -81,17 +81,17 @@ class Happenings(RuleBasedStateMachine):
 
     @rule(lane=st.sampled_from(Lane), to=st.sampled_from(["board", "host"]))
     def a_message_is_lost(self, lane: Lane, to: str) -> None:
-        """Without a sound."""
+        """Silently."""
         self.world.lose(lane, to)
 
     @rule(lane=st.sampled_from(Lane), to=st.sampled_from(["board", "host"]))
     def a_message_comes_twice(self, lane: Lane, to: str) -> None:
-        """As from a transport that delivers again."""
+        """As from a transport that delivers twice."""
         self.world.repeat(lane, to)
 
     @rule(lane=st.sampled_from(Lane))
     def a_connection_breaks(self, lane: Lane) -> None:
-        """Both sides are told."""
+        """Both sides are notified."""
         self.world.break_lane(lane)
 
     @rule()
@@ -101,12 +101,12 @@ class Happenings(RuleBasedStateMachine):
 
     @rule(by_ns=st.sampled_from([-3600 * SECOND_NS, -10 * SECOND_NS, 10 * SECOND_NS, 3600 * SECOND_NS, 2**61]))
     def a_stamp_lies(self, by_ns: int) -> None:
-        """One frame's stamps are off by seconds or more."""
+        """The stamps of one frame are off by seconds or more."""
         self.world.lie(self.world.false_frame(by_ns))
 
     @rule(by_ns=st.sampled_from([-3600 * SECOND_NS, -SECOND_NS, SECOND_NS, 3600 * SECOND_NS]), wave=st.integers(0, 500))
     def an_echo_lies(self, by_ns: int, wave: int) -> None:
-        """An answer of a wave, perhaps of the present one, tells another time."""
+        """An answer in a wave, perhaps the present one, gives a false time."""
         told_ns, asked_ns = self.world.board_clock() + by_ns, self.world.host_clock() - MS
         self.world.lie(Pong(wave=wave, t0_ns=asked_ns, t1_ns=told_ns, t2_ns=told_ns))
 
@@ -117,19 +117,19 @@ class Happenings(RuleBasedStateMachine):
 
     @invariant()
     def no_wrong_pair(self) -> None:
-        """After a step of two periods none is wrong; after a smaller one none from the first answered echo on."""
+        """After a step of two periods no pair is wrong; after a smaller one none from the first answered echo on."""
         if not hasattr(self, "world"):
             return
         assert all(pair.excusable for pair in self.world.witness.wrong), self.world.witness.wrong
 
     @invariant()
     def accounts_conserve(self) -> None:
-        """Received is paired, orphaned, held, or dropped by name."""
+        """Received frames are paired, orphaned, held, or dropped by reason."""
         if hasattr(self, "world"):
             self.world.check_accounts()
 
     def teardown(self) -> None:
-        """In the end pairs come again, and each wrong one is named as suspect."""
+        """At the end pairs come again, and each wrong one is reported as suspect."""
         if not hasattr(self, "world"):
             return
         self.world.run(6 * SECOND_NS)
@@ -148,7 +148,7 @@ TestHappenings.settings = settings(deadline=None, max_examples=25, stateful_step
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_step_that_hides_in_a_slow_link(seed: int) -> None:
-    """Frames that take 30 to 120 ms cannot show a step of 67 to 90 ms: they wait for an echo, and no pair is wrong, also before it comes."""
+    """Frames that take 30 to 120 ms cannot show a step of 67 to 90 ms. They wait for an echo, and no pair is wrong, not even before it comes."""
     world = SteppingWorld(30 * MS, 3.0, seed)
     world.run(2500 * MS + seed * 41 * MS)
     world.step(world.board, 2 * PERIOD_NS + seed * 2 * MS)
@@ -161,7 +161,7 @@ def test_a_step_that_hides_in_a_slow_link(seed: int) -> None:
 
 @pytest.mark.parametrize("latency_ns", [300 * MS, 700 * MS, 1500 * MS])
 def test_a_link_that_becomes_slow(latency_ns: int) -> None:
-    """Where a round trip comes to take longer than the time between two waves, and than a wave is waited for, echoes still count and pairs come."""
+    """If a round trip becomes longer than the time between two waves, and longer than the wait for a wave, echoes still count and pairs come."""
     world = SteppingWorld(20 * MS, 0.3, 1)
     world.run(3 * SECOND_NS)
     world.latency_ns = latency_ns
@@ -174,7 +174,7 @@ def test_a_link_that_becomes_slow(latency_ns: int) -> None:
 
 
 def test_a_board_that_answers_no_echo_is_named() -> None:
-    """A board that sends frames and answers no echo: from the first unusual frame on none is believed, and each is counted by its reason."""
+    """A board sends frames and answers no echo: from the first unusual frame on none is believed, and each is counted by its reason."""
     world = SteppingWorld(2 * MS, 0.0, 1)
     world.run(3 * SECOND_NS)
     world.answers_echoes = False
@@ -197,7 +197,7 @@ def test_a_board_that_answers_no_echo_is_named() -> None:
 @pytest.mark.parametrize("lane", Lane)
 @pytest.mark.parametrize("after_ms", range(0, 150, 15))
 def test_a_connection_that_breaks_in_a_doubt_forgets_no_step(lane: Lane, after_ms: int) -> None:
-    """A machine that slept for a moment, and whose connection breaks soon after: each wrong pair is named as suspect all the same."""
+    """A machine slept for a moment, and its connection breaks soon after: each wrong pair is still reported as suspect."""
     world = SteppingWorld(1 * MS, 0.0, 1)
     world.run(2700 * MS)
     world.step(world.board, -30 * MS)
@@ -213,7 +213,7 @@ def test_a_connection_that_breaks_in_a_doubt_forgets_no_step(lane: Lane, after_m
 
 @pytest.mark.parametrize("seed", range(10))
 def test_a_wave_that_lies_is_not_confirmed_by_slow_echoes(seed: int) -> None:
-    """Honest echoes so slow that they fit a lie as well do not make it true."""
+    """Honest echoes that are so slow that a lie fits them as well do not make the lie true."""
     world = SteppingWorld(60 * MS, 4.0, seed)
     world.run(4 * SECOND_NS)
     told_ns, asked_ns = world.board_clock() + 180 * MS, world.host_clock() - MS

@@ -1,4 +1,4 @@
-"""Words that come out of turn: late, over the wrong lane, from the wrong side, or before anybody is there. Board and host are spoken to directly."""
+"""Messages out of turn: late, on the wrong lane, from the wrong side, or before any host has greeted. Board and host are called directly."""
 
 from dataclasses import replace
 
@@ -43,7 +43,7 @@ def greeted(*lanes: bytes) -> BoardSession:
 
 
 def words(said: list[Outgoing]) -> list[tuple[bytes, Message]]:
-    """What was said, and over which connections."""
+    """The messages that were sent, and on which connections."""
     return [(outgoing.connection, outgoing.message) for outgoing in said]
 
 
@@ -53,7 +53,7 @@ FROM_A_BOARD += [Status("life", BoardCounts(9, 9), Rung()), End("life", BoardCou
 
 @pytest.mark.parametrize("word", FROM_A_BOARD, ids=lambda word: type(word).__name__)
 def test_a_board_hears_no_boards_words(word: Message) -> None:
-    """What only boards say gets no answer from a board, and neither ends the host's part nor gives leave for a frame."""
+    """A board does not answer messages that only boards send. They neither end the host's part nor give credit for a frame."""
     board = greeted(*NEAR.values())
     assert board.receive(NEAR[Lane.CONTROL], word, NOW_NS, NONE) == []
     assert (board.carrier, board.has_host, board.has_credit) == (0, True, False)
@@ -61,7 +61,7 @@ def test_a_board_hears_no_boards_words(word: Message) -> None:
 
 @pytest.mark.parametrize("word", [HostHello("other", Lane.CONTROL), Ping(1, 2), Credit(99), Steer(MS)])
 def test_a_host_hears_no_hosts_words(word: Message) -> None:
-    """What only hosts say gets no answer from a host, and the link stays up."""
+    """A host does not answer messages that only hosts send, and the link stays up."""
     host = HostSession("host", [NEAR])
     host.tick(NOW_NS)
     assert LinkUp(0, HELLO) in host.receive(NEAR[Lane.CONTROL], HELLO, NOW_NS)
@@ -71,7 +71,7 @@ def test_a_host_hears_no_hosts_words(word: Message) -> None:
 
 
 def test_a_link_that_fell_silent_is_not_spoken_on_any_more() -> None:
-    """Of two links the one that does not carry falls silent: frames go on over the other, and later questions go over that one alone."""
+    """Of two links the standby falls silent: frames continue on the other, and later pings go over that one alone."""
     board = greeted(NEAR[Lane.CONTROL], NEAR[Lane.FRAMES], FAR[Lane.CONTROL])
     for now_ns in range(NOW_NS, NOW_NS + SILENCE_NS + 200 * MS, 100 * MS):
         board.receive(NEAR[Lane.CONTROL], Ping(1, now_ns), now_ns, NONE)
@@ -82,7 +82,7 @@ def test_a_link_that_fell_silent_is_not_spoken_on_any_more() -> None:
 
 
 def test_a_camera_that_changed_before_anybody_came_is_told_as_it_is() -> None:
-    """A board whose camera was set anew while no host was there tells the next one of the new camera."""
+    """If a board's camera got new settings while no host was there, the board reports the new camera to the next host."""
     board = BoardSession("life", "boot", CAMERA)
     grey = replace(CAMERA, pixel_format=PixelFormat.GREY, period_ns=66 * MS)
     board.describe(grey, Rung(index=1, last=2, period_ns=66 * MS))
@@ -92,7 +92,7 @@ def test_a_camera_that_changed_before_anybody_came_is_told_as_it_is() -> None:
 
 
 def test_a_hello_for_the_wrong_lane_is_put_right_before_there_is_a_host() -> None:
-    """A board that has dialled knows what each connection is for: a first hello for another lane gets a knock with the right one, and makes no host."""
+    """A board that has dialled knows each connection's lane: a first hello for another lane gets a knock with the right one, and does not make its sender the host."""
     board = BoardSession("life", "boot", CAMERA, tuple(NEAR.items()))
     said = board.receive(NEAR[Lane.CONTROL], HostHello("host", Lane.FRAMES), NOW_NS, NONE)
     assert words(said) == [(NEAR[Lane.CONTROL], Knock(Lane.CONTROL, "life"))]
@@ -100,7 +100,7 @@ def test_a_hello_for_the_wrong_lane_is_put_right_before_there_is_a_host() -> Non
 
 
 def test_a_caller_may_put_right_what_its_connection_is_for() -> None:
-    """A connection that a host that is called took for the frames' lane is the control lane as soon as its board says so."""
+    """A host that is dialled corrects the lane of a connection as soon as its board names it: here from frames to control."""
     host = HostSession("host", [{}])
     caller = NEAR[Lane.CONTROL]
     host.receive(caller, Knock(Lane.FRAMES, "life"), NOW_NS)
@@ -110,7 +110,7 @@ def test_a_caller_may_put_right_what_its_connection_is_for() -> None:
 
 
 def test_a_board_that_slept_brings_its_link_down_and_up_again() -> None:
-    """A hello with another life of the board's clock, on a link that is up, ends what was known of the link, and begins it anew."""
+    """A hello with another life of the board's clock, on a link that is up, discards what was known of the link and starts it again."""
     host = HostSession("host", [NEAR])
     host.tick(NOW_NS)
     host.receive(NEAR[Lane.CONTROL], HELLO, NOW_NS)
@@ -124,7 +124,7 @@ def test_a_board_that_slept_brings_its_link_down_and_up_again() -> None:
 
 
 def test_a_late_answer_does_not_move_the_frames_back() -> None:
-    """A board's answer to an older hello over another link may have moved its frames there: the host asks for them again where it wants them."""
+    """A board's answer to an older hello on another link may have moved its frames there: the host asks for them again on the link that it wants."""
     host = HostSession("host", [NEAR, FAR])
     host.tick(NOW_NS)
     for lanes in (NEAR, FAR):

@@ -1,4 +1,4 @@
-"""What board and host say to each other when they meet and part, in single cases: greetings, refusals, silence, goodbyes; on simulated time."""
+"""Messages when board and host meet and part, in single cases: greetings, refusals, silence, goodbyes; on simulated time."""
 
 import pytest
 
@@ -41,7 +41,7 @@ from tests.support.session_world import World, frame
 
 
 def test_an_answer_of_a_dead_board_opens_nothing() -> None:
-    """A hello of the board's old life on one lane and of its new life on the other do not make a session."""
+    """A hello of the board's old life on one lane and one of its new life on the other do not make a session."""
     world = World()
     world.pass_time(20 * MS)
     host = world.hosts[0]
@@ -64,7 +64,7 @@ def test_an_answer_of_a_dead_board_opens_nothing() -> None:
 
 
 def test_a_second_host_waits_until_the_first_is_silent() -> None:
-    """While the first host is alive a second one is told busy; one second after its last word the second one gets in."""
+    """While the first host is alive a second one is told busy; one second after the first one's last message the second one gets in."""
     world = World()
     world.settle(500 * MS)
     first, second = world.hosts[0], world.add_host()
@@ -72,18 +72,18 @@ def test_a_second_host_waits_until_the_first_is_silent() -> None:
     assert not second.arrived
     assert Refused(RefusalReason.BUSY) in second.others
     assert len(first.arrived) > 60
-    for lane in Lane:  # the first one falls silent
+    for lane in Lane:  # the first host falls silent
         world.wires = {name: held for name, held in world.wires.items() if held[2] is not first.wires[0, lane]}
     silent_ns = world.now_ns
     world.hosts.remove(first)
     while not second.arrived:
         world.settle(20 * MS)
         assert world.now_ns - silent_ns < TAKEOVER_NS + 1000 * MS
-    assert world.now_ns - silent_ns >= TAKEOVER_NS - 250 * MS  # its last word was a clock echo
+    assert world.now_ns - silent_ns >= TAKEOVER_NS - 250 * MS  # its last message was a clock echo
 
 
 def test_a_goodbye_makes_room_at_once() -> None:
-    """After a host's goodbye the next one gets in with its next hello, long before the first would count as silent."""
+    """After a host's goodbye the next host gets in with its next hello, long before the first would count as silent."""
     world = World()
     world.settle(500 * MS)
     first, second = world.hosts[0], world.add_host()
@@ -98,7 +98,7 @@ def test_a_goodbye_makes_room_at_once() -> None:
 
 
 def test_a_strangers_end_is_nothing_to_the_host() -> None:
-    """A connection that was never the host's may vanish without a word to the host."""
+    """A connection that never belonged to the host may close without notice to the host."""
     world = World()
     world.settle(300 * MS)
     assert world.board.unreachable(b"a stranger") == []
@@ -106,7 +106,7 @@ def test_a_strangers_end_is_nothing_to_the_host() -> None:
 
 
 def test_a_silent_board_is_given_up() -> None:
-    """A host that hears nothing for SILENCE_NS says that the board has vanished, and not a moment before."""
+    """A host that hears nothing for SILENCE_NS reports the board as vanished, and not a moment earlier."""
     world = World()
     world.settle(300 * MS)
     host = world.hosts[0]
@@ -121,7 +121,7 @@ def test_a_silent_board_is_given_up() -> None:
 
 @pytest.mark.parametrize("stopped", ["host", "board", "both"])
 def test_silence_is_not_ones_own_absence(stopped: str) -> None:
-    """A program that was stopped for ten seconds takes nobody for gone; only who ran and heard nothing does."""
+    """A program that was stopped for ten seconds takes nobody for gone; only a running program that heard nothing does."""
     world = World()
     world.settle(2000 * MS)
     host, board = world.hosts[0], world.board
@@ -142,7 +142,7 @@ def test_silence_is_not_ones_own_absence(stopped: str) -> None:
 
 
 def test_a_board_that_forgot_its_host_voids_what_is_known_of_the_clocks() -> None:
-    """Where the board says to a host of its session that it does not know it, one of the two was away: clock, echoes and credit begin anew."""
+    """If the board tells a host of its session that it does not know it, one of the two was away: clock, echoes and credit start again."""
     world = World()
     world.settle(2000 * MS)
     host = world.hosts[0]
@@ -156,7 +156,7 @@ def test_a_board_that_forgot_its_host_voids_what_is_known_of_the_clocks() -> Non
 
 
 def test_a_board_without_its_frames_lane_keeps_the_clock() -> None:
-    """Where the board has lost the frames' lane alone it knows its host still, and nothing that is known of the clocks is given up."""
+    """A board that has lost only the lane for frames still knows its host, and everything known of the clocks is kept."""
     world = World(links=2)
     world.settle(2000 * MS)
     host = world.hosts[0]
@@ -170,7 +170,7 @@ def test_a_board_without_its_frames_lane_keeps_the_clock() -> None:
 
 @pytest.mark.parametrize("board_dials", [False, True])
 def test_a_refusal_counts_on_a_lane_that_was_dialled_only(*, board_dials: bool) -> None:
-    """A stranger who calls a waiting host may say anything; only who was called can refuse."""
+    """A stranger who dials a waiting host may say anything; only a board that was dialled can refuse."""
     world = World(board_dials=board_dials)
     host = world.hosts[0]
     names = {lane: host.names[0, lane] for lane in Lane}
@@ -180,7 +180,7 @@ def test_a_refusal_counts_on_a_lane_that_was_dialled_only(*, board_dials: bool) 
 
 
 def test_frames_beyond_the_credit_are_named_and_change_nothing() -> None:
-    """A board that sends more than it may, or with an index from nowhere, spends nothing of what an honest frame needs."""
+    """A board that sends more than it may, or with a senseless index, uses up nothing that an honest frame needs."""
     world = World()
     world.settle(1000 * MS)
     host = world.hosts[0]
@@ -195,7 +195,7 @@ def test_frames_beyond_the_credit_are_named_and_change_nothing() -> None:
 
 
 def test_an_account_of_more_than_was_allowed_is_not_believed() -> None:
-    """A board cannot have sent what it had no leave for: no frame is taken for lost or repeated because it says so."""
+    """A board cannot have sent a frame without credit: a claim that it did makes no frame lost or repeated."""
     world = World()
     world.settle(1000 * MS)
     host = world.hosts[0]
@@ -209,7 +209,7 @@ def test_an_account_of_more_than_was_allowed_is_not_believed() -> None:
 
 
 def test_a_link_that_was_only_slow_is_borne_with() -> None:
-    """Where a frame takes five seconds and all else waits behind it, the board is given up once at most; then the host waits long enough."""
+    """If a frame takes five seconds and everything else waits behind it, the board is given up at most once; then the host waits long enough."""
     world = World()
     world.settle(1000 * MS)
     host = world.hosts[0]
@@ -235,7 +235,7 @@ def test_a_link_that_was_only_slow_is_borne_with() -> None:
 
 
 def test_a_boards_goodbye_gives_its_last_account() -> None:
-    """A board that leaves on purpose is known as such, with its final counts and what they show as lost, and is sought again."""
+    """A board that leaves on purpose is reported as such, with its final counts and the losses that they show, and is searched for again."""
     world = World()
     world.settle(300 * MS)
     host = world.hosts[0]
@@ -253,7 +253,7 @@ def test_a_boards_goodbye_gives_its_last_account() -> None:
 
 
 def test_a_goodbye_counts_also_when_the_other_lane_broke_first() -> None:
-    """The last account is taken even when the frames' lane was seen to break just before it, but not that of another life."""
+    """The last account is taken even if the lane for frames was seen to break just before it, but not that of another life."""
     world = World()
     world.settle(300 * MS)
     host = world.hosts[0]
@@ -267,12 +267,12 @@ def test_a_goodbye_counts_also_when_the_other_lane_broke_first() -> None:
 
 
 def test_the_end_is_said_until_it_is_heard() -> None:
-    """The word that no frame follows is repeated, so that a host that lost it, or comes back later, hears it, too."""
+    """The message that no frame follows is repeated, so that a host that missed it, or comes back later, gets it, too."""
     world = World()
     world.settle(300 * MS)
     host = world.hosts[0]
     world.camera_runs = False
-    world.board.end(world.counts)  # these words are lost
+    world.board.end(world.counts)  # these messages are lost
     heard: list[object] = []
     for _ in range(50):
         world.pass_time(20 * MS)
@@ -282,7 +282,7 @@ def test_the_end_is_said_until_it_is_heard() -> None:
 
 
 def test_a_refusal_for_the_version_reaches_the_host() -> None:
-    """A host that is refused, busy or for its version, is told the reason and goes on asking."""
+    """A host that is refused, as the board is busy or for its version, gets the reason and keeps asking."""
     for reason in RefusalReason:
         world = World()
         host = world.hosts[0]
@@ -295,7 +295,7 @@ def test_a_refusal_for_the_version_reaches_the_host() -> None:
 
 
 def test_strangers_are_asked_who_they_are() -> None:
-    """Words of a host from before a restart are answered with a knock, except its goodbye; no word of it counts."""
+    """Messages of a host from before a restart are answered with a knock, except its goodbye; none of them counts."""
     world = World()
     knock = [Outgoing(b"x", Knock(Lane.CONTROL, world.board.session))]
     for message in (Ping(1, 2), Credit(10**6), Pong(wave=1, t0_ns=2, t1_ns=3, t2_ns=4)):

@@ -1,4 +1,4 @@
-"""Settings: each origin stronger than the one before, and mistakes named with their place."""
+"""Settings: each source overrides the one before, and mistakes are reported with their place."""
 
 import json
 import logging
@@ -46,7 +46,7 @@ VALUES: dict[str, tuple[object, object, object]] = {
 def test_the_strongest_origin_wins_and_is_named(
     field: str, origins: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Default < file < environment < option, in every combination; the other settings stay at their default."""
+    """Default < file < environment < option, in every combination; the other settings keep their default."""
     file = tmp_path / "board.toml"
     expected, origin = VALUES[field][0], "default"
     if origins & 1:
@@ -85,7 +85,7 @@ def test_the_strongest_origin_wins_and_is_named(
     ],
 )
 def test_mistakes_in_the_file_name_key_and_file(line: str, named: str, tmp_path: Path) -> None:
-    """An unknown key, a wrong type or broken TOML is one line with the file's name and the key or line in it."""
+    """An unknown key, a wrong type or broken TOML gives one line with the file's name and the key or line in it."""
     file = tmp_path / "board.toml"
     file.write_text(line + "\n", encoding="utf-8")
     with pytest.raises(SettingsError) as caught:
@@ -96,7 +96,7 @@ def test_mistakes_in_the_file_name_key_and_file(line: str, named: str, tmp_path:
 
 
 def test_a_stronger_origin_does_not_hide_a_mistake_in_the_file(tmp_path: Path) -> None:
-    """A wrong value in the file is told even where an option outdoes it."""
+    """A wrong value in the file is reported even if an option overrides it."""
     file = tmp_path / "board.toml"
     file.write_text('depth = "2"\n', encoding="utf-8")
     with pytest.raises(SettingsError, match="depth"):
@@ -107,7 +107,7 @@ def test_a_stronger_origin_does_not_hide_a_mistake_in_the_file(tmp_path: Path) -
     ("field", "text"), [("DEPTH", "two"), ("DEPTH", ""), ("DEPTH", "1.5"), ("TOLERANCE", "x"), ("LOOP_FOREVER", "yes!")]
 )
 def test_mistakes_in_the_environment_name_the_variable(field: str, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A value that is not of the setting's type is told with its variable."""
+    """A value that is not of the setting's type is reported with its variable."""
     monkeypatch.setenv(f"SAMPLE_{field}", text)
     with pytest.raises(SettingsError, match=f"SAMPLE_{field}"):
         resolve(Sample, "SAMPLE", None, {})
@@ -115,7 +115,7 @@ def test_mistakes_in_the_environment_name_the_variable(field: str, text: str, mo
 
 @pytest.mark.parametrize("content", [None, b"\xff\xfe"])
 def test_an_unreadable_file_is_named(content: bytes | None, tmp_path: Path) -> None:
-    """A file that is missing or no UTF-8 is told by name, and so is a folder in its place."""
+    """A file that is missing or not UTF-8 is reported by name, and so is a folder in its place."""
     file = tmp_path / "board.toml"
     if content is not None:
         file.write_bytes(content)
@@ -126,7 +126,7 @@ def test_an_unreadable_file_is_named(content: bytes | None, tmp_path: Path) -> N
 
 
 def test_the_listing_has_straight_columns_whatever_the_names_and_values(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Values and origins begin in one column each, also beside a value longer than any other, and lists are joined by blanks."""
+    """Values and origins are aligned in one column each, even beside an overlong value, and lists are joined by blanks."""
     monkeypatch.setenv("SAMPLE_NAME", "x" * 60)
     lines = listing(resolve(Sample, "SAMPLE", None, {"depth": 4}), as_json=False).splitlines()
     assert [line.split()[0] for line in lines] == list(VALUES)
@@ -137,7 +137,7 @@ def test_the_listing_has_straight_columns_whatever_the_names_and_values(monkeypa
 
 
 def test_the_listing_as_json_keeps_types(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each name leads to its value, of its own type, and its origin."""
+    """Each name maps to its value, of the right type, and its origin."""
     monkeypatch.setenv("SAMPLE_DEPTH", "3")
     shown = json.loads(listing(resolve(Sample, "SAMPLE", None, {}), as_json=True))
     assert shown["depth"] == {"value": 3, "origin": "SAMPLE_DEPTH"}
@@ -145,14 +145,14 @@ def test_the_listing_as_json_keeps_types(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_log_levels_go_by_name() -> None:
-    """The four names are known in any case; others are refused by name."""
+    """The four names are accepted in any case; others are refused by name."""
     assert log_level("Warning") == logging.WARNING
     with pytest.raises(SettingsError, match="loud"):
         log_level("loud")
 
 
 def test_a_run_is_saved_with_the_origin_of_each_setting(tmp_path: Path) -> None:
-    """Settings keep their origin; options that are none say whether they were given, also cut short; paths are texts."""
+    """Settings keep their origin; other options show whether they were given, even abbreviated; paths are saved as text."""
     resolved = resolve(Sample, "NOBODY_SETS_THIS", None, {"depth": 4})
     options = {"name": None, "out": tmp_path, "save_every": 3, "pairs": 0, "wait": 2.5}
     words = ["phone-host", "run", "--out", str(tmp_path), "--save=3", "--wait", "2.5", "--pairs-of-nothing"]

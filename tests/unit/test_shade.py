@@ -1,4 +1,4 @@
-"""What bodies take of each other's light: seen from far above, from below, and beside."""
+"""How bodies block each other's light: seen from far above, from below, and from beside."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def points(*places: tuple[float, float, float]) -> np.ndarray:
 
 @pytest.mark.parametrize(("shape", "radius_m"), [(Sphere(0.3), 0.3), (Box((0.6, 0.6, 0.6)), 0.3)])
 def test_a_solid_body_hides_its_share_of_the_sky(shape: Sphere | Box, radius_m: float) -> None:
-    """Half a metre straight above, a ball of radius r, or a cube of that size, hides (2 r)^2 of the sky but for what nobody sees; from behind a surface nothing."""
+    """From half a metre straight above, a ball of radius r, or a cube of that size, hides (2 r)^2 of the sky minus what nobody sees; from behind a surface it hides nothing."""
     body = Body("it", shape, (0.0, 0.5, 0.0))
     normals = points(UP, (0.0, -1.0, 0.0))
     hidden = sky_blocked(body, points((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), normals)
@@ -28,7 +28,7 @@ def test_a_solid_body_hides_its_share_of_the_sky(shape: Sphere | Box, radius_m: 
 
 
 def test_a_plane_hides_no_sky_and_bodies_far_beside_leave_each_other_alone() -> None:
-    """A plane is no body to stand behind; two balls ten metres apart, none in the other's light, do not darken each other."""
+    """A plane does not count as a body that hides; two balls ten metres apart, neither in the other's light, do not darken each other."""
     assert not sky_blocked(TABLE, points((0.0, 1.0, 0.0)), points(UP)).any()
     ball, lower = Body("ball", Sphere(0.1), (0.0, 2.0, 0.0)), Body("lower", Sphere(0.1), (0.0, -8.0, 0.0))
     aside = Body("aside", Sphere(0.1), (10.0, 2.0, 0.0))
@@ -39,7 +39,7 @@ def test_a_plane_hides_no_sky_and_bodies_far_beside_leave_each_other_alone() -> 
 
 
 def test_a_plane_lets_the_lamp_through_and_hides_no_sky() -> None:
-    """A poster throws no shadow on what is behind it, and what stands half a metre beside it keeps its light; a ball there takes sky from it."""
+    """A poster casts no shadow on what is behind it, and what is half a metre beside it keeps its light; a ball there hides sky from it."""
     poster = Body("poster", Plane(0.6, 0.8), (0.0, 1.0, 0.0))
     through = lamp_reaching(poster, points((0.0, 0.5, 0.0), (0.1, 0.0, 0.2)), np.array(UP, dtype=np.float32))
     assert through.tolist() == [1.0, 1.0]
@@ -50,7 +50,7 @@ def test_a_plane_lets_the_lamp_through_and_hides_no_sky() -> None:
 
 
 def test_a_body_high_above_a_plane_takes_no_sky_from_it() -> None:
-    """Near the plane a ball dims a disc around its foot and throws a shadow; five metres up it hides 0.04 % of the sky, which counts as nothing."""
+    """Near the plane a ball dims a disc around its foot and casts a shadow; five metres up it hides 0.04 % of the sky, which is ignored."""
     lamp, below = Light(towards=(0.0, 0.0, 1.0)), Light(towards=(0.0, 0.0, -1.0))
     near, high = (Body("ball", Sphere(0.1), (1.0, 2.0, height)) for height in (0.2, 5.0))
     assert [len(shadow_balls(light, body, TABLE)) for body in (near, high) for light in (lamp, below)] == [2, 1, 1, 0]

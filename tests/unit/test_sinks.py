@@ -1,4 +1,4 @@
-"""Sinks: a slow one never delays a pair, each drop is counted, a waiting one loses nothing; and what is on disk afterwards."""
+"""Sinks: a slow one never delays a pair, each drop is counted, a waiting one loses nothing; and what is on disk at the end."""
 
 import json
 import os
@@ -27,7 +27,7 @@ PATIENCE_S = 60.0
 
 
 def result(number: int) -> Result:
-    """A result of two grey images."""
+    """A result with two grey images."""
     marks = BoardMarks(exposed_ns=number, grabbed_ns=number + 1, sent_ns=number + 2)
     message = replace(
         FRAME,
@@ -70,13 +70,13 @@ def result(number: int) -> Result:
 
 
 class Gate:
-    """Holds a sink up until it is opened."""
+    """Blocks a sink until it is opened."""
 
     def __init__(self) -> None:
         self.entered, self.opened, self.seen = threading.Event(), threading.Event(), list[int]()
 
     def take(self, number: int) -> None:
-        """Wait, then note the number."""
+        """Wait, then record the number."""
         self.entered.set()
         assert self.opened.wait(PATIENCE_S)
         self.seen.append(number)
@@ -84,14 +84,14 @@ class Gate:
 
 @pytest.fixture
 def gate() -> Iterator[Gate]:
-    """A gate that is open at the end, whatever fails."""
+    """A gate that is opened at the end, even after a failure."""
     found = Gate()
     yield found
     found.opened.set()
 
 
 def test_a_stuck_sink_drops_and_counts_and_holds_nobody_up(gate: Gate) -> None:
-    """While a sink does nothing, a thousand results are offered without waiting: as many as its queue is deep are kept, the others counted under its name."""
+    """While a sink does nothing, a thousand results are offered without waiting: as many as its queue holds are kept, and the others are counted under its name."""
     queue = SinkQueue("stuck", gate.take, depth=3)
     taken = [queue.offer(number) for number in range(1000)]
     account = queue.account
@@ -104,7 +104,7 @@ def test_a_stuck_sink_drops_and_counts_and_holds_nobody_up(gate: Gate) -> None:
 
 
 def test_a_waiting_sink_misses_nothing() -> None:
-    """A sink that waits gets all of a thousand results in order, however fast they come and however small its queue."""
+    """A sink that waits gets all of a thousand results in order, however fast they come and however short its queue is."""
     seen: list[int] = []
     queue = SinkQueue("waiting", seen.append, depth=1, waits=True)
     for number in range(1000):
@@ -116,7 +116,7 @@ def test_a_waiting_sink_misses_nothing() -> None:
 
 
 def test_only_a_waiting_sink_makes_its_worker_wait(gate: Gate) -> None:
-    """With a full queue `await_place` comes back at once, unless the sink is one that waits: then when there is a place."""
+    """With a full queue `await_place` returns at once, unless the sink waits: then it returns when there is a place."""
     hasty, patient = SinkQueue("hasty", gate.take, depth=1), SinkQueue("patient", gate.take, depth=1, waits=True)
     hasty.offer(0)
     hasty.await_place()
@@ -135,7 +135,7 @@ def test_only_a_waiting_sink_makes_its_worker_wait(gate: Gate) -> None:
 @given(st.integers(1, 4), st.lists(st.booleans(), max_size=60))
 @settings(deadline=None, max_examples=40)
 def test_what_is_offered_is_written_or_dropped(depth: int, pauses: list[bool]) -> None:
-    """Whatever the order of offers and pauses, offered = written + dropped at the end, and what is written keeps its order."""
+    """For any order of offers and pauses, offered = written + dropped at the end, and written results keep their order."""
     seen: list[int] = []
     queue = SinkQueue("any", seen.append, depth=depth)
     for number, pause in enumerate(pauses):
@@ -149,7 +149,7 @@ def test_what_is_offered_is_written_or_dropped(depth: int, pauses: list[bool]) -
 
 
 def test_a_sink_that_fails_is_told_and_takes_nothing_more() -> None:
-    """A sink's exception is its failure; from then on it drops, wakes whoever waits for a place, and ends."""
+    """An exception of a sink is its failure: from then on it drops, wakes whatever waits for a place, and ends."""
 
     def fail(_: Result) -> None:
         raise ZeroDivisionError
@@ -164,7 +164,7 @@ def test_a_sink_that_fails_is_told_and_takes_nothing_more() -> None:
 
 
 def test_all_lines_and_every_third_pair_are_on_disk(tmp_path: Path) -> None:
-    """Of ten results each has its line, every third its folder with whole files, and the settings stand beside them; all of it is listed as ours."""
+    """Each of ten results has its line, every third has its folder with whole files, and the settings are beside them; all of it is listed as ours."""
     sink = FileSink(tmp_path, 3, waits=True, settings={"fifo": {"value": "1:block", "origin": "--fifo"}})
     for number in range(10):
         sink.await_place(number)
@@ -181,7 +181,7 @@ def test_all_lines_and_every_third_pair_are_on_disk(tmp_path: Path) -> None:
 
 
 def test_a_pair_whose_name_somebody_has_taken_is_counted_and_the_run_goes_on(tmp_path: Path) -> None:
-    """A file in the way of one pair's folder costs this pair alone; its half-made folder is gone, and so is nothing of the other's."""
+    """Somebody's folder in the place of one pair's costs only this pair: the half-made folder is removed, and that person's file stays."""
     sink = FileSink(tmp_path, 1, waits=True)
     (tmp_path / "pair-000001").mkdir()
     (tmp_path / "pair-000001" / "mine").write_text("mine")
@@ -198,7 +198,7 @@ def test_a_pair_whose_name_somebody_has_taken_is_counted_and_the_run_goes_on(tmp
 
 
 def test_a_disk_slower_than_the_pairs_costs_pairs_and_no_line(tmp_path: Path) -> None:
-    """Of 30 large pairs that come at once some are dropped, under the name of the sink that saves them; each has its line all the same."""
+    """Of 30 large pairs that come at once some are dropped, counted under the sink that saves them; each still has its line."""
     noise = np.random.default_rng(1).integers(0, 256, (1200, 1600), np.uint8)
     sink = FileSink(tmp_path, 1)
     for number in range(30):
@@ -213,13 +213,13 @@ def test_a_disk_slower_than_the_pairs_costs_pairs_and_no_line(tmp_path: Path) ->
 
 
 def test_a_full_disk_is_told_once_and_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """Where no file may grow nothing is written; lines wait, pairs are counted as failed, each trouble is one line of the log, and the folder is let go."""
+    """If no file may grow, nothing is written: lines wait, pairs are counted as failed, each problem is one line in the log, and the folder is unlocked."""
     sink = FileSink(tmp_path, 1, waits=True)
     noise = np.random.default_rng(1).integers(0, 256, (100, 100), np.uint8)
     large = replace(result(0).processed, pair=RectifiedPair(noise, noise))
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (200, hard))  # the list of names still has room
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200, hard))  # the list of names still fits
     try:
         for number in range(3):
             sink.await_place(number)
@@ -239,14 +239,14 @@ def test_a_full_disk_is_told_once_and_counted(tmp_path: Path, caplog: pytest.Log
 
 
 def test_a_folder_that_cannot_be_begun_is_let_go(tmp_path: Path) -> None:
-    """Settings that cannot be written, or are no JSON, leave no lock behind."""
+    """Settings that cannot be written, or are not JSON, leave no lock behind."""
     with pytest.raises(TypeError):
         FileSink(tmp_path, 1, settings={"camera": object()})
     FileSink(tmp_path, 1).close({})
 
 
 def test_only_a_pair_that_is_due_waits_for_its_place(tmp_path: Path) -> None:
-    """While the queue of pairs is full, a result that is not to be saved is handed over at once."""
+    """While the queue of pairs is full, a result that is not to be saved is still passed on at once."""
     sink = FileSink(tmp_path, 10, waits=True)
     noise = np.random.default_rng(1).integers(0, 256, (2400, 3200), np.uint8)
     for number in (0, 10):

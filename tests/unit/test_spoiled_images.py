@@ -1,4 +1,4 @@
-"""Images whose bytes are whole but wrong: the decoder's word is heard, counts, and does not reach stderr."""
+"""Images whose bytes are complete but wrong: the decoder's message is caught and counted, and does not reach stderr."""
 
 import ctypes
 import subprocess
@@ -20,12 +20,12 @@ WITH_RESTARTS = bombs.textured_jpeg(restart=4)
 
 
 def cut(content: bytes) -> bytes:
-    """Half of a JPEG, closed with an end marker as a careless program does."""
+    """Half of a JPEG, closed with an end marker, as a careless program writes it."""
     return content[: len(content) // 2] + b"\xff\xd9"
 
 
 def flipped(content: bytes, bits: int = 40) -> bytes:
-    """A JPEG with some bits of its compressed data flipped, as by memory or a cable that fails; no byte becomes a marker."""
+    """A JPEG with some bits of its compressed data flipped, as by faulty memory or a faulty cable; no byte becomes a marker."""
     data, chance = bytearray(content), np.random.default_rng(3)
     start = bombs.scan_start(content)
     while bits:
@@ -38,7 +38,7 @@ def flipped(content: bytes, bits: int = 40) -> bytes:
 
 
 def without_a_restart(content: bytes) -> bytes:
-    """A JPEG that has lost what lay between two restart markers, and one of them."""
+    """A JPEG without the bytes from its restart marker FF D2 up to FF D4."""
     start = content.index(b"\xff\xd2")
     return content[:start] + content[content.index(b"\xff\xd4") :]
 
@@ -62,7 +62,7 @@ def test_a_corrupt_body_is_told(case: str, capfd: pytest.CaptureFixture[str]) ->
 
 
 def test_sound_images_pass_unchanged(capfd: pytest.CaptureFixture[str]) -> None:
-    """Sound JPEGs, with restart markers or progressive, give the pixels that OpenCV gives, before and behind a spoiled one."""
+    """Sound JPEGs, with restart markers or progressive, give the same pixels as OpenCV, before and after a spoiled one."""
     for content in (SOUND, WITH_RESTARTS, bombs.progressive(), jpeg()):
         expected = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
         assert expected is not None
@@ -75,7 +75,7 @@ def test_sound_images_pass_unchanged(capfd: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("junk", [b"\0", b"\0\0", b"abcd"])
 def test_what_webcams_leave_before_the_end_is_harmless(junk: bytes, capfd: pytest.CaptureFixture[str]) -> None:
-    """A few bytes between the data and the end marker, and any number between segments, change no pixel: the image is taken."""
+    """A few bytes between the data and the end marker, and any number between segments, change no pixel: the image is accepted."""
     sloppy = SOUND[:-2] + junk + SOUND[-2:]
     np.testing.assert_array_equal(decode(sloppy), decode(SOUND))
     untidy = SOUND[:20] + bytes(300) + SOUND[20:]
@@ -84,13 +84,13 @@ def test_what_webcams_leave_before_the_end_is_harmless(junk: bytes, capfd: pytes
 
 
 def test_a_decoder_that_is_left_with_much_has_lost_its_way() -> None:
-    """Hundreds of bytes between the data and the end marker are no padding."""
+    """Hundreds of bytes between the data and the end marker are not padding."""
     with pytest.raises(SpoiledImageError, match="extraneous"):
         decode(SOUND[:-2] + SOUND[-400:])
 
 
 def test_words_of_other_decoders_are_not_printed(capfd: pytest.CaptureFixture[str]) -> None:
-    """Spoiled images of every kind are refused without a word on stderr, OpenCV's own log included."""
+    """Spoiled images of every kind are refused without output on stderr, OpenCV's own log included."""
     for suffix in (".png", ".webp", ".tiff", ".bmp"):
         content = bytearray(encoded(suffix, picture(64, 48)))
         content[len(content) // 2 :] = bytes(len(content) - len(content) // 2)
@@ -103,13 +103,13 @@ def test_words_of_other_decoders_are_not_printed(capfd: pytest.CaptureFixture[st
 
 
 def test_both_images_of_a_pair_are_heard() -> None:
-    """The one that is spoiled is named."""
+    """The spoiled one is named."""
     with pytest.raises(SpoiledImageError, match="the right one"):
         decode_pair(SOUND, SPOILED["bits flipped"], "the left one", "the right one")
 
 
 def test_threads_do_not_hear_each_other() -> None:
-    """While one thread decodes spoiled images, another one's sound images are never blamed, and each spoiled one is told."""
+    """While one thread decodes spoiled images, another thread's sound images are never blamed, and each spoiled one is reported."""
     wrong: list[str] = []
 
     def check(content: bytes, is_sound: bool) -> None:  # noqa: FBT001 - what the thread is told
@@ -132,7 +132,7 @@ def test_threads_do_not_hear_each_other() -> None:
 
 
 def test_stderr_stays_what_it_is(capfd: pytest.CaptureFixture[str]) -> None:
-    """Python's stderr and those of children started meanwhile are not concerned, and the C library's is the usual one afterwards, also after an error."""
+    """Python's stderr, and that of children started meanwhile, are not affected. The C library's is the usual one afterwards, even after an error."""
     c_library = ctypes.CDLL(None)
     stream = ctypes.c_void_p.in_dll(c_library, "stderr")
     usual = stream.value
@@ -153,7 +153,7 @@ def test_stderr_stays_what_it_is(capfd: pytest.CaptureFixture[str]) -> None:
 
 
 def test_words_of_other_libraries_are_logged(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What another library prints while an image is decoded comes as a line of the log."""
+    """What another library prints while an image is decoded becomes a line in the log."""
     c_library = ctypes.CDLL(None)
     stream = ctypes.c_void_p.in_dll(c_library, "stderr")
     real = cv2.imdecode
@@ -162,6 +162,6 @@ def test_words_of_other_libraries_are_logged(caplog: pytest.LogCaptureFixture, m
         c_library.fprintf(stream, b"the radio is on fire\n")
         return real(*given)  # type: ignore[call-overload]  # as it came
 
-    monkeypatch.setattr(cv2, "imdecode", talking)  # OpenCV stands for a library of another thread
+    monkeypatch.setattr(cv2, "imdecode", talking)  # OpenCV stands in for a library on another thread
     decode(SOUND)
     assert "library_said text='the radio is on fire'" in caplog.text

@@ -1,4 +1,4 @@
-"""What a start costs: help and the board's start import no more than they need."""
+"""The cost of a start: help and the board's start import no more than they need."""
 
 import json
 import resource
@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 HEAVY = {"numpy", "cv2", "rich", "zmq", "msgpack", "serial", "zeroconf", "asyncio", "importlib.metadata"}
 
 HELP_MS = 150.0
-"""CPU of `phone-host --help`: a command that answers within a tenth of a second or two feels instant, also where it is started by others."""
+"""CPU of `phone-host --help`: a command that answers within a tenth of a second or two feels instant, even when another program starts it."""
 
 
 def loaded_by(module: str, *arguments: str) -> set[str]:
@@ -45,7 +45,7 @@ def loaded_by(module: str, *arguments: str) -> set[str]:
     ],
 )
 def test_help_and_settings_load_nothing_heavy(module: str, arguments: list[str]) -> None:
-    """Help, settings and lists need neither numpy nor OpenCV, rich, ZeroMQ or a search for other packages."""
+    """Help, settings and lists need no numpy, OpenCV, rich or ZeroMQ, and no search for other packages."""
     assert loaded_by(module, *arguments) & HEAVY == set()
 
 
@@ -65,7 +65,7 @@ def test_help_and_settings_load_nothing_heavy(module: str, arguments: list[str])
     ],
 )
 def test_the_board_loads_what_it_was_asked_for(link: str, camera: str, unwanted: set[str], tmp_path: Path) -> None:
-    """board-agent run loads the kinds of link and camera that it was asked for, and neither the others nor what keys and extensions need."""
+    """board-agent run loads the kinds of link and camera that were requested, neither the others nor what keys and extensions need."""
     (tmp_path / "1.pgm").write_bytes(b"P5 2 2 255\nabcd")
     chosen = ["--link", link.format(folder=tmp_path), "--camera", camera.format(folder=tmp_path)]
     loaded = loaded_by("board_agent.cli", "run", *chosen)
@@ -73,7 +73,7 @@ def test_the_board_loads_what_it_was_asked_for(link: str, camera: str, unwanted:
 
 
 def test_help_costs_little() -> None:
-    """`phone-host --help` takes less than 150 ms of CPU; the best of five, for what others do on the machine is not its cost."""
+    """`phone-host --help` takes less than 150 ms of CPU. The best of five counts, as other programs' load is not its cost."""
     taken_ms = []
     for _ in range(5):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)

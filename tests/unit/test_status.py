@@ -11,14 +11,14 @@ def line(pacing: Pacing = Pacing.CLOCK) -> StatusLine:
 
 
 def test_without_a_host_it_says_where_one_is_awaited() -> None:
-    """While nobody listens the links are named."""
+    """While no host is there, the links are named."""
     assert (
         line().text(SECOND_NS, BoardCounts(), has_host=False) == "waiting for a host on tcp://*:5555 and ipc:///run/x"
     )
 
 
 def test_the_rate_is_that_of_the_time_since_the_last_line() -> None:
-    """60 frames in the first 2 s and 10 in the next give 30 and then 5 frames a second, drops summed over all reasons."""
+    """60 frames in the first 2 s and 10 in the next give 30 and then 5 frames a second; drops are summed over all reasons."""
     status = line()
     dropped = ((DropReason.REPLACED, 3), (DropReason.SPOILED, 2))
     assert status.text(2 * SECOND_NS, BoardCounts(60, 55, dropped), has_host=True).startswith("30.0 fps, 55 sent")
@@ -27,7 +27,7 @@ def test_the_rate_is_that_of_the_time_since_the_last_line() -> None:
 
 
 def test_the_link_in_use_is_named() -> None:
-    """Of several links the one that carries the frames stands beside the rate; none does while none carries them."""
+    """Of several links the carrier is shown beside the rate; none is shown while none carries."""
     status = line()
     text = status.text(SECOND_NS, BoardCounts(30, 30), has_host=True, carrier=1)
     assert text == "30.0 fps over ipc:///run/x, 30 sent to the host, 0 dropped"
@@ -35,7 +35,7 @@ def test_the_link_in_use_is_named() -> None:
 
 
 def test_a_lowered_camera_is_told() -> None:
-    """What the camera gives instead of what was asked for stands at the end; nothing does while it gives all."""
+    """What the camera gives instead of the requested values is at the end; nothing is there while it gives all."""
     lowered = Rung(index=1, last=2, changes=1, period_ns=200_000_000, quality=50, width_px=320, height_px=240)
     text = line().text(SECOND_NS, BoardCounts(5, 5), has_host=True, rung=lowered)
     assert text.endswith("0 dropped; lowered to 5 fps of 320x240 at quality 50 for the link (rung 1 of 2)")
@@ -44,7 +44,7 @@ def test_a_lowered_camera_is_told() -> None:
 
 
 def test_a_silent_camera_is_named_with_its_silence() -> None:
-    """A camera that gives nothing for seconds while a host waits is named; one frame makes it well again."""
+    """A camera that gives nothing for seconds while a host waits is named; one frame clears that."""
     status = line()
     status.text(SECOND_NS, BoardCounts(30, 30), has_host=True)
     assert "fps" in status.text(3 * SECOND_NS, BoardCounts(30, 30), has_host=True)
@@ -59,7 +59,7 @@ def test_a_camera_on_demand_may_be_silent() -> None:
 
 
 def test_a_camera_that_rested_without_a_host_is_not_called_silent() -> None:
-    """An hour without host and frames is no silence of the camera: it counts from the host's coming."""
+    """An hour without host and frames is not a silence of the camera: its silence counts from the host's arrival."""
     status = line()
     status.text(3600 * SECOND_NS, BoardCounts(), has_host=False)
     assert "fps" in status.text(3602 * SECOND_NS, BoardCounts(), has_host=True)

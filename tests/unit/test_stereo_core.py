@@ -1,4 +1,4 @@
-"""The stereo core's stages one by one, and what it and the matchers refuse before they work."""
+"""The stereo core's stages one by one, and what the core and the matchers refuse before they start."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ GEOMETRY = StereoGeometry(focal_px=500.0, baseline_m=0.1, cx_px=31.5, cy_px=15.5
 
 
 def shifted(px: int) -> tuple[Image, Image]:
-    """Random levels, and the same so much further left."""
+    """Random levels, and the same levels this many pixels further left."""
     left = noise(64, 32)
     return left, np.roll(left, -px, axis=1)
 
@@ -37,7 +37,7 @@ def test_a_shift_becomes_a_depth(name: MatcherName) -> None:
 
 
 def test_a_core_that_rectifies_has_the_rigs_geometry() -> None:
-    """With a rectifier the geometry is the rig's, another one is a mistake, and sizes are those that were calibrated."""
+    """With a rectifier the geometry is the rig's, another geometry is a mistake, and images must have the calibrated sizes."""
     rectifier, matcher = Rectifier(unlike_rig()), create_matcher(MatchSettings())
     core = StereoCore(matcher, rectifier)
     assert core.geometry == rectifier.geometry
@@ -52,7 +52,7 @@ def test_a_core_that_rectifies_has_the_rigs_geometry() -> None:
 
 
 def test_without_a_rig_sizes_agree_and_there_are_no_metres() -> None:
-    """Images that come rectified have one size; without a geometry disparity is all there is."""
+    """Images that come rectified have equal sizes; without a geometry the only result is disparity."""
     core = StereoCore(create_matcher(MatchSettings(MatcherName.BLOCK, 4)))
     assert core.rig is None
     with pytest.raises(DataError):
@@ -72,7 +72,7 @@ def test_without_a_rig_sizes_agree_and_there_are_no_metres() -> None:
     ],
 )
 def test_no_matcher_takes_what_is_no_pair(left: Image, right: Image, word: str) -> None:
-    """Other types, four channels, nothing at all and two sizes are refused, and the error says which image."""
+    """Other types, four channels, no image and two sizes are refused; the error says which image."""
     with pytest.raises(DataError) as caught:
         check_pair(RectifiedPair(left, right))
     assert word in caught.value.problem
@@ -88,6 +88,6 @@ def test_grey_stays_itself_and_colour_is_weighed() -> None:
 
 
 def test_a_range_of_nothing_is_refused() -> None:
-    """A matcher that may search no disparity is a mistake in the settings."""
+    """A matcher without any disparity to search is a mistake in the settings."""
     with pytest.raises(SettingsError):
         MatchSettings(disparities=0)

@@ -1,4 +1,4 @@
-"""The chessboard: reading its size, finding it, and the order of its corners."""
+"""The chessboard: parsing its size, finding it, and the order of its corners."""
 
 import cv2
 import numpy as np
@@ -12,7 +12,7 @@ from tests.support.rigs import project_points, unlike_rig
 
 @pytest.mark.parametrize("square", ["25mm", "2.5cm", "0.025m", "25", " 25 mm ", "25MM"])
 def test_lengths_are_read_with_their_unit(square: str) -> None:
-    """All ways to write 25 mm give 0.025 m; a bare number is millimetres."""
+    """All ways to write 25 mm give 0.025 m; a bare number means millimetres."""
     board = parse_board("9x6", square)
     assert (board.columns, board.rows) == (9, 6)
     assert board.square_m == pytest.approx(0.025)
@@ -30,7 +30,7 @@ def test_sizes_that_make_no_sense_name_their_option(corners: str, square: str, o
 
 
 def test_points_run_along_rows_in_metres() -> None:
-    """The second point is one square to the right, the one after a row is one square down."""
+    """The second point is one square to the right, and the first of the next row is one square down."""
     points = BOARD.points_m()
     assert points.shape == (54, 3)
     np.testing.assert_allclose(points[1], [0.025, 0, 0])
@@ -38,7 +38,7 @@ def test_points_run_along_rows_in_metres() -> None:
 
 
 def test_corners_of_a_rendered_board_are_where_geometry_puts_them() -> None:
-    """Through both lenses corners are found 0.25 px (root mean square) from their projection, none off by 0.5 px, in order."""
+    """In both cameras' images corners are found within 0.25 px (root mean square) of their projection, none off by 0.5 px, in order."""
     rig = unlike_rig()
     for pose in poses(3, seed=3):
         from_pose = _corners_m(pose)
@@ -46,9 +46,9 @@ def test_corners_of_a_rendered_board_are_where_geometry_puts_them() -> None:
         for image, truth in zip(render_pair(rig, pose), expected, strict=True):
             found = find_corners(image, BOARD)
             assert found.shape == (54, 2)
-            # The board's first inner square is black here, so its white-first order is turned by half.
+            # The board's first inner square is black here, so its white-first order is rotated by 180 degrees.
             errors = np.linalg.norm(found[::-1] - truth, axis=1)
-            assert np.sqrt((errors**2).mean()) < 0.25  # edges without any lens blur alias
+            assert np.sqrt((errors**2).mean()) < 0.25  # without lens blur edges alias
             assert errors.max() < 0.5
 
 
@@ -58,7 +58,7 @@ def _corners_m(pose: np.ndarray) -> np.ndarray:
 
 
 def test_an_image_on_its_head_gives_the_same_corner_first() -> None:
-    """A 9x6 board tells by its colours which corner is the first, whichever way the camera is held."""
+    """A 9x6 board's colours show which corner is the first, however the camera is held."""
     image = render_pair(unlike_rig(), poses(1, seed=4)[0])[0]
     upright, turned = find_corners(image, BOARD), find_corners(image[::-1, ::-1].copy(), BOARD)
     height, width = image.shape
@@ -67,7 +67,7 @@ def test_an_image_on_its_head_gives_the_same_corner_first() -> None:
 
 @pytest.mark.parametrize("board", [Board(8, 6, 0.025), Board(7, 5, 0.025), Board(6, 6, 0.025)])
 def test_boards_that_look_the_same_turned_get_one_order_in_both_views(board: Board) -> None:
-    """Whatever turn the detector gave the right view, it is brought to the left view's."""
+    """If the detector turned the right view, that is undone to match the left view."""
     grid = np.dstack(np.meshgrid(np.arange(board.columns) * 20.0, np.arange(board.rows) * 20.0))
     left, right = grid.reshape(-1, 2) + 50, grid.reshape(-1, 2) * 0.9 + np.array([20, 60])
     turns = [grid * 0.9 + np.array([20, 60])]
@@ -79,14 +79,14 @@ def test_boards_that_look_the_same_turned_get_one_order_in_both_views(board: Boa
 
 
 def test_an_image_without_a_board_gives_no_corners() -> None:
-    """Noise and an empty wall hold no board."""
+    """Noise and an empty wall show no board."""
     noise = np.random.default_rng(1).integers(0, 255, (240, 320)).astype(np.uint8)
     assert find_corners(noise, BOARD).shape == (0, 2)
     assert find_corners(np.full((240, 320, 3), 200, np.uint8), BOARD).shape == (0, 2)
 
 
 def test_corners_from_a_detector_that_looks_from_behind_are_turned_over() -> None:
-    """Rows in mirrored order are put right, and corners that begin at the black end are turned by half."""
+    """Mirrored rows are corrected, and corners that begin at the black end are rotated by 180 degrees."""
     image = render_pair(unlike_rig(), poses(1, seed=4)[0])[0]
     corners = find_corners(image, BOARD)
     grid = corners.reshape(BOARD.rows, BOARD.columns, 2)
@@ -95,6 +95,6 @@ def test_corners_from_a_detector_that_looks_from_behind_are_turned_over() -> Non
 
 
 def test_a_board_whose_colours_tell_keeps_its_corners_as_they_are() -> None:
-    """On a board of 9x6 the first corner is known by its colours: a right view on its head is not turned to look like the left one."""
+    """The colours of a 9x6 board give its first corner: an upside-down right view is not turned to look like the left one."""
     left = np.dstack(np.meshgrid(np.arange(9) * 20.0, np.arange(6) * 20.0)).reshape(-1, 2)
     np.testing.assert_array_equal(agree(left, left[::-1], BOARD), left[::-1])

@@ -1,4 +1,4 @@
-"""The time offset of two cameras, from a screen, a lamp and a scene whose truth is known; and what is said where nothing can be measured."""
+"""The time offset of two cameras, from a screen, a lamp and a scene with known truth; and what is reported if nothing can be measured."""
 
 import math
 from dataclasses import replace
@@ -42,11 +42,11 @@ REFRESH_S = 1 / 59.94
 START_S = 12.3
 
 UNIT_PX = 12
-"""Of the pattern as it is shown; it is filmed at half that, so that its markers are about as small as they may be."""
+"""Size in the displayed pattern; it is filmed at half that, so that its markers are about as small as they may be."""
 
 
 def stamps(seconds: float, fps: float, phase_s: float) -> Times:
-    """Moments at which a camera exposes."""
+    """Times at which a camera exposes."""
     return np.arange(0.0, seconds, 1 / fps) + phase_s
 
 
@@ -65,7 +65,7 @@ def shown(number: int) -> Image:
 
 
 def filmed(moment_s: float, exposure_s: float, *, host: bool) -> Image:
-    """A screen in a room as a camera sees it: slanted, blurred, with less light, and mixed where a refresh falls into the exposure."""
+    """A screen in a room as a camera sees it: slanted, blurred, darker, and mixed if a refresh falls into the exposure."""
     corners = np.array([[0, 0], [WIDTH, 0], [WIDTH, HEIGHT], [0, HEIGHT]], dtype=np.float32) * UNIT_PX
     seen = [[66, 41], [199, 53], [197, 162], [72, 155]] if host else [[53, 57], [228, 48], [221, 160], [57, 162]]
     turn = cv2.getPerspectiveTransform(corners, np.array(seen, dtype=np.float32))
@@ -85,7 +85,7 @@ NOISE = np.random.default_rng(6).normal(0, 3, (13, 210, 280)).astype(np.float32)
 
 @cache
 def side_of_film(fps: float, phase_s: float, *, host: bool) -> tuple[Times, list[Reading | None]]:
-    """Eight seconds of the counting screen as one camera sees it: moments from their beginning, and what was read; filmed once."""
+    """Eight seconds of the counting screen as one camera sees it: times from its start, and the numbers read; filmed once."""
     reader = PatternReader()
     moments = stamps(8.0, fps, phase_s) + START_S
     return moments - START_S, [reader.read(filmed(float(t), 0.008, host=host)) for t in moments]
@@ -99,7 +99,7 @@ def film_screen(offset_s: float, board_fps: float, host_fps: float) -> Measured:
 
 
 def test_every_number_is_read() -> None:
-    """Numbers over the whole range are read from a slanted, noisy image of a screen at rest, and their row is near the middle."""
+    """Numbers over the whole range are read from a slanted, noisy image of a still screen, and their row is near the middle."""
     reader = PatternReader()
     for number in (0, 1, 2, 3, 511, 2048, 3000, COUNT - 1):
         reading = reader.read(filmed((number + 0.5) * REFRESH_S, 0.001, host=True))
@@ -113,7 +113,7 @@ def test_every_number_is_read() -> None:
     [(0.0, 29.6, 29.75, 2), (0.021, 29.6, 30.2, 2), (-0.0605, 29.6, 24.1, 2), (0.02, 30.0, 30.0, 18)],
 )
 def test_a_screen_gives_the_offset(offset: float, board_fps: float, host_fps: float, most_ms: float) -> None:
-    """Stamps that are late by a known time are found late by it, within an uncertainty that is small if all of a refresh was seen in 8 s."""
+    """The known delay of late stamps is measured, with an uncertainty that is small if every part of a refresh was seen in 8 s."""
     measured = film_screen(offset, board_fps, host_fps)
     found, doubt = offset_ms(measured)
     assert measured.method is Method.SCREEN
@@ -123,7 +123,7 @@ def test_a_screen_gives_the_offset(offset: float, board_fps: float, host_fps: fl
 
 
 def test_a_camera_in_step_with_the_screen_is_doubted() -> None:
-    """Where a camera sees each refresh at the same moment of it always, half a refresh is left open and said so."""
+    """If a camera always sees each refresh at the same phase, half a refresh remains uncertain, and the result says so."""
     numbers = np.arange(240) * 2
     times = numbers / 60.0
     locked = counted(times + 0.003, [read_as(int(n)) for n in numbers])
@@ -143,7 +143,7 @@ def read_as(number: int) -> Reading:
     [(10, True, "too short"), (60, False, "did not change"), (60, None, "saw the pattern in 0 of 60")],
 )
 def test_a_screen_that_cannot_serve_is_named(count: int, moves: bool | None, words: str) -> None:  # noqa: FBT001
-    """Too few frames, a still pattern and none at all are three different errors, each with its remedy."""
+    """Too few frames, a still pattern and no pattern are three different errors, each with its remedy."""
     times = stamps(count / 30, 30, 0)[:count]
     readings = [None if moves is None else read_as(int(t * 60) if moves else 7) for t in times]
     with pytest.raises(DataError, match=words) as caught:
@@ -155,7 +155,7 @@ def test_a_screen_that_cannot_serve_is_named(count: int, moves: bool | None, wor
 
 
 def film_lamp(offset_s: float, switches: Times, host_fps: float, exposure_s: float) -> Measured:
-    """Film a lamp that changes at these moments, in the corner of one image and the middle of the other."""
+    """Film a lamp that changes at these times, in the corner of one image and the middle of the other."""
     shown = tuple(switches.tolist())
     board = side_of_lamp(shown, 30.0, 0.003, exposure_s, host=False)
     host = side_of_lamp(shown, host_fps, 0.019, exposure_s, host=True)
@@ -166,7 +166,7 @@ def film_lamp(offset_s: float, switches: Times, host_fps: float, exposure_s: flo
 def side_of_lamp(
     switches: tuple[float, ...], fps: float, phase_s: float, exposure_s: float, *, host: bool
 ) -> Brightness:
-    """What one camera sees of the lamp; filmed once."""
+    """One camera's view of the lamp; filmed once."""
     moments = stamps(switches[-1] + 0.5, fps, phase_s)
     chance = np.random.default_rng(int(host))
     noise = chance.normal(0, 4, (97, 96, 128)).astype(np.float32)
@@ -184,7 +184,7 @@ def side_of_lamp(
 @pytest.mark.parametrize("offset", [0.0, 0.013, -0.070])
 @pytest.mark.parametrize(("host_fps", "exposure_s"), [(30.0, 0.001), (30.0, 0.02), (24.0, 0.01)])
 def test_a_lamp_gives_the_offset(offset: float, host_fps: float, exposure_s: float) -> None:
-    """Sixty changes of a lamp at random moments give the offset within the stated uncertainty, whatever rates and exposure times."""
+    """Sixty changes of a lamp at random times give the offset within the stated uncertainty, for any rates and exposure times."""
     chance = np.random.default_rng(5)
     switches = np.cumsum(chance.uniform(0.12, 0.6, 60))
     measured = film_lamp(offset, switches, host_fps, exposure_s)
@@ -195,14 +195,14 @@ def test_a_lamp_gives_the_offset(offset: float, host_fps: float, exposure_s: flo
 
 @pytest.mark.parametrize("pause_s", [10 / 30, 0.347])
 def test_a_lamp_that_blinks_regularly_is_refused(pause_s: float) -> None:
-    """Such a lamp may keep step with the frames, and then every change would be off by the same unknown time."""
+    """A regular lamp may be in step with the frames, and then every change would be off by the same unknown time."""
     with pytest.raises(DataError, match="regularly"):
         film_lamp(0.0, np.linspace(pause_s, 40 * pause_s, 40) + 0.021, 30.0, 0.001)
 
 
 @pytest.mark.parametrize(("switches", "words"), [(3, "only 3 changes"), (0, "saw no lamp")])
 def test_a_lamp_that_says_too_little_is_named(switches: int, words: str) -> None:
-    """Too few changes and a lamp that was not seen are told apart."""
+    """Too few changes and an unseen lamp give different errors."""
     moments = np.array([1.0, 2.2, 3.1][:switches] + ([] if switches else [100.0]))
     if not switches:
         still = Brightness(stamps(4, 30, 0), np.random.default_rng(1).normal(60, 0.2, (120, 108)))
@@ -235,7 +235,7 @@ def moving(amplitude_m: tuple[float, float, float], spin_rad_s: float) -> Scene:
 
 @cache
 def rendered(amplitude_m: tuple[float, float, float], spin_rad_s: float) -> dict[Side, list[tuple[float, Image]]]:
-    """The scene as both cameras of the demo's rig see it, with the moments; the right one exposes 9 ms after the left."""
+    """The scene as both cameras of the demo's rig see it, with the times; the right one exposes 9 ms after the left."""
     rig, scene = small_rig(), moving(amplitude_m, spin_rad_s)
     views = zip(Side, (rig.left, rig.right), rig_poses(rig), (WEBCAM_LOOK, PHONE_LOOK), strict=True)
     film = {}
@@ -247,7 +247,7 @@ def rendered(amplitude_m: tuple[float, float, float], spin_rad_s: float) -> dict
 
 
 def film_scene(film: dict[Side, list[tuple[float, Image]]], offset_s: float, board_side: Side) -> Measured:
-    """Measure the offset of two cameras of which the host's has stamps that are late."""
+    """Measure the offset of two cameras; the host camera's stamps are late."""
     images: dict[str, Image] = {}
     sides: dict[Side, list[Shot]] = {Side.LEFT: [], Side.RIGHT: []}
     for side, frames in film.items():
@@ -273,7 +273,7 @@ def film_scene(film: dict[Side, list[tuple[float, Image]]], offset_s: float, boa
 
 @pytest.mark.parametrize(("offset", "board_side"), [(0.013, Side.LEFT), (-0.024, Side.RIGHT)])
 def test_a_moving_scene_gives_the_offset(offset: float, board_side: Side) -> None:
-    """From a rendered scene that moves up and down the known offset is found within the stated uncertainty, whichever side the board is."""
+    """From a rendered scene that moves up and down, the known offset is measured within the stated uncertainty, whichever camera is the board's."""
     measured = film_scene(rendered((0.05, 0.10, 0.0), 0.3), offset, board_side)
     found, doubt = offset_ms(measured)
     assert abs(found - offset * 1e3) <= doubt < 3
@@ -284,7 +284,7 @@ def test_a_moving_scene_gives_the_offset(offset: float, board_side: Side) -> Non
 
 
 def test_motion_along_the_rows_is_not_enough() -> None:
-    """A scene that moves sideways only says nothing of time: the error says so, with what to do."""
+    """A scene that only moves sideways says nothing about time: the error says so, and what to do."""
     with pytest.raises(DataError, match="motion up or down") as caught:
         film_scene(rendered((0.10, 0.0, 0.0), 0.0), 0.01, Side.LEFT)
     assert "up and down" in caught.value.remedy

@@ -1,4 +1,4 @@
-"""Measuring the time offset where something goes wrong on the way: frames lost, numbers misread, stamps that jump, a lens covered for a moment."""
+"""Measuring the time offset when something goes wrong: lost frames, misread numbers, jumping stamps, a lens covered for a moment."""
 
 from functools import cache
 
@@ -29,7 +29,7 @@ def offset_ms(measured: Measured) -> tuple[float, float]:
 
 
 def read_at(times_s: Times, late_s: NDArray[np.float64] | float = 0.0, *, misread: tuple[int, ...] = ()) -> Counted:
-    """What a camera reads of a count that began at 0: its stamps are late; some numbers are far off."""
+    """A camera's readings of a count that began at 0: its stamps are late, and some numbers are far off."""
     numbers = [int(t * REFRESH_HZ) + 1000 * (k in misread) for k, t in enumerate(times_s)]
     return counted(times_s + late_s, [Reading(number % COUNT, 0.5) for number in numbers])
 
@@ -38,13 +38,13 @@ BOARD_S, HOST_S = np.arange(240) / 29.7, np.arange(240) / 30.31 + 0.004
 
 
 def test_a_number_misread_now_and_then_changes_nothing() -> None:
-    """Two of 240 numbers that are off by a quarter of the count leave the offset where it is, and its uncertainty small."""
+    """If two of 240 numbers are off by a quarter of the count, the offset stays correct, and its uncertainty small."""
     found, doubt = offset_ms(measure_screen(read_at(BOARD_S, misread=(50, 180)), read_at(HOST_S, 0.021)))
     assert abs(found - 21.0) <= doubt < 2.0
 
 
 def test_stamps_that_jump_a_little_are_allowed_for() -> None:
-    """Where stamps are off by up to 1.5 ms at random the offset is still found, with more doubt than without."""
+    """With random errors of up to 1.5 ms in the stamps the offset is still found, with a larger uncertainty."""
     off_s = np.random.default_rng(1).uniform(-0.0015, 0.0015, len(HOST_S))
     sure = offset_ms(measure_screen(read_at(BOARD_S), read_at(HOST_S, 0.021)))
     found, doubt = offset_ms(measure_screen(read_at(BOARD_S), read_at(HOST_S, 0.021 + off_s)))
@@ -53,14 +53,14 @@ def test_stamps_that_jump_a_little_are_allowed_for() -> None:
 
 
 def test_stamps_that_jump_by_periods_are_refused() -> None:
-    """Stamps that are off by up to 60 ms at random fit no steady count: an error that says what else there is."""
+    """Stamps with random errors of up to 60 ms fit no steady count: the error names the other ways to measure."""
     off_s = np.random.default_rng(2).uniform(-0.06, 0.06, len(HOST_S))
     with pytest.raises(DataError, match=r"do not fit the screen's count.*--by lamp"):
         measure_screen(read_at(BOARD_S), read_at(HOST_S, off_s))
 
 
 def test_a_pattern_half_out_of_view_or_too_faint_is_not_read() -> None:
-    """One marker alone does not tell where the cells are, and grey on grey not which of them are dark: no number rather than a false one."""
+    """One marker alone does not show where the cells are, and grey on grey does not show which are dark: no number is better than a wrong one."""
     reader, whole = PatternReader(), cv2.copyMakeBorder(draw(1234, 12), 30, 30, 30, 30, cv2.BORDER_CONSTANT, value=255)
     reading = reader.read(np.asarray(whole, np.uint8))
     assert reading is not None
@@ -78,14 +78,14 @@ FILM_S = np.arange(0.0, 12.0, 1 / 30)
 
 
 def lamp_seen(times_s: Times, late_s: float = 0.0, *, switches_s: Times | None = None, lost: Lost = None) -> Brightness:
-    """What a camera with an exposure of no length sees of a lamp that fills the image; frames may be lost."""
+    """What a camera with zero exposure time sees of a lamp that fills the image; frames may be lost."""
     kept = times_s if lost is None else times_s[~lost]
     light = 60.0 + 90.0 * (np.searchsorted(SWITCHES_S if switches_s is None else switches_s, kept) % 2)
     return Brightness(kept + late_s, np.repeat(light[:, np.newaxis], CELLS[0] * CELLS[1], axis=1))
 
 
 def test_a_change_that_falls_into_a_gap_counts_for_nothing() -> None:
-    """Where three frames are lost around every fourth change those could be anywhere: they are left out, and the others give the offset."""
+    """If three frames are lost around every fourth change, those changes could be anywhere. They are left out, and the others give the offset."""
     gaps = np.abs(FILM_S[:, np.newaxis] - SWITCHES_S[::4]).min(axis=1) < 0.05
     whole = measure_lamp(lamp_seen(FILM_S), lamp_seen(FILM_S + 0.011, 0.025))
     holed = measure_lamp(lamp_seen(FILM_S, lost=gaps), lamp_seen(FILM_S + 0.011, 0.025))
@@ -96,7 +96,7 @@ def test_a_change_that_falls_into_a_gap_counts_for_nothing() -> None:
 
 
 def test_a_regular_lamp_is_refused_though_a_change_was_missed() -> None:
-    """Two changes that fall into gaps make two pauses of double length: the lamp blinks regularly all the same, and may keep step."""
+    """Two changes in gaps make two pauses of double length: the lamp still blinks regularly, and may be in step."""
     regular_s = np.arange(0.368, 10.6, 0.347)
     gaps = np.abs(FILM_S[:, np.newaxis] - regular_s[[8, 17]]).min(axis=1) < 0.05
     seen_by_host = lamp_seen(FILM_S + 0.011, 0.025, switches_s=regular_s)
@@ -105,7 +105,7 @@ def test_a_regular_lamp_is_refused_though_a_change_was_missed() -> None:
 
 
 def test_a_switch_that_bounces_tells_nothing_where_it_does() -> None:
-    """A swift camera sees every third change three times within 40 ms, a slow one once: which of them it saw is left open, and the others give the offset."""
+    """A fast camera sees every third change three times within 40 ms, a slow one once, and which of the three is unknown. These changes are left out, and the others give the offset."""
     bounces_s = np.sort(np.concatenate([SWITCHES_S, SWITCHES_S[::3] + 0.02, SWITCHES_S[::3] + 0.04]))
     swift_s = np.arange(0.0, 12.0, 1 / 100)
     once = measure_lamp(lamp_seen(FILM_S), lamp_seen(swift_s, 0.025))
@@ -117,7 +117,7 @@ def test_a_switch_that_bounces_tells_nothing_where_it_does() -> None:
 
 
 def test_films_that_overlap_little_are_compared_where_they_do() -> None:
-    """A host that filmed from the middle of the board's film on: offsets that leave less than half to compare are no candidates; the true one is found."""
+    """The host films only from the middle of the board's film on: offsets that leave less than half to compare are no candidates, and the true one is found."""
     measured = measure_lamp(lamp_seen(FILM_S), lamp_seen(FILM_S[FILM_S > 5.8] + 0.011, -0.030))
     assert np.isinf(measured.misfits).any()
     found, doubt = offset_ms(measured)
@@ -147,14 +147,14 @@ def poster() -> Image:
 
 
 def seen(moment_s: float, right_px: float = 0.0, down_px: float = 0.0) -> Image:
-    """A poster that swings up and down by 10 px, 1.5 times a second, as a camera sees it that stands aside."""
+    """A poster that swings up and down by 10 px, 1.5 times a second, as seen by a camera to one side."""
     height_px = 10.0 * np.sin(2 * np.pi * 1.5 * moment_s) + down_px
     moved = np.array([[1.0, 0.0, -40.0 - right_px], [0.0, 1.0, -40.0 + height_px]])
     return np.asarray(cv2.warpAffine(poster(), moved, (160, 120), flags=cv2.INTER_CUBIC), np.uint8)
 
 
 def film(board: list[Image], host: dict[int, Image], offset_s: float) -> Measured:
-    """Measure with 30 frames a second of both cameras, the host's 9 ms behind the board's and stamped late by `offset_s`."""
+    """Measure with 30 frames a second from both cameras; the host's are 9 ms behind the board's and stamped late by `offset_s`."""
     images: dict[str, Image] = {}
 
     def shot(name: str, moment_s: float, image: Image) -> Shot:
@@ -170,7 +170,7 @@ def film(board: list[Image], host: dict[int, Image], offset_s: float) -> Measure
 
 
 def test_lost_frames_and_a_covered_lens_cost_only_themselves() -> None:
-    """Four host's frames in a row that never came, and two board's frames of a covered lens, leave the offset where it is."""
+    """Four host frames lost in a row, and two board frames with a covered lens, do not change the offset."""
     board = [seen(k / 30) if k not in {20, 21} else np.zeros((120, 160), np.uint8) for k in range(FRAMES)]
     host = {k: seen(k / 30 + LATE_S, right_px=12.0) for k in range(FRAMES) if k not in range(8, 12)}
     found, doubt = offset_ms(film(board, host, 0.013))
@@ -178,7 +178,7 @@ def test_lost_frames_and_a_covered_lens_cost_only_themselves() -> None:
 
 
 def test_a_rig_that_shakes_against_itself_is_no_measurement() -> None:
-    """Where the second camera nods by itself the rows say more of that than of the time: refused, with the doubt that was left."""
+    """If the second camera itself nods, the rows show that more than the time: refused, with the remaining uncertainty."""
     nods_px = np.random.default_rng(3).uniform(-5, 5, FRAMES)
     board = [seen(k / 30) for k in range(FRAMES)]
     host = {k: seen(k / 30 + LATE_S, right_px=12.0, down_px=float(nods_px[k])) for k in range(FRAMES)}

@@ -1,4 +1,4 @@
-"""Traces of pairs' lives for Perfetto."""
+"""Traces for Perfetto of what happens to each pair."""
 
 from dataclasses import replace
 from typing import Any
@@ -16,7 +16,7 @@ PARTS = ("capture", "outbox", "propagation", "pairing", "queuing", "processing")
 
 @st.composite
 def runs(draw: st.DrawFn) -> tuple[PairLedger, ...]:
-    """Pairs in the order in which they were done, one worker, everything else overlapping at will."""
+    """Pairs in the order in which they were done, with one worker and everything else overlapping freely."""
     done_ns = 10**15
     ledgers = []
     for number in range(draw(st.integers(0, 12))):
@@ -51,7 +51,7 @@ def runs(draw: st.DrawFn) -> tuple[PairLedger, ...]:
 @given(st.lists(runs(), max_size=3))
 @settings(deadline=None, max_examples=60)
 def test_any_runs_give_a_trace_by_the_rules(ledgers: list[tuple[PairLedger, ...]]) -> None:
-    """Whatever overlaps, every event has what its phase demands, slices nest, flows join a begin to an end."""
+    """Whatever overlaps, every event has the fields that its phase requires, slices nest, and flows join a begin to an end."""
     events = checked(trace_json([TracedRun(f"run {number}", run) for number, run in enumerate(ledgers)]))
     pairs = sum(len(run) for run in ledgers)
     assert sum(event["name"] == "processing" for event in events if event["ph"] == "X") == pairs
@@ -61,7 +61,7 @@ def test_any_runs_give_a_trace_by_the_rules(ledgers: list[tuple[PairLedger, ...]
 @given(runs())
 @settings(deadline=None, max_examples=40)
 def test_a_pairs_slices_are_its_delays_one_behind_the_other(ledgers: tuple[PairLedger, ...]) -> None:
-    """For each pair the six slices have the ledger's delays as lengths, and each begins where the one before ends."""
+    """The six slices of each pair are as long as the ledger's delays, and each begins where the one before ends."""
     events = checked(trace_json([TracedRun("run", ledgers)]))
     for ledger in ledgers:
         slices: dict[str, Any] = {
@@ -79,7 +79,7 @@ def test_a_pairs_slices_are_its_delays_one_behind_the_other(ledgers: tuple[PairL
 
 
 def test_a_clock_that_errs_gives_no_negative_slice() -> None:
-    """A frame that seems to come before it was sent, within the clock's uncertainty, is shown as a slice without length."""
+    """A frame that appears to arrive before it was sent, within the clock's uncertainty, is shown as a slice of length zero."""
     board = BoardMarks(exposed_ns=0, grabbed_ns=1000, sent_ns=2000)
     ledger = replace(
         LEDGER,

@@ -1,4 +1,4 @@
-"""Time skew, clock and age against motion: a warning in words exactly where a point is displaced too far."""
+"""Time skew, clock and age against image motion: a warning exactly where a point is displaced too far."""
 
 from dataclasses import replace
 
@@ -38,12 +38,12 @@ STILL = Timing(time_skew_ns=16 * MS, uncertainty_ns=0.1 * MS, end_to_end_ns=80 *
     ],
 )
 def test_the_limits(timing: Timing, found: list[Doubt]) -> None:
-    """Half a pixel by time skew or clock, a twentieth of the width by age; what is not known makes no warning."""
+    """Half a pixel by time skew or clock, a twentieth of the width by age; unknown values cause no warning."""
     assert [concern.doubt for concern in timing_concerns(timing)] == found
 
 
 def warned(skew_ns: float, motion_px_s: float) -> bool:
-    """Whether this time skew at this motion is warned of; a warning has a remedy."""
+    """Whether this time skew at this motion causes a warning; a warning has a remedy."""
     concerns = timing_concerns(replace(STILL, time_skew_ns=skew_ns, motion_px_s=motion_px_s))
     found = [concern for concern in concerns if concern.doubt is Doubt.TIME_SKEW]
     assert all(concern.remedy for concern in found)
@@ -54,7 +54,7 @@ def warned(skew_ns: float, motion_px_s: float) -> bool:
     ("skew_ms", "motion_px_s"), [(0.25, 2000), (1, 500), (5, 100), (10, 50), (33, 15.1515151515), (100, 5)]
 )
 def test_the_limit_is_half_a_pixel(skew_ms: float, motion_px_s: float) -> None:
-    """Of skews and motions that make half a pixel together, a hundredth less of either is silent and a hundredth more is not."""
+    """Where skew and motion together make half a pixel, a hundredth less of either gives no warning and a hundredth more gives one."""
     assert not warned(0.99 * skew_ms * MS, motion_px_s)
     assert warned(1.01 * skew_ms * MS, motion_px_s)
     assert not warned(skew_ms * MS, 0.99 * motion_px_s)
@@ -65,7 +65,7 @@ def test_the_limit_is_half_a_pixel(skew_ms: float, motion_px_s: float) -> None:
 def test_more_skew_or_motion_never_silences_the_warning(
     skew_ns: float, motion_px_s: float, later: float, faster: float
 ) -> None:
-    """What is warned of is warned of when frames are further apart or things move faster."""
+    """A warning stays when frames are further apart or things move faster."""
     assert warned(later * skew_ns, faster * motion_px_s) >= warned(skew_ns, motion_px_s)
 
 
@@ -107,7 +107,7 @@ MEASURED = TimeOffset(3 * MS, 2 * MS)
 def test_what_is_not_known_of_the_stamps_adds_up(
     offset: TimeOffset, own: CameraHealth, half_width_ns: int, said: str, remedy: str
 ) -> None:
-    """An unmeasured time offset, an own camera's latency and its jitter add up, and a warning names figure and remedy where that is half a pixel."""
+    """An unmeasured time offset and an own camera's latency and jitter add up; if that is half a pixel, a warning names figure and remedy."""
     doubt = stamp_doubt(offset, own)
     assert doubt.half_width_ns == half_width_ns
     limit_px_s = 0.5e9 / half_width_ns

@@ -1,4 +1,4 @@
-"""The host's udev rule, from a tree of files as the kernel's."""
+"""The host's udev rule, from a file tree like the kernel's."""
 
 import os
 import re
@@ -26,7 +26,7 @@ def plug(sysfs: Path, port: str, serial: str, manufacturer: str = "tandemscan", 
 
 @pytest.fixture
 def sysfs(tmp_path: Path) -> Path:
-    """A machine with a port that belongs to no USB device, and a foreign modem."""
+    """A machine with a port that belongs to no USB device, and another maker's modem."""
     sysfs = tmp_path / "sys"
     (sysfs / "devices" / "platform" / "serial8250" / "tty" / "ttyS0").mkdir(parents=True)
     (sysfs / "class" / "tty").mkdir(parents=True)
@@ -36,7 +36,7 @@ def sysfs(tmp_path: Path) -> Path:
 
 
 def test_the_only_board_is_found_and_named_by_its_three_numbers(sysfs: Path) -> None:
-    """The rule holds vendor, product and serial number in each of its lines, and no other device's."""
+    """The rule has vendor, product and serial number in each of its lines, and nothing of other devices."""
     plug(sysfs, "ttyACM3", "0a1b2c3d4e5f")
     board = find_usb_board(None, sysfs)
     assert (board.device, board.vendor, board.product, board.serial) == ("ttyACM3", "1d6b", "0104", "0a1b2c3d4e5f")
@@ -49,7 +49,7 @@ def test_the_only_board_is_found_and_named_by_its_three_numbers(sysfs: Path) -> 
 
 
 def test_a_port_chooses_one_of_several(sysfs: Path) -> None:
-    """Two boards end in one line that names both and the option; with a port, also one with another maker's name, its device is taken."""
+    """Two boards give one line that names both and the option. With a port, even another maker's, the port's device is taken."""
     plug(sysfs, "ttyACM3", "aaa")
     plug(sysfs, "ttyACM4", "bbb")
     with pytest.raises(SettingsError, match=r"ttyACM3.*ttyACM4.*--link serial:"):
@@ -60,7 +60,7 @@ def test_a_port_chooses_one_of_several(sysfs: Path) -> None:
 
 @pytest.mark.parametrize("port", [None, Path("/dev/ttyACM9"), Path("/dev/ttyS0")])
 def test_without_a_board_there_is_one_line(sysfs: Path, port: Path | None) -> None:
-    """No board, a port that is not there, one that is no USB device's: each is named with the remedy."""
+    """No board, a missing port and a port of no USB device: each error names it and the remedy."""
     with pytest.raises(MissingDeviceError, match="plug") as caught:
         find_usb_board(port, sysfs)
     assert "\n" not in str(caught.value)
@@ -83,14 +83,14 @@ def test_without_a_board_there_is_one_line(sysfs: Path, port: Path | None) -> No
     ],
 )
 def test_a_serial_number_that_says_more_is_refused(sysfs: Path, serial: str) -> None:
-    """A device whose number would be a pattern, or another rule, gets none."""
+    """A device whose serial number would act as a pattern or another rule gets no rule."""
     plug(sysfs, "ttyACM3", serial)
     with pytest.raises(DataError, match="ttyACM3"):
         find_usb_board(None, sysfs)
 
 
 def test_the_rule_is_written_whole_for_all_to_read(sysfs: Path, tmp_path: Path) -> None:
-    """It takes the place of an earlier one; a link in its place is replaced, and leads nowhere."""
+    """The new rule replaces an earlier one. A link in its place is replaced, and its target is not touched."""
     plug(sysfs, "ttyACM3", "aaa")
     (tmp_path / "precious").write_text("precious")
     (tmp_path / "rules.d").mkdir()

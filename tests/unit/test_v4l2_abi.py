@@ -24,7 +24,7 @@ _FIXED: dict[str, type[ctypes.Structure]] = {
     "v4l2_querymenu": abi.MenuItem,
     "v4l2_event_subscription": abi.EventSubscription,
 }
-# What a C compiler says of <linux/videodev2.h> (Linux 6.1 headers) for x86-64, for armhf, and for armhf with a 64-bit time_t:
+# What a C compiler reports for <linux/videodev2.h> (Linux 6.1 headers) on x86-64, on armhf, and on armhf with a 64-bit time_t:
 # sizes of v4l2_format, v4l2_buffer, v4l2_event; offsets of format.fmt, buffer.timestamp, .sequence, .m, .length; VIDIOC_DQBUF, VIDIOC_DQEVENT.
 _MACHINES = {
     (64, 64): (208, 88, 136, 8, 24, 56, 64, 72, 0xC0585611, 0x80885659),
@@ -71,7 +71,7 @@ _NAMES = {
 
 @pytest.mark.parametrize("machine", _MACHINES)
 def test_the_layout_of_every_machine_is_the_compilers(machine: tuple[int, int]) -> None:
-    """Sizes, offsets and ioctl numbers of 64-bit, 32-bit and 32-bit machines with long time are what C compilers say."""
+    """Sizes, offsets and ioctl numbers on 64-bit, 32-bit and 32-bit machines with 64-bit time_t are those of C compilers."""
     made = abi.layout(*machine)
     sizes = [ctypes.sizeof(kind) for kind in (made.format, made.buffer, made.event)]
     names = ("seconds", "sequence", "place", "length")
@@ -113,7 +113,7 @@ def test_this_machines_headers_agree(tmp_path: Path) -> None:
 
 
 def test_four_letters_of_a_format() -> None:
-    """A format's letters become its number and back; YUYV is 0x56595559 in videodev2.h's arithmetic."""
+    """A format's letters convert to its number and back; YUYV is 0x56595559 by videodev2.h's arithmetic."""
     assert abi.fourcc("YUYV") == 0x56595559
     assert abi.fourcc_name(0x56595559) == "YUYV"
     assert abi.fourcc_name(0x20203859) == "Y8.."

@@ -1,4 +1,4 @@
-"""The order and the values in which a camera's controls are set."""
+"""The order in which a camera's controls are set, and their values."""
 
 from dataclasses import replace
 
@@ -97,7 +97,7 @@ def _set(steps: list[object]) -> list[tuple[str, int]]:
 
 
 def test_known_values_are_set_with_the_automatism_off_first() -> None:
-    """Frame rate first, then each automatism off before its value: the order that drivers demand (EACCES otherwise)."""
+    """The frame rate comes first, then each automatic mode is switched off before its value is set: drivers require that order (EACCES otherwise)."""
     wishes = ControlWishes(((Axis.FOCUS, 30), (Axis.EXPOSURE, 100), (Axis.WHITE_BALANCE, 4000)), PowerLine.HZ_50)
     assert _set([*ControlPlan(_WEBCAM).to_start(wishes)]) == [
         ("Dynamic Framerate", 0),
@@ -112,7 +112,7 @@ def test_known_values_are_set_with_the_automatism_off_first() -> None:
 
 
 def test_what_was_found_is_held() -> None:
-    """Axes without a wish are read, and then held at just that; those with a wish are left alone."""
+    """Controls without a requested value are read, and then fixed at that value; those with one are left alone."""
     plan, wishes = ControlPlan(_WEBCAM), ControlWishes(((Axis.GAIN, 20),))
     assert [axis for axis, _ in plan.to_find(wishes)] == [Axis.EXPOSURE, Axis.WHITE_BALANCE, Axis.FOCUS]
     found = ((Axis.EXPOSURE, 333), (Axis.WHITE_BALANCE, 5100), (Axis.FOCUS, 45))
@@ -131,14 +131,14 @@ def test_what_was_found_is_held() -> None:
 
 
 def test_lock_off_leaves_the_automatisms_alone() -> None:
-    """With lock=0 nothing is read to be held, and only the frame rate is kept constant."""
+    """With lock=0 nothing is read to be fixed, and only the frame rate is kept constant."""
     plan, wishes = ControlPlan(_WEBCAM), ControlWishes(lock=False)
     assert plan.to_find(wishes) == []
     assert _set([*plan.to_start(wishes)]) == [("Dynamic Framerate", 0)]
 
 
 def test_a_camera_without_controls_is_left_alone() -> None:
-    """Nothing is set that is not there, and wishes that cannot be met are named."""
+    """Only existing controls are set, and requests that cannot be met are named."""
     plan, wishes = ControlPlan(()), ControlWishes(((Axis.EXPOSURE, 100),), PowerLine.HZ_60)
     assert plan.to_start(wishes) == []
     assert plan.to_find(wishes) == []
@@ -148,13 +148,13 @@ def test_a_camera_without_controls_is_left_alone() -> None:
 
 
 def test_an_automatism_without_a_value_is_switched_off() -> None:
-    """White balance that has only an automatism is held by switching that off; exposure is not: it could go dark."""
+    """If white balance has only an automatic mode, it is fixed by switching that off; exposure is not, as the image could go dark."""
     plan = ControlPlan((_AUTO_WHITE, _AUTO_EXPOSURE))
     assert _set([*plan.to_lock((), ControlWishes())]) == [("White Balance, Auto", 0)]
 
 
 def test_shutter_priority_stands_in_for_manual() -> None:
-    """A camera whose menu has no manual mode is held in shutter priority."""
+    """A camera whose menu has no manual mode is fixed in shutter priority."""
     menu = Control(
         id=abi.CID_AUTO_EXPOSURE,
         name="Auto Exposure",
@@ -172,7 +172,7 @@ def test_shutter_priority_stands_in_for_manual() -> None:
 
 @pytest.mark.parametrize("flag", [abi.CTRL_FLAG_GRABBED, abi.CTRL_FLAG_READ_ONLY, abi.CTRL_FLAG_DISABLED])
 def test_controls_that_cannot_be_set_are_not_tried(flag: int) -> None:
-    """Grabbed, read-only and disabled controls are left alone; inactive ones are set, for they wake with their automatism off."""
+    """Grabbed, read-only and disabled controls are left alone. Inactive ones are set, as they become active when their automatic mode is off."""
     gain = Control(
         id=abi.CID_GAIN, name="Gain", kind=abi.CTRL_TYPE_INTEGER, minimum=0, maximum=100, step=1, default=0, flags=flag
     )
@@ -184,7 +184,7 @@ def test_controls_that_cannot_be_set_are_not_tried(flag: int) -> None:
     value=st.integers(-(2**40), 2**40), low=st.integers(-1000, 1000), span=st.integers(0, 5000), step=st.integers(0, 99)
 )
 def test_values_are_fitted_to_the_range(value: int, low: int, span: int, step: int) -> None:
-    """A fitted value lies in the range, on the grid or at its end, and no further off than half a step from what can be had."""
+    """A fitted value lies in the range, on the grid or at its end, and no further than half a step from the nearest possible value."""
     control = Control(
         id=abi.CID_GAIN,
         name="Gain",
@@ -212,7 +212,7 @@ _QUALITY = Control(
 
 
 def test_a_quality_is_set_before_the_stream_and_again_after_a_loss() -> None:
-    """A quality that was chosen is among what is set at every start; without a choice, or without the control, nothing is."""
+    """A chosen quality is set at every start; without a choice, or without the control, it is not."""
     assert _set([*ControlPlan((_QUALITY,)).to_start(ControlWishes(quality=45))]) == [("Compression Quality", 45)]
     assert _set([*ControlPlan((_QUALITY,)).to_start(ControlWishes())]) == []
     assert ControlPlan(_WEBCAM).to_start(ControlWishes(quality=45)) == ControlPlan(_WEBCAM).to_start(ControlWishes())
@@ -221,7 +221,7 @@ def test_a_quality_is_set_before_the_stream_and_again_after_a_loss() -> None:
 
 
 def test_a_quality_that_cannot_be_set_is_none() -> None:
-    """A camera without the control, or whose driver only tells the value, offers no quality."""
+    """A camera without the control, or whose driver only reports the value, offers no quality."""
     told = replace(_QUALITY, flags=abi.CTRL_FLAG_READ_ONLY)
     assert ControlPlan((_QUALITY,)).quality() == _QUALITY
     assert ControlPlan((told,)).quality() is None
@@ -230,7 +230,7 @@ def test_a_quality_that_cannot_be_set_is_none() -> None:
 
 @given(st.integers(1, 50), st.integers(0, 255), st.integers(1, 7), st.data())
 def test_lower_qualities_are_values_of_the_control(minimum: int, range_: int, step: int, data: st.DataObject) -> None:
-    """Whatever range a driver has, each value is one that its control takes, below the present one, the best first, and at most four."""
+    """For any range of a driver, each offered value is valid for its control and below the present one; the best comes first, and there are at most four."""
     control = replace(_QUALITY, minimum=minimum, maximum=minimum + range_, step=step)
     present = data.draw(st.integers(control.minimum, control.maximum))
     values = lower_qualities(control, present)

@@ -1,4 +1,4 @@
-"""The choice among what a camera offers."""
+"""Choosing among the formats that a camera offers."""
 
 from fractions import Fraction
 
@@ -25,7 +25,7 @@ _H264 = FormatOffer(letters="H264", text="H.264", sizes_px=_SIZES)
 
 
 def test_jpeg_at_the_usual_size_without_a_wish() -> None:
-    """Of a camera that has both, MJPEG is taken, at 640x480, wherever they stand in its list."""
+    """If a camera has both, MJPEG is chosen, at 640x480, wherever they are in its list."""
     choice = choose((_YUYV, _H264, _MJPEG), Wanted(), "/dev/video0")
     assert (choice.letters, choice.pixel_format, choice.size_px) == ("MJPG", PixelFormat.MJPEG, (640, 480))
 
@@ -51,12 +51,12 @@ def test_a_size_that_only_raw_has_is_taken_raw() -> None:
 
 
 def test_a_format_that_is_asked_for_is_taken() -> None:
-    """The user's format goes before the preference."""
+    """The user's format overrides the preference."""
     assert choose((_MJPEG, _YUYV), Wanted(None, None, PixelFormat.YUYV), "x").letters == "YUYV"
 
 
 def test_an_absent_size_is_refused_with_the_list() -> None:
-    """A size that is not there is an error of one line that names the camera and lists its sizes."""
+    """An unavailable size gives an error of one line that names the camera and lists its sizes."""
     with pytest.raises(SettingsError) as caught:
         choose((_MJPEG,), Wanted((800, 601)), "/dev/video0")
     text = str(caught.value)
@@ -66,20 +66,20 @@ def test_an_absent_size_is_refused_with_the_list() -> None:
 
 
 def test_an_absent_format_is_refused_with_the_list() -> None:
-    """A format that is not there is an error that lists the camera's formats."""
+    """An unavailable format gives an error that lists the camera's formats."""
     with pytest.raises(SettingsError, match="nv12") as caught:
         choose((_MJPEG, _YUYV), Wanted(None, None, PixelFormat.NV12), "x")
     assert caught.value.remedy.endswith("MJPG, YUYV")
 
 
 def test_a_camera_with_h264_alone_is_refused() -> None:
-    """H.264 is no sequence of images; the error says so, and what to use instead."""
+    """H.264 is not a sequence of images; the error says so, and what to use instead."""
     with pytest.raises(UnavailableError, match=r"has only H264, which cannot be sent.*MJPEG"):
         choose((_H264,), Wanted(), "x")
 
 
 def test_a_camera_without_any_format_is_not_there_yet() -> None:
-    """A loopback device that nobody feeds offers nothing: unavailable now, not wrong."""
+    """A loopback device without a source offers nothing: unavailable now, not wrong."""
     with pytest.raises(UnavailableError, match="no format at the moment"):
         choose((), Wanted(), "x")
 
@@ -110,7 +110,7 @@ _NAMED = Rates((Fraction(60), Fraction(10_000_000, 333_333), Fraction(15)))
     ],
 )
 def test_the_rate(rates: Rates, wish: Fraction | None, expected: Fraction) -> None:
-    """Without a wish the highest rate up to 30 is taken; a wish is met within one per cent; an unknown list refuses nothing."""
+    """By default the highest rate up to 30 is chosen; a requested rate is met within one per cent; an unknown list refuses nothing."""
     assert choose_rate(rates, Wanted(None, wish), "x") == expected
 
 
@@ -118,14 +118,14 @@ def test_the_rate(rates: Rates, wish: Fraction | None, expected: Fraction) -> No
     ("rates", "listed"), [(_NAMED, "60, 30, 15"), (Rates((), (Fraction(1), Fraction(15))), "1 to 15")]
 )
 def test_an_absent_rate_is_refused_with_the_list(rates: Rates, listed: str) -> None:
-    """A rate that is not there is an error that lists those that are."""
+    """An unavailable rate gives an error that lists the available ones."""
     with pytest.raises(SettingsError, match="25") as caught:
         choose_rate(rates, Wanted(None, Fraction(25)), "x")
     assert caught.value.remedy.endswith(listed)
 
 
 def test_slower_rates_are_those_below() -> None:
-    """Of named rates those below the present one are offered, the highest first; of any between two, whole parts of it; of an unknown set, none."""
+    """Of listed rates those below the present one are offered, the highest first; of a continuous range, whole fractions of it; of an unknown set, none."""
     named = Rates((Fraction(30), Fraction(2997, 100), Fraction(15), Fraction(15, 2), Fraction(5)))
     assert slower_rates(named, Fraction(30)) == (Fraction(15), Fraction(15, 2), Fraction(5))
     assert slower_rates(named, Fraction(15)) == (Fraction(15, 2), Fraction(5))
@@ -136,17 +136,17 @@ def test_slower_rates_are_those_below() -> None:
 
 
 def test_smaller_sizes_have_exactly_one_shape() -> None:
-    """Of the sizes below one, those of exactly its shape are offered, the largest first; a scaling camera's are its halves, thirds and quarters."""
+    """Of the smaller sizes, those of exactly the same shape are offered, the largest first; a scaling camera offers halves, thirds and quarters."""
     sizes = ((1280, 960), (640, 480), (640, 360), (352, 288), (320, 240), (160, 120))
     assert smaller_sizes(FormatOffer(letters="MJPG", text="", sizes_px=sizes), (640, 480)) == ((320, 240), (160, 120))
     assert smaller_sizes(FormatOffer(letters="MJPG", text="", sizes_px=sizes), (352, 288)) == ()
     scaling = FormatOffer(letters="MJPG", text="", sizes_px=(), size_range=SizeRange((16, 1280, 8), (16, 960, 8)))
-    assert smaller_sizes(scaling, (640, 480)) == ((320, 240), (160, 120))  # 213x160 is no third
+    assert smaller_sizes(scaling, (640, 480)) == ((320, 240), (160, 120))  # 213x160 is not an exact third
     assert smaller_sizes(scaling, (96, 96)) == ((48, 48), (32, 32), (24, 24))
 
 
 def test_a_size_must_have_the_rates() -> None:
-    """A size is of use if it has each rate of the ladder, to a hundredth."""
+    """A size is usable if it has each rate of the ladder, to a hundredth."""
     rates = Rates((Fraction(30), Fraction(15), Fraction(5)))
     assert has_rates(rates, [Fraction(2997, 100), Fraction(5)])
     assert not has_rates(rates, [Fraction(30), Fraction(10)])
@@ -165,13 +165,13 @@ def test_a_size_must_have_the_rates() -> None:
 def test_a_scaling_camera_without_the_usual_size_gives_the_nearest(
     width_px: tuple[int, int, int], height_px: tuple[int, int, int], expected: tuple[int, int]
 ) -> None:
-    """Where 640x480 is beyond a scaling camera's sizes, or not on their grid, the largest of them below it is taken, or the smallest there is."""
+    """If 640x480 is beyond a scaling camera's sizes, or not on their grid, the largest size below it is chosen, or the smallest one."""
     scaling = FormatOffer(letters="YUYV", text="", sizes_px=(), size_range=SizeRange(width_px, height_px))
     assert choose((scaling,), Wanted(), "x").size_px == expected
 
 
 def test_the_highest_rate_is_the_first_of_a_list_or_the_end_of_a_range() -> None:
-    """The shortest time that an exposure may take follows from it; a driver that names no rate leaves it open."""
+    """The highest rate is the first of a list or the upper end of a range; if a driver names no rate, it is unknown."""
     assert Rates((Fraction(60), Fraction(30))).highest_hz == 60
     assert Rates(between_hz=(Fraction(1), Fraction(90))).highest_hz == 90
     assert Rates().highest_hz is None

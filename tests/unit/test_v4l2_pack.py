@@ -1,4 +1,4 @@
-"""What leaves a buffer, and the faults of raw and encoded bytes."""
+"""What is taken from a buffer, and the faults of raw and encoded bytes."""
 
 import pytest
 from hypothesis import given
@@ -22,7 +22,7 @@ _even = st.integers(1, 12).map(lambda half: 2 * half)
 def test_rows_lose_their_padding_and_nothing_else(
     source: PixelFormat, part: SendPart, width: int, height: int, padding: int
 ) -> None:
-    """Whatever the row length, the payload holds the image's bytes in order: all of them, or those of the luma."""
+    """For any row length, the payload holds the image's bytes in order: all of them, or only the luma."""
     row = width * (2 if source is PixelFormat.YUYV else 1)
     rows = height * 3 // 2 if source is PixelFormat.NV12 else height
     image = bytes((31 * i + 7) % 251 for i in range(row * rows))
@@ -42,7 +42,7 @@ def test_rows_lose_their_padding_and_nothing_else(
 
 @pytest.mark.parametrize("part", list(SendPart))
 def test_jpeg_passes_untouched(part: SendPart) -> None:
-    """A JPEG leaves as it came, also when luma is asked for: taking it would need decoding."""
+    """A JPEG is passed on unchanged, even if luma is requested: extracting it would need decoding."""
     packing = Packing.of(
         PixelFormatSet(letters="MJPG", size_px=(640, 480), row_bytes=0, image_bytes=614400), PixelFormat.MJPEG, part
     )
@@ -55,7 +55,7 @@ def test_jpeg_passes_untouched(part: SendPart) -> None:
 
 
 def test_a_raw_buffer_that_is_too_short_is_spoiled() -> None:
-    """A raw image is whole from its last used byte on; one byte less is a fault, none at all another."""
+    """A raw image is whole if its last used byte is there; one byte less is a fault, none at all is another one."""
     made = PixelFormatSet(letters="YUYV", size_px=(8, 4), row_bytes=20, image_bytes=80)
     least = Packing.of(made, PixelFormat.YUYV, SendPart.WHOLE).least_bytes
     assert least == 3 * 20 + 16

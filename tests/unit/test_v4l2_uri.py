@@ -15,7 +15,7 @@ from common.frame import PixelFormat
 
 
 def test_every_option_is_read() -> None:
-    """Each option lands where it belongs, in the units of the code."""
+    """Each option gets to its setting, in the units of the code."""
     options = {
         "size": "1280x720",
         "fps": "29.97",
@@ -73,7 +73,7 @@ def test_auto_and_nothing_mean_the_first_camera(path: str) -> None:
     ],
 )
 def test_a_value_of_no_use_is_refused_with_a_remedy(option: str, value: str) -> None:
-    """A bad value is an error of one line that names the option and shows a good one."""
+    """A bad value is an error of one line that names the option and shows a valid one."""
     with pytest.raises(SettingsError) as caught:
         v4l2_settings("v4l2:/dev/video0", "/dev/video0", {option: value}, "host")
     text = str(caught.value)

@@ -1,4 +1,4 @@
-"""All versions stand in one place, every command prints them, and peers of two versions are told which side to update."""
+"""All versions are in one place, every command prints them, and peers of two versions are told which side to update."""
 
 import re
 import subprocess
@@ -16,7 +16,7 @@ BIN = Path(sys.executable).parent
 
 @pytest.mark.parametrize("command", ["board-agent", "phone-host", "delay-bench"])
 def test_every_command_prints_all_versions(command: str) -> None:
-    """`--version` needs no verb, prints one line on stdout and ends with 0."""
+    """`--version` needs no verb, prints one line on stdout and exits with 0."""
     done = subprocess.run([BIN / command, "--version"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == all_versions() + "\n"
@@ -39,7 +39,7 @@ def test_the_changes_begin_with_this_version() -> None:
 
 
 def test_the_boards_package_has_this_version() -> None:
-    """The pattern by which build-deb finds the version finds exactly this one."""
+    """The pattern by which build-deb finds the version matches exactly this one."""
     script = (ROOT / "deploy" / "board" / "build-deb").read_text(encoding="utf-8")
     (command,) = re.findall(r"^version=\$\((sed .*)\)$", script, re.MULTILINE)
     done = subprocess.run(["sh", "-c", f"root={ROOT}; {command}"], capture_output=True, text=True, check=True)
@@ -50,7 +50,7 @@ def test_the_boards_package_has_this_version() -> None:
     ("theirs", "remedy"), [(PROTOCOL_VERSION - 1, "update the board's"), (PROTOCOL_VERSION + 1, "update this host's")]
 )
 def test_the_older_side_is_to_be_updated(theirs: int, remedy: str) -> None:
-    """Both versions and the side whose is lower are named."""
+    """The message names both versions and the side with the lower one."""
     assert other_protocol(theirs, peer="the board", own="this host") == (
         f"the board speaks protocol {theirs}, this host protocol {PROTOCOL_VERSION}",
         f"{remedy} tandemscan",

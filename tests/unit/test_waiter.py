@@ -1,4 +1,4 @@
-"""What a loop waits on, and when it looks without sleep: on real pipes, with a clock that counts who reads it."""
+"""What a loop waits on, and when it polls without sleep: on real pipes, with a clock that counts its readings."""
 
 import os
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ _TURN_NS = 10_000
 
 
 class Clock:
-    """A clock that goes on by 10 us with each reading, or by what it was told."""
+    """A clock that advances by 10 us with each reading, or by a given time."""
 
     def __init__(self) -> None:
         self.now_ns = 10**12
@@ -27,7 +27,7 @@ class Clock:
 
 @pytest.fixture
 def clock() -> Clock:
-    """The waiter's."""
+    """The waiter's clock."""
     return Clock()
 
 
@@ -41,14 +41,14 @@ def pipe() -> Iterator[tuple[int, int]]:
 
 
 def looks(waiter: Waiter, clock: Clock) -> int:
-    """How often a wait for nothing looked without sleep: it reads the clock once before, and after each look."""
+    """How often an idle wait polled without sleep: it reads the clock once before, and after each poll."""
     before = clock.read
     assert waiter.wait(1) == []
     return clock.read - before - 1
 
 
 def test_a_waiter_sleeps_unless_it_is_to_stay_awake(clock: Clock, pipe: tuple[int, int]) -> None:
-    """It looks again and again for 200 us after `stay_awake`, and sleeps before and afterwards, and where it was not to wait at all."""
+    """The waiter polls for 200 us after `stay_awake`. It sleeps before and afterwards, and does not poll if it was not to wait at all."""
     waiter = Waiter(pipe[:1], clock)
     assert looks(waiter, clock) == 0
     waiter.stay_awake()
@@ -60,7 +60,7 @@ def test_a_waiter_sleeps_unless_it_is_to_stay_awake(clock: Clock, pipe: tuple[in
 
 
 def test_what_is_readable_ends_the_looking(clock: Clock, pipe: tuple[int, int]) -> None:
-    """It is told at once, and once."""
+    """It is reported at once, and once."""
     waiter = Waiter(pipe[:1], clock)
     waiter.stay_awake()
     os.write(pipe[1], b"x")
@@ -70,7 +70,7 @@ def test_what_is_readable_ends_the_looking(clock: Clock, pipe: tuple[int, int]) 
 
 
 def test_a_core_that_others_want_is_left_to_them(clock: Clock, pipe: tuple[int, int]) -> None:
-    """Once others had it for longer than it may look, it sleeps as ever for a second, however often it is to stay awake; news of that turn is told."""
+    """If other programs had the core for longer than the waiter may poll, it sleeps normally for a second, however often it is told to stay awake; news of that turn is reported."""
     waiter = Waiter(pipe[:1], clock)
     waiter.stay_awake()
     os.write(pipe[1], b"x")

@@ -1,4 +1,4 @@
-"""Messages to bytes and back, and what strangers may send."""
+"""Messages to bytes and back, and anything that strangers may send."""
 
 import random
 import tracemalloc
@@ -44,7 +44,7 @@ MUTATIONS = 80
 
 
 def is_refused_or_read(header: bytes, payload: bytes = b"") -> None:
-    """Only a ProtocolError may come out of decode, or a message that can be written again."""
+    """The only results of decode are a ProtocolError, or a message that can be encoded again."""
     try:
         message = decode(header, payload)
     except ProtocolError:
@@ -55,7 +55,7 @@ def is_refused_or_read(header: bytes, payload: bytes = b"") -> None:
 @given(MESSAGES)
 @settings(deadline=None, max_examples=300)
 def test_round_trip(message: Message) -> None:
-    """What is read back is the message that was written, with the payload as its own buffer."""
+    """The message that is read is the one that was written, with the payload in its own buffer."""
     header, payload = encode(message)
     assert decode(header, payload) == message
     assert decode(memoryview(bytearray(header)), memoryview(payload)) == message
@@ -67,7 +67,7 @@ def test_round_trip(message: Message) -> None:
 @given(MESSAGES, st.integers(0, 2**32))
 @settings(deadline=None, max_examples=150)
 def test_mutated_headers_raise_nothing_but_protocol_errors(message: Message, seed: int) -> None:
-    """However an honest header is spoiled, the codec refuses it or reads a sound message."""
+    """However a valid header is changed, the codec refuses it or reads a valid message."""
     header, payload = encode(message)
     chance = random.Random(seed)
     for _ in range(MUTATIONS):
@@ -77,7 +77,7 @@ def test_mutated_headers_raise_nothing_but_protocol_errors(message: Message, see
 @given(MESSAGES)
 @settings(deadline=None, max_examples=60)
 def test_every_truncation_is_refused(message: Message) -> None:
-    """A header that is cut off anywhere is no message."""
+    """A header that is truncated anywhere is no message."""
     header, payload = encode(message)
     for length in range(len(header)):
         with pytest.raises(ProtocolError):
@@ -87,7 +87,7 @@ def test_every_truncation_is_refused(message: Message) -> None:
 @given(st.binary(max_size=MAX_HEADER_BYTES + 10))
 @settings(deadline=None, max_examples=300)
 def test_random_bytes_raise_nothing_but_protocol_errors(header: bytes) -> None:
-    """Bytes of a stranger are refused and nothing else happens."""
+    """A stranger's bytes are refused, without side effects."""
     is_refused_or_read(header)
 
 
@@ -101,7 +101,7 @@ def test_random_bytes_raise_nothing_but_protocol_errors(header: bytes) -> None:
 )
 @settings(deadline=None, max_examples=300)
 def test_well_formed_msgpack_of_the_wrong_shape_is_refused(value: Any, kind: int) -> None:
-    """Sound msgpack that is none of our arrays is refused, whatever its types and nesting."""
+    """Valid msgpack that is not one of our arrays is refused, whatever its types and nesting."""
     is_refused_or_read(msgpack.packb(value))
     fields = value if isinstance(value, list) else [value]
     is_refused_or_read(msgpack.packb([PROTOCOL_VERSION, kind, *fields]))
@@ -121,7 +121,7 @@ def test_well_formed_msgpack_of_the_wrong_shape_is_refused(value: Any, kind: int
     ],
 )
 def test_a_claim_of_great_size_costs_no_memory(claim: bytes) -> None:
-    """A header that promises huge or deeply nested contents is refused without room being made for them."""
+    """A header that announces huge or deeply nested contents is refused without allocating memory for them."""
     tracemalloc.start()
     try:
         for header in (claim, b"\x93\x01\x06" + claim):
@@ -141,13 +141,13 @@ def test_long_header_is_refused() -> None:
 @given(MESSAGES.filter(lambda message: not isinstance(message, FrameMessage)), st.binary(min_size=1, max_size=9))
 @settings(deadline=None, max_examples=50)
 def test_only_frames_carry_a_payload(message: Message, payload: bytes) -> None:
-    """Bytes beside any other message make it none of ours."""
+    """Image bytes after any other message make it invalid."""
     with pytest.raises(ProtocolError, match="payload"):
         decode(encode(message)[0], payload)
 
 
 FRAME_FIELDS: list[Any] = ["s", 0, 0, 640, 480, 0, None, 1, 2, 3]
-"""A frame's header behind version and kind: session, sent index, sequence, width, height, format, exposure, three marks."""
+"""A frame's header after version and kind: session, sent index, sequence, width, height, format, exposure, three marks."""
 
 
 @pytest.mark.parametrize(
@@ -185,13 +185,13 @@ def test_fields_out_of_range_are_refused(field: int, value: Any) -> None:
 
 @pytest.mark.parametrize("fields", [FRAME_FIELDS[:-1], [*FRAME_FIELDS, 0]])
 def test_number_of_fields_is_exact(fields: list[Any]) -> None:
-    """A field too few or too many makes a header none of ours."""
+    """One field too few or too many makes a header invalid."""
     with pytest.raises(ProtocolError):
         decode(msgpack.packb([PROTOCOL_VERSION, 5, *fields]))
 
 
 def test_payload_has_a_limit() -> None:
-    """A frame of exactly the greatest size is read, one of a byte more is refused."""
+    """A frame of exactly the maximum size is read; one byte more is refused."""
     whole = memoryview(bytes(MAX_PAYLOAD_BYTES + 1))
     header = encode(
         FrameMessage(
@@ -216,7 +216,7 @@ def test_payload_has_a_limit() -> None:
 @given(MESSAGES, st.integers(0, 2**53).filter(lambda version: version != PROTOCOL_VERSION))
 @settings(deadline=None, max_examples=60)
 def test_another_version_is_told_apart_from_garbage(message: Message, version: int) -> None:
-    """Whatever the rest means in that version, a header of another one raises VersionError with its number."""
+    """A header of another version raises VersionError with its number, whatever the rest means there."""
     items = msgpack.unpackb(encode(message)[0])
     with pytest.raises(VersionError) as caught:
         decode(msgpack.packb([version, *items[1:]]), b"anything")
@@ -225,7 +225,7 @@ def test_another_version_is_told_apart_from_garbage(message: Message, version: i
 
 @pytest.mark.parametrize("reason", RefusalReason)
 def test_a_refusal_can_be_said_in_any_version(reason: RefusalReason) -> None:
-    """A refusal keeps its kind and field in the envelope of the peer's version: there it reads as what it is here."""
+    """A refusal keeps its kind and field in the envelope of the peer's version, and reads the same there as here."""
     for version in (0, PROTOCOL_VERSION + 1, 2**31):
         foreign = msgpack.unpackb(encode_for_any_version(version, Refusal(reason)))
         assert foreign[0] == version
@@ -242,7 +242,7 @@ def test_kinds_keep_their_numbers() -> None:
 
 @pytest.mark.parametrize("name", ["caf\udce9", "x" * 300, "\U0001f4f7" * 300, "\udcff" * 97])
 def test_any_folder_name_makes_a_hello(name: str) -> None:
-    """A camera's name that is too long or, being a path, no UTF-8 is shortened or mended, never refused."""
+    """A camera name that is too long, or a path that is not UTF-8, is shortened or repaired, never refused."""
     camera = CameraDescription(
         name=name, width_px=640, height_px=480, pixel_format=PixelFormat.MJPEG, period_ns=1, pacing=Pacing.CLOCK
     )
@@ -254,7 +254,7 @@ def test_any_folder_name_makes_a_hello(name: str) -> None:
 
 
 def test_an_echo_is_as_long_as_its_answer() -> None:
-    """On a slow line unequal lengths would be taken for a difference of the clocks."""
+    """On a slow line unequal lengths would look like a difference of the clocks."""
     uptime_ns = 3600 * 10**9
     ping, pong = encode(Ping(7, uptime_ns)), encode(Pong(wave=7, t0_ns=uptime_ns, t1_ns=uptime_ns, t2_ns=uptime_ns))
     assert len(ping[0]) == len(pong[0])
