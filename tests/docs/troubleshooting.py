@@ -363,7 +363,7 @@ def messages(code: Code) -> Iterator[tuple[Place, list[str], list[str]]]:
                 _,
                 problem,
                 remedy,
-            ]:  # the error for a spoiled image has one more argument in front
+            ]:  # the first argument of a spoiled image's error says what is wrong
                 yield place, code.texts(place, problem), code.texts(place, remedy)
             case _:
                 yield place, [], []

@@ -139,7 +139,7 @@ def wire(data: bytes) -> None:
 
 
 def _parts(data: bytes) -> Iterator[bytes]:
-    """Cut an input into parts, each after its length: one byte, in units of eight."""
+    """Cut an input into parts, each preceded by its length in one byte; large lengths are in units of eight."""
     at = 0
     while at < len(data):
         length = 1 + data[at] if data[at] < 128 else 8 * (data[at] - 111)
