@@ -49,7 +49,7 @@ def black_png(
 
 
 def packed_zeros(megabytes: int) -> bytes:
-    """So many megabytes of zeros, compressed a thousandfold."""
+    """This many megabytes of zeros, compressed a thousandfold."""
     packer = zlib.compressobj(9)
     return b"".join(packer.compress(bytes(2**20)) for _ in range(megabytes)) + packer.flush()
 

@@ -138,7 +138,7 @@ class Rig:
         return pairing.returncode
 
     def streams(self, name: str) -> None:
-        """Whether a host gets frames over this link."""
+        """Check that a host gets frames over this link."""
         images = self.folder / "film"
         arguments = ["run", "--link", self.link, "--keys", self.host_keys, "--camera", f"replay:{images}?pace=demand"]
         with host([*arguments, "--pairs", "3", "--json"], self.folder, name) as running:
