@@ -68,7 +68,7 @@ class Exchange:
         self.say(f"{boundary}\nContent-Type: image/jpeg\nContent-Length: {len(image)}\n\n", image + b"\r\n")
 
     def is_sound(self, sent: int) -> bool:
-        """Whether to behave well: it is too early to go wrong, or it has gone wrong already.
+        """Whether to behave well: not enough images sent yet, or a later connection than the first.
 
         Args:
             sent: images of this connection so far.
