@@ -152,7 +152,7 @@ def decoding_seeds() -> list[bytes]:
 
 
 def mjpeg(data: bytes) -> None:
-    """A server's stream split in two ways gives the same images, each found in the bytes; none beyond the limit; good ones follow garbage."""
+    """A stream split in two ways gives the same images, each found in the bytes; none exceeds the limit; a good one after garbage is found."""
     good = _JPEG
     stream = data + bytes(70_000) + good  # no segment in the garbage is long enough to cover what follows so many bytes
     whole, chopped = JpegStream(), JpegStream()
