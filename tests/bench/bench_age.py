@@ -1,10 +1,10 @@
 """How old frames get when the host is ten times slower than the camera: `python -m tests.bench.bench_age [--help]`.
 
-A board-agent process replays 50 KB JPEGs at 30 per second over loopback TCP; the host's matcher takes 333 ms. Figures to reach with a FIFO of
-depth 1: age at the link (received - exposed) p95 at most 35 ms, age at the pipeline (dequeued - exposed) p95 at most 1.5 periods plus
-the link's age, both the same at the end as in the first seconds; and the camera is never throttled. With `block` nothing is dropped
-on the host: a pair waits for the one before it, one processing time. A bare PUSH/PULL with high-water marks of 10 stands beside them.
-Exit 4 when a figure is missed.
+A board-agent process replays 50 KB JPEGs at 30 per second over loopback TCP; the host's matcher takes 333 ms. Figures
+to reach with a FIFO of depth 1: age at the link (received - exposed) p95 at most 35 ms; age at the pipeline (dequeued -
+exposed) p95 at most 1.5 periods plus the age at the link; both the same at the end as in the first seconds; the camera
+never throttled. With `block`, the host drops nothing: each pair waits one processing time for the pair before it. A
+bare PUSH/PULL with high-water marks of 10 runs for comparison. Exit 4 when a figure is missed.
 """
 
 import argparse
@@ -52,7 +52,7 @@ _STAMP = struct.Struct("<q")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """Ages in one stretch of time, ms; NaN where nothing came."""
+    """Ages within one time window, ms; NaN if no frame came."""
 
     frames: int
     p50_ms: float
@@ -80,7 +80,7 @@ class Row:
 
 
 class SlowMatcher:
-    """Stands for a host ten times slower than the camera: it waits instead of computing."""
+    """Stands for a host ten times slower than the camera: it sleeps instead of computing."""
 
     def match(self, pair: RectifiedPair) -> Disparity:
         """Take ten periods, find nothing."""
@@ -89,7 +89,7 @@ class SlowMatcher:
 
 
 class WatchedHost(Host):
-    """Notes the age of every frame that comes over the link; pairs that the FIFO drops leave no ledger."""
+    """Notes the age of every frame received over the link; pairs that the FIFO drops leave no ledger."""
 
     def __init__(self, policy: str, right: str, address: str) -> None:
         self.link_ages: list[tuple[int, int]] = []
@@ -104,7 +104,7 @@ class WatchedHost(Host):
         take_in = self._queue.add_board
 
         def watched(frame: BoardFrame) -> None:
-            """Take the age of each frame as it comes."""
+            """Note a frame's age on arrival."""
             take_in(frame)
             now_ns = now.monotonic_ns()
             self.link_ages.append((now_ns, now_ns - frame.marks.exposed_ns))
@@ -116,7 +116,7 @@ class WatchedHost(Host):
 
 
 def windows(ages: Sequence[tuple[int, int]]) -> tuple[Window, Window]:
-    """The first seconds after the warm-up and the last ones.
+    """Ages in the first seconds after the warm-up and in the last ones.
 
     Args:
         ages: (moment, age), ns, in order.
@@ -131,7 +131,7 @@ def windows(ages: Sequence[tuple[int, int]]) -> tuple[Window, Window]:
 
 
 def ours(policy: str, folder: Path, seconds: float) -> Row:
-    """Our board and host with one overflow policy."""
+    """Measure our board and host with one overflow policy."""
     address = f"tcp://127.0.0.1:{free_port()}"
     camera = f"replay:{folder}?fps={_FPS}&loop=1"
     with board_process(camera, address) as board:
@@ -146,7 +146,7 @@ def ours(policy: str, folder: Path, seconds: float) -> Row:
         stopped_ns = now.monotonic_ns()
     run = host.snapshot("stopped")
     before = run.link.sessions[-1].first.grabbed
-    # The board's count begins with its life and ends with it; the first frame that came tells when frame `before` was exposed.
+    # The board counts over the whole session; the first received frame tells when frame `before` was exposed.
     grabbed, since_ns = account.grabbed - before, host.link_ages[0][0] - host.link_ages[0][1]
     pipeline = [(ledger.dequeued_ns, ledger.dequeued_ns - ledger.board.exposed_ns) for ledger in host.ledgers]
     return Row(
@@ -159,7 +159,7 @@ def ours(policy: str, folder: Path, seconds: float) -> Row:
 
 
 def bare(folder: Path, seconds: float) -> Row:
-    """A PUSH/PULL pair with high-water marks and the same slow consumer."""
+    """Measure a PUSH/PULL pair with high-water marks and the same slow consumer."""
     payloads = [path.read_bytes() for path in sorted(folder.iterdir())]
     address = f"tcp://127.0.0.1:{free_port()}"
     stop, grabbed = threading.Event(), [0]
@@ -203,7 +203,7 @@ def bare(folder: Path, seconds: float) -> Row:
 
 
 def main() -> int:
-    """Run and print; 4 when a figure is missed."""
+    """Run and print; exit code 4 when a figure is missed."""
     parser = argparse.ArgumentParser("python -m tests.bench.bench_age", description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0, help="length of each run (default 60)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")

@@ -1,14 +1,17 @@
 """What the board's job costs a BeagleBone-class board: `python -m tests.bench.bench_board [--help]`.
 
-In a booted armhf guest (512 MB, one processor, Debian's kernel and its uvcvideo driver) a webcam outside of it gives 640x480 MJPEG at 30 per
-second, over TCP to this machine. In turns: the installed service with our host, a C program of the same job (V4L2 mmap dequeue -> zmq_send,
-tests/bench/board/forward.c) and Debian's ustreamer passing MJPEG through over HTTP. Figures to reach: CPU time a frame at most 4 times the C
-program's; resident memory below 40 MB; each image byte copied at most once before the link; idle (no host, camera at rest) below 1 % of the
-processor; start to READY below 3 s; from a host's dialling to its first frame, the camera at rest, below 300 ms (the emulated webcam gives its
-first image at once; most real ones take longer). For orientation: 0.45 % of the time for 10^6 rounds of `x += i` would be about 10 % of a real BeagleBone.
+The board is a booted armhf guest (512 MB, one processor, Debian's kernel and its uvcvideo driver). A webcam emulated
+outside it delivers 640x480 MJPEG at 30 per second; frames go over TCP to this machine. Three programs run in turn: the
+installed service with our host; a C program that does the same job (V4L2 mmap dequeue -> zmq_send,
+tests/bench/board/forward.c); and Debian's ustreamer, which passes MJPEG through over HTTP. Figures to reach: CPU time
+per frame at most 4 times the C program's; resident memory below 40 MB; each image byte copied at most once before the
+link; idle (no host, camera at rest) below 1 % of the processor; start to READY below 3 s; from a host's dialling to its
+first frame, with the camera at rest, below 300 ms (the emulated webcam delivers its first image at once; most real ones
+take longer). For scale: 0.45 % of the time for 10^6 rounds of `x += i` would be about 10 % of a real BeagleBone.
 
-Copies are counted, in a run of their own: a preloaded library (tests/bench/board/copies.c) takes the place of memcpy and memmove, counts what
-copies 4 KiB and more at once, and names the object that called. What the kernel copies (driver, TCP) is not in it. Exit 4 when a figure is missed.
+Copies are counted in a separate run. A preloaded library (tests/bench/board/copies.c) replaces memcpy and memmove,
+counts copies of 4 KiB or more, and names the object that made the call. Copies made by the kernel (driver, TCP) are not
+counted. Exit 4 when a figure is missed.
 """
 
 import argparse
@@ -55,10 +58,10 @@ _READOUT_NS: Final = 20_000_000
 _STARTS: Final = 5
 _CONNECTS: Final = 5
 _WARM_UP_S: Final = 12.0
-"""For the first ten seconds of a session our host learns the clock with more echoes; the others get the same time."""
+"""Our host sends more echoes in the first ten seconds of a session to learn the clock; the other programs get the same time."""
 
 _COPIES_FPS: Final = 10
-"""Slow enough that no frame is replaced by a newer one even in the slow counted run: then what is copied is also sent."""
+"""Slow enough that no newer frame replaces an older one, even in the slow counted run: every copied frame is also sent."""
 
 _CAMERA: Final = f"v4l2:auto?size={_SIZE_PX[0]}x{_SIZE_PX[1]}&fps="
 _DEVICE: Final = "$(ls /dev/v4l/by-id/*index0)"
@@ -73,22 +76,22 @@ _ORIENTATION: Final = 0.0045
 
 _NAMES: Final = ("board-agent", "C program", "ustreamer")
 _LINK_OBJECTS: Final = ("libzmq", "/zmq/")
-"""Objects that belong to the link: ZeroMQ and its binding."""
+"""Objects that are part of the link: ZeroMQ and its binding."""
 
 
 @dataclass(slots=True)
 class Figures:
-    """All that was measured.
+    """All measured figures.
 
     Attributes:
-        quiet: whether the emulator was put before all other work on this machine.
-        interpreter_s: 10^6 rounds of `x += i`.
-        costs: by program, one a run.
+        quiet: whether the emulator was given priority over all other work on this machine.
+        interpreter_s: time for 10^6 rounds of `x += i`.
+        costs: by program, one entry per run.
         idle: CPU share without a host, the camera at rest.
         no_camera: CPU share without a camera.
-        ready_ms: from the start of the process to READY.
+        ready_ms: from process start to READY.
         first_frame_ms: from a host's dialling to its first frame, the camera at rest before.
-        copies: by object that copied: how often each image byte was copied.
+        copies: how often each image byte was copied, by the object that copied it.
     """
 
     quiet: bool = False
@@ -101,22 +104,22 @@ class Figures:
     copies: dict[str, float] = field(default_factory=dict)
 
     def frame_ms(self, name: str) -> float:
-        """CPU time a frame, the median over the runs, ms."""
+        """CPU time per frame, the median over the runs, ms."""
         return statistics.median(cost.frame_ms for cost in self.costs[name])
 
     @property
     def resident_mb(self) -> float:
-        """Most memory of our service."""
+        """Peak memory of our service, MB."""
         return max(cost.resident_bytes for cost in self.costs["board-agent"]) / 1e6
 
     @property
     def copies_before_link(self) -> float:
-        """How often each image byte was copied by anything but the link."""
+        """How often anything but the link copied each image byte."""
         return sum(times for name, times in self.copies.items() if not any(part in name for part in _LINK_OBJECTS))
 
 
 def main() -> int:
-    """Run and print; 3 when what it needs is missing, 4 when a figure is missed."""
+    """Run and print; exit code 3 when something needed is missing, 4 when a figure is missed."""
     options = _options()
     console = Console(stderr=True)
     try:
@@ -205,7 +208,7 @@ def _counter(name: str, board: Board) -> Counter:
 
 @contextmanager
 def _program(board: Board, name: str) -> Iterator[int]:
-    """One of the programs for the length of a block, alone with the camera; gives its process id."""
+    """Run one of the programs alone with the camera while the block lasts; yields its process id."""
     if name == "board-agent":
         board.guest.sh(f"systemctl start {UNIT}")
         yield board.service_pid
@@ -217,12 +220,12 @@ def _program(board: Board, name: str) -> Iterator[int]:
 
 
 def _share(board: Board, seconds: float) -> float:
-    """Share of the processor that the service takes while nothing happens."""
+    """The service's share of the processor while nothing happens."""
     return board.watch(board.service_pid, lambda: 0, seconds).share
 
 
 def _count_copies(board: Board, seconds: float) -> dict[str, float]:
-    """How often each image byte is copied, by the object that copies."""
+    """How often each image byte is copied, by the object that copies it."""
     board.guest.configure(f"{_CAMERA}{_COPIES_FPS}")
     board.guest.sh(f"systemctl stop {UNIT}")
     preload = "env LD_PRELOAD=/opt/bench/copies.so COPIES=/run/copies"
@@ -278,7 +281,7 @@ def _print(figures: Figures) -> None:
 
 
 def _judge(figures: Figures) -> list[Verdict]:
-    """Of the programs that were not run nothing is said."""
+    """Judge the figures; programs that did not run are skipped."""
     found: list[tuple[str, float, float]] = []
     if {"board-agent", "C program"} <= figures.costs.keys():
         ratio = figures.frame_ms("board-agent") / figures.frame_ms("C program")
@@ -287,7 +290,11 @@ def _judge(figures: Figures) -> list[Verdict]:
         found.append(("resident, MB", figures.resident_mb, _RESIDENT_MB))
     firsts, starts = figures.first_frame_ms, figures.ready_ms
     found += [
-        ("copies of an image byte before the link", figures.copies_before_link, _COPIES + 0.005),  # a header is none
+        (
+            "copies of an image byte before the link",
+            figures.copies_before_link,
+            _COPIES + 0.005,
+        ),  # a header does not count as one
         ("idle, camera at rest, % of processor", 100 * figures.idle, 100 * _IDLE_SHARE),
         (f"dialling to first frame, camera at rest, ms, most of {len(firsts)}", max(firsts), _FIRST_FRAME_MS),
         (f"start to READY, ms, most of {len(starts)}", max(starts), _READY_MS),

@@ -1,10 +1,12 @@
 """How well the board's clock is known: `python -m tests.bench.bench_clock [--help]`.
 
-First simulated clocks (offset to hours, skew to 97 ppm, changing by up to 1 ppm a minute) over links modelled in tests/support/clock_sim, under full
-image load: error for frames sent 10 to 13 s after the first echo; at the end of 5 minutes; and 60 s after the last echo of these (`held`). Beside ours, on the same echoes,
-min-RTT as libsoftwaresync does it (the sample of the least round trip of the last 300, no skew) and the mean of all offsets. Then two real
-processes of this machine over loopback TCP, idle and with raw frames at 30 per second: both read one CLOCK_MONOTONIC, so the true offset is 0.
-Figures to reach: printed beside what was measured; exit 4 when one is missed.
+First part: simulated clocks (offset up to hours, skew up to 97 ppm, changing by up to 1 ppm a minute) over links
+modelled in tests/support/clock_sim, under full image load. It measures the error for frames sent 10 to 13 s after the
+first echo, at the end of 5 minutes, and 60 s after the last of these echoes (`held`). Two other methods run on the same
+echoes: min-RTT as in libsoftwaresync (the sample with the least round trip of the last 300, no skew) and the mean of
+all offsets. Second part: two real processes on this machine over loopback TCP, idle and with raw frames at 30 per
+second. Both read one CLOCK_MONOTONIC, so the true offset is 0. Figures to reach are printed beside the measured ones;
+exit 4 when one is missed.
 """
 
 import argparse
@@ -54,10 +56,10 @@ class Case:
 
     Attributes:
         name: for the table.
-        profile: draws it.
-        target_us: error p99 to reach after 10 s; None: none is named.
-        holdover: whether the 60 s are measured too.
-        symmetric: whether it keeps the near-symmetry under which `uncertainty` and the comparison hold.
+        profile: draws the link.
+        target_us: error p99 to reach after 10 s; None: no target.
+        holdover: whether the 60 s holdover is measured too.
+        symmetric: whether the link is nearly symmetric; `uncertainty` and the comparison hold only then.
     """
 
     name: str
@@ -85,7 +87,7 @@ CASES = (
 
 @dataclass(slots=True)
 class Errors:
-    """What the runs of one case gave, us; violations of `bound` over all times."""
+    """Errors in the runs of one case, us; `bound` violations over all times."""
 
     ours: list[float] = field(default_factory=list)
     least: list[float] = field(default_factory=list)
@@ -100,7 +102,7 @@ class Errors:
 
 
 class Rivals:
-    """Min-RTT and mean, fed with the same echoes."""
+    """Min-RTT and mean, given the same echoes."""
 
     def __init__(self, origin_ns: int) -> None:
         self._origin_ns = origin_ns
@@ -108,7 +110,7 @@ class Rivals:
         self._total, self._count = 0.0, 0
 
     def add(self, echo: Echo) -> None:
-        """Take an echo."""
+        """Add an echo."""
         round_trip = (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns)
         middle = (echo.t0_ns - echo.t1_ns + echo.t3_ns - echo.t2_ns) / 2 - self._origin_ns
         self._latest.append((round_trip, middle))
@@ -122,7 +124,7 @@ class Rivals:
 
 
 def simulate(profile: Profile, seed: int, seconds: float, errors: Errors) -> None:
-    """One run; short ones give the error after 10 s, long ones that at the end of the holdover."""
+    """Simulate one run; a short run gives the error after 10 s, a long one the error at the end of the holdover."""
     chance = random.Random(seed)
     clocks = DriftingClocks(chance)
     estimator, rivals = ClockEstimator(), Rivals(clocks.origin_ns)
@@ -161,7 +163,7 @@ def simulate(profile: Profile, seed: int, seconds: float, errors: Errors) -> Non
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One case's figures, us; NaN: not measured."""
+    """Figures of one case, us; NaN: not measured."""
 
     name: str
     target_us: float | None
@@ -180,7 +182,7 @@ class Row:
 
     @property
     def failures(self) -> list[str]:
-        """The figures that were missed."""
+        """The missed figures."""
         missed = {
             f"error p99 > {self.target_us} us": self.target_us is not None and self.p99_us > self.target_us,
             "bound violated": self.violations > 0,
@@ -214,7 +216,7 @@ def row_of(case: Case, errors: Errors) -> Row:
 
 
 def main() -> int:
-    """Run and print; 4 when a figure is missed."""
+    """Run and print; exit code 4 when a figure is missed."""
     parser = argparse.ArgumentParser("python -m tests.bench.bench_clock", description=__doc__)
     parser.add_argument("--runs", type=int, default=400, help="simulated runs of 13 s for each link (default 400)")
     parser.add_argument("--long-runs", type=int, default=100, help="simulated runs of 5 minutes (default 100)")
@@ -314,7 +316,7 @@ def _print_real(rows: Sequence[RealRow]) -> None:
 
 
 def _real_failures(row: RealRow) -> list[str]:
-    """The figures that were missed."""
+    """The missed figures."""
     early, late = row.early_p99_us > _REAL_US[0], row.late_p99_us > _REAL_US[1]
     return [*(["after 1 s"] if early else []), *(["after 10 s"] if late else [])]
 

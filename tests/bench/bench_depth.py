@@ -1,13 +1,16 @@
 """How exact the disparities are on real pairs with ground truth: `python -m tests.bench.bench_depth [--help]`.
 
-The eight scenes of $SCAN_DATA that have ground truth. (middlebury_v3_trainingQ_images has none and is left out.) The four of them whose truth is fine are matched in
-four cases: clean; both images as JPEG of quality 80; the right image 0.5 px too low; all of that with the right image darker as well.
-Each by `sgbm`, by `block` and, as the anchor of the same run, by tuned OpenCV: StereoSGBM 3WAY, block 3, left border padded (decision
-0002; the recipe with WLS needs OpenCV's contrib modules and is not here). Pixels: those whose truth is known and that both cameras see.
+Uses the eight scenes of $SCAN_DATA that have ground truth. (middlebury_v3_trainingQ_images has none and is left out.)
+The four scenes with fine ground truth are matched in four cases: clean; both images as JPEG of quality 80; the right
+image 0.5 px too low; and all of these with the right image darker as well. Each case is matched by `sgbm`, by `block`
+and, as the reference in the same run, by tuned OpenCV: StereoSGBM 3WAY, block 3, left border padded (decision 0002; the
+recipe with WLS needs OpenCV's contrib modules and is not included). Only pixels that have known ground truth and that
+both cameras see are counted.
 
-density: pixels with a value, %. bad2: values off by more than 2 px, % of the values. fill2: the same of all pixels, after each pixel without a value
-took the smaller of its neighbours' values in the row. ms/MP: time for a megapixel of the left image; CPU: of all cores.
-Figures to reach: bad2 and fill2 of `sgbm`, means over all cases, below the anchor's. Exit 4 when one is missed, 3 when there is no SCAN_DATA.
+density: pixels with a value, %. bad2: values off by more than 2 px, % of the values. fill2: the same over all pixels,
+after each pixel without a value has taken the smaller of its neighbours' values in the row. ms/MP: time per megapixel
+of the left image; CPU: of all cores. Figures to reach: bad2 and fill2 of `sgbm`, as means over all cases, below those
+of the reference. Exit 4 when one is missed, 3 when there is no SCAN_DATA.
 """
 
 import argparse
@@ -42,7 +45,7 @@ def _by_matcher(name: MatcherName) -> Callable[[Image, Image, int], Values]:
 
 
 def tuned_opencv(left: Image, right: Image, disparities: int) -> Values:
-    """The anchor."""
+    """The reference method."""
     sgbm = cv2.StereoSGBM.create(
         numDisparities=disparities,
         blockSize=3,
@@ -71,7 +74,7 @@ METHODS: Final[dict[str, Callable[[Image, Image, int], Values]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One scene in one case by one method, or a mean of these."""
+    """One scene in one case by one method, or a mean over several."""
 
     scene: str
     case: str
@@ -84,7 +87,7 @@ class Row:
 
 
 def filled(found: Values) -> Values:
-    """Give each pixel without a value (NaN) the smaller of the next values to its left and right; a row without any stays as it is."""
+    """Fill each pixel without a value (NaN) with the smaller of the next values to its left and right; an empty row stays as it is."""
     columns = np.arange(found.shape[1])
     has = np.isfinite(found)
     before = np.maximum.accumulate(np.where(has, columns, -1), axis=1)
@@ -95,7 +98,7 @@ def filled(found: Values) -> Values:
 
 
 def measure(scene: Scene, case: str, method: str) -> Row:
-    """Match once and judge."""
+    """Match once and score the result."""
     left, right = CASES[case](scene.left, scene.right)
     began_s, cpu_s = time.perf_counter(), time.process_time()
     found = METHODS[method](left, right, scene.disparities)
@@ -111,14 +114,14 @@ def measure(scene: Scene, case: str, method: str) -> Row:
 
 
 def mean(rows: Sequence[Row], method: str, case: str = "") -> Row:
-    """Over the cases of a method, or one kind of them; each counts the same."""
+    """Mean over all cases of a method, or over one kind of case; each case counts the same."""
     chosen = [row for row in rows if row.method == method and case in {"", row.case}]
     names = ("density", "bad2", "fill2", "ms_per_mp", "cpu_ms_per_mp")
     return Row("mean", case, method, *(float(np.mean([getattr(row, name) for row in chosen])) for name in names))
 
 
 def judge(rows: Sequence[Row]) -> list[Verdict]:
-    """Our default beside the anchor."""
+    """Compare our default with the reference."""
     ours, anchor = mean(rows, MatcherName.SGBM.value), mean(rows, ANCHOR)
     both = {"bad2": (ours.bad2, anchor.bad2), "fill2": (ours.fill2, anchor.fill2)}
     return [
@@ -133,7 +136,7 @@ def judge(rows: Sequence[Row]) -> list[Verdict]:
 
 
 def main() -> int:
-    """Run and print; 3 when there are no images, 4 when a figure is missed."""
+    """Run and print; exit code 3 when there are no images, 4 when a figure is missed."""
     parser = argparse.ArgumentParser("python -m tests.bench.bench_depth", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()

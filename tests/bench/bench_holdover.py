@@ -1,9 +1,11 @@
-"""What holds the holdover up: `python -m tests.bench.bench_holdover [--help]`.
+"""What limits the accuracy of the holdover: `python -m tests.bench.bench_holdover [--help]`.
 
-Five minutes of echoes over the links of bench_clock, then 60 s without; error of the offset then, beside that at the end of the echoes. On the same echoes:
-ours; other estimators that were tried; and oracles, which know what no estimator can. `drift known`: the clocks' true course is given, only the offset is
-looked for, in the middle between the extremes of all echoes. `asymmetry alone`: the least delays are given as well; what is left is half of their
-difference, which looks like an offset in every echo. That is a floor for all; the middle of the extremes may be a little improved by what is known of the scatter.
+Runs five minutes of echoes over the links of bench_clock, then 60 s without echoes. Compares the error of the offset at
+that point with the error at the end of the echoes. On the same echoes it runs our estimator, other estimators that were
+tried, and oracles, which know what no estimator can know. `drift known`: the clocks' true course is given; only the
+offset is estimated, as the middle between the extremes of all echoes. `asymmetry alone`: the least delays are given as
+well; half of their difference remains, which looks like an offset in every echo. That is a floor for all estimators;
+knowing the scatter may improve the middle of the extremes a little.
 """
 
 import argparse
@@ -29,7 +31,7 @@ Values = NDArray[np.float64]
 
 _LEARN_S, _HOLD_S = 300, 60
 _SKEWS = np.linspace(-5e-6, 5e-6, 101)
-"""Around our own estimate: wide enough for any that was seen to win."""
+"""Around our own estimate; wide enough for every skew that was seen to win."""
 
 _SMALLEST = 12
 _NEAR = 24
@@ -56,13 +58,13 @@ LINKS = (
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Run:
-    """The tightest facts of each wave of one run; times from the end of the echoes on, offsets less ours at that moment and less our skew; ns.
+    """The tightest facts of each wave of one run. Times count from the end of the echoes; offsets are less ours at that moment and less our skew; ns.
 
     Attributes:
-        lower_x: board time of each lower fact; below: what the offset was at least then.
-        below: see there.
+        lower_x: board time of each lower fact.
+        below: the least that the offset was at each lower fact.
         upper_x: board time of each upper fact.
-        above: what the offset was at most then.
+        above: the most that the offset was at each upper fact.
         true_lower: the true offset at the lower facts.
         true_upper: the true offset at the upper facts.
         true_end: the true offset at the end of the echoes.
@@ -84,12 +86,12 @@ class Run:
 
 
 def collect(link: Link, seed: int) -> Run:
-    """Run a session of five minutes on simulated time."""
+    """Run a five-minute session in simulated time."""
     chance = random.Random(seed)
     clocks = DriftingClocks(chance)
     state = chance.getstate()
     there_ns, back_ns = least_delays(chance, link.low_ns, link.high_ns)
-    chance.setstate(state)  # the profile draws the same ones again
+    chance.setstate(state)  # so that the profile draws the same values again
     estimator, now_ns = ClockEstimator(), clocks.start_ns
     lower, upper = [], []
     for at_ns, echoes in waves(clocks, link.profile(chance), chance, _LEARN_S):
@@ -103,7 +105,7 @@ def collect(link: Link, seed: int) -> Run:
     assert estimate is not None
 
     def rest(board_ns: int, offset_ns: float) -> float:
-        """An offset less our line."""
+        """An offset minus our line."""
         line = estimate.offset_at(end_ns) - clocks.origin_ns + estimate.skew * (board_ns - end_ns)
         return offset_ns - line
 
@@ -125,24 +127,25 @@ def collect(link: Link, seed: int) -> Run:
 
 
 Found = tuple[float, float]
-"""Offset at the end of the echoes, ns, and skew; both beside ours."""
+"""Offset at the end of the echoes, ns, and skew; both relative to ours."""
 
 
 def ours(_run: Run) -> Found:
-    """Our estimator: all else is told beside it."""
+    """Our estimator; all other results are relative to it."""
     return 0.0, 0.0
 
 
 def hulls(run: Run, seconds: float, bends: int, *, shaped: bool = False) -> Found:
-    """The mean of all curves that leave the lower facts below and the upper ones above, by the likelihood of exponential delays.
+    """The mean of all curves above the lower facts and below the upper ones, weighted by the likelihood of exponential delays.
 
-    A constant difference of the two ways shifts both hulls alike and leaves the skew as it is.
+    A constant difference between the two directions shifts both hulls equally and leaves the skew unchanged.
 
     Args:
         run: the echoes.
-        seconds: how far back they count.
-        bends: how many even changes of the skew, between both limits, are tried; 1: none.
-        shaped: whether the distance of the smallest delays from the least is told from their scatter (Hall, Annals of Statistics 10(2), 1982).
+        seconds: how far back echoes count.
+        bends: how many evenly spaced changes of the skew to try, between both limits; 1: none.
+        shaped: whether to estimate the distance of the smallest delays from the least one from their scatter (Hall,
+            Annals of Statistics 10(2), 1982).
     """
     strip = _strip(run, seconds, bends)
     beyond = _beyond_ns if shaped else _spacing_ns
@@ -151,7 +154,7 @@ def hulls(run: Run, seconds: float, bends: int, *, shaped: bool = False) -> Foun
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Strip:
-    """Mean of the middles of all allowed curves, their skew, and the scatter of the delays around the likeliest, rising; ns."""
+    """Mean of the middles of all allowed curves, their skew, and the scatter of the delays around the likeliest curve, rising; ns."""
 
     offset_ns: float
     skew: float
@@ -184,7 +187,7 @@ def _strip(run: Run, seconds: float, bends: int) -> _Strip:
 
 
 def _spacing_ns(scatter: Values) -> float:
-    """Mean distance of the smallest delays from one another."""
+    """Mean distance between neighbouring smallest delays."""
     return max(500.0, float(scatter[_SMALLEST]) / (_SMALLEST - 1))
 
 
@@ -208,7 +211,7 @@ def _blocks(run: Run) -> list[tuple[float, float, float]]:
 
 
 def least_squares(run: Run) -> Found:
-    """A parabola through the blocks' middles."""
+    """Fit a parabola to the middles of the blocks."""
     blocks = np.array(_blocks(run))
     bend, skew, offset = np.polyfit(blocks[:, 0] / 1e9, blocks[:, 1], 2)
     del bend
@@ -216,7 +219,7 @@ def least_squares(run: Run) -> Found:
 
 
 def kalman(run: Run) -> Found:
-    """Offset and skew (ns/s) as a state, the skew a random walk of SKEW_CHANGE a minute, the blocks' middles as measurements."""
+    """Kalman filter. State: offset and skew (ns/s), the skew a random walk of SKEW_CHANGE a minute; measurements: the blocks' middles."""
     state, spread, step_s = np.zeros(2), np.diag([1e12, 5e3**2]), _BLOCK_NS / 1e9
     noise = (SKEW_CHANGE * 60e9 * 1e9) ** 2 / 60
     move = np.array([[1.0, step_s], [0.0, 1.0]])
@@ -242,7 +245,7 @@ ESTIMATORS: dict[str, Callable[[Run], Found]] = {
 
 
 def errors_of(run: Run) -> dict[str, tuple[float, float]]:
-    """Error of each estimator at the end and 60 s later, ns."""
+    """Error of each estimator at the end of the echoes and 60 s later, ns."""
     found = {}
     for name, estimator in ESTIMATORS.items():
         offset, skew = estimator(run)

@@ -1,9 +1,10 @@
-"""Every link in one table: our own over tcp, ipc and serial, beside bare pyzmq, bare TCP, imagezmq and NetGear: `python -m tests.bench.bench_link [--help]`.
+"""Every link in one table: ours over tcp, ipc and serial, bare pyzmq, bare TCP, imagezmq, NetGear: `python -m tests.bench.bench_link [--help]`.
 
-640x480 frames at 30 per second over loopback, a Unix socket or a pseudo terminal, all transports in turns within one run, medians over the runs:
-one-way latency, CPU time a frame of both sides, loss. Then once more as fast as each goes: throughput. Figures to reach for JPEGs of about 50 KB:
-one-way p50 over tcp at most 1.1 times that of bare pyzmq, the sender's CPU time at most 40 us a frame above it;
-with keys (CURVE) at most 1.25 times that without.
+Sends 640x480 frames at 30 per second over loopback, a Unix socket or a pseudo terminal. All transports take turns
+within one run; results are medians over the runs: one-way latency, CPU time per frame on both sides, loss. A second
+pass sends as fast as each transport can: throughput. Figures to reach for JPEGs of about 50 KB: one-way p50 over tcp at
+most 1.1 times that of bare pyzmq; the sender's CPU time at most 40 us per frame above it; with keys (CURVE) at most
+1.25 times that without.
 """
 
 import argparse
@@ -37,7 +38,7 @@ from tests.support.keys import acquainted
 _FPS = 30
 _CONNECT_S = 2.0
 _LEARNING_S = 12.0
-"""Left out: the time to connect; of our own link also the first ten seconds of a session, in which it learns the clock with more echoes."""
+"""Left out: the time to connect and, for our own link, the first ten seconds of a session, in which it learns the clock with more echoes."""
 
 _FULL_SPEED_BYTES = 200_000_000
 _NAMES = {
@@ -63,17 +64,17 @@ _PAYLOADS: dict[str, Callable[[Path], int]] = {"jpeg": write_jpegs, "raw": write
 
 @dataclass(slots=True)
 class Rows:
-    """What the runs of one transport gave, one number a run.
+    """Results of the runs of one transport, one number per run.
 
     Attributes:
-        p50_us: one-way latency.
-        p95_us: the same.
-        p99_us: the same.
-        sender_us: CPU time a frame of the sender's process.
-        receiver_us: the same of the receiver's.
-        mb_per_s: throughput when frames come as fast as they are taken.
+        p50_us: one-way latency, median.
+        p95_us: one-way latency, 95th percentile.
+        p99_us: one-way latency, 99th percentile.
+        sender_us: CPU time per frame of the sender's process.
+        receiver_us: CPU time per frame of the receiver's process.
+        mb_per_s: throughput when frames are sent as fast as they are taken.
         lost: frames that never came at the steady rate, over all runs.
-        lost_at_speed: share of those that never came at full speed.
+        lost_at_speed: share of frames that never came at full speed.
     """
 
     p50_us: list[float] = field(default_factory=list)
@@ -86,7 +87,7 @@ class Rows:
     lost: int = 0
 
     def add(self, sender: dict[str, float], receiver: dict[str, Any] | None, measured: int) -> None:
-        """Take one run at the steady rate."""
+        """Add one run at the steady rate."""
         self.sender_us.append(sender["cpu_us_per_frame"])
         if receiver is None:
             return
@@ -97,7 +98,7 @@ class Rows:
             values.append(float(np.percentile(delays, q)) / 1000 if delays else float("nan"))
 
     def add_at_speed(self, receiver: dict[str, Any], measured: int) -> None:
-        """Take one run at full speed."""
+        """Add one run at full speed."""
         self.mb_per_s.append(receiver["mb_per_s"])
         self.lost_at_speed.append(1 - len(receiver["delays_ns"]) / measured)
 
@@ -109,7 +110,7 @@ class Rows:
 
 
 def main() -> int:
-    """Run and print; 4 when a figure is missed."""
+    """Run and print; exit code 4 when a figure is missed."""
     options = _options()
     runs = range(options.runs)
     missing = _missing(options.transports)
@@ -164,7 +165,7 @@ def _options() -> argparse.Namespace:
 
 
 def _missing(wanted: list[str]) -> dict[str, str]:
-    """Why some of these transports are not measured here."""
+    """Why some of these transports cannot be measured here."""
     absent = {
         name: f"{name}: {_EXTRAS[name]} is not installed (make bench does it)" for name in wanted if name in _EXTRAS
     }
@@ -181,7 +182,7 @@ Result = tuple[dict[str, float], dict[str, Any] | None]
 
 
 def _run(transport: str, folder: Path, fps: int, warm_up: int, frames: int) -> Result:
-    """Both ends in processes of their own; gives what the sender and the receiver saw."""
+    """Run both ends in separate processes; returns what the sender and the receiver saw."""
     with ExitStack() as stack:
         addresses, descriptors = _addresses(transport, stack)
         numbers = [str(fps), str(warm_up), str(warm_up + frames)]
@@ -204,11 +205,11 @@ def _run(transport: str, folder: Path, fps: int, warm_up: int, frames: int) -> R
 
 
 def _addresses(transport: str, stack: ExitStack) -> tuple[dict[str, str], tuple[int, ...]]:
-    """Where each role's end is, and the descriptors that the processes inherit."""
+    """The address of each role's end, and the descriptors that the processes inherit."""
     if transport == "tandemscan-curve":
         address = f"tcp://127.0.0.1:{free_port()}"
         board, host = acquainted(Path(stack.enter_context(tempfile.TemporaryDirectory())), address)
-        # On loopback alone a board asks for no keys.
+        # A board that listens on loopback alone asks for no keys.
         return {"send": f"{address.replace('127.0.0.1', '*')}#{board.path}", "receive": f"{address}#{host.path}"}, ()
     if transport == "tandemscan-ipc":
         folder = stack.enter_context(tempfile.TemporaryDirectory())
@@ -263,7 +264,7 @@ def _print(payload: str, size: int, rows: dict[str, Rows], missing: dict[str, st
 
 
 def _judge(rows: dict[str, Rows]) -> list[Verdict]:
-    """Of the JPEGs; of transports that were not run nothing is said."""
+    """Judge the JPEG rows; transports that did not run are skipped."""
     verdicts = []
     if {"tandemscan", "pyzmq"} <= rows.keys():
         ours, bare = rows["tandemscan"], rows["pyzmq"]

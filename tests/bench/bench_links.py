@@ -1,10 +1,11 @@
-"""How long the stream pauses when the carrier is lost, and when the better link is back: `python -m tests.bench.bench_links [--help]`.
+"""How long the stream pauses when the carrier is lost and when the better link returns: `python -m tests.bench.bench_links [--help]`.
 
-Both programs over a serial cable (a pseudo terminal, 3 MB/s) and tcp or ipc, JPEGs of 5 KB at 30 per second, so that the cable is the better link.
-The cable is pulled so many times, or falls silent without a word. A pause is the time between the last frame over one link and the first over the
-other, as they came to the host (delays.jsonl); 33 ms of it are the camera's period. The way back is a choice, made after the cable has proved
-itself for a second, and for twice as long after each loss; its pause is what the change costs. Figures to reach for a pulled cable (DESIGN, section
-7): median 1 s, p95 2 s; a silent one is known as lost after 1.5 s. Exit 4 when one is missed.
+Both programs run over a serial cable (a pseudo terminal, 3 MB/s) and tcp or ipc. JPEGs of 5 KB at 30 per second make
+the cable the better link. The cable is pulled, or falls silent without notice, several times. A pause is the time
+between the last frame over one link and the first frame over the other, as received by the host (delays.jsonl); it
+includes 33 ms, the camera's period. The way back is a choice: the cable must prove itself for a second, and for twice
+as long after each loss. Its pause is what the change costs. Figures to reach for a pulled cable (DESIGN, section 7):
+median 1 s, p95 2 s; a silent cable is known as lost after 1.5 s. Exit 4 when one is missed.
 """
 
 import argparse
@@ -33,14 +34,14 @@ _FPS = 30
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The cable lost in one way, with one other link.
+    """One way of losing the cable, with one other link.
 
     Attributes:
         way: `pulled` or `silent`.
         other: kind of the other link.
-        there_ms: pause of each change to it.
+        there_ms: pause of each change to the other link.
         back_ms: pause of each return.
-        lost: frames lost a switch.
+        lost: frames lost per switch.
     """
 
     way: str
@@ -51,7 +52,7 @@ class Row:
 
 
 def main() -> int:
-    """Measure and print a table; 4 when a figure is missed."""
+    """Measure and print a table; exit code 4 when a figure is missed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--losses", type=int, default=3, help="how often the cable is lost in each way (default 3)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -89,16 +90,16 @@ def _judge(rows: list[Row]) -> list[Verdict]:
 
 
 def measure(folder: Path, way: str, other: str, losses: int) -> tuple[list[float], list[float], float]:
-    """Lose the cable and give it back.
+    """Lose the cable and bring it back.
 
     Args:
-        folder: for the run.
+        folder: for the run's files.
         way: `pulled` or `silent`.
         other: kind of the other link.
         losses: how often.
 
     Returns:
-        Pauses at the loss and at the return, ms, and frames lost a switch.
+        Pauses at the loss and at the return, ms, and frames lost per switch.
     """
     film = write_film(folder / "film", 300)
     camera = ["--camera", f"replay:{film}?fps={_FPS}&loop=1"]
@@ -132,7 +133,7 @@ def _pause_ms(before: dict[str, Any], after: dict[str, Any]) -> float:
 
 
 def _lose(cable: PtyLine, way: str) -> Callable[[], None]:
-    """Lose the cable; gives what brings it back."""
+    """Lose the cable; returns a function that brings it back."""
     if way == "pulled":
         cable.pull()
         return cable.plug
@@ -147,7 +148,7 @@ def _lose(cable: PtyLine, way: str) -> Callable[[], None]:
 
 
 def _wait(out: Path, link: str, pairs: int) -> None:
-    """Wait for so many pairs in a row over a link."""
+    """Wait for this many pairs in a row over a link."""
 
     def came() -> bool:
         if lines(out / "delays.jsonl") < pairs:

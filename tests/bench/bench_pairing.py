@@ -1,12 +1,14 @@
-"""Pairs of random streams beside the offline optimum: `python -m tests.bench.bench_pairing [--help]`.
+"""Pairs of random streams compared with the offline optimum: `python -m tests.bench.bench_pairing [--help]`.
 
-Two cameras, 2 s each, phases at random, 150 ppm apart, jitter of the stamps; frames come 25 +- 6 ms (board) and 6 +- 2 ms (host) late, in order
-within their stream, and are lost with 0, 2 or 10 %. Judge: the optimum by dynamic programming (most pairs, then least total skew), knowing all. Columns:
-pairs and total skew as parts of the optimum's; streams equal to it; pairs beyond the tolerance, and pairs that no optimum contains; extra wait:
-from the arrival of a pair's later frame to its forming. Missed: what the figures ask of our own rows and they do not hold. Rivals: ROS ApproximateTime (default, and with a lower bound of 0.9 periods), naive nearest.
-Figures to reach: where frames are further apart than twice the tolerance all streams equal, no forbidden pair, extra wait p50 0 and p99 1 ms; elsewhere
-99 % of the optimum's pairs, none beyond the tolerance, and no wait beyond one period of the slower camera (and a tick, when it ends). Exit 4 when
-a figure is missed.
+Two cameras run for 2 s each, with random phases, 150 ppm apart, with jitter on the stamps. Frames arrive 25 +- 6 ms
+(board) and 6 +- 2 ms (host) late, in order within their stream; 0, 2 or 10 % are lost. The judge is the optimum found
+by dynamic programming with full knowledge (most pairs, then least total skew). Columns: pairs and total skew as
+fractions of the optimum's; streams equal to it; pairs beyond the tolerance, and pairs that no optimum contains; extra
+wait: from the arrival of a pair's later frame until the pair forms. Missed: figures that our own rows do not reach.
+Rivals: ROS ApproximateTime (default, and with a lower bound of 0.9 periods), naive nearest. Figures to reach: where
+frames are further apart than twice the tolerance, all streams equal, no forbidden pair, extra wait p50 0 and p99 1 ms;
+elsewhere 99 % of the optimum's pairs, none beyond the tolerance, and no wait beyond one period of the slower camera
+(plus one tick at its end). Exit 4 when a figure is missed.
 """
 
 import argparse
@@ -36,7 +38,7 @@ _LOSSES = (0.0, 0.02, 0.1)
 
 @dataclass(frozen=True, slots=True)
 class Regime:
-    """Periods, tolerance and jitter of a kind of streams; `tolerance` and `jitter` in periods of the slower camera."""
+    """Periods, tolerance and jitter of one kind of stream; `tolerance` and `jitter` in periods of the slower camera."""
 
     name: str
     board_period_ns: int = PERIOD_NS
@@ -74,7 +76,7 @@ REGIMES = (
 
 @dataclass(frozen=True, slots=True)
 class Streams:
-    """Stamps of both cameras, and the arrivals in their order: (time, stamp, from the board?)."""
+    """Stamps of both cameras, and the arrivals in order: (time, stamp, from the board?)."""
 
     board_ns: list[int]
     host_ns: list[int]
@@ -82,7 +84,7 @@ class Streams:
 
 
 def draw(regime: Regime, loss: float, chance: random.Random) -> Streams:
-    """Two random streams of a regime."""
+    """Draw two random streams of a regime."""
     jitter_ns = regime.jitter * regime.longer_ns / 2
     phase_ns = PERIOD_NS / 2 if regime.half_phase else chance.uniform(0, regime.host_period_ns)
     sides = []
@@ -100,11 +102,11 @@ def draw(regime: Regime, loss: float, chance: random.Random) -> Streams:
 
 
 Formed = Iterator[tuple[int, int, int]]
-"""Pairs with the time of their forming: (time, board, host)."""
+"""Pairs with the time when they formed: (time, board, host)."""
 
 
 def ours(regime: Regime, streams: Streams) -> Formed:
-    """Our pairing, also ticked every 5 ms."""
+    """Run our pairing, also ticked every 5 ms."""
     pairing: Pairing[int, int] = Pairing(
         PairingSettings(regime.tolerance_ns, regime.board_period_ns, regime.host_period_ns)
     )
@@ -146,7 +148,7 @@ class Tally:
     waits_ms: list[float] = field(default_factory=list)
 
     def add(self, regime: Regime, streams: Streams, formed: Formed) -> None:
-        """Judge one stream's pairs."""
+        """Add the pairs of one stream."""
         came = {(stamp, from_board): at for at, stamp, from_board in streams.arrivals}
         pairs = []
         for at_ns, board, host in formed:
@@ -186,7 +188,7 @@ class Row:
 
 
 def failures(regime: Regime, tally: Tally) -> tuple[str, ...]:
-    """The figures that were missed."""
+    """The missed figures."""
     waits = tally.waits_ms
     if regime.spacing_allows:
         missed = {
@@ -204,7 +206,7 @@ def failures(regime: Regime, tally: Tally) -> tuple[str, ...]:
 
 
 def row_of(regime: Regime, loss: float, method: str, tally: Tally) -> Row:
-    """Sum up; rivals are not asked to reach the figures."""
+    """Sum up; rivals need not reach the figures."""
     waits = tally.waits_ms or [float("nan")]
     return Row(
         regime=regime.name,

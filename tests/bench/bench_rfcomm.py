@@ -1,8 +1,9 @@
-"""Every link's delays in one run, RFCOMM among them: delay-bench in a booted board with two virtual Bluetooth adapters.
+"""Every link's delays in one run, RFCOMM included: delay-bench in a booted board with two virtual Bluetooth adapters.
 
-`python -m tests.bench.bench_rfcomm [--seconds S]` (images of the board: make test-board). Both programs run in the guest, whose processor is
-emulated: the rows compare with each other and with no other table. The adapters are btvirt's, without a radio between them: the row shows what
-RFCOMM, its kernel and our framing cost, not what the air does. NumPy and OpenCV come from this checkout's environment, on a disk of the guest's.
+`python -m tests.bench.bench_rfcomm [--seconds S]` (images of the board: make test-board). Both programs run in the
+guest, whose processor is emulated: compare the rows with each other only, never with another table. The adapters are
+btvirt's, with no radio between them: the row shows what RFCOMM, its kernel and our framing cost, without the radio.
+NumPy and OpenCV come from this checkout's environment, on a disk attached to the guest.
 """
 
 import argparse
@@ -30,7 +31,7 @@ _WHEELS: Final = (
 )
 _SOURCES: Final = ("board_agent", "common", "phone_host")
 _GUEST_PYTHON: Final = (3, 11)
-"""Debian 12's; wheels with native code fit no other."""
+"""The version in Debian 12; wheels with native code fit no other."""
 
 
 def main() -> int:
@@ -67,7 +68,7 @@ def main() -> int:
 
 
 def _disk(folder: Path) -> Path:
-    """Write a file system with what the host's program needs beside Debian's packages."""
+    """Write a file system with what the host's program needs besides Debian's packages."""
     content, disk = folder / "content", folder / "disk"
     content.mkdir()
     installed = Path(sys.prefix) / "lib" / f"python{_GUEST_PYTHON[0]}.{_GUEST_PYTHON[1]}" / "site-packages"

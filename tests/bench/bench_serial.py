@@ -1,10 +1,11 @@
 """Serial lines: throughput over a pty, goodput and echoes on slow lines: `python -m tests.bench.bench_serial [--help]`.
 
-Over a pty: frames of 50 KB from one process to another, our link and messages beside the same bytes in a bare loop (COBS + CRC-32 where the
-package `cobs` is installed; length + CRC-32), all in turns, medians over the runs. Figure to reach: 0.7 times the COBS loop.
-On an emulated line (bytes at a rate, 0.3 ms of delay, an unlimited queue in front): a real board-agent whose camera gives 30 frames of 25 KB a
-second, and the host's role of the protocol with its clock echoes, from the eleventh second on. Goodput is the frames' bytes over what the line can carry. Figures to
-reach: 1.5 Mbit/s: 95 % and echo p99 20 ms; 115200 baud 8N1: 93 %.
+Over a pty: one process sends frames of 50 KB to another. Our link and messages are compared with a bare loop that sends
+the same bytes (COBS + CRC-32 where the package `cobs` is installed; length + CRC-32). All take turns; results are
+medians over the runs. Figure to reach: 0.7 times the COBS loop. On an emulated line (limited byte rate, 0.3 ms of
+delay, an unlimited queue in front): a real board-agent whose camera delivers 30 frames of 25 KB a second, and the
+host's role of the protocol with its clock echoes, measured from the eleventh second on. Goodput is the frames' bytes
+divided by what the line can carry. Figures to reach: 1.5 Mbit/s: 95 % and echo p99 20 ms; 115200 baud 8N1: 93 %.
 """
 
 import argparse
@@ -42,12 +43,12 @@ _FRAME_BYTES = 50_000
 _FRAMES = 4000
 _RATIO = 0.7
 _SETTLING_NS = 11_000_000_000
-"""For ten seconds the host learns the skew of the clocks with more echoes."""
+"""The host sends more echoes for ten seconds to learn the skew of the clocks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowLine:
-    """A line to emulate, and what is to be reached on it.
+    """A line to emulate, and the figures to reach on it.
 
     Attributes:
         name: for people.
@@ -70,7 +71,7 @@ _FILM_BYTES = 25_000
 
 
 def main() -> int:
-    """Run and print; 4 when a figure is missed."""
+    """Run and print; exit code 4 when a figure is missed."""
     options = _options()
     console = Console(stderr=True)
     framings = [name for name in _NAMES if name != "cobs" or importlib.util.find_spec("cobs")]
@@ -103,7 +104,7 @@ def _options() -> argparse.Namespace:
 
 
 def _over_pty(framing: str) -> tuple[float, float, float]:
-    """MB/s, and CPU microseconds a frame of sender and receiver."""
+    """MB/s, and CPU microseconds per frame of sender and receiver."""
     master, slave = pty.openpty()
     tty.setraw(slave)
     module = [sys.executable, "-m", "tests.bench.serial_worker"]
@@ -125,7 +126,7 @@ def _over_pty(framing: str) -> tuple[float, float, float]:
 
 
 def _write_film(folder: Path) -> None:
-    """JPEGs of exactly 25 KB: numbered images, filled up with a comment (ITU-T T.81, B.2.4.5)."""
+    """Write JPEGs of exactly 25 KB: numbered images, padded with a comment (ITU-T T.81, B.2.4.5)."""
     chance = np.random.default_rng(3)
     for number in range(30):
         done, encoded = cv2.imencode(".jpg", draw(number))
@@ -194,7 +195,7 @@ def _print(
 
 
 def _judge(fast: dict[str, list[tuple[float, float, float]]], slow: dict[str, dict[str, float]]) -> list[Verdict]:
-    """Of a framing that is not installed nothing is said."""
+    """Judge the figures; framings that are not installed are skipped."""
     verdicts = []
     if "cobs" in fast:
         ours, theirs = (statistics.median(run[0] for run in fast[name]) for name in ("ours", "cobs"))

@@ -1,7 +1,7 @@
-"""A booted armhf board under measurement: programs in it, what they cost, and who takes their frames on this machine.
+"""A booted armhf board under measurement: the programs on it, what they cost, and what takes their frames on this machine.
 
-CPU time is what the guest's kernel gives for all threads of a process (/proc/PID/task/*/schedstat, ns on a processor), the kernel's work on
-its behalf included, what runs in kernel threads and interrupts not.
+CPU time is what the guest's kernel reports for all threads of a process (/proc/PID/task/*/schedstat, ns on a
+processor). It includes the kernel's work on behalf of the process, but not work in kernel threads and interrupts.
 """
 
 import os
@@ -40,21 +40,21 @@ _FIFO_PRIORITY: Final = 10
 
 
 class Counter(Protocol):
-    """Takes frames and counts them."""
+    """Takes and counts frames."""
 
     frames: int
     bytes: int
 
     def close(self) -> None:
-        """Let go of the connection."""
+        """Close the connection."""
 
 
 class OurHost:
     """Our host up to the pairing: link, session, clock echoes, credit.
 
     Attributes:
-        ages_ns: of each frame when it came, since its exposure.
-        first_ns: when the first frame came; 0 before it.
+        ages_ns: age of each frame on arrival, since its exposure.
+        first_ns: when the first frame arrived; 0 until then.
 
     Args:
         address: of the board's link.
@@ -66,7 +66,7 @@ class OurHost:
         counter = self
 
         class Counting(Unkept):
-            """Counts the frames at the end of their way."""
+            """A sink that counts the frames."""
 
             def add_board(self, frame: BoardFrame) -> None:
                 counter.first_ns = counter.first_ns or frame.received_ns
@@ -79,18 +79,18 @@ class OurHost:
         self._receiver.start()
 
     def close(self) -> None:
-        """Say goodbye, and hear the board's last account."""
+        """Say goodbye, and receive the board's last account."""
         self._receiver.stop()
 
     @property
     def account(self) -> SessionAccount:
-        """The session so far; whole after `close`."""
+        """The account of the session so far; complete after `close`."""
         (only,) = self._receiver.account.sessions
         return only
 
 
 class _Counting(threading.Thread):
-    """A counter with a thread of its own."""
+    """A counter with its own thread."""
 
     def __init__(self) -> None:
         super().__init__(daemon=True)
@@ -99,20 +99,20 @@ class _Counting(threading.Thread):
         self.start()
 
     def close(self) -> None:
-        """Let go of the connection."""
+        """Close the connection."""
         self.stopping.set()
         self.join()
 
 
 class Puller(_Counting):
-    """Takes the messages of the C program."""
+    """Receives the C program's messages."""
 
     def __init__(self, address: str) -> None:
         self._address = address
         super().__init__()
 
     def run(self) -> None:
-        """Pull until told to stop."""
+        """Receive until told to stop."""
         with zmq.Context() as context, context.socket(zmq.PULL) as sock:
             sock.setsockopt(zmq.RCVTIMEO, 100)
             sock.setsockopt(zmq.LINGER, 0)
@@ -125,7 +125,7 @@ class Puller(_Counting):
 
 
 class HttpReader(_Counting):
-    """Takes ustreamer's stream: multipart over HTTP, each part with its length."""
+    """Reads ustreamer's stream: multipart over HTTP, each part with its length."""
 
     def __init__(self, address: str) -> None:
         host, _, port = address.removeprefix("tcp://").rpartition(":")
@@ -133,7 +133,7 @@ class HttpReader(_Counting):
         super().__init__()
 
     def run(self) -> None:
-        """Read until told to stop; a server that is not there yet is dialled again."""
+        """Read until told to stop; keep dialling a server that is not there yet."""
         while not self.stopping.is_set():
             with suppress(OSError), socket.create_connection(self._endpoint, timeout=5) as sock:
                 sock.sendall(b"GET /stream HTTP/1.0\r\n\r\n")
@@ -150,13 +150,13 @@ class HttpReader(_Counting):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
-    """What a program took while it streamed.
+    """What a program used while it streamed.
 
     Attributes:
-        frames: that arrived here in the time.
-        seconds: that it was watched.
+        frames: that arrived here in that time.
+        seconds: how long it was watched.
         cpu_ns: CPU time of all its threads.
-        system_ns: the kernel's share of that (of coarser grain).
+        system_ns: the kernel's share of that (at a coarser resolution).
         resident_bytes: its memory at the end.
     """
 
@@ -168,12 +168,12 @@ class Cost:
 
     @property
     def frame_ms(self) -> float:
-        """CPU time a frame, ms."""
+        """CPU time per frame, ms."""
         return self.cpu_ns / max(1, self.frames) / 1e6
 
     @property
     def share(self) -> float:
-        """Of one processor."""
+        """Share of one processor."""
         return self.cpu_ns / 1e9 / self.seconds
 
 
@@ -195,7 +195,7 @@ class Board:
         self.guest = guest
 
     def be_quiet(self) -> bool:
-        """Put the emulator and this process before ordinary work: time in which the guest does not run counts as its programs' own.
+        """Give the emulator and this process priority: time in which the guest does not run counts as its programs' own.
 
         Returns:
             Whether that is permitted.
@@ -210,14 +210,14 @@ class Board:
         return True
 
     def interpreter_s(self) -> float:
-        """What the guest's Python takes for 10^6 rounds of `x += i`: the best of three, s."""
+        """Time the guest's Python takes for 10^6 rounds of `x += i`: the best of three, s."""
         loop = (
             "import timeit; print(min(timeit.repeat('for i in range(1000000): x += i', 'x = 0', number=1, repeat=3)))"
         )
         return float(self.guest.sh(f"python3 -c {shlex.quote(loop)}"))
 
     def cost(self, pid: int, counter: Counter, seconds: float) -> Cost:
-        """Wait until frames come, then watch a process for a while."""
+        """Wait for frames, then watch a process for a while."""
         self.until_frames(counter)
         return self.watch(pid, lambda: counter.frames, seconds)
 
@@ -226,7 +226,7 @@ class Board:
 
         Args:
             pid: the process.
-            frames: how many have come here so far.
+            frames: gives the number of frames received here so far.
             seconds: how long.
         """
         before, frames_before = self.meter(pid), frames()
@@ -245,10 +245,10 @@ class Board:
         return 1024 * int(self.guest.sh(f"awk '/^VmRSS/ {{ print $2 }}' /proc/{pid}/status"))
 
     def until_frames(self, counter: Counter) -> None:
-        """Wait until a second's worth of frames has come.
+        """Wait for one second's worth of frames.
 
         Raises:
-            UnavailableError: none come.
+            UnavailableError: no frames came.
         """
         wanted, deadline = counter.frames + _LEAST_FRAMES, time.monotonic() + _PATIENCE_S
         while counter.frames < wanted:
@@ -271,7 +271,7 @@ class Board:
         return int(self.guest.show("MainPID"))
 
     def start_ms(self) -> float:
-        """Restart the service; gives the time from the start of its process to READY, by the guest's own systemd, ms."""
+        """Restart the service; returns the time from process start to READY as measured by the guest's systemd, ms."""
         self.guest.sh(f"systemctl restart {UNIT}")
         times = [
             int(self.guest.show(name)) for name in ("ExecMainStartTimestampMonotonic", "ActiveEnterTimestampMonotonic")
@@ -280,7 +280,7 @@ class Board:
 
     @contextmanager
     def running(self, command: str) -> Iterator[int]:
-        """Run a command in the guest for the length of a block; gives its process id."""
+        """Run a command in the guest while the block lasts; yields its process id."""
         pid_file = "/run/bench.pid"
         process = self.guest.popen(f"echo $$ > {pid_file}; exec {command} >/run/bench.log 2>&1")
         try:
@@ -295,7 +295,7 @@ class Board:
 
 @contextmanager
 def booted_board(architecture: Architecture = Architecture.ARMHF) -> Iterator[Board]:
-    """Boot a board and install our package, for the length of a block.
+    """Boot a board and install our package, while the block lasts.
 
     Raises:
         UnavailableError: the image or the emulator is missing.
@@ -318,7 +318,7 @@ def booted_board(architecture: Architecture = Architecture.ARMHF) -> Iterator[Bo
 
 
 def need_compiler() -> None:
-    """Look for what `install_rivals` needs, before minutes go into a boot.
+    """Check for what `install_rivals` needs before spending minutes on a boot.
 
     Raises:
         UnavailableError: the cross compiler is missing.
@@ -328,7 +328,7 @@ def need_compiler() -> None:
 
 
 def install_rivals(board: Board) -> None:
-    """Compile what stands beside our board and what counts its copies for an armhf guest, linked to its own libzmq, and put it there."""
+    """Compile the rival and the copy counter for the armhf guest, link them to its own libzmq, and install them there."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         libzmq, forward, copies = folder / "libzmq.so.5", folder / "forward", folder / "copies.so"
@@ -336,7 +336,7 @@ def install_rivals(board: Board) -> None:
         compiler = (COMPILER, "-O2", "-Wall", "-Wextra", "-Werror")
         linked = (SOURCES / "forward.c", libzmq, "-Wl,--allow-shlib-undefined")
         subprocess.run([*compiler, "-o", forward, *linked], check=True)
-        # -fno-builtin: its own loops must not become calls of what they stand for.
+        # -fno-builtin: its own loops must not be compiled into calls of the functions that they replace.
         library = ("-fno-builtin", "-shared", "-fPIC", SOURCES / "copies.c")
         subprocess.run([*compiler, "-o", copies, *library], check=True)
         for program in (forward, copies):

@@ -1,4 +1,4 @@
-"""The error of the clock estimate between two real processes of one machine, for bench_clock: a board-agent and our `Receiver`."""
+"""The error of the clock estimate between two real processes on one machine, for bench_clock: a board-agent and our `Receiver`."""
 
 import os
 import tempfile
@@ -25,7 +25,7 @@ _STEP_S = 0.02
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RealRow:
-    """One load's figures, us; how busy each core was, by anybody, %."""
+    """Figures for one load, us; how busy each core was with any work, %."""
 
     load: str
     scheduling: str
@@ -42,10 +42,10 @@ class RealRow:
 
 
 def measure(runs: int) -> list[RealRow]:
-    """Measure idle and under raw frames; with SCHED_FIFO and a core for each side where that is permitted, and without.
+    """Measure idle and under raw frames, with and without SCHED_FIFO and a core for each side where permitted.
 
     Args:
-        runs: sessions for each row.
+        runs: sessions per row.
     """
     rows = []
     with tempfile.TemporaryDirectory() as name:
@@ -62,7 +62,7 @@ def measure(runs: int) -> list[RealRow]:
 
 @contextmanager
 def _scheduling(*, fifo: bool) -> Iterator[list[int]]:
-    """Begin on the first core before ordinary work; afterwards everything is as it was."""
+    """While the block lasts, run on the first core with priority over ordinary work; restore everything afterwards."""
     cores, policy, parameter = sorted(os.sched_getaffinity(0)), os.sched_getscheduler(0), os.sched_getparam(0)
     if fifo:
         be_quiet(0)
@@ -108,7 +108,7 @@ def _measured(load: str, folder: Path, fps: int, runs: int, *, fifo: bool) -> Re
 
 
 def _session(address: str) -> Iterator[tuple[float, int, ClockEstimate]]:
-    """A host that comes, learns and goes; (seconds since the first echo, host's time, estimate)."""
+    """Run one host session; returns (seconds since the first echo, host's time, estimate)."""
     link = open_link(parse_link(address, listens_by_default=False))
     receiver = Receiver([link], now.random_id(), Unkept())
     receiver.start()

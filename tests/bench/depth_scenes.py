@@ -1,4 +1,4 @@
-"""Rectified pairs with ground truth out of $SCAN_DATA for bench_depth, and what two cheap unlike cameras would make of them."""
+"""Rectified pairs with ground truth from $SCAN_DATA for bench_depth, degraded as two cheap, unlike cameras would."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ CASES: Final[dict[str, Callable[[Image, Image], tuple[Image, Image]]]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A rectified pair and its truth.
+    """A rectified pair and its ground truth.
 
     Attributes:
         name: folder.
@@ -72,7 +72,7 @@ class Scene:
 
 
 def scenes(data: Path) -> Iterator[Scene]:
-    """Read what is there."""
+    """Read all available scenes."""
     everything = tuple(CASES)
     for name, scale in (("tsukuba", 16), ("cones", 4)):
         folder = data / "middlebury_v2" / name
@@ -108,12 +108,12 @@ def _known(truth: Values) -> Values:
 
 
 def _coarse(path: Path, scale: int) -> Values:
-    """Truth as grey levels, 0 = unknown."""
+    """Ground truth stored as grey levels, 0 = unknown."""
     return _known(_read(path, cv2.IMREAD_GRAYSCALE).astype(np.float32) / np.float32(scale))
 
 
 def _seen_by_both(left: Values, right: Values) -> Values:
-    """The left truth where the right one says the same within a pixel."""
+    """The left ground truth where the right one agrees within a pixel."""
     rows, columns = np.indices(left.shape)
     there = np.rint(columns - np.nan_to_num(left, nan=-1)).astype(int)
     inside = (there >= 0) & (there < left.shape[1])

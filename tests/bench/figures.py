@@ -1,4 +1,4 @@
-"""Figures to reach. A benchmark says of each whether it was reached, and ends with exit code 4 when one was not, as the soak does."""
+"""Figures to reach. A benchmark reports whether each was reached and exits with code 4 when one was missed, as the soak does."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,13 +9,13 @@ _MISSED: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """One figure beside what was found.
+    """One figure and the measured value.
 
     Attributes:
-        what: was measured.
+        what: the quantity measured.
         reached: whether the figure was reached.
-        found: with its unit.
-        limit: what was to be reached.
+        found: the measured value with its unit.
+        limit: the figure to reach.
     """
 
     what: str
@@ -29,5 +29,5 @@ class Verdict:
 
 
 def exit_code(verdicts: Sequence[Verdict]) -> int:
-    """0 when all were reached."""
+    """0 when all figures were reached."""
     return 0 if all(verdict.reached for verdict in verdicts) else _MISSED

@@ -1,4 +1,4 @@
-"""What one end of a link under test is asked for, and what it saw."""
+"""The job of one end of a link under test, and its results."""
 
 import json
 import resource
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 SILENCE_S = 3.0
-"""A receiver that hears nothing for this long ends: frames may be lost, also the last one."""
+"""A receiver that hears nothing for this long stops: frames may be lost, including the last one."""
 
 
 @dataclass(slots=True)
@@ -29,13 +29,13 @@ class Tally:
     _cpu: list[tuple[int, float]] = field(default_factory=list)
 
     def passed(self, number: int) -> None:
-        """Take note that a frame has gone through this end; CPU time counts from the end of the warm-up to the last frame."""
+        """Record that a frame has passed this end; CPU time counts from the end of the warm-up to the last frame."""
         if number >= self.warm_up - 1 and (not self._cpu or number == self.frames - 1):
             usage = resource.getrusage(resource.RUSAGE_SELF)
             self._cpu.append((number, usage.ru_utime + usage.ru_stime))
 
     def arrived(self, number: int, sent_ns: int, size_bytes: int) -> None:
-        """Take note that a frame's bytes are usable."""
+        """Record that a frame's bytes are usable."""
         now_ns = time.monotonic_ns()
         if number >= self.warm_up:
             self.delays_ns.append(now_ns - sent_ns)
@@ -46,7 +46,7 @@ class Tally:
         self.passed(number)
 
     def report(self) -> str:
-        """The JSON object; CPU time is NaN where the first or last frame never came."""
+        """The results as a JSON object; CPU time is NaN if the first or last frame never came."""
         per_frame = float("nan")
         if len(self._cpu) == 2:
             (first, before_s), (last, after_s) = self._cpu
@@ -58,7 +58,7 @@ class Tally:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """What a worker is asked for; `fps` 0: as fast as it goes."""
+    """A worker's job; `fps` 0: as fast as possible."""
 
     address: str
     folder: Path
@@ -67,11 +67,11 @@ class Job:
     frames: int
 
     def tally(self) -> Tally:
-        """An empty tally for it."""
+        """An empty tally for this job."""
         return Tally(self.warm_up, self.frames)
 
     def payloads(self) -> list[bytes]:
-        """The folder's images."""
+        """The images in the folder."""
         return [path.read_bytes() for path in sorted(self.folder.iterdir())]
 
     @property
@@ -82,7 +82,7 @@ class Job:
 
 
 def pace(job: Job, send: Callable[[int, bytes], object]) -> Tally:
-    """Show frames at a steady rate, or as fast as they are taken, as every sender but ours does."""
+    """Send frames at a steady rate, or as fast as they are taken; every sender but ours uses this."""
     payloads, tally = job.payloads(), job.tally()
     start_s = time.monotonic()
     for number in range(job.frames):

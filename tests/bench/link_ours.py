@@ -1,4 +1,4 @@
-"""Our own link and protocol as transports of the link benchmark: board-agent's agent and phone-host's receiver, whole."""
+"""Our own link and protocol as transports of the link benchmark: board-agent's complete agent and phone-host's complete receiver."""
 
 import os
 import socket
@@ -21,11 +21,11 @@ from tests.bench.link_job import Job, Tally
 from tests.support.unkept import Unkept
 
 _SLOTS = 8
-"""Free places that the host tells of when frames go as fast as they can: more than one, so that the link is never idle."""
+"""Free slots that the host grants when frames go as fast as they can: more than one, so that the link is never idle."""
 
 
 class OpenLine:
-    """The end of a pseudo terminal that is open already, as a line."""
+    """The end of an already open pseudo terminal, as a line."""
 
     def __init__(self, descriptor: int) -> None:
         os.set_blocking(descriptor, False)
@@ -36,11 +36,11 @@ class OpenLine:
         return self._descriptor
 
     def is_drained(self) -> bool:
-        """Nothing is known."""
+        """Unknown here."""
         return True
 
     def discard_output(self) -> None:
-        """Nothing can be done."""
+        """Not possible here."""
 
     def close(self) -> None:
         """Close it."""
@@ -52,7 +52,7 @@ def send_tandemscan(job: Job) -> Tally:
     tally = job.tally()
 
     class Metered(ReplayCamera):
-        """Reads the meter where the other senders do, and ends after the last frame."""
+        """Reads the meter where the other senders do, and stops after the last frame."""
 
         _shown = -1
 
@@ -86,7 +86,7 @@ def receive_tandemscan(job: Job) -> Tally:
     take_in = receiver._reception._accept_frame
 
     def stamped(frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
-        """Stamps a frame when it is decoded and the session has taken it, before the host decides whether to believe it."""
+        """Stamp a frame once it is decoded and the session has taken it, before the host decides whether to believe it."""
         tally.arrived(frame.sequence, frame.marks.sent_ns, len(frame.payload))
         take_in(frame, lost, link, now_ns)
 
@@ -101,7 +101,7 @@ def receive_tandemscan(job: Job) -> Tally:
 
 
 def _open(address: str) -> Link:
-    """The host's end: an address, or `fd:N` for the end of a pseudo terminal."""
+    """Open the host's end: an address, or `fd:N` for the end of a pseudo terminal."""
     if address.startswith("fd:"):
         descriptor = int(address.removeprefix("fd:"))
         return StreamLink("serial", LinkEnd.DIALLER, lambda: OpenLine(descriptor))
@@ -109,7 +109,7 @@ def _open(address: str) -> Link:
 
 
 def _open_tcp(address: str, *, listens: bool) -> Link:
-    """Open a URI; behind a `#` there may be the folder of keys."""
+    """Open a URI; a `#` may introduce the folder of keys."""
     uri, _, keys = address.partition("#")
     return open_link(
         parse_link(uri, listens_by_default=listens), KeyFolder(Path(keys)) if keys else None, board=listens

@@ -12,11 +12,11 @@ from tests.bench.link_job import SILENCE_S, Job, Tally, pace
 
 _STAMP_BYTES = 16
 _SUBSCRIBE_S = 1.0
-"""A PUB socket drops what it sends before the subscription has come."""
+"""A PUB socket drops what it sends before the subscription arrives."""
 
 
 def send_imagezmq(job: Job) -> Tally:
-    """Rival imagezmq: REQ/REP, the sender waits for each reply."""
+    """Rival imagezmq: REQ/REP; the sender waits for each reply."""
     sender = imagezmq.ImageSender(connect_to=job.address)
     return pace(job, lambda number, payload: sender.send_jpg(f"{number} {time.monotonic_ns()}", payload))
 
@@ -27,7 +27,7 @@ def receive_imagezmq(job: Job) -> Tally:
 
 
 def send_imagezmq_pub(job: Job) -> Tally:
-    """Rival imagezmq: PUB/SUB, nothing waits and nothing is told of what is lost."""
+    """Rival imagezmq: PUB/SUB; nothing waits, and losses go unreported."""
     sender = imagezmq.ImageSender(connect_to=f"tcp://*:{job.endpoint[1]}", REQ_REP=False)
     time.sleep(_SUBSCRIBE_S)
     return pace(job, lambda number, payload: sender.send_jpg(f"{number} {time.monotonic_ns()}", payload))
@@ -55,14 +55,14 @@ def _receive_imagezmq(job: Job, hub: Any, *, replies: bool) -> Tally:
 
 
 def _netgear(job: Job, *, receives: bool) -> Any:
-    """NetGear with its default pattern, PAIR; without compression, for it would encode the JPEG once more."""
+    """NetGear with its default pattern, PAIR; without compression, which would encode the JPEG again."""
     host, port = job.endpoint
     options: dict[str, Any] = {"jpeg_compression": False}
     return NetGear(address=host, port=str(port), protocol="tcp", pattern=0, receive_mode=receives, **options)
 
 
 def send_netgear(job: Job) -> Tally:
-    """Rival NetGear: it carries arrays and no text, so number and stamp are the array's last bytes, written in place."""
+    """Rival NetGear: it carries arrays but no text, so number and stamp are written in place as the array's last bytes."""
     server = _netgear(job, receives=False)
     arrays: dict[int, np.ndarray[Any, np.dtype[np.uint8]]] = {}
 
@@ -85,4 +85,4 @@ def receive_netgear(job: Job) -> Tally:
     while number < job.frames - 1 and (array := client.recv()) is not None:
         number, sent_ns = np.frombuffer(array[-_STAMP_BYTES:].tobytes(), np.int64).tolist()
         tally.arrived(number, sent_ns, len(array) - _STAMP_BYTES)
-    return tally  # its thread ends with the process: close() pulls the socket from under it
+    return tally  # its thread ends with the process: close() would close the socket while the thread uses it

@@ -1,8 +1,9 @@
-"""One end of one transport in a process of its own, for bench_link: `python -m tests.bench.link_worker ROLE TRANSPORT ADDRESS FOLDER FPS WARM_UP FRAMES`.
+"""One end of one transport in its own process: `python -m tests.bench.link_worker ROLE TRANSPORT ADDRESS FOLDER FPS WARM_UP FRAMES`.
 
-Every sender shows the frames of a folder at a steady rate (FPS 0: as fast as it goes) and stamps each just before its send call; every receiver
-stamps a frame when its bytes are usable. Both read CLOCK_MONOTONIC of one machine. The first frames (WARM_UP) are left out, of the delays as of
-the CPU time. Prints one JSON object.
+Serves bench_link. Every sender sends the frames of a folder at a steady rate (FPS 0: as fast as it goes) and stamps
+each just before its send call. Every receiver stamps a frame when its bytes are usable. Both read CLOCK_MONOTONIC on
+one machine. The first frames (WARM_UP) count neither towards the delays nor towards the CPU time. Prints one JSON
+object.
 """
 
 import importlib
@@ -24,7 +25,7 @@ _TCP_HEAD = struct.Struct("<qqI")
 
 
 def send_null(job: Job) -> Tally:
-    """Pace and send nothing: what a sender costs before it sends."""
+    """Pace and send nothing: the cost of a sender before it sends."""
     return pace(job, lambda _number, _payload: None)
 
 
@@ -123,11 +124,11 @@ _WORKERS: dict[str, tuple[str, str, str]] = {
     "tandemscan-ipc": _OURS,
     "tandemscan-serial": _OURS,
 }
-"""Module, sender and receiver of each transport; loaded by name, so that none pays for the imports of another."""
+"""Module, sender and receiver of each transport; loaded by name, so that none pays for another's imports."""
 
 
 def receives(transport: str) -> bool:
-    """Whether a transport has a receiver at all."""
+    """Whether a transport has a receiver."""
     return bool(_WORKERS[transport][2])
 
 

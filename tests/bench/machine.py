@@ -1,4 +1,4 @@
-"""What every benchmark's table says of the machine it ran on, and how it asks for quiet there."""
+"""What every benchmark's table says about its machine, and how a benchmark asks for quiet there."""
 
 import importlib.metadata
 import os
@@ -25,7 +25,7 @@ class Machine:
         python: version of the interpreter.
         pyzmq: version of pyzmq.
         libzmq: version of ZeroMQ itself.
-        date: local wall time.
+        date: local wall-clock time.
     """
 
     cpu: str
@@ -42,7 +42,7 @@ class Machine:
 
 
 def machine() -> Machine:
-    """Look at this machine."""
+    """Describe this machine."""
     names = [platform.processor() or platform.machine()]
     with suppress(OSError):
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
@@ -59,7 +59,7 @@ def machine() -> Machine:
 
 
 class Busyness:
-    """How busy each core was, by anybody, since this was made: what disturbs a measurement of microseconds is nothing that the load average tells."""
+    """How busy each core has been since this was created, with any work; the load average does not show what disturbs microsecond measurements."""
 
     def __init__(self) -> None:
         self._before = _ticks()
@@ -72,7 +72,7 @@ class Busyness:
 
 
 def _ticks() -> list[tuple[int, int]]:
-    """Of each core: ticks that were not idle, and all."""
+    """Ticks of each core: not idle, and all."""
     found = []
     for line in Path("/proc/stat").read_text(encoding="ascii").splitlines():
         name, *fields = line.split()
@@ -83,7 +83,7 @@ def _ticks() -> list[tuple[int, int]]:
 
 
 def may_use_fifo() -> bool:
-    """Whether this process may take SCHED_FIFO; it comes back to its own scheduling at once."""
+    """Whether this process may use SCHED_FIFO; it restores its own scheduling at once."""
     policy, parameter = os.sched_getscheduler(0), os.sched_getparam(0)
     if not _take_fifo():
         return False
@@ -92,7 +92,7 @@ def may_use_fifo() -> bool:
 
 
 def be_quiet(core: int) -> None:
-    """Pin this process to one core and put it before ordinary work on it, as far as that is permitted.
+    """Pin this process to one core and give it priority over ordinary work there, as far as permitted.
 
     Args:
         core: index among the cores that it may use.

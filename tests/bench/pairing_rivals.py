@@ -1,9 +1,9 @@
 """Rivals of the pairing, written from their published descriptions, for bench_pairing.
 
-`ApproximateTime` of ROS message_filters for two streams (wiki.ros.org/message_filters/ApproximateTime: each message is used once, sets do not
-cross, the pivot is the later of the two heads, the smallest set that contains it is given out once that is proven, i.e. when the next message
-of the other stream is known to be no better; a later set must be smaller by the age penalty, 0.1). The lower bound of the time between messages,
-0 by default, may prove it earlier.
+`ApproximateTime` of ROS message_filters for two streams follows wiki.ros.org/message_filters/ApproximateTime. Each
+message is used once, and sets do not cross. The pivot is the later of the two heads. The smallest set that contains it
+is output once that is proven, i.e. when the next message of the other stream is known to be no better; a later set must
+be smaller by the age penalty, 0.1. The lower bound on the time between messages, 0 by default, may prove it earlier.
 """
 
 from collections import deque
@@ -14,7 +14,7 @@ Item = tuple[int, bool]
 
 
 class ApproximateTime:
-    """Two streams, parameter-free but for the lower bound.
+    """Two streams; the lower bound is the only parameter.
 
     Args:
         lower_bound_ns: least time between two messages of a stream.
@@ -27,7 +27,7 @@ class ApproximateTime:
         self._queues: dict[bool, deque[int]] = {True: deque(), False: deque()}
 
     def add(self, stamp_ns: int, *, from_board: bool) -> list[Pair]:
-        """Take a message; gives the pairs that are proven by it, (board, host)."""
+        """Add a message; returns the pairs that it proves, (board, host)."""
         self._queues[from_board].append(stamp_ns)
         pairs: list[Pair] = []
         while (pair := self._proven()) is not None:
@@ -55,7 +55,7 @@ class ApproximateTime:
 
 
 class Nearest:
-    """The naive way: each board frame takes the nearest host frame that has come and is unused, if it is within the tolerance.
+    """The naive way: each board frame takes the nearest unused host frame received so far, if within the tolerance.
 
     Args:
         tolerance_ns: greatest time skew.
@@ -66,7 +66,7 @@ class Nearest:
         self._host: deque[int] = deque(maxlen=100)
 
     def add(self, stamp_ns: int, *, from_board: bool) -> list[Pair]:
-        """Take a frame; gives the pair that it completes, (board, host)."""
+        """Add a frame; returns the pair that it completes, (board, host)."""
         if not from_board:
             self._host.append(stamp_ns)
             return []

@@ -12,7 +12,7 @@ _FPS = 15
 
 
 def write_jpegs(folder: Path) -> int:
-    """Write frames of 640x480 px, of that JPEG quality at which their mean size is nearest to 50 KB.
+    """Write frames of 640x480 px at the JPEG quality that brings their mean size nearest to 50 KB.
 
     Args:
         folder: an empty folder.
@@ -32,7 +32,7 @@ def write_jpegs(folder: Path) -> int:
 
 
 def write_raw(folder: Path) -> int:
-    """Write frames of 640x480x3 bytes as PNG without compression: raw bytes in an envelope that a replay camera takes.
+    """Write frames of 640x480x3 bytes as PNG without compression: raw bytes in a container that a replay camera accepts.
 
     Args:
         folder: an empty folder.

@@ -1,7 +1,8 @@
-"""One end of a serial line in a process of its own, for bench_serial. Prints one JSON object.
+"""One end of a serial line in its own process, for bench_serial. Prints one JSON object.
 
-`python -m tests.bench.serial_worker send FRAMING DEVICE FRAMES FRAME_BYTES`, `… receive FRAMING DESCRIPTOR FRAMES FRAME_BYTES`, and
-`… host DEVICE SECONDS`: the host's role of the protocol against a real board-agent, noting every echo and every frame.
+`python -m tests.bench.serial_worker send FRAMING DEVICE FRAMES FRAME_BYTES`, `… receive FRAMING DESCRIPTOR FRAMES
+FRAME_BYTES`, and `… host DEVICE SECONDS`: the host's role of the protocol against a real board-agent; it records every
+echo and every frame.
 """
 
 import json
@@ -43,18 +44,18 @@ def cpu_s() -> float:
 
 
 def write_all(descriptor: int, data: bytes) -> None:
-    """Write on a blocking descriptor."""
+    """Write all data to a blocking descriptor."""
     view = memoryview(data)
     while view:
         view = view[os.write(descriptor, view) :]
 
 
 def send_bare(framing: str, device: str, frames: int, frame: bytes) -> dict[str, float]:
-    """A bare loop: each frame with its CRC-32, as one COBS packet or behind its length."""
+    """Send in a bare loop: each frame with its CRC-32, as one COBS packet or after its length."""
     descriptor = os.open(device, os.O_RDWR | os.O_NOCTTY)
     tty.setraw(descriptor)
     write_all(descriptor, b"\0")
-    os.read(descriptor, 1)  # the receiver is there
+    os.read(descriptor, 1)  # the receiver is ready
     before = cpu_s()
     if framing == "cobs":
         from cobs import cobs  # noqa: PLC0415 - only where it is asked for
@@ -66,12 +67,12 @@ def send_bare(framing: str, device: str, frames: int, frame: bytes) -> dict[str,
             lengths = _LENGTHS.pack(len(frame), crc32(_CRC.pack(len(frame))))
             write_all(descriptor, b"".join((lengths, frame, _CRC.pack(crc32(frame)))))
     used = cpu_s() - before
-    os.read(descriptor, 1)  # all has come; closing before would throw it away
+    os.read(descriptor, 1)  # everything has arrived; closing earlier would discard it
     return {"cpu_us_per_frame": used / frames * 1e6}
 
 
 def receive_bare(framing: str, descriptor: int, frames: int) -> dict[str, float]:
-    """The other end of it."""
+    """Receive what `send_bare` sends."""
     os.read(descriptor, 1)
     os.write(descriptor, b"\0")
     packets = _cobs_packets(descriptor) if framing == "cobs" else _length_packets(descriptor)
@@ -118,7 +119,7 @@ def _length_packets(descriptor: int) -> Iterator[tuple[int, bool]]:
 
 
 def send_ours(device: str, frames: int, payload: bytes) -> dict[str, float]:
-    """Our link and messages, as the board uses them."""
+    """Send over our link with our messages, as the board does."""
     link = open_link(parse_link(f"serial:{device}", listens_by_default=True))
     poller = zmq.Poller()
     poller.register(link.pollables[0], zmq.POLLIN)
@@ -153,7 +154,7 @@ def send_ours(device: str, frames: int, payload: bytes) -> dict[str, float]:
 
 
 def receive_ours(descriptor: int, frames: int) -> dict[str, float]:
-    """The other end of it."""
+    """Receive what `send_ours` sends."""
     link = StreamLink("serial", LinkEnd.DIALLER, lambda: OpenLine(descriptor))
     poller = zmq.Poller()
     poller.register(link.pollables[0], zmq.POLLIN)
@@ -180,7 +181,7 @@ def receive_ours(descriptor: int, frames: int) -> dict[str, float]:
 
 
 def play_host(uri: str, seconds: float) -> dict[str, object]:
-    """The host's role: two frames of credit, as `phone-host` grants on such a link; every echo and frame is noted."""
+    """Play the host's role: two frames of credit, as `phone-host` grants on such a link; record every echo and frame."""
     link = open_link(parse_link(uri, listens_by_default=False))
     session = HostSession("bench", [{lane: connection_name(0, path) for lane, path in link.dialled.items()}])
     poller = zmq.Poller()

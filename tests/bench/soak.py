@@ -1,8 +1,10 @@
-"""For how long it goes well: `python -m tests.bench.soak [--help]`; `make soak` runs both parts at their full length.
+"""How long everything runs well: `python -m tests.bench.soak [--help]`; `make soak` runs both parts at their full length.
 
-board, 10 minutes: the installed service on a booted virtual board with a webcam at 30 per second: no frame lost that the camera delivered, age at
-the host p99 below 3 periods, memory flat. host, 30 minutes: board-agent and phone-host with a cheap matcher over loopback at 30 pairs a second:
-memory of both flat, no delay drifts between the first minutes and the last, every frame accounted for. Exit 4 when a limit is missed.
+board, 10 minutes: the installed service on a booted virtual board with a webcam at 30 per second. No frame that the
+camera delivered may be lost, age at the host p99 must stay below 3 periods, and memory must stay flat. host, 30
+minutes: board-agent and phone-host with a cheap matcher over loopback at 30 pairs a second. Memory of both must stay
+flat, no delay may drift between the first minutes and the last, and every frame must be accounted for. Exit 4 when a
+limit is missed.
 """
 
 import argparse
@@ -26,11 +28,11 @@ from tests.bench.soak_host import soak_host
 
 _Part = Callable[[Path, float, Callable[[float], None]], list[Check]]
 _PARTS: Final[dict[str, tuple[_Part, float]]] = {"board": (soak_board, 10.0), "host": (soak_host, 30.0)}
-"""Each with its full length, minutes."""
+"""Each part with its full length, minutes."""
 
 
 def main() -> int:
-    """Run and print; 3 when something is missing, 4 when a limit is missed."""
+    """Run and print; exit code 3 when something is missing, 4 when a limit is missed."""
     parser = argparse.ArgumentParser("python -m tests.bench.soak", description=__doc__)
     parser.add_argument("--minutes", type=float, help="length of each part (default: board 10, host 30)")
     parser.add_argument("--parts", nargs="+", choices=list(_PARTS), default=list(_PARTS))

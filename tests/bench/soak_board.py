@@ -22,11 +22,11 @@ _PERIOD_NS: Final = 1_000_000_000 // _FPS
 _SIZE_PX: Final = (640, 480)
 _READOUT_NS: Final = 20_000_000
 _SAMPLES: Final = 60
-"""Of the memory, over the run: each one costs the board an ssh command."""
+"""Memory samples over the run; each one costs the board an ssh command."""
 
 _AGE_PERIODS: Final = 3
 _SETTLING_S: Final = 12
-"""Left out of the ages: the camera's automatic exposure and the clock are being learnt."""
+"""Excluded from the ages: the camera's exposure and the clock estimate are still settling."""
 
 _PART: Final = "board"
 _CAMERA_ACCOUNT: Final = re.compile(
@@ -40,7 +40,7 @@ def soak_board(folder: Path, minutes: float, tell: Callable[[float], None]) -> l
     Args:
         folder: for images.
         minutes: how long, from the first frames.
-        tell: told of the share that is done.
+        tell: receives the share that is done.
 
     Raises:
         UnavailableError: there is no image of a board.

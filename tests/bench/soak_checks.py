@@ -1,6 +1,6 @@
-"""What a soak demands of its samples: memory that stays flat, delays that do not drift. Values in, verdicts out.
+"""What a soak demands of its samples: flat memory, delays that do not drift. Values in, verdicts out.
 
-Only a run of its full length proves something: in a short one a buffer that is being warmed up looks like a leak.
+Only a full-length run proves anything: in a short one a buffer that is still filling looks like a leak.
 """
 
 from collections.abc import Sequence
@@ -10,15 +10,15 @@ from typing import Final
 import numpy as np
 
 _SETTLING: Final = 0.2
-"""Share of the run that is left out of the memory's slope: caches and arenas fill up."""
+"""Share of the run left out of the memory's slope, while caches and arenas fill up."""
 
 _GROWTH_BYTES: Final = 1_000_000
 _GROWTH_SHARE: Final = 0.02
-"""Flat: the fitted line rises by less than 1 MB, or 2 % of the process, from the first sample to the last."""
+"""Flat: from the first sample to the last, the fitted line rises by less than 1 MB, or 2 % of the process's memory."""
 
 _DRIFT_NS: Final = 1_000_000
 _DRIFT_SHARE: Final = 0.1
-"""No drift: first and last median differ by less than 1 ms or a tenth."""
+"""No drift: the first and last medians differ by less than 1 ms or a tenth."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,10 +27,10 @@ class Check:
 
     Attributes:
         part: of the soak.
-        what: is checked.
+        what: the quantity checked.
         found: in words.
         limit: in words.
-        holds: whether it is kept.
+        holds: whether the limit is kept.
     """
 
     part: str
@@ -49,7 +49,7 @@ class Resident:
 
 
 def memory(part: str, name: str, samples: Sequence[Resident]) -> Check:
-    """Whether a process's memory is flat: a straight line is laid through the samples after the settling."""
+    """Check that a process's memory is flat: fit a straight line to the samples after the settling time."""
     settled = samples[int(len(samples) * _SETTLING) :]
     hours = np.array([sample.at_ns - settled[0].at_ns for sample in settled]) / 3.6e12
     sizes = np.array([sample.size_bytes for sample in settled], float)
@@ -67,7 +67,7 @@ def memory(part: str, name: str, samples: Sequence[Resident]) -> Check:
 
 
 def drift(part: str, name: str, delays_ns: Sequence[int], window: int) -> Check:
-    """Whether a delay is the same at the end as at the beginning: medians of the first and the last `window` pairs."""
+    """Check that a delay is the same at the end as at the beginning: medians of the first and the last `window` pairs."""
     first, last = np.array(delays_ns[:window]), np.array(delays_ns[-window:])
     medians = float(np.median(first)), float(np.median(last))
     p95 = float(np.percentile(first, 95)), float(np.percentile(last, 95))
@@ -78,5 +78,5 @@ def drift(part: str, name: str, delays_ns: Sequence[int], window: int) -> Check:
 
 
 def count(part: str, what: str, found: int, wanted: int) -> Check:
-    """Whether a count is exactly what it must be."""
+    """Check that a count is exactly what it must be."""
     return Check(part=part, what=what, found=str(found), limit=str(wanted), holds=found == wanted)

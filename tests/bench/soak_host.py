@@ -15,10 +15,10 @@ from tests.support.programs import Program, board, host, ledgers, lines
 _FPS: Final = 30
 _VIEWS: Final = 30
 _SAMPLES: Final = 300
-"""Of each process's memory, over the run."""
+"""Samples of each process's memory over the run."""
 
 _WINDOW: Final = 0.15
-"""Share of the pairs at either end that are compared."""
+"""Share of the pairs compared at each end of the run."""
 
 _PART: Final = "host"
 _DELAYS: Final = ("capture", "outbox", "propagation", "pairing", "queuing", "processing", "end_to_end")
@@ -30,7 +30,7 @@ def soak_host(folder: Path, minutes: float, tell: Callable[[float], None]) -> li
     Args:
         folder: for images and results.
         minutes: how long, from the first pair.
-        tell: told of the share that is done.
+        tell: receives the share that is done.
     """
     _write_views(folder)
     address, out = f"tcp://127.0.0.1:{free_port()}", folder / "out"
@@ -60,13 +60,13 @@ def soak_host(folder: Path, minutes: float, tell: Callable[[float], None]) -> li
     ]
     checks += [memory(_PART, name, found) for name, found in samples.items()]
     window = max(_FPS, int(len(pairs) * _WINDOW))
-    settled = pairs[min(10 * _FPS, len(pairs) // 4) :]  # for ten seconds the clock is learnt with more echoes
+    settled = pairs[min(10 * _FPS, len(pairs) // 4) :]  # the host learns the clock with more echoes for ten seconds
     checks += [drift(_PART, name, [pair[f"{name}_ns"] for pair in settled], window) for name in _DELAYS]
     return [*checks, *_conservation(report, account, len(pairs))]
 
 
 def _conservation(report: dict[str, Any], account: dict[str, Any], ledger_lines: int) -> list[Check]:
-    """Every frame and every pair is accounted for, to the frame."""
+    """Check that every single frame and pair is accounted for."""
     frames, pairs, (session,) = report["frames"], report["pairs_account"], report["sessions"]
     orphaned, dropped = sum(frames["orphaned"].values()), sum(account["dropped"].values())
     used = pairs["processed"] + pairs["undecodable"] + pairs["dropped_fifo"]
@@ -87,7 +87,7 @@ def _conservation(report: dict[str, Any], account: dict[str, Any], ledger_lines:
             frames["received"],
             frames["paired"] + orphaned + frames["held"],
         ),
-        # One pair may be with the matcher when the run is ended, one in the FIFO.
+        # When the run is stopped, one pair may be with the matcher and one in the FIFO.
         Check(
             part=_PART,
             what="paired = processed + dropped + stopped",

@@ -1,1 +1,1 @@
-"""What makes the documentation from the code, and what the site adds to it."""
+"""Generates documentation from the code, and extends the site."""

@@ -1,4 +1,4 @@
-"""The command lines that stand in the documentation, as a reader would type them."""
+"""The command lines in the documentation, as a reader would type them."""
 
 import re
 import shlex
@@ -15,10 +15,10 @@ _FENCE: Final = re.compile(r"^\s*```")
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command line of a page.
+    """A command line on a page.
 
     Attributes:
-        page: where it stands, with its line.
+        page: its page, with the line number.
         words: program and arguments.
         line: as it is printed.
     """
@@ -34,19 +34,19 @@ class Command:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """The words without a `--help` behind them."""
+        """The words without a trailing `--help`."""
         return self.words[:-1] if self.words[-1] == "--help" else self.words
 
 
 def pages() -> list[Path]:
-    """Everything that a reader may type from; what is made from the code itself is left out."""
+    """Every page that a reader may type from; pages generated from the code are left out."""
     made = {"troubleshooting.md", "figures.md", "changelog.md"}
     found = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
     return [path for path in found if path.name not in made]
 
 
 def documented() -> list[Command]:
-    """All command lines of all pages, in their order."""
+    """All command lines of all pages, in order."""
     return [command for page in pages() for command in _of(page)]
 
 
@@ -68,7 +68,7 @@ def _of(page: Path) -> Iterator[Command]:
 
 
 def _words(line: str) -> tuple[str, ...]:
-    """Program and arguments; nothing where the line begins with another program."""
+    """Program and arguments; nothing if the line begins with another program."""
     try:
         words = shlex.split(line, comments=True)
     except ValueError:  # prose with an apostrophe

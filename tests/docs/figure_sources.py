@@ -1,6 +1,7 @@
-"""Where the figures of docs/figures.md come from: a command line for each, and how its JSON is told in rows.
+"""Where the figures of docs/figures.md come from: a command line for each, and how its JSON becomes rows.
 
-The arguments keep `make figures` within about twelve minutes on two cores. An anchor stands in the same run where there is one; otherwise its origin is said.
+The arguments keep `make figures` within about twelve minutes on two cores. Where a reference measurement exists, it
+comes from the same run; otherwise its origin is stated.
 """
 
 import math
@@ -15,7 +16,7 @@ Data = Mapping[str, Any]
 
 
 class Topic(Enum):
-    """The page's sections, in their order, by their headings."""
+    """The page's sections, in order, by their headings."""
 
     DEPTH = "Depth"
     CALIBRATION = "Calibration"
@@ -31,11 +32,11 @@ class Figure:
     """One row.
 
     Attributes:
-        what: is measured.
+        what: the quantity measured.
         figure: with its unit.
-        anchor: what stands beside it; empty: nothing.
-        limit: what is to be reached; empty: nothing.
-        reached: whether it was.
+        anchor: the reference value; empty: none.
+        limit: the value to reach; empty: none.
+        reached: whether it was reached.
     """
 
     what: str
@@ -52,9 +53,9 @@ class Source:
     Attributes:
         name: of its file in out/figures.
         topic: section of the page.
-        title: what it measures, one sentence.
-        command: as a reader types it in the project's folder, the environment activated.
-        rows: tells its JSON.
+        title: what it measures, in one sentence.
+        command: as a reader types it in the project's folder, with the environment activated.
+        rows: turns its JSON into rows.
         about_s: how long it takes.
     """
 
@@ -67,7 +68,7 @@ class Source:
 
 
 def _number(value: float | None) -> str:
-    """Three digits or all before the point."""
+    """Three digits, or all digits before the point."""
     if value is None or math.isnan(value):
         return "-"
     return f"{value:.{0 if abs(value) >= 100 else 1 if abs(value) >= 10 else 2}f}"
@@ -139,7 +140,7 @@ def _published(data: Data) -> Iterator[Figure]:
 
 
 def _opencv_images(data: Data) -> Iterator[Figure]:
-    """The side of its squares is unknown, so its millimetres mean nothing."""
+    """The side length of its squares is unknown, so its millimetres mean nothing."""
     return _calibration(data, f"OpenCV's stereoCalibrate, in a run of its own: {_OPENCV_RMS_PX} px", "")
 
 

@@ -1,8 +1,8 @@
 """Measures the figures and writes docs/figures.md: `python -m tests.docs.figures [--only NAME] [--again]`, or `make figures`.
 
-Each source (tests/docs/figure_sources.py) is run once; what it said is kept in out/figures/NAME.json with its command, date, exit code and machine. A source
-whose result lies there, made by the same command, is not run again without --again. The page is written from all files; nobody writes it by hand.
-Exit 4 when a figure is missed, 1 when a source failed.
+Runs each source (tests/docs/figure_sources.py) once and keeps its output in out/figures/NAME.json with its command,
+date, exit code and machine. A source with a stored result of the same command runs again only with --again. The page is
+generated from all these files, never by hand. Exit 4 when a figure is missed, 1 when a source failed.
 """
 
 import argparse
@@ -44,14 +44,14 @@ the median, p95 and p99 are the 95th and 99th percentile.
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a source's run gave: the content of its file.
+    """The result of a source's run: the content of its file.
 
     Attributes:
         command: the command line, as a reader types it.
-        date: local wall time.
+        date: local wall-clock time.
         machine: processor, cores, kernel, interpreter.
         exit: code of the command.
-        reason: why there are no figures; empty: there are.
+        reason: why there are no figures; empty: there are some.
         data: its JSON.
     """
 
@@ -64,12 +64,12 @@ class Outcome:
 
     @property
     def measured(self) -> bool:
-        """Whether it gave figures."""
+        """Whether it produced figures."""
         return not self.reason
 
 
 def main() -> int:
-    """Measure what is not measured yet, and write the page."""
+    """Measure what has not been measured yet, and write the page."""
     parser = argparse.ArgumentParser("python -m tests.docs.figures", description=__doc__)
     parser.add_argument("--only", choices=[source.name for source in SOURCES], help="run this source alone")
     parser.add_argument("--again", action="store_true", help="run also what has a result")
@@ -102,7 +102,7 @@ def main() -> int:
 
 
 def load(folder: Path) -> dict[str, Outcome]:
-    """Read the results of the sources that are known, by name.
+    """Read the results of all known sources, by name.
 
     Args:
         folder: with a file NAME.json for each.
@@ -124,7 +124,7 @@ def _run(source: Source, tell: Callable[[float], None]) -> Outcome:
 
     Args:
         source: what to run.
-        tell: told of each stretch of its `about_s` that is over, s; all of it in the end.
+        tell: receives each elapsed part of its `about_s`, s; in the end all of it.
     """
     here = machine()
     about = f"{here.cpu}, {here.cores} cores, {here.kernel}, Python {here.python}"
@@ -143,7 +143,7 @@ def _run(source: Source, tell: Callable[[float], None]) -> Outcome:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        start_new_session=True,  # so that all of its processes can be ended
+        start_new_session=True,  # so that all of its processes can be ended together
     )
     told_s = 0.0
     out: str | None = None
@@ -171,7 +171,7 @@ def _run(source: Source, tell: Callable[[float], None]) -> Outcome:
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """End a process that is still there, with all that it started."""
+    """End a process that still runs, with everything it started."""
     for number in (signal.SIGINT, signal.SIGKILL):
         if process.poll() is None:
             os.killpg(process.pid, number)
@@ -182,14 +182,14 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 def _without_paths(line: str) -> str:
-    """Say nothing of this machine's folders."""
+    """Remove this machine's folders from a line."""
     for path, name in ((os.environ.get("SCAN_DATA"), "$SCAN_DATA"), (str(_ROOT), "."), (str(Path.home()), "~")):
         line = line.replace(path, name) if path and path != "/" else line
     return line.removeprefix("error: ")
 
 
 def figures(source: Source, outcome: Outcome) -> list[Figure]:
-    """The rows of a source that was measured."""
+    """The rows of a measured source."""
     return list(source.rows(outcome.data))
 
 
@@ -205,7 +205,7 @@ def page(outcomes: Mapping[str, Outcome]) -> str:
     """The page's text.
 
     Args:
-        outcomes: by name of the source; what has none, nobody has run.
+        outcomes: by name of the source; a source without one has not been run.
     """
     judged = list(_judged(outcomes))
     missed = [

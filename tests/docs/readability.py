@@ -1,7 +1,7 @@
-"""How easily README, help and messages read: `python -m tests.docs.readability [REVISION ...]`, today's text beside that of earlier revisions.
+"""How easily README, help and messages read: `python -m tests.docs.readability [REVISION ...]` compares today's text with earlier revisions.
 
-Words per sentence, and the share of sentences in the passive voice (a form of "to be" and a participle). Both are rough: they compare two texts of one
-kind, they do not grade one.
+Measures words per sentence and the share of sentences in the passive voice (a form of "to be" and a participle). Both
+are rough: they compare two texts of one kind but do not grade a single text.
 """
 
 import re
@@ -35,7 +35,7 @@ for name, verbs in (("phone_host.cli", ("run", "calibrate", "calibrate-time", "s
 
 
 def sentences(text: str) -> list[str]:
-    """Split prose: at full stops, colons and semicolons that end a clause, and where a table's cell ends."""
+    """Split prose into sentences: at full stops, at colons and semicolons that end a clause, and at the end of a table cell."""
     plain = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
     plain = re.sub(r"^ {4}.*$|!\[[^\]]*\]\([^)]*\)", "", plain, flags=re.MULTILINE)
     plain = re.sub(r"`[^`\n]*`", " X ", plain)
@@ -54,7 +54,7 @@ def measure(text: str) -> tuple[int, float, float]:
 
 
 def texts(root: Path) -> dict[str, str]:
-    """What a user reads, by its kind."""
+    """The texts that a user reads, by kind."""
     packages = [
         path for name in ("common", "board_agent", "phone_host") for path in sorted((root / name).rglob("*.py"))
     ]

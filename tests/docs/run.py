@@ -1,6 +1,7 @@
 """Runs the documentation's command lines that need no hardware: `python -m tests.docs.run` (all of them; the tests run the quick ones).
 
-Each page's commands run in its order in one folder, which holds what the pages speak of: pictures of a chessboard from both cameras, one pair, a calibration.
+Each page's commands run in order in one folder. It holds what the pages refer to: pictures of a chessboard from both
+cameras, one pair, a calibration.
 """
 
 import os
@@ -31,7 +32,7 @@ _HARDWARE: Final = (
     "wall",
     "opencv-bm",
 )
-"""What stands for a device, an address or a name of the reader's own. `wall` has a test of its own (test_contributing.py)."""
+"""Stands for a device, an address or a name of the reader's own. `wall` has its own test (test_contributing.py)."""
 
 _LONG: Final = ("demo", "delay-bench", "calibrate")
 _MODULES: Final = {
@@ -43,7 +44,7 @@ _PATIENCE_S: Final = 300
 
 
 def needs_hardware(command: Command) -> bool:
-    """Whether it asks for a device, another machine or a file that only the reader has."""
+    """Whether it needs a device, another machine or a file that only the reader has."""
     return command.is_mention or any(word in command.line for word in _HARDWARE)
 
 
@@ -53,7 +54,7 @@ def is_long(command: Command) -> bool:
 
 
 def prepare(folder: Path) -> None:
-    """Put there what the pages take for given."""
+    """Create what the pages assume to exist."""
     rig = unlike_rig()
     for side in ("left", "right"):
         (folder / side).mkdir()
@@ -65,7 +66,7 @@ def prepare(folder: Path) -> None:
 
 
 def run(command: Command, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run it as it is printed, in that folder."""
+    """Run it as printed, in that folder."""
     arguments = [sys.executable, "-P", "-m", _MODULES[command.words[0]], *command.words[1:]]
     environment = {**os.environ, "XDG_CONFIG_HOME": str(folder / "config")}
     return subprocess.run(
@@ -74,7 +75,7 @@ def run(command: Command, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def main() -> None:
-    """Run all of them; exit 4 when one fails."""
+    """Run all of them; exit code 4 when one fails."""
     failed = 0
     with tempfile.TemporaryDirectory() as name:
         prepare(Path(name))

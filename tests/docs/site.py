@@ -1,6 +1,6 @@
-"""Hooks of mkdocs: README.md, CONTRIBUTING.md and CHANGELOG.md become pages, and the decisions an index with a place in the menu.
+"""Hooks for mkdocs: README.md, CONTRIBUTING.md and CHANGELOG.md become pages; the decisions get an index and menu entries.
 
-The three lie at the project's root, where people look for them; links are written so that they work there, too.
+The three files stay at the project's root, where people look for them; their links work in both places.
 """
 
 import re
@@ -15,7 +15,7 @@ _TITLE = re.compile(r"^# *(.+)$", re.MULTILINE)
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """Put every decision into the menu."""
+    """Add every decision to the menu."""
     decisions = [f"decisions/{path.name}" for path in _decisions()]
     assert config.nav is not None
     config.nav = [
@@ -25,7 +25,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the pages that lie elsewhere, and the index of the decisions."""
+    """Add the pages from outside docs/, and the index of the decisions."""
     for name, page in _AT_ROOT.items():
         text = (_ROOT / name).read_text(encoding="utf-8").replace("](docs/decisions)", "](decisions/README.md)")
         files.append(File.generated(config, page, content=_linked(text.replace("](docs/", "]("), "")))
@@ -36,14 +36,14 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, **_kwargs: object) -> str:
-    """Let links to the files at the root lead to their pages."""
+    """Point links to files at the root to their pages."""
     return _linked(markdown, "../")
 
 
 def _linked(text: str, up: str) -> str:
     for name, page in _AT_ROOT.items():
         text = re.sub(rf"\]\({re.escape(up + name)}(#[^)]*)?\)", rf"]({page}\1)", text)
-    # Code is read in the repository; the site has no copy of it.
+    # Readers find the code in the repository; the site has no copy of it.
     return re.sub(rf"\[([^\]]+)\]\({re.escape(up)}examples\)", r"\1", text)
 
 

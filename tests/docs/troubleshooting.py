@@ -1,8 +1,9 @@
 """Writes docs/troubleshooting.md from the code: `python -m tests.docs.troubleshooting`.
 
-Every place that raises one of our errors, or makes a concern about a run, is found in the syntax trees of the three packages; so none can be
-missing. A value that a message quotes is shown as a word in capitals. Where a problem or remedy is a variable, all that the code may put into it is
-listed: what is assigned to it, or what callers of the function give.
+It searches the syntax trees of the three packages for every place that raises one of our errors or makes a concern
+about a run, so that none can be missing. A value quoted in a message appears as a word in capitals. Where a problem or
+remedy is a variable, the page lists every value that the code may give it: assignments to it, or arguments from the
+function's callers.
 """
 
 import ast
@@ -17,7 +18,7 @@ _ROOT: Final = Path(__file__).parents[2]
 PAGE: Final = _ROOT / "docs" / "troubleshooting.md"
 
 _EXITS: Final = {"SettingsError": 2, "UnavailableError": 3, "DataError": 4}
-"""Error classes that a user meets, and the exit code of each; subclasses are found in the code."""
+"""Error classes that a user meets, with their exit codes; subclasses are found in the code."""
 
 _ROOMS: Final = (
     (
@@ -85,7 +86,7 @@ The summary, the page and `report.json` of a run name each reason why its depth 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A call that makes an error or a concern, with the function and the file around it."""
+    """A call that makes an error or a concern, with its function and file."""
 
     path: Path
     call: ast.Call
@@ -93,11 +94,11 @@ class Place:
 
 
 _NOWHERE: Final = ast.Call(ast.Name("nowhere"), [], [], lineno=sys.maxsize)
-"""In place of a call, where all that a function assigns counts."""
+"""Placeholder for a call, for use where every assignment in a function counts."""
 
 
 class Code:
-    """The syntax trees of the packages, and what can be asked of them."""
+    """The syntax trees of the packages, and queries on them."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self.trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in paths}
@@ -135,7 +136,7 @@ class Code:
         return sorted(found, key=lambda place: (str(place.path), place.call.lineno))
 
     def returned(self, function: str) -> list[tuple[ast.expr, ast.expr]]:
-        """Pairs of problem and remedy that a function gives."""
+        """Pairs of problem and remedy that a function returns."""
         nodes = [node for found in self._functions.get(function, []) for node in ast.walk(found)]
         pairs = [
             node.value.elts for node in nodes if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple)
@@ -143,7 +144,7 @@ class Code:
         return [(pair[0], pair[1]) for pair in pairs if len(pair) == 2]
 
     def texts(self, place: Place, expression: ast.expr, depth: int = 4) -> list[str]:  # noqa: PLR0911 - one line for each kind of expression
-        """All texts that an expression may be, values as words in capitals; none where nobody can tell."""
+        """All texts that an expression may have, with values as words in capitals; none if they cannot be determined."""
         match expression:
             case ast.Constant(value=str() as text):
                 return [text]
@@ -179,7 +180,7 @@ class Code:
                 return []
 
     def _quoted(self, place: Place, value: ast.expr, depth: int) -> str:
-        """A quoted value: the text of a constant, else a word."""
+        """A quoted value: the text of a constant, otherwise a word."""
         inner = value.value if isinstance(value, ast.FormattedValue) else value
         if isinstance(inner, ast.Name) and (constant := self._constants[place.path].get(inner.id)) is not None:
             if isinstance(constant, ast.Constant):
@@ -193,7 +194,7 @@ class Code:
         return word(inner)
 
     def _attributes(self, path: Path, name: str) -> Iterator[tuple[Place, ast.expr]]:
-        """What a file's classes assign to an attribute of this name."""
+        """What a file's classes assign to an attribute with this name."""
         for function in (node for node in ast.walk(self.trees[path]) if isinstance(node, ast.FunctionDef)):
             for node in ast.walk(function):
                 match node:
@@ -205,7 +206,7 @@ class Code:
                         pass
 
     def _named(self, place: Place, name: str, depth: int) -> list[str]:
-        """What a variable may be: what the function assigns, the module's constant, or what callers give."""
+        """The possible values of a variable: assignments in the function, the module's constant, or arguments from callers."""
         found: list[str] = []
         if place.around is not None:
             for value in _reaching(place, name):
@@ -228,7 +229,7 @@ class Code:
         return list(dict.fromkeys(found))
 
     def _looped(self, place: Place, name: str, depth: int) -> list[str]:
-        """What a loop over a table of the module puts into a name."""
+        """The values that a loop over a table of the module gives a name."""
         found = []
         for node in ast.walk(place.around) if place.around else ():
             match node:
@@ -253,7 +254,7 @@ class Code:
 
 
 def word(expression: ast.expr) -> str:
-    """A quoted value's place in a message: the last name in it, in capitals."""
+    """The placeholder for a quoted value in a message: the last name in it, in capitals."""
     while isinstance(expression, ast.Call | ast.Subscript | ast.FormattedValue | ast.GeneratorExp | ast.IfExp):
         match expression:
             case ast.Call(args=[first, *_]):
@@ -291,7 +292,7 @@ def _parameters(function: ast.FunctionDef) -> list[str]:
 
 
 def _assigned(nodes: Iterator[ast.AST] | Sequence[ast.AST]) -> Iterator[tuple[str, ast.expr]]:
-    """Names and what is assigned to them, tuples taken apart."""
+    """Names and the values assigned to them, with tuples unpacked."""
     for node in nodes:
         match node:
             case (
@@ -310,7 +311,7 @@ def _assigned(nodes: Iterator[ast.AST] | Sequence[ast.AST]) -> Iterator[tuple[st
 
 
 def _reaching(place: Place, name: str) -> list[ast.expr]:
-    """What is assigned to a name above the call: the nearest one, and where that stands in a branch those of the other branches, too."""
+    """Assignments to a name above the call: the nearest one and, if that is in a branch, those in the other branches too."""
     assert place.around is not None
     line = place.call.lineno
     depths = [
@@ -341,7 +342,7 @@ def packages() -> list[Path]:
 
 
 def unresolved(code: Code) -> list[str]:
-    """Places whose message nobody can tell from the code, as `path:line`."""
+    """Places whose message cannot be determined from the code, as `path:line`."""
     return [
         f"{place.path.relative_to(_ROOT)}:{place.call.lineno}"
         for place, problems, remedies in messages(code)
@@ -350,15 +351,19 @@ def unresolved(code: Code) -> list[str]:
 
 
 def messages(code: Code) -> Iterator[tuple[Place, list[str], list[str]]]:
-    """Every place that makes an error, with what its problem and its remedy may read."""
+    """Every place that makes an error, with the possible texts of its problem and its remedy."""
     for place in code.calls(list(code.errors)):
         match place.call.args:
             case [ast.Attribute(attr="problem"), _]:
-                pass  # another error of ours, told in other words: it is listed where it is made
+                pass  # rewords another of our errors, which is listed where it is made
             case [ast.Starred(value=ast.Call() as pair)]:
                 for problem, remedy in code.returned(_called(pair)):
                     yield place, code.texts(place, problem), code.texts(place, remedy)
-            case [problem, remedy] | [_, problem, remedy]:  # a spoiled image's error begins with what is wrong
+            case [problem, remedy] | [
+                _,
+                problem,
+                remedy,
+            ]:  # the first argument of a spoiled image's error says what is wrong
                 yield place, code.texts(place, problem), code.texts(place, remedy)
             case _:
                 yield place, [], []
@@ -389,7 +394,7 @@ def page(code: Code) -> str:
         )
         told = (
             [] if isinstance(kind, ast.Attribute) and kind.attr == "STAMPS" else code.texts(place, sentence)
-        )  # below, one by one
+        )  # listed one by one below
         rows = [
             f"| {name} | {_cell(text)} | {_cell(' / '.join(code.texts(place, remedy)))} |\n" for text in told if text
         ]

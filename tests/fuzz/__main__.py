@@ -1,7 +1,8 @@
 """Hostile bytes for every reader, guided by coverage: `python -m tests.fuzz [--bytes 1e9] [--minutes M] [TARGET …]`, or `make fuzz`.
 
-Each target runs in a process of its own, bounded in memory (512 MB) and in time for one input (10 s). The corpus in tests/fuzz/corpus grows in
-build/fuzz; what is found lies in build/fuzz/found: copy it to tests/fuzz/corpus/TARGET, where the test suite runs it for ever. Exit 4 when anything was.
+Each target runs in its own process with limits on memory (512 MB) and on time per input (10 s). The corpus from
+tests/fuzz/corpus grows in build/fuzz. Findings are stored in build/fuzz/found: copy them to tests/fuzz/corpus/TARGET,
+where the test suite runs them from then on. Exit 4 when anything was found.
 """
 
 import argparse
@@ -34,15 +35,15 @@ _FOUND = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What became of one target.
+    """The result of one target.
 
     Attributes:
-        runs: inputs.
+        runs: number of inputs.
         fed_bytes: their bytes.
-        seconds: it took.
+        seconds: duration.
         edges: branches of our code that were reached.
         inputs: of the corpus, each of which reaches something new.
-        problem: what was found; empty: nothing.
+        problem: the finding; empty: none.
     """
 
     runs: int
@@ -134,7 +135,7 @@ def _fuzz(name: str, target: Target, budget: int, limit_s: float | None, show: C
 
 
 def _problem(text: str, log: Path) -> str:
-    """The lines of a worker's output that say what was wrong, and where its input lies."""
+    """The lines of a worker's output that say what was wrong and where its input is stored."""
     told = re.findall(
         r"=== Uncaught Python exception: ===\n(.*)|ERROR: (libFuzzer: .*)|(Test unit written to .*)", text
     )

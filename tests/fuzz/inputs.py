@@ -1,4 +1,4 @@
-"""Fuzz targets: what users, drivers, servers and disks give. Each takes any bytes and raises only where something is wrong."""
+"""Fuzz targets: input from users, drivers, servers and disks. Each takes any bytes and raises only if something is wrong."""
 
 import tempfile
 from pathlib import Path
@@ -29,7 +29,7 @@ from tests.support.pictures import encoded, jpeg, picture
 
 
 def uri(data: bytes) -> None:
-    """What a user may type as link or camera: a link, a camera or a SettingsError that says why not in one line."""
+    """What a user may type as link or camera. Expected: a link, a camera, or a SettingsError that says in one line why not."""
     text = data.decode("utf-8", "surrogateescape")
     for read in (lambda: parse_link(text, listens_by_default=True), lambda: check_camera(text)):
         try:
@@ -57,7 +57,7 @@ def uri_seeds() -> list[bytes]:
 
 
 def v4l2(data: bytes) -> None:
-    """What a driver may claim of its controls and buffers: plans set only what fits, stamps in the future are never trusted."""
+    """What a driver may claim about its controls and buffers. Plans set only what fits; stamps in the future are never trusted."""
     size = 40
     controls = tuple(_control(data[at : at + size]) for at in range(0, len(data) - size + 1, size))
     plan = ControlPlan(controls)
@@ -109,7 +109,7 @@ def v4l2_seeds() -> list[bytes]:
 
 
 def image(data: bytes) -> None:
-    """Image files: a DataError, or an image within the limits that a link can carry."""
+    """Image files. Expected: a DataError, or an image within the limits of what a link can carry."""
     try:
         read = read_image(Path("file"), data)
     except DataError as error:
@@ -128,7 +128,7 @@ def image_seeds() -> list[bytes]:
 
 
 def decoding(data: bytes) -> None:
-    """Images of every kind: a SpoiledImageError before or by the decoder, or an image of the size that was read and judged before."""
+    """Images of every kind. Expected: a SpoiledImageError before or by the decoder, or an image of the size read and judged before."""
     try:
         file = examine(data, "image", MEGAPIXEL)
     except SpoiledImageError as error:
@@ -145,16 +145,16 @@ def decoding(data: bytes) -> None:
 
 
 def decoding_seeds() -> list[bytes]:
-    """One of each kind, small."""
+    """One small image of each kind."""
     small = picture(24, 16)
     kinds = [encoded(suffix, small) for suffix in (".jpg", ".png", ".bmp", ".ppm", ".tiff", ".webp")]
     return [*kinds, progressive(24, 16), black_png(9, 7, bits=16, interlaced=True), SMALL_BOMB]
 
 
 def mjpeg(data: bytes) -> None:
-    """A server's stream in two ways of chopping: the same images, each of which stands in the bytes; nothing beyond the limit; good ones come again."""
+    """A stream split in two ways gives the same images, each found in the bytes; none exceeds the limit; a good one after garbage is found."""
     good = _JPEG
-    stream = data + bytes(70_000) + good  # no segment of the garbage covers what comes behind so many bytes
+    stream = data + bytes(70_000) + good  # no segment in the garbage is long enough to cover what follows so many bytes
     whole, chopped = JpegStream(), JpegStream()
     images = [event.payload for event in whole.feed(stream, 1) if isinstance(event, WholeImage)]
     pieces: list[bytes] = []
@@ -193,7 +193,7 @@ _FOLDER = tempfile.TemporaryDirectory(prefix="fuzz")
 
 
 def rig(data: bytes) -> None:
-    """rig.yaml: a rig, or a DataError in one line."""
+    """rig.yaml. Expected: a rig, or a one-line DataError."""
     path = Path(_FOLDER.name) / "rig.yaml"
     path.write_bytes(data)
     try:
@@ -215,7 +215,7 @@ def rig_seeds() -> list[bytes]:
 
 
 def settings(data: bytes) -> None:
-    """A settings file: settings that `run` could use, or a SettingsError in one line."""
+    """A settings file. Expected: settings that `run` could use, or a one-line SettingsError."""
     path = Path(_FOLDER.name) / "settings.toml"
     path.write_bytes(data)
     try:
@@ -232,7 +232,7 @@ def settings_seeds() -> list[bytes]:
 
 
 def results(data: bytes) -> None:
-    """Disparity maps, point clouds and lists of peers from a disk: what they hold, or a DataError in one line."""
+    """Disparity maps, point clouds and lists of peers from a disk. Expected: their content, or a one-line DataError."""
     path = Path(_FOLDER.name) / "peers.json"
     path.write_bytes(data)
     path.chmod(0o600)
@@ -245,7 +245,7 @@ def results(data: bytes) -> None:
 
 
 def results_seeds() -> list[bytes]:
-    """Sound files."""
+    """Valid files."""
     properties = b"".join(b"property float %c\n" % axis for axis in b"xyz")
     colours = b"".join(b"property uchar %s\n" % name for name in (b"red", b"green", b"blue"))
     header = b"ply\nformat binary_little_endian 1.0\nelement vertex 1\n" + properties + colours + b"end_header\n"

@@ -1,4 +1,4 @@
-"""Fuzz targets: what comes over links. Each takes any bytes and raises only where something is wrong."""
+"""Fuzz targets: input from links. Each takes any bytes and raises only if something is wrong."""
 
 import random
 from collections.abc import Iterator
@@ -95,7 +95,7 @@ _GOOD = Unit(kind=UnitKind.CONTROL, first=True, last=True, number=77, body=b"the
 
 
 def deframer(data: bytes) -> None:
-    """Bytes of a line in two ways of chopping: the same units, each of which stands in the bytes; the good one behind them is found."""
+    """Bytes of a line split in two ways give the same units, each found in the bytes; the good unit after them is found."""
     stream = data + _wire(LinkEnd.LISTENER, _GOOD)
     whole, chopped = Deframer(LinkEnd.LISTENER), Deframer(LinkEnd.LISTENER)
     units = [_wire(LinkEnd.LISTENER, unit) for unit in whole.feed(stream)]
@@ -129,7 +129,7 @@ def deframer_seeds() -> list[bytes]:
 
 
 def wire(data: bytes) -> None:
-    """Headers of a stranger, each behind its length: refused, or read as what can be written and read again."""
+    """Headers from a stranger, each after its length: rejected, or read as something that can be written and read again."""
     for header in _parts(data):
         try:
             message = decode(header[:MAX_HEADER_BYTES], b"")
@@ -139,7 +139,7 @@ def wire(data: bytes) -> None:
 
 
 def _parts(data: bytes) -> Iterator[bytes]:
-    """Cut an input into parts, each behind its length: one byte, in eights."""
+    """Cut an input into parts, each preceded by its length in one byte; large lengths are in units of eight."""
     at = 0
     while at < len(data):
         length = 1 + data[at] if data[at] < 128 else 8 * (data[at] - 111)
@@ -162,7 +162,7 @@ def wire_seeds() -> list[bytes]:
 
 
 def line(data: bytes) -> None:
-    """Units with sound checks and hostile contents: no error, no packet beyond the limits, no more bytes held than came."""
+    """Units with valid checksums and hostile content: no error, no packet beyond the limits, no more bytes held than came."""
     for side in LinkEnd:
         end = Duplex(side, 17)
         now_ns, at, numbers = 1, 0, [0, 0, 0, 0]
@@ -204,7 +204,7 @@ def line_seeds() -> list[bytes]:
 
 
 def session(data: bytes) -> None:
-    """Sound messages of a hostile peer in any order: both roles and the clock go on, and what they answer can be written."""
+    """Valid messages from a hostile peer in any order: both roles and the clock go on, and their answers can be written."""
     lanes = {Lane.FRAMES: b"\0f", Lane.CONTROL: b"\0c"}
     host, board, clock = HostSession("host", [lanes]), BoardSession("s", "boot", _CAMERA), ClockEstimator()
     now_ns = 10**12
@@ -251,7 +251,7 @@ def session_seeds() -> list[bytes]:
 
 
 def pairing(data: bytes) -> None:
-    """Words of pairing from anybody, in any order: a ProtocolError or an answer; nobody is let in without the code."""
+    """Pairing messages from anybody, in any order: a ProtocolError or an answer; nobody is let in without the code."""
     door = Desk(Identity(b"b" * KEY_BYTES, "board"), bytes)
     asking = Asking(Identity(b"h" * KEY_BYTES, "host"), lambda count: b"\1" * count)
     now_ns = 10**12
@@ -277,7 +277,7 @@ def pairing(data: bytes) -> None:
 
 
 def pairing_seeds() -> list[bytes]:
-    """Sound words."""
+    """Valid pairing messages."""
     words: list[Word] = [
         Ask(Identity(b"k" * KEY_BYTES, "phone")),
         Shown(Identity(b"k" * KEY_BYTES, "board")),
@@ -291,7 +291,7 @@ def pairing_seeds() -> list[bytes]:
 
 
 def doors(data: bytes) -> None:
-    """What ZeroMQ's authentication and Bluetooth's directory of services may hand over: a request or ProtocolError, a channel or none."""
+    """What ZeroMQ's authentication and Bluetooth's service directory may deliver: a request or ProtocolError, a channel or none."""
     try:
         request = read_request(list(_parts(data)))
         assert len(request.key) in {0, KEY_BYTES}, "half a key"
@@ -302,7 +302,7 @@ def doors(data: bytes) -> None:
 
 
 def doors_seeds() -> list[bytes]:
-    """A sound request of each kind, and a sound record."""
+    """A valid request of each kind, and a valid record."""
     request = [b"1.0", b"1", b"global", b"127.0.0.1", b"id", b"CURVE", b"k" * KEY_BYTES]
     record = b"\x35\x11\x35\x0f\x09\x00\x04\x35\x0a\x35\x03\x19\x01\x00\x35\x03\x19\x00\x03\x08\x05"
     return [

@@ -1,4 +1,4 @@
-"""What a thing to fuzz is."""
+"""Defines a fuzz target."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ class Target:
 
     Attributes:
         what: for people.
-        run: takes any bytes; raises where something is wrong.
-        seeds: sound inputs to begin with.
-        most_bytes: of one input.
-        share: of the bytes that were asked for.
+        run: takes any bytes; raises if something is wrong.
+        seeds: valid inputs to begin with.
+        most_bytes: limit per input.
+        share: of the requested bytes.
     """
 
     what: str
@@ -26,5 +26,5 @@ class Target:
 
 
 def is_one_line(error: TandemError) -> None:
-    """Check what an error says."""
+    """Check that an error message is one line."""
     assert "\n" not in str(error), "an error of several lines"

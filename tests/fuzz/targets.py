@@ -1,7 +1,7 @@
-"""What is fuzzed, and what must hold of each reader whatever it is fed: only the documented errors, nothing delivered altered, no growth.
+"""What is fuzzed, and what every reader must guarantee for any input: only documented errors, nothing delivered altered, no growth.
 
-A target takes any bytes and raises only where something is wrong. The same functions run in `make fuzz`, guided by coverage, and in the test suite
-over the corpus, which holds every input that ever found something.
+A target takes any bytes and raises only if something is wrong. The same functions run in `make fuzz`, guided by
+coverage, and in the test suite over the corpus, which holds every input that ever found something.
 """
 
 from tests.fuzz import inputs, protocols

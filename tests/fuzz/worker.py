@@ -1,6 +1,7 @@
-"""One target under atheris in a process of its own: `python -m tests.fuzz.worker TARGET BYTES METER [libFuzzer's arguments]`.
+"""Runs one target under atheris in its own process: `python -m tests.fuzz.worker TARGET BYTES METER [libFuzzer's arguments]`.
 
-Counts its runs and bytes in METER, a file of two 64 bit numbers that the parent reads meanwhile; ends when BYTES have been fed.
+Writes its counts of runs and bytes to METER, a file of two 64-bit numbers that the parent reads meanwhile; stops after
+BYTES bytes.
 """
 
 import mmap
@@ -32,7 +33,7 @@ def main() -> None:
         run(data)
         if fed >= most_bytes:
             sys.stderr.flush()
-            os._exit(0)  # libFuzzer ends by itself only after a number of runs
+            os._exit(0)  # libFuzzer itself stops only after a number of runs
 
     atheris.Setup([sys.argv[0], *sys.argv[4:]], once)
     atheris.Fuzz()

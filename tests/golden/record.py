@@ -1,12 +1,15 @@
-"""Records what the two roles of a session say to each other, byte for byte, as the golden transcripts in this folder; `record_bytes.py` does the rest.
+"""Records the byte-exact messages between the two roles of a session as golden transcripts; `record_bytes.py` does the rest.
 
-Run once, against commit aa28bce (package 0.1, protocol 3): `CHECKOUT/.venv/bin/python tests/golden/record.py tests/golden/v0_1`, where CHECKOUT is a worktree
-of that commit with its own environment, in which the package is installed. For a later version run it from a worktree of that version, into a folder of its own beside `v0_1`, and add
-that folder to `tests/support/golden.py`. What was recorded is never written anew: it stands for programs that are out there.
+Transcripts go into this folder. Run once, against commit aa28bce (package 0.1, protocol 3): `CHECKOUT/.venv/bin/python
+tests/golden/record.py tests/golden/v0_1`, where CHECKOUT is a worktree of that commit with its own environment, in
+which the package is installed. For a later version, run it from a worktree of that version, into a new folder beside
+`v0_1`, and add that folder to `tests/support/golden.py`. Never re-record a transcript: it stands for programs already
+in use.
 
-A transcript is one JSON object a line. The first tells what it is; every other is one step of one role: who, at what time of its own clock (ns), what it
-was told, and what it said then: [connection, header, payload], all in hex. A step `receive` names what came by the number that it was said as, or
-holds the bytes of a stranger. Ticks are no steps with nothing said: each role's own `due_ns` says when they are.
+A transcript is one JSON object per line. The first describes the transcript. Every other is one step of one role: who,
+at what time of its own clock (ns), its input, and what it then said: [connection, header, payload], all in hex. A
+`receive` step names a message by its number in the order of sending, or holds the bytes of a stranger. Ticks that say
+nothing are not recorded as steps: each role's own `due_ns` says when they happen.
 """
 
 import hashlib
@@ -43,7 +46,7 @@ from common.stamp import Stamp
 
 MS: Final = 1_000_000
 OFFSET_NS: Final = 5_000_000_000_000
-"""The board's clock is so far ahead of the host's at the host's zero, and gains a 50 000th."""
+"""The board's clock is ahead of the host's by this much at the host's zero, and gains one part in 50 000."""
 
 START_NS: Final = 40_000_000_000
 PERIOD_NS: Final = 33 * MS
@@ -69,7 +72,7 @@ def board_ns(host_ns: int) -> int:
 
 
 def host_ns_at(due_ns: int) -> int:
-    """The first moment, on the host's clock, at which the board's shows `due_ns` or more."""
+    """The first moment on the host's clock at which the board's clock shows `due_ns` or more."""
     at_ns = (due_ns - OFFSET_NS) * 50_000 // 50_001 - 2
     while board_ns(at_ns) < due_ns:
         at_ns += 1
@@ -77,13 +80,13 @@ def host_ns_at(due_ns: int) -> int:
 
 
 def tiny_jpeg(sequence: int) -> bytes:
-    """Bytes that begin and end as a JPEG does; every tenth is long enough to be cut into chunks."""
+    """Bytes that begin and end like a JPEG; every tenth is long enough to be split into chunks."""
     body = hashlib.sha256(sequence.to_bytes(4, "big")).digest()
     return b"\xff\xd8" + body[:20] * (60 if sequence % 10 == 9 else 1) + b"\xff\xd9"
 
 
 def frame_at(now_ns: int, sequence: int) -> Frame:
-    """What the board's camera gives at that time of its clock."""
+    """The frame of the board's camera at that time of its clock."""
     clock = "board:golden-boot"
     return Frame(
         sequence=sequence,
@@ -99,7 +102,7 @@ def frame_at(now_ns: int, sequence: int) -> Frame:
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What was said: by whom, over which lane, when (host's clock, ns)."""
+    """A message: by whom, on which lane, when (host's clock, ns)."""
 
     at_ns: int
     who: str
@@ -109,7 +112,7 @@ class Said:
 
 
 def sessions(links: int, *, board_dials: bool) -> tuple[BoardSession, HostSession]:
-    """The two roles, as they were recorded with so many links."""
+    """The two roles with this many links, as recorded."""
     names = [{lane: connection_name(link, lane.name[:1].encode()) for lane in Lane} for link in range(links)]
     dialled = tuple((lane, name) for link in names for lane, name in link.items())
     board = BoardSession("golden-session", "golden-boot", CAMERA, dialled if board_dials else ())
@@ -117,7 +120,7 @@ def sessions(links: int, *, board_dials: bool) -> tuple[BoardSession, HostSessio
 
 
 class World:
-    """An old board and an old host on simulated time; every step of theirs is written down."""
+    """An old board and an old host in simulated time; every step of both is recorded."""
 
     def __init__(self, *, links: int = 1, board_dials: bool = False) -> None:
         self.board, self.host = sessions(links, board_dials=board_dials)
@@ -139,8 +142,8 @@ class World:
         return BoardCounts(self.grabbed, self.sent, dropped)
 
     def plan(self, after_ns: int, what: Callable[[], None]) -> None:
-        """Let something happen later."""
-        self._planned += 1  # what is planned for one moment happens in the order of planning
+        """Schedule something for later."""
+        self._planned += 1  # actions scheduled for the same moment run in the order of scheduling
         heapq.heappush(self.plans, (self.now_ns + after_ns, self._planned, what))
 
     def run(self, duration_ns: int) -> None:
@@ -165,7 +168,7 @@ class World:
         self.now_ns = end_ns
 
     def note(self, who: str, do: str, outputs: list[Any], *, counts: bool = False, **told: Any) -> None:
-        """Write a step down, and send what was said."""
+        """Record a step and send what was said."""
         out = []
         ns = board_ns(self.now_ns) if who == "board" else self.now_ns
         for output in outputs:
@@ -179,7 +182,7 @@ class World:
         self.steps.append({"who": who, "ns": ns, "do": do, **told, **account, "says": out})
 
     def send(self, said: Said) -> None:
-        """Let a message travel, if anybody is there."""
+        """Send a message if anybody is there to receive it."""
         number = len(self.said)
         self.said.append(said)
         lane = self.lanes.get(said.connection)
@@ -190,14 +193,14 @@ class World:
         self.plan(travel_ns, lambda: None if said.connection in self.dead else arrive(said, number))
 
     def to_board(self, said: Said, number: int | None) -> None:
-        """Let something arrive at the board."""
+        """Deliver something to the board."""
         message = decode(said.header, said.payload)
         outputs = self.board.receive(said.connection, message, board_ns(self.now_ns), self.counts)
         told = {"bytes": said.header.hex()} if number is None else {"number": number}
         self.note("board", "receive", outputs, counts=True, connection=said.connection.hex(), **told)
 
     def to_host(self, said: Said, number: int) -> None:
-        """Let something arrive at the host, which is gone when the board's last account has answered its goodbye."""
+        """Deliver something to the host, which is gone once the board's last account has answered its goodbye."""
         if self.host_gone:
             return
         outputs: list[Any] = self.host.receive(said.connection, decode(said.header, said.payload), self.now_ns)
@@ -210,16 +213,16 @@ class World:
             self.leave_host()
 
     def stranger(self, message: Message) -> None:
-        """Let somebody else say something to the board."""
+        """Let a stranger send something to the board."""
         self.to_board(Said(self.now_ns, "stranger", STRANGER, bytes(encode(message)[0]), b""), None)
 
     def show(self, frames: int) -> None:
-        """Let the board's camera give frames."""
+        """Let the board's camera deliver frames."""
         if frames and not self.board_left:
             self.plan(PERIOD_NS, lambda: self.grab(frames))
 
     def grab(self, frames: int) -> None:
-        """One frame: sent, or counted as replaced where there is no credit."""
+        """Deliver one frame: sent, or counted as replaced if there is no credit."""
         if self.board_left:
             return
         now_ns, sequence = board_ns(self.now_ns), self.grabbed
@@ -237,16 +240,16 @@ class World:
         self.note("host", "steer", list(self.host.steer(later_ns)), later_ns=later_ns)
 
     def step_down(self) -> None:
-        """Let the board's camera give something else."""
+        """Let the board's camera change what it delivers."""
         self.board.describe(CAMERA, LOWERED)
         self.note("board", "describe", [])
 
     def carry(self, link: int) -> None:
-        """Let the host want its frames over another link."""
+        """Let the host ask for its frames over another link."""
         self.note("host", "carry", list(self.host.carry(link, self.now_ns)), link=link)
 
     def cut(self, *connections: bytes) -> None:
-        """Let connections break: what is under way is lost, the board notes it at once, the host 20 ms later, when they can be used again."""
+        """Break connections: messages under way are lost; the board notices at once, the host 20 ms later, when they work again."""
         self.dead |= set(connections)
         for connection in connections:
             name = connection.hex()
@@ -254,14 +257,14 @@ class World:
         self.plan(20 * MS, lambda: self.mend(connections))
 
     def mend(self, connections: tuple[bytes, ...]) -> None:
-        """The other end of `cut`."""
+        """Mend what `cut` broke."""
         self.dead -= set(connections)
         for connection in connections:
             outputs = list(self.host.interrupted(connection, self.now_ns))
             self.note("host", "interrupted", outputs, connection=connection.hex())
 
     def end(self) -> None:
-        """Let the board's camera come to its end."""
+        """Let the board's camera end."""
         self.ended = True
         self.note("board", "end", list(self.board.end(self.counts)), counts=True)
 
@@ -277,7 +280,7 @@ class World:
 
 
 def goodbye_of_the_host() -> World:
-    """A whole session: hello, waves, credit, frames, a correction, a lowered rate, a stranger turned away, and the host leaves."""
+    """A whole session: hello, waves, credit, frames, a correction, a lowered rate, a rejected stranger; then the host leaves."""
     world = World()
     world.show(60)
     world.plan(500 * MS, lambda: world.stranger(HostHello("another-host", Lane.CONTROL)))
@@ -291,7 +294,7 @@ def goodbye_of_the_host() -> World:
 
 
 def goodbye_of_the_board() -> World:
-    """The board leaves in the midst of it, and the host answers."""
+    """The board leaves in mid-session, and the host answers."""
     world = World()
     world.show(20)
     world.run(500 * MS)
@@ -301,7 +304,7 @@ def goodbye_of_the_board() -> World:
 
 
 def the_board_dials() -> World:
-    """The board knocks; its camera comes to its end, at which the host leaves."""
+    """The board knocks; its camera ends, and the host then leaves."""
     world = World(board_dials=True)
     world.show(8)
     world.plan(400 * MS, world.end)
@@ -310,7 +313,7 @@ def the_board_dials() -> World:
 
 
 def a_break() -> World:
-    """The frames' lane breaks with a frame under way, later the control lane; the session goes on each time."""
+    """The frames' lane breaks with a frame under way, and later the control lane; the session goes on each time."""
     world = World()
     world.show(40)
     world.plan(335 * MS, lambda: world.cut(connection_name(0, b"F")))
@@ -322,7 +325,7 @@ def a_break() -> World:
 
 
 def busy() -> World:
-    """Another host is served until it has been silent for a second."""
+    """The board serves another host until that one has been silent for a second."""
     world = World()
     world.stranger(HostHello("another-host", Lane.CONTROL))
     world.show(40)
@@ -333,7 +336,7 @@ def busy() -> World:
 
 
 def two_links() -> World:
-    """Frames change over to the second link, which breaks with both lanes."""
+    """Frames move to the second link, whose two lanes then break."""
     world = World(links=2)
     world.show(40)
     world.plan(300 * MS, lambda: world.carry(1))
@@ -354,7 +357,7 @@ def write(path: Path, head: dict[str, Any], steps: list[dict[str, Any]]) -> None
 
 
 def main(out: Path) -> None:
-    """Record all that there is."""
+    """Record all transcripts."""
     out.mkdir(parents=True, exist_ok=True)
     source = Path(str(common.__file__)).parent
     commit = subprocess.run(

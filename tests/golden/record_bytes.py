@@ -1,8 +1,10 @@
-"""Records what byte streams carry, from the transcripts that `record.py` has made: a serial line, Bluetooth, and the words of an enrolment.
+"""Records what byte streams carry, based on the transcripts of `record.py`: a serial line, Bluetooth, and the messages of an enrolment.
 
-Run once, against commit aa28bce, behind `record.py` and as that is: `CHECKOUT/.venv/bin/python tests/golden/record_bytes.py tests/golden/v0_1`.
+Run once, against commit aa28bce, after `record.py` and in the same way: `CHECKOUT/.venv/bin/python
+tests/golden/record_bytes.py tests/golden/v0_1`.
 
-A step `puts` gives a packet to one end of the stream (lane, header, payload), `writes` is what that end then wrote, at that time; it arrives 2 ms later.
+A step `puts` gives a packet to one end of the stream (lane, header, payload). A step `writes` is what that end then
+wrote, at that time; it arrives 2 ms later.
 """
 
 import hashlib
@@ -20,16 +22,16 @@ MS: Final = 1_000_000
 START_NS: Final = 40_000_000_000
 TRAVEL_NS: Final = 2 * MS
 NUMBERS: Final = {"host": 0x600D1234, "board": 0}
-"""Of the contacts; a listener's is not used."""
+"""Numbers of the contacts; a listener's is not used."""
 
 LATER_NS: Final = 300 * MS
-"""The packets are said so much later than in the session: the two ends have to meet first."""
+"""Packets are sent this much later than in the session: the two ends have to meet first."""
 
 
 def stream_of(transcript: Path, *, frame_bytes: int) -> list[dict[str, Any]]:
-    """What a byte stream carries when a session's messages go over it: the host dials, and says goodbye when all is said."""
+    """What a byte stream carries for a session's messages: the host dials, and says goodbye after the last message."""
     framing: Any = importlib.import_module("common.protocol.framing")
-    side = framing.LinkEnd if hasattr(framing, "LinkEnd") else framing.Side  # as it was called before the hardening
+    side = framing.LinkEnd if hasattr(framing, "LinkEnd") else framing.Side  # its name before the hardening
     ends = {
         "host": Duplex(side.DIALLER, NUMBERS["host"], frame_bytes),
         "board": Duplex(side.LISTENER, NUMBERS["board"], frame_bytes),
@@ -72,7 +74,7 @@ def packets_of(transcript: Path) -> list[tuple[int, str, Lane, bytes, bytes]]:
 
 
 def enrolment(typed: int) -> list[dict[str, Any]]:
-    """The words of an enrolment, as they travel; what each side draws by chance follows from a fixed text."""
+    """The messages of an enrolment as they travel; each side's random draws follow from a fixed text."""
     try:
         code = importlib.import_module("common.protocol.enrolment_code")
         wire, words = (importlib.import_module(f"common.protocol.enrolment_{name}") for name in ("wire", "words"))
@@ -98,13 +100,13 @@ def enrolment(typed: int) -> list[dict[str, Any]]:
 
 
 def chance_of(who: str) -> Callable[[int], bytes]:
-    """Bytes that look like chance and are always the same."""
+    """Bytes that look random and are always the same."""
     drawn = iter(range(1000))
     return lambda count: hashlib.sha256(f"{who} {next(drawn)}".encode()).digest()[:count]
 
 
 def main(out: Path) -> None:
-    """Record all that there is."""
+    """Record everything."""
     sessions = out / "goodbye_of_the_board.jsonl"
     head = json.loads(sessions.read_text(encoding="utf-8").splitlines()[0])
     of_all = {"commit": head["commit"]}

@@ -15,7 +15,7 @@ BOARD = Board(9, 6, 0.025)
 def poses(
     count: int, seed: int, tilt_deg: float = 35.0, depth_m: tuple[float, float] = (0.45, 0.8)
 ) -> NDArray[np.float64]:
-    """(V, 6) poses of boards in the left camera's axes: tilted by up to `tilt_deg`, spread over what both cameras see."""
+    """Poses of boards in the left camera's axes, (V, 6): tilted by up to `tilt_deg`, spread over the common view of both cameras."""
     random = np.random.default_rng(seed)
     result = []
     for _ in range(count):
@@ -30,7 +30,7 @@ def poses(
 
 
 def exact_pairs(rig: Rig, board_poses: NDArray[np.float64], noise_px: float = 0.0, seed: int = 0) -> list[BoardPair]:
-    """The corners both cameras see, with Gaussian noise."""
+    """The corners that both cameras see, with Gaussian noise."""
     random = np.random.default_rng(seed)
     pairs = []
     for index, pose in enumerate(board_poses):
@@ -44,8 +44,11 @@ def exact_pairs(rig: Rig, board_poses: NDArray[np.float64], noise_px: float = 0.
 def render_board(
     model: CameraModel, rotation: NDArray[np.float64], translation_m: NDArray[np.float64], board: Board = BOARD
 ) -> Image:
-    """What a camera sees of a board at a pose in its own axes: white paper with a rim of one square, grey around it."""
-    fine, coarse = 3, 4  # rays per pixel and direction; pixels per solved ray: linear between them is 0.003 px off
+    """What a camera sees of a board at a pose in its own axes: white paper with a margin of one square, grey around it."""
+    fine, coarse = (
+        3,
+        4,
+    )  # rays per pixel and direction; pixels per solved ray: linear interpolation between them is off by 0.003 px
     steps_x = (np.arange(model.width_px // coarse) + 0.5) * coarse - 0.5
     steps_y = (np.arange(model.height_px // coarse) + 0.5) * coarse - 0.5
     columns, rows = np.meshgrid(steps_x, steps_y)
@@ -54,7 +57,7 @@ def render_board(
     slopes = cv2.undistortPointsIter(pixels, model.matrix, model.distortion, np.eye(3), np.eye(3), criteria)
     grid = np.asarray(slopes, dtype=np.float64).reshape(*columns.shape, 2)
     x, y = _squares(grid, rotation, translation_m, board)
-    # Only around the paper is there anything to see: two squares or two solved rays beyond it all is grey.
+    # Something is visible only near the paper: two squares or two solved rays beyond it everything is grey.
     near = (x >= -3) & (x < board.columns + 4) & (y >= -3) & (y < board.rows + 4)
     part = tuple(
         slice(max(0, int(at.min()) - 2), int(at.max()) + 3) for at in (np.flatnonzero(near.any(axis=i)) for i in (1, 0))
@@ -76,12 +79,13 @@ def _squares(
     slopes: NDArray[np.float64], rotation: NDArray[np.float64], translation_m: NDArray[np.float64], board: Board
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Where rays (x, y, 1) meet the board's plane, in squares from its outer corner."""
-    # Rays into the board's axes, cut with its plane z = 0; written out, it takes a third of the time of a product of matrices.
+    # Rotate the rays into the board's axes and intersect them with its plane z = 0; written out, this takes a third of
+    # the time of a matrix product.
     x, y = (np.ascontiguousarray(slopes[..., i]) for i in range(2))
     along, down, away = (x * rotation[0, i] + y * rotation[1, i] + rotation[2, i] for i in range(3))
     origin = -rotation.T @ translation_m
     depth = origin[2] / away
-    # Inner corners start one square inside.
+    # The inner corners start one square inside.
     return (origin[0] - along * depth) / board.square_m + 1, (origin[1] - down * depth) / board.square_m + 1
 
 

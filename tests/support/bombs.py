@@ -1,4 +1,4 @@
-"""Images that are not what they claim to be, and honest ones that are hard to tell from them; none is larger than some hundred kilobytes."""
+"""Images that are not what they claim to be, and honest ones that are hard to tell from them; all are at most some hundred kilobytes."""
 
 import struct
 import zlib
@@ -25,14 +25,14 @@ def chunk(kind: bytes, body: bytes) -> bytes:
 def black_png(
     width_px: int, height_px: int, *, bits: int = 8, colour: int = 2, interlaced: bool = False, extra: bytes = b""
 ) -> bytes:
-    """A sound PNG of black pixels, a thousandth of its size when it is unpacked.
+    """A valid PNG of black pixels, compressed to a thousandth of its unpacked size.
 
     Args:
         width_px: width, px.
         height_px: height, px.
-        bits: of a channel.
+        bits: per channel.
         colour: 0 grey, 2 colour, 6 colour and alpha.
-        interlaced: in seven passes.
+        interlaced: whether in seven passes.
         extra: chunks before the pixels.
     """
     channels = {0: 1, 2: 3, 6: 4}[colour]
@@ -49,7 +49,7 @@ def black_png(
 
 
 def packed_zeros(megabytes: int) -> bytes:
-    """So many zeros, packed a thousand times."""
+    """This many megabytes of zeros, compressed a thousandfold."""
     packer = zlib.compressobj(9)
     return b"".join(packer.compress(bytes(2**20)) for _ in range(megabytes)) + packer.flush()
 
@@ -64,7 +64,7 @@ def claiming(content: bytes, width_px: int, height_px: int) -> bytes:
 
 
 def with_scans(content: bytes, scans: int) -> bytes:
-    """A progressive JPEG whose last scan comes so many times more."""
+    """A progressive JPEG whose last scan is repeated this many more times."""
     starts = [at for code, at in _markers(content) if code == 0xDA]
     return content[:-2] + content[starts[-1] : -2] * scans + b"\xff\xd9"
 
@@ -77,26 +77,26 @@ def progressive(width_px: int = 64, height_px: int = 48) -> bytes:
 
 
 def textured(width_px: int = 640, height_px: int = 480) -> Image:
-    """An image with something in every block, (H, W, 3) uint8."""
+    """An image with texture in every block, (H, W, 3) uint8."""
     noise = np.random.default_rng(7).integers(0, 256, (height_px, width_px, 3), dtype=np.uint8)
     return np.asarray(cv2.GaussianBlur(noise, (0, 0), 1.5), np.uint8)
 
 
 def textured_jpeg(restart: int = 0) -> bytes:
-    """A JPEG of that image, with a restart marker after so many rows of blocks."""
+    """A JPEG of that image, with a restart marker after this many rows of blocks."""
     done, data = cv2.imencode(".jpg", textured(), [cv2.IMWRITE_JPEG_RST_INTERVAL, restart])
     assert done
     return data.tobytes()
 
 
 def scan_start(content: bytes) -> int:
-    """Where a JPEG's compressed data begin."""
+    """Where a JPEG's compressed data begins."""
     at = next(at for code, at in _markers(content) if code == 0xDA)
     return at + 2 + int.from_bytes(content[at + 2 : at + 4], "big")
 
 
 def _markers(content: bytes) -> Iterator[tuple[int, int]]:
-    """Code and offset of each segment, those between scans included."""
+    """Code and offset of each segment, including those between scans."""
     at = 2
     while at + 4 <= len(content):
         code, length = content[at + 1], int.from_bytes(content[at + 2 : at + 4], "big")
@@ -122,13 +122,13 @@ def jpeg_bomb(size_px: int = HUGE_PX) -> bytes:
 
 @cache
 def png_bomb(size_px: int = LARGE_PX) -> bytes:
-    """A sound PNG of a large black square."""
+    """A valid PNG of a large black square."""
     return black_png(size_px, size_px, colour=0)
 
 
 @cache
 def torn_jpeg() -> bytes:
-    """A JPEG with its start, its end and nonsense between."""
+    """A JPEG with its start, its end and nonsense in between."""
     data = bytearray(encoded(".jpg", draw(0)))
     middle = len(data) // 2
     data[middle : middle + 200] = bytes(value ^ 0x5A for value in data[middle : middle + 200])

@@ -1,6 +1,7 @@
-"""The share of the pure modules' branches that the unit tests take: `python -m tests.support.branches FILE`, of what `coverage json` wrote.
+"""Share of the pure modules' branches that the unit tests take: `python -m tests.support.branches FILE`, for a FILE from `coverage json`.
 
-coverage's own limit (fail_under in pyproject.toml) is on statements and branches together, where one branch in twenty may be left out unseen.
+coverage's own limit (fail_under in pyproject.toml) applies to statements and branches together, so one branch in twenty
+could be missed unnoticed.
 """
 
 import json
@@ -15,11 +16,12 @@ def judge(totals: dict[str, int]) -> tuple[str, bool]:
     """One line for people, and whether the share is enough.
 
     Args:
-        totals: of the report: `num_branches` and `covered_branches`. No branches at all are no measurement, and not enough.
+        totals: of the report: `num_branches` and `covered_branches`. No branches at all count as no measurement, and
+            not as enough.
     """
     taken, every = totals["covered_branches"], totals["num_branches"]
     percent = 100.0 * taken / every if every else 0.0
-    # Cut off, not rounded: 97.96 shall not read like the limit that it misses.
+    # Truncated, not rounded: 97.96 must not look like the limit that it misses.
     told = f"{int(10 * percent) / 10:.1f} % ({taken} of {every}); at least {LEAST_PERCENT:.0f}"
     return f"branches of the pure modules: {told}", percent >= LEAST_PERCENT
 

@@ -1,4 +1,4 @@
-"""Settings of both kinds of camera that live by the automaton of `common.camera.life`."""
+"""Settings of both kinds of camera that follow the automaton of `common.camera.life`."""
 
 from dataclasses import replace
 
@@ -33,4 +33,4 @@ SERVER = replace(
 )
 
 BOTH = pytest.mark.parametrize("settings", [DEVICE, SERVER], ids=["device", "server"])
-"""Runs a test with either."""
+"""Runs a test with each."""

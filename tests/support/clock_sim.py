@@ -1,7 +1,8 @@
-"""Simulated clocks and links with known truth: what the clock estimator is measured against.
+"""Simulated clocks and links with known truth: the clock estimator is measured against them.
 
-The waves are those of the real `HostSession`; only time, delays and the board's answers are simulated. Every link's least delays differ between the
-directions by up to 8 % of the least round trip, the near-symmetry that the estimator states; profiles named adversarial keep no such promise.
+The waves are those of the real `HostSession`; only time, delays and the board's answers are simulated. On every link
+the least delays of the two directions differ by up to 8 % of the least round trip, the near-symmetry that the estimator
+assumes; profiles named adversarial do not keep it.
 """
 
 import math
@@ -34,10 +35,10 @@ _CAMERA = CameraDescription(
 
 
 class DriftingClocks:
-    """A host's and a board's clock: offset up to hours, skew to 100 ppm, swinging as slowly as temperature does.
+    """A host's and a board's clock: offset up to hours, skew up to 100 ppm, changing as slowly as temperature does.
 
-    offset(b) = o + s (b - b0) + a P / 2 pi (cos p - cos(2 pi (b - b0) / P + p)): the skew swings by a around s with period P; |its change| <=
-    a 2 pi / P, which is drawn from 0 to `change`.
+    offset(b) = o + s (b - b0) + a P / 2 pi (cos p - cos(2 pi (b - b0) / P + p)): the skew swings by a around s with
+    period P; |its change| <= a 2 pi / P, which is drawn from 0 to `change`.
 
     Args:
         chance: draws the clocks.
@@ -54,11 +55,11 @@ class DriftingClocks:
 
     @property
     def start_ns(self) -> int:
-        """Host's time of the start."""
+        """Host time at the start."""
         return self.board_start_ns + self._offset_ns
 
     def offset(self, board_ns: int) -> float:
-        """Host clock minus board clock minus `origin_ns`, exact to a small part of a ns."""
+        """Host clock minus board clock minus `origin_ns`, exact to a small fraction of a ns."""
         age = board_ns - self.board_start_ns
         return self._skew * age + self._swing / self._rate * (
             math.cos(self._phase) - math.cos(self._rate * age + self._phase)
@@ -66,21 +67,21 @@ class DriftingClocks:
 
     @property
     def origin_ns(self) -> int:
-        """The whole part of the offset, apart because a float does not hold hours and nanoseconds at once."""
+        """The integer part of the offset, kept apart because a float cannot hold hours and nanoseconds at once."""
         return self._offset_ns
 
     def board(self, host_ns: int) -> int:
-        """What the board's clock shows at a moment of the host's."""
+        """What the board's clock shows at a moment of the host's clock."""
         elapsed = host_ns - self.start_ns
         age = float(elapsed)
-        for _ in range(4):  # each step is right to 1e-4 of the one before
+        for _ in range(4):  # each step's error is 1e-4 of the one before
             age = elapsed - self.offset(self.board_start_ns + round(age))
         return self.board_start_ns + round(age)
 
 
 @dataclass(frozen=True, slots=True)
 class Delays:
-    """A link drawn at random: how long the two ways take, ns; told whether it is the first echo after a rest, and since when the link is up."""
+    """A randomly drawn link: the delays of both directions, ns, given whether the echo is the first after a rest and since when the link is up."""
 
     there: Callable[[bool, int], float]
     back: Callable[[bool, int], float]
@@ -96,7 +97,7 @@ def least_delays(chance: random.Random, low_ns: float, high_ns: float) -> tuple[
 
 
 def loopback(chance: random.Random) -> Delays:
-    """Two processes of one machine: wake-ups, a cold first one, rare spells on the run queue; frames of a MB in front of a third of the answers."""
+    """Two processes of one machine: wake-ups, a cold first one, rare waits on the run queue; frames of a MB ahead of a third of the answers."""
     (there, back), scatter = least_delays(chance, 30 * US, 60 * US), chance.uniform(10 * US, 60 * US)
 
     def wake(*, first: bool) -> float:
@@ -110,7 +111,7 @@ def loopback(chance: random.Random) -> Delays:
 
 
 def wifi(chance: random.Random) -> Delays:
-    """Least round trip about 2 ms, jitter of 2 to 10 ms on the average both ways, exponential."""
+    """Least round trip about 2 ms; exponential jitter, 2 to 10 ms on average in both directions."""
     (there, back), jitter = least_delays(chance, 0.6 * MS, 1.2 * MS), chance.uniform(2 * MS, 10 * MS)
     return Delays(
         lambda _first, _age_ns: there + chance.expovariate(1 / jitter),
@@ -119,7 +120,7 @@ def wifi(chance: random.Random) -> Delays:
 
 
 def loaded_line(bits_per_s: float, least_ns: float, slot_ns: float, wait_ns: float | None = None) -> Profile:
-    """A line full of image bytes: each answer waits behind anything up to two chunks (or `wait_ns`), both ways behind a slot of the radio or bus."""
+    """A line full of image bytes: each answer waits behind up to two chunks (or `wait_ns`); both directions wait for a slot of the radio or bus."""
     wait = 2 * _UNIT_BYTES * _BITS_PER_BYTE / bits_per_s * 1e9 if wait_ns is None else wait_ns
 
     def draw(chance: random.Random) -> Delays:
@@ -136,7 +137,7 @@ def loaded_line(bits_per_s: float, least_ns: float, slot_ns: float, wait_ns: flo
 
 
 def one_sided(chance: random.Random) -> Delays:
-    """Adversarial: one way takes 20 ms more, always."""
+    """Adversarial: one direction always takes 20 ms more."""
     return Delays(lambda _f, _a: MS + chance.expovariate(1 / MS), lambda _f, _a: 21 * MS + chance.expovariate(1 / MS))
 
 
@@ -150,7 +151,7 @@ def standing_queue(chance: random.Random) -> Delays:
 
 
 def heavy_tails(chance: random.Random) -> Delays:
-    """Adversarial: Pareto delays without mean on both ways."""
+    """Adversarial: Pareto delays without a mean in both directions."""
     return Delays(
         lambda _f, _a: 0.2 * MS * chance.paretovariate(0.9), lambda _f, _a: 2 * MS * chance.paretovariate(0.9)
     )
@@ -159,7 +160,7 @@ def heavy_tails(chance: random.Random) -> Delays:
 def waves(
     clocks: DriftingClocks, delays: Delays, chance: random.Random, seconds: float
 ) -> Iterator[tuple[int, list[Echo]]]:
-    """Run a session on simulated time.
+    """Run a session in simulated time.
 
     Args:
         clocks: the truth.
@@ -168,7 +169,7 @@ def waves(
         seconds: how long.
 
     Yields:
-        At the end of each wave: host's time, and the wave's echoes.
+        At the end of each wave: the host's time, and the wave's echoes.
     """
     session, now_ns = HostSession("host", [_LANES]), clocks.start_ns
     hello = BoardHello(

@@ -20,7 +20,7 @@ GADGET: Final = (Path("/dev/ttyGS0"), Path("/dev/ttyACM0"))
 
 
 class MissingError(Exception):
-    """Raised when the devices are not there; says why."""
+    """Raised when the devices are missing; says why."""
 
 
 def gadget_uris() -> tuple[str, str]:
@@ -40,7 +40,7 @@ def adapters() -> list[str]:
     """Addresses of the Bluetooth adapters that are up.
 
     Raises:
-        MissingError: Python or the kernel has no Bluetooth.
+        MissingError: Python or the kernel lacks Bluetooth.
     """
     if not hasattr(socket, "AF_BLUETOOTH"):
         raise MissingError("this Python was built without Bluetooth")
@@ -65,10 +65,10 @@ def adapters() -> list[str]:
 
 
 def rfcomm_uri() -> str:
-    """Link URI of a free channel of the first of two adapters; the second dials.
+    """Link URI of a free channel on the first of two adapters; the second dials.
 
     Raises:
-        MissingError: there are not two.
+        MissingError: there are fewer than two.
     """
     there = adapters()
     if len(there) < 2:

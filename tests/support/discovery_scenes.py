@@ -1,7 +1,7 @@
-"""Boards and a host alone in a network of their own: `python -m tests.support.discovery_scenes SCENE FOLDER`, inside `unshare -rn`.
+"""Boards and a host alone in their own network: `python -m tests.support.discovery_scenes SCENE FOLDER`, inside `unshare -rn`.
 
-Each scene starts real boards, announces them with a real mDNS responder where it says so, and runs `phone-host run` without --link; it prints
-the host's exit code and stderr as one JSON object.
+Each scene starts real boards, announces them with a real mDNS responder where it says so, and runs `phone-host run`
+without --link. It prints the host's exit code and stderr as one JSON object.
 """
 
 import json
@@ -22,7 +22,7 @@ PORT = 5555
 
 
 def announce(stack: ExitStack, name: str, address: str, port: int) -> None:
-    """Announce a board until the stack is left."""
+    """Announce a board until the stack closes."""
     network = Zeroconf(interfaces=["127.0.0.1"])
     stack.callback(network.close)
     where = [socket.inet_aton(address)]
@@ -32,7 +32,7 @@ def announce(stack: ExitStack, name: str, address: str, port: int) -> None:
 
 
 def serve(stack: ExitStack, folder: Path, name: str, link: str, *more: str) -> Any:
-    """Run a board until the stack is left."""
+    """Run a board until the stack closes."""
     camera = f"replay:{folder / 'film'}?pace=demand&loop=1"
     agent = stack.enter_context(board(["run", "--camera", camera, "--link", link, *more], folder, name))
     until(lambda: " serving " in agent.stderr, f"{name} serves")
@@ -40,7 +40,7 @@ def serve(stack: ExitStack, folder: Path, name: str, link: str, *more: str) -> A
 
 
 def pair(stack: ExitStack, folder: Path) -> dict[str, Any]:
-    """Pair with a board that nobody names, by the code that its owner is shown."""
+    """Pair with an unnamed board, by the code shown to its owner."""
     command = ["pair", "--keys", str(folder / "board-keys")]
     owner = stack.enter_context(program("board_agent.cli", command, folder, "owner"))
     shown = "type this code"
@@ -60,7 +60,7 @@ def pair(stack: ExitStack, folder: Path) -> dict[str, Any]:
 
 
 def look(folder: Path, *options: str, name: str = "host", wait: str = "20") -> dict[str, Any]:
-    """Run a host that is told of no board."""
+    """Run a host that is not told of any board."""
     camera = f"replay:{folder / 'film'}?pace=demand"
     arguments = [
         "run",
@@ -80,7 +80,7 @@ def look(folder: Path, *options: str, name: str = "host", wait: str = "20") -> d
 
 
 def announced(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
-    """One board announces itself and serves, one is announced and gone."""
+    """One board announces itself and serves; another was announced and is gone."""
     serve(stack, folder, "bone", "tcp://127.0.0.2:6001")
     announce(stack, "bone", "127.0.0.2", 6001)
     announce(stack, "gone", "127.0.0.2", 6002)
@@ -96,7 +96,7 @@ def several(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
 
 
 def last(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
-    """A board is used, another one comes, the first one goes."""
+    """A board is used, another one appears, the first one disappears."""
     agent = serve(stack, folder, "bone", "tcp://127.0.0.2:6001")
     announce(stack, "bone", "127.0.0.2", 6001)
     first = look(folder, name="first")
@@ -121,7 +121,7 @@ def gadget(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
 
 
 def cable(stack: ExitStack, folder: Path) -> list[dict[str, Any]]:
-    """A board at the gadget's address that is paired and used."""
+    """A board at the gadget's address that is paired and in use."""
     plug_cable()
     serve(stack, folder, "bone", f"tcp://192.168.7.2:{PORT}", "--keys", str(folder / "board-keys"))
     return [pair(stack, folder), look(folder)]

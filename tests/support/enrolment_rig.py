@@ -18,11 +18,11 @@ from tests.support.programs import Program, board, host, program, until
 _CODE = re.compile(r"type this code on the host: (\d{6})$", re.MULTILINE)
 
 _OWNER_S = 4.0
-"""So long after `board-agent pair` has gone the board has noticed it (pairing_door says 3 s)."""
+"""Within this time after `board-agent pair` has ended, the board has noticed (pairing_door says 3 s)."""
 
 
 def ports() -> int:
-    """A free port with another free one behind it, below those that the kernel gives to whoever dials (32768 and up on Linux)."""
+    """A free port followed by another free one, below the range that the kernel gives to dialling processes (32768 and up on Linux)."""
     while True:
         port = random.randrange(20000, 32000)
         with socket.socket() as first, socket.socket() as second, suppress(OSError):
@@ -40,11 +40,11 @@ def start_pairing(link: str, keys: str, *options: str) -> "subprocess.Popen[str]
 
 
 class Owner:
-    """The board's owner with `sudo board-agent pair`, for as long as the block lasts; what was shown stays known.
+    """The board's owner, running `sudo board-agent pair` while the block lasts; the codes shown stay known.
 
     Args:
         keys: the board's folder of keys.
-        folder: for what the command prints.
+        folder: for the command's output.
     """
 
     def __init__(self, keys: str, folder: Path) -> None:
@@ -54,16 +54,16 @@ class Owner:
 
     @property
     def codes(self) -> list[str]:
-        """The codes that were shown so far, each once."""
+        """The codes shown so far, each once."""
         return list(dict.fromkeys(code for run in self._running for code in _CODE.findall(run.out.read_text())))
 
     @property
     def has_gone(self) -> bool:
-        """Whether the command does not run."""
+        """Whether the command is not running."""
         return not self._running or self._running[-1].process.poll() is not None
 
     def comes(self) -> bool:
-        """Run the command, unless it runs; whether it did not."""
+        """Run the command unless it is running; returns whether it was not."""
         if not self.has_gone:
             return False
         name, command = f"owner{len(self._running)}", ["pair", "--keys", self._keys]
@@ -88,7 +88,7 @@ class Rig:
         agent: the board.
         link: the host's link to it.
         folder: of everything.
-        owner: who reads the codes.
+        owner: the person who reads the codes.
     """
 
     agent: Program
@@ -107,11 +107,11 @@ class Rig:
         return str(self.folder / "h")
 
     def codes(self) -> list[str]:
-        """The codes that the owner was shown."""
+        """The codes shown to the owner."""
         return self.owner.codes
 
     def code(self) -> str:
-        """Have the owner look at the board; the code of the moment."""
+        """Have the owner look at the board; returns the current code."""
         known = len(self.codes()) if self.owner.comes() else 0
         until(lambda: len(self.codes()) > known, "the owner is shown a code")
         return self.codes()[-1]
@@ -121,14 +121,14 @@ class Rig:
         return start_pairing(self.link, self.host_keys, *options)
 
     def pair_by_code(self) -> tuple[int, str, str]:
-        """Pair with the code that `board-agent pair` shows; exit code, stdout and stderr."""
+        """Pair with the code that `board-agent pair` shows; returns exit code, stdout and stderr."""
         pairing = self.pair("--json")
         said = pairing.communicate(f"{self.code()}\n", timeout=60)
         until(lambda: pairing.returncode != 0 or self.owner.has_gone, "the owner is told who came")
         return pairing.returncode, *said
 
     def pair_wrongly(self, *options: str) -> int:
-        """Type a code that is not the board's; the exit code."""
+        """Type a code that is not the board's; returns the exit code."""
         pairing = self.pair(*options)
         wrong = code_text((int(self.code()) + 1) % 10**CODE_DIGITS)
         known = len(self.codes())
@@ -138,7 +138,7 @@ class Rig:
         return pairing.returncode
 
     def streams(self, name: str) -> None:
-        """A host gets frames over this link."""
+        """Check that a host gets frames over this link."""
         images = self.folder / "film"
         arguments = ["run", "--link", self.link, "--keys", self.host_keys, "--camera", f"replay:{images}?pace=demand"]
         with host([*arguments, "--pairs", "3", "--json"], self.folder, name) as running:

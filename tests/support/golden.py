@@ -1,6 +1,6 @@
-"""Golden transcripts (tests/golden): reads them, and lets one role of today take the place of the recorded one.
+"""Golden transcripts (tests/golden): reads them, and replays them with one of today's roles in place of the recorded one.
 
-The other role stays what was recorded: its messages come at the recorded times, whatever today's role says.
+The other role stays as recorded: its messages come at the recorded times, whatever today's role says.
 """
 
 import json
@@ -18,14 +18,14 @@ from tests.golden.record import CAMERA, LOWERED, frame_at, sessions
 
 FOLDER = Path(__file__).resolve().parents[1] / "golden"
 RECORDED = ("v0_1",)
-"""Folders of transcripts, one for each version that was recorded."""
+"""Folders of transcripts, one for each recorded version."""
 
 SCENES = ("goodbye_of_the_host", "goodbye_of_the_board", "the_board_dials", "a_break", "busy", "two_links")
 _NEVER = 2**62
 
 
 def read(version: str, name: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """A transcript: what it tells of itself, and its steps."""
+    """Read a transcript: its description of itself, and its steps."""
     lines = (FOLDER / version / f"{name}.jsonl").read_text(encoding="utf-8").splitlines()
     head, *steps = map(json.loads, lines)
     return head, steps
@@ -33,7 +33,7 @@ def read(version: str, name: str) -> tuple[dict[str, Any], list[dict[str, Any]]]
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """A message as it travels: when it was said (its speaker's clock, ns), and where."""
+    """A message as it travels: when it was sent (its sender's clock, ns), and where."""
 
     ns: int
     connection: bytes
@@ -42,29 +42,29 @@ class Words:
 
     @property
     def message(self) -> Message:
-        """What it means to today's decoder."""
+        """The message as today's decoder reads it."""
         return decode(self.header, self.payload)
 
 
 def words_of(step: dict[str, Any]) -> list[Words]:
-    """What was said in a step."""
+    """What was said in one step."""
     return [Words(step["ns"], *map(bytes.fromhex, said)) for said in step["says"]]
 
 
 def all_words(steps: list[dict[str, Any]]) -> list[Words]:
-    """Everything that was said by both; a step `receive` names it by its place here."""
+    """Everything that both said; a `receive` step names an item by its index here."""
     return [words for step in steps for words in words_of(step)]
 
 
 @dataclass(slots=True)
 class Replay:
-    """What today's role said in the place of the recorded one, and what it noticed."""
+    """What today's role said in place of the recorded one, and what it noticed."""
 
     said: list[Words] = field(default_factory=list)
     noticed: list[Output] = field(default_factory=list)
 
     def note(self, outputs: list[Outgoing] | list[Output], ns: int) -> None:
-        """Take what a role gave."""
+        """Add a role's outputs."""
         for output in outputs:
             if isinstance(output, Outgoing):
                 header, payload = encode_stamped(output.message, lambda: ns)
@@ -79,24 +79,24 @@ def recorded(steps: list[dict[str, Any]], who: str) -> list[Words]:
 
 
 def received(step: dict[str, Any], words: list[Words]) -> Message:
-    """What came in a step."""
+    """What was received in a step."""
     return decode(bytes.fromhex(step["bytes"])) if "bytes" in step else words[step["number"]].message
 
 
 class Ticking(Protocol):
-    """What wants to be called at certain times."""
+    """Something that wants to be called at certain times."""
 
     @property
     def due_ns(self) -> int:
-        """When next, ns."""
+        """The time of the next call, ns."""
 
 
 def steps_and_ticks(
     role: Ticking, steps: list[dict[str, Any]], who: str
 ) -> Iterator[tuple[dict[str, Any], int | None]]:
-    """The role's steps, and between them the times at which it wants to be called: it ticks as it likes, not as was recorded.
+    """The role's steps, and the times in between at which it wants to be called: it ticks as it likes, not as recorded.
 
-    Once it has said goodbye it only listens, as the programs do.
+    After its goodbye it only listens, as the programs do.
     """
     own = [step for step in steps if step["who"] == who]
     now_ns, left = own[0]["ns"], False

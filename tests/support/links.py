@@ -1,4 +1,4 @@
-"""Waiting for what a link gives, without sleeping: poll its sockets until a condition holds."""
+"""Waits without sleeping for what a link delivers: poll its sockets until a condition holds."""
 
 import os
 import socket
@@ -18,7 +18,7 @@ PATIENCE_S = float(os.environ.get("TEST_PATIENCE_S", "60"))
 
 @dataclass(slots=True)
 class End:
-    """One end of a link, with everything that came in at it."""
+    """One end of a link, with everything it has received."""
 
     link: Link
     packets: list[tuple[bytes, bytes, bytes]] = field(default_factory=list)
@@ -26,7 +26,7 @@ class End:
     garbage: int = 0
 
     def take(self) -> None:
-        """Take what has come in."""
+        """Take what has arrived."""
         for incoming in self.link.receive():
             match incoming:
                 case Packet(connection, header, payload):
@@ -38,12 +38,12 @@ class End:
 
     @property
     def headers(self) -> list[bytes]:
-        """The headers that came, in order."""
+        """The received headers, in order."""
         return [header for _, header, _ in self.packets]
 
 
 def wait_until(condition: Callable[[], bool], *ends: End) -> None:
-    """Take what comes in at these ends until the condition holds; it is tried again at least every 20 ms."""
+    """Take what arrives at these ends until the condition holds; check it at least every 20 ms."""
     poller = zmq.Poller()
     for end in ends:
         for pollable in end.link.pollables:
@@ -57,7 +57,7 @@ def wait_until(condition: Callable[[], bool], *ends: End) -> None:
 
 
 def _told(ends: Sequence[End]) -> str:
-    """What each end has seen, for whoever must find out why nothing more came."""
+    """What each end has seen, to help find out why nothing more came."""
     seen = []
     for end in ends:
         lost = f", {end.link.counts}" if isinstance(end.link, StreamLink) else ""
@@ -66,12 +66,12 @@ def _told(ends: Sequence[End]) -> str:
 
 
 def send_until_sent(end: End, connection: bytes, header: bytes, payload: bytes, *others: End) -> None:
-    """Hand a packet over as soon as the link takes it."""
+    """Send a packet as soon as the link accepts it."""
     wait_until(lambda: end.link.send(connection, header, payload) is SendResult.SENT, end, *others)
 
 
 def meet(listener: End, dialler: End, greeting: bytes = b"hello") -> dict[Lane, bytes]:
-    """Let the listener learn the dialler's connections; gives its names for them. A greeting that is not heard within a second is repeated."""
+    """Let the listener learn the dialler's connections; returns its names for them. A greeting not heard within a second is repeated."""
     names: dict[Lane, bytes] = {}
     for lane, connection in dialler.link.dialled.items():
         _greet(listener, dialler, connection, greeting + lane.name.encode())

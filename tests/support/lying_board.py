@@ -1,4 +1,4 @@
-"""A board whose camera shows a film of which every other image is replaced by something else, and whose headers say what they like."""
+"""A board whose camera shows a film with every other image replaced by something else, and whose headers may say anything."""
 
 import itertools
 import socket
@@ -33,13 +33,13 @@ class Lie:
 
 
 class LyingCamera(ReplayCamera):
-    """A film and lies by turns.
+    """A film, alternating with lies.
 
     Args:
         folder: the film.
         fps: of both together.
-        lies: one after the other, again and again; none: all is honest.
-        size_px: what the camera says of itself; None: the film's size.
+        lies: in turn, over and over; none: all frames are honest.
+        size_px: the size that the camera claims; None: the film's size.
     """
 
     def __init__(self, folder: Path, fps: int, lies: Sequence[Lie], size_px: tuple[int, int] | None = None) -> None:
@@ -51,7 +51,7 @@ class LyingCamera(ReplayCamera):
         self._lies = itertools.cycle(lies) if lies else None
 
     def read(self, now_ns: int) -> list[Grab]:
-        """Honest images under even numbers."""
+        """Honest images have even numbers."""
         return [self._turned(grab) for grab in super().read(now_ns)]
 
     def _turned(self, grab: Grab) -> Grab:

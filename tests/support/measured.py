@@ -1,7 +1,7 @@
 """A plugin for pytest, `-p tests.support.measured`: coverage.py follows the pure modules, and nothing else, in each of pytest's processes.
 
-`coverage combine` and `coverage report` then tell what they saw. Programs that tests start are not followed: that would be slow, and a program is no
-test of a pure module.
+`coverage combine` and `coverage report` then show the result. Programs that tests start are not followed: that would be
+slow, and a program is no test of a pure module.
 """
 
 import functools
@@ -15,7 +15,7 @@ import pytest
 
 from tests.support.pure import ROOT, pure_modules
 
-# A process id, since each worker writes a file of its own.
+# A process id, since each worker writes its own file.
 _MEASURED = coverage.Coverage(
     config_file=str(ROOT / "pyproject.toml"),
     data_suffix=str(os.getpid()),
@@ -33,7 +33,7 @@ def pytest_collectstart(collector: pytest.Collector) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
-    """A test that computes long is left alone, and a property after its first examples: the tracer makes all Python slow, hypothesis' own too."""
+    """Do not trace long computations, nor a property after its first examples: the tracer slows all Python down, including hypothesis."""
     handle = getattr(getattr(item, "obj", None), "hypothesis", None)
     if item.get_closest_marker("long") is not None:
         with _left_alone():
@@ -56,7 +56,7 @@ def _left_alone() -> Generator[None, None, None]:
 
 @contextmanager
 def _begun(handle: Any) -> Generator[None, None, None]:
-    """Follow only the first examples of a property; `handle` is what hypothesis hangs on its test."""
+    """Trace only the first examples of a property; `handle` is what hypothesis attaches to its test."""
     prove: Callable[..., Any] = handle.inner_test
     count = 0
 
@@ -78,6 +78,6 @@ def _begun(handle: Any) -> Generator[None, None, None]:
 
 
 def pytest_unconfigure() -> None:
-    """The process has run its tests."""
+    """The process has finished its tests."""
     _MEASURED.stop()
     _MEASURED.save()

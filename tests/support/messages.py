@@ -1,4 +1,4 @@
-"""Strategies for every message of the protocol, each field over its whole allowed range; and how headers are spoiled."""
+"""Strategies for every message of the protocol, each field over its whole allowed range; and ways to corrupt headers."""
 
 import random
 
@@ -93,7 +93,7 @@ MESSAGES: st.SearchStrategy[Message] = st.one_of(
 
 
 def mutated(header: bytes, chance: random.Random) -> bytes:
-    """A header with some bytes changed, left out, put in, doubled or cut off."""
+    """A header with some bytes changed, removed, inserted, doubled or cut off."""
     data = bytearray(header)
     for _ in range(chance.randint(1, 4)):
         at = chance.randrange(len(data) + 1)

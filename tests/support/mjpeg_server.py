@@ -1,7 +1,8 @@
-"""An MJPEG server of many manners, most of them bad, in a process of its own: `python -m tests.support.mjpeg_server FOLDER FPS MANNER PORT [CERTIFICATE]`.
+"""An MJPEG server with a choice of behaviours: `python -m tests.support.mjpeg_server FOLDER FPS MANNER PORT [CERTIFICATE]`.
 
-Image number floor(t * FPS) of CLOCK_MONOTONIC (modulo their number) is sent at k / FPS, as a replay shows it. Prints its port. A manner that goes wrong
-after some images does so on the first connection; later ones are sound, so that a client that comes back is seen to.
+Most of the behaviours are bad. The server runs in its own process and prints its port. At time k / FPS of
+CLOCK_MONOTONIC it sends image k (modulo their number), as a replay shows it. A manner that goes wrong after some images
+does so on the first connection; later connections are sound, so that a client that comes back can be tested.
 """
 
 import base64
@@ -25,24 +26,24 @@ from tests.support.bombs import claiming, jpeg_bomb
 USER: Final = "me"
 PASSWORD: Final = "a:b@c/%"
 _GOOD_IMAGES: Final = 20
-"""So many are sent before a manner goes wrong."""
+"""This many images are sent before a manner goes wrong."""
 
 _BOMBS: Final = range(100, 110)
-"""Late enough for whoever wants to know what is normal before."""
+"""Late enough for a client that first learns what is normal."""
 
 _TYPE: Final = "multipart/x-mixed-replace"
 _LONG_S: Final = 600
 
 
 class Exchange:
-    """One connection after its request."""
+    """One connection, after its request."""
 
     def __init__(self, sock: socket.socket, request: str, number: int, images: list[bytes], fps: float) -> None:
         self.sock, self.request, self.number = sock, request, number
         self._images, self._fps = images, fps
 
     def say(self, text: str, data: bytes = b"") -> None:
-        """Write a text with its line ends, and bytes behind it."""
+        """Write a text with its line ends, followed by bytes."""
         self.sock.sendall(text.replace("\n", "\r\n").encode() + data)
 
     def answer(self, kind: str, more: str = "") -> None:
@@ -50,7 +51,7 @@ class Exchange:
         self.say(f"HTTP/1.1 200 OK\nServer: test\nContent-Type: {kind}\n{more}\n")
 
     def film(self) -> Iterator[bytes]:
-        """Images at their time, for ever."""
+        """Images at their times, without end."""
         index = int(time.monotonic() * self._fps) + 1
         while True:
             time.sleep(max(0.0, index / self._fps - time.monotonic()))
@@ -58,16 +59,16 @@ class Exchange:
             index = max(index + 1, int(time.monotonic() * self._fps))
 
     def parts(self, boundary: str = "--frame") -> None:
-        """Sound parts, for ever."""
+        """Valid parts, without end."""
         for image in self.film():
             self.part(image, boundary)
 
     def part(self, image: bytes, boundary: str = "--frame") -> None:
-        """One sound part."""
+        """One valid part."""
         self.say(f"{boundary}\nContent-Type: image/jpeg\nContent-Length: {len(image)}\n\n", image + b"\r\n")
 
     def is_sound(self, sent: int) -> bool:
-        """Whether it is not the time to go wrong yet, or not any more.
+        """Whether to behave well: not enough images sent yet, or a later connection than the first.
 
         Args:
             sent: images of this connection so far.
@@ -75,7 +76,7 @@ class Exchange:
         return self.number > 1 or sent < _GOOD_IMAGES
 
     def first_parts(self) -> Iterator[bytes]:
-        """Sound parts as many as are sent before it goes wrong; then further images. On later connections sound parts for ever."""
+        """Valid parts until it is time to go wrong, then the images that follow. On later connections: valid parts without end."""
         self.answer(f"{_TYPE}; boundary=frame")
         film = self.film()
         for sent, image in enumerate(film):
@@ -92,34 +93,34 @@ def plain(on: Exchange) -> None:
 
 
 def dashes(on: Exchange) -> None:
-    """The dashes stand in the announcement already, quoted, beside another parameter."""
+    """The announcement already contains the dashes, quoted, beside another parameter."""
     on.answer(f'{_TYPE};charset=utf-8; boundary="--dcmjpeg"')
     on.parts("--dcmjpeg")
 
 
 def no_dashes(on: Exchange) -> None:
-    """The boundary is written as it was announced, without dashes, and no lengths."""
+    """The boundary is sent exactly as announced, without dashes; no lengths."""
     on.answer(f"{_TYPE}; boundary=Ba4oTvQMY8ew04N8dcnM")
     for image in on.film():
         on.say("Ba4oTvQMY8ew04N8dcnM\nContent-Type: image/jpeg\n\n", image + b"\r\n")
 
 
 def no_line_end(on: Exchange) -> None:
-    """Nothing between an image and the next boundary, no lengths, HTTP/1.0."""
+    """Nothing between an image and the next boundary; no lengths; HTTP/1.0."""
     on.say(f"HTTP/1.0 200 OK\nContent-type: {_TYPE};boundary=x\n\n")
     for image in on.film():
         on.say("--x\nContent-type: image/jpg\nX-Timestamp: 12\n\n", image)
 
 
 def wrong_boundary(on: Exchange) -> None:
-    """One boundary announced, another written, and lengths that lie."""
+    """One boundary announced, another sent, and false lengths."""
     on.answer(f"{_TYPE}; boundary=announced")
     for image in on.film():
         on.say("--written\nContent-Length: 10\n\n", image + b"\r\n")
 
 
 def chunked(on: Exchange) -> None:
-    """Chunked transfer encoding, chunks that end anywhere."""
+    """Chunked transfer encoding; chunks end anywhere."""
     on.answer(f"{_TYPE}; boundary=frame", "Transfer-Encoding: chunked\n")
     for image in on.film():
         part = b"--frame\r\nContent-Type: image/jpeg\r\n\r\n" + image + b"\r\n"
@@ -129,7 +130,7 @@ def chunked(on: Exchange) -> None:
 
 
 def empty_parts(on: Exchange) -> None:
-    """A part without content before every image, to keep the line alive."""
+    """An empty part before every image, to keep the line alive."""
     on.answer(f"{_TYPE}; boundary=frame")
     for image in on.film():
         on.say("--frame\nContent-Type: image/jpeg\nContent-Length: 0\n\n\n")
@@ -155,7 +156,7 @@ def garbage(on: Exchange) -> None:
 
 
 def truncated(on: Exchange) -> None:
-    """Every fourth image is cut in half, its length says so."""
+    """Every fourth image is cut in half, as its length says."""
     on.answer(f"{_TYPE}; boundary=frame")
     for count, image in enumerate(on.film()):
         on.part(image[: len(image) // 2] if count % 4 == 3 else image)
@@ -185,7 +186,7 @@ def password(on: Exchange) -> None:
 
 
 def digest(on: Exchange) -> None:
-    """Another kind of password."""
+    """A different kind of password."""
     on.say('HTTP/1.1 401 Unauthorized\nWWW-Authenticate: Digest realm="cam", nonce="1"\nContent-Length: 0\n\n')
 
 
@@ -208,12 +209,12 @@ def missing(on: Exchange) -> None:
 
 
 def moved(on: Exchange) -> None:
-    """Elsewhere."""
+    """Redirects elsewhere."""
     on.say("HTTP/1.1 302 Found\nLocation: http://elsewhere/video\nContent-Length: 0\n\n")
 
 
 def moved_here(on: Exchange) -> None:
-    """Elsewhere on the same server, for good."""
+    """Redirects to the same server, permanently."""
     on.say("HTTP/1.1 301 Moved Permanently\nLocation: /other\nContent-Length: 0\n\n")
 
 
@@ -223,7 +224,7 @@ def busy(on: Exchange) -> None:
 
 
 def another_tongue(on: Exchange) -> None:
-    """No HTTP."""
+    """Not HTTP."""
     on.say("SSH-2.0-OpenSSH_9.2\n")
 
 
@@ -241,14 +242,14 @@ def mute(on: Exchange) -> None:
 
 
 def drips_head(on: Exchange) -> None:
-    """Answers a letter at a time, and never to the end."""
+    """Answers one letter at a time and never finishes."""
     for letter in "HTTP/1.1 200 OK\r\nX-Long: " + 10_000 * "x":
         on.sock.sendall(letter.encode())
         time.sleep(0.2)
 
 
 def hangs(on: Exchange) -> None:
-    """Falls silent in the middle of an image."""
+    """Goes silent in the middle of an image."""
     for image in on.first_parts():
         on.say("--frame\n\n", image[:100])
         time.sleep(_LONG_S)
@@ -269,7 +270,7 @@ def resets(on: Exchange) -> None:
 
 
 def bad_chunks(on: Exchange) -> None:
-    """Chunks whose sizes are no numbers any more."""
+    """Chunks whose sizes stop being numbers."""
     on.answer(f"{_TYPE}; boundary=frame", "Transfer-Encoding: chunked\n")
     for sent, image in enumerate(on.film()):
         part = b"--frame\r\n\r\n" + image
@@ -278,7 +279,7 @@ def bad_chunks(on: Exchange) -> None:
 
 
 def last_chunk(on: Exchange) -> None:
-    """A chunked answer that ends in good order, as a server does that restarts its camera."""
+    """A chunked answer that ends properly, like a server that restarts its camera."""
     on.answer(f"{_TYPE}; boundary=frame", "Transfer-Encoding: chunked\n")
     for sent, image in enumerate(on.film()):
         if not on.is_sound(sent):
@@ -288,7 +289,7 @@ def last_chunk(on: Exchange) -> None:
 
 
 def drips(on: Exchange) -> None:
-    """Goes on with a byte now and then, each within every timeout."""
+    """Continues with a byte now and then, each within every timeout."""
     for image in on.first_parts():
         for at in range(len(image)):
             on.sock.sendall(image[at : at + 1])
@@ -372,7 +373,7 @@ def _begin(manner: str, number: int, images: list[bytes], fps: float, stream: so
 
 
 def _answer(sock: socket.socket, context: ssl.SSLContext | None, answer: Callable[[socket.socket, str], None]) -> None:
-    with suppress(OSError):  # the client has gone, or did not like the certificate
+    with suppress(OSError):  # the client has gone, or rejected the certificate
         stream = context.wrap_socket(sock, server_side=True) if context else sock
         with stream:
             stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -380,7 +381,7 @@ def _answer(sock: socket.socket, context: ssl.SSLContext | None, answer: Callabl
             while b"\r\n\r\n" not in request and (data := stream.recv(4096)):
                 request += data
                 if not request[:1].isalpha():
-                    return  # no HTTP
+                    return  # not HTTP
             answer(stream, request.decode("latin-1"))
 
 

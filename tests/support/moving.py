@@ -1,4 +1,4 @@
-"""A film whose image moves sideways at a known speed: for what time and motion do together."""
+"""A film whose image moves sideways at a known speed, to test the combined effect of time and motion."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import numpy as np
 
 
 def write_moving_film(folder: Path, frames: int, step_px: int) -> Path:
-    """A texture that moves by so many pixels from image to image, back and forth."""
+    """A texture that moves by this many pixels per image, back and forth."""
     folder.mkdir(parents=True)
     noise = np.random.default_rng(3).integers(0, 255, (240, 320 + frames * step_px), dtype=np.uint8)
     texture = np.asarray(cv2.GaussianBlur(noise, (0, 0), 2.5))

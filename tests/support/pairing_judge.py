@@ -1,22 +1,22 @@
-"""What the best pairing of two streams is, found offline by dynamic programming: the judge of the pairing that has to decide at once."""
+"""Finds the best pairing of two streams offline by dynamic programming, to judge the pairing that must decide at once."""
 
 from dataclasses import dataclass
 from typing import Final
 
 _PAIR: Final = 1 << 62
-"""A pair is worth more than all time skew there can be, so that one integer orders both."""
+"""A pair is worth more than any possible time skew, so that one integer orders both."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Score:
-    """A pairing's worth: most pairs first, then least total time skew; greater is better."""
+    """A pairing's score: most pairs first, then least total time skew; greater is better."""
 
     pairs: int
     minus_skew_ns: int
 
 
 def best_score(board_ns: list[int], host_ns: list[int], tolerance_ns: int) -> Score:
-    """The best that an ordered one-to-one pairing within the tolerance can reach."""
+    """The best score of any ordered one-to-one pairing within the tolerance."""
     value = _table(board_ns, host_ns, tolerance_ns)[-1][-1]
     pairs = -(-value // _PAIR)
     return Score(pairs, value - pairs * _PAIR)
@@ -25,7 +25,7 @@ def best_score(board_ns: list[int], host_ns: list[int], tolerance_ns: int) -> Sc
 def forbidden_pairs(
     pairs: list[tuple[int, int]], board_ns: list[int], host_ns: list[int], tolerance_ns: int
 ) -> list[tuple[int, int]]:
-    """Those of some pairs that no best pairing contains."""
+    """The given pairs that no best pairing contains."""
     before = _table(board_ns, host_ns, tolerance_ns)
     behind = _table([-b for b in reversed(board_ns)], [-h for h in reversed(host_ns)], tolerance_ns)
     board_at = {stamp: index for index, stamp in enumerate(board_ns)}

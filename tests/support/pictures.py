@@ -1,4 +1,4 @@
-"""Small real image files, written by OpenCV: the product's own readers are tested against another's writer."""
+"""Small real image files, written by OpenCV, so that the product's own readers are tested against a different writer."""
 
 import cv2
 import numpy as np
@@ -21,5 +21,5 @@ def encoded(suffix: str, image: Image | np.ndarray[tuple[int, ...], np.dtype[np.
 
 
 def jpeg(width_px: int = 32, height_px: int = 24, seed: int = 0) -> bytes:
-    """A JPEG file's bytes."""
+    """The bytes of a JPEG file."""
     return encoded(".jpg", picture(width_px, height_px, seed))

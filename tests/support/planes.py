@@ -1,4 +1,4 @@
-"""Pairs of a textured slanted plane, rendered without any interpolation: the texture is a formula, read where geometry says."""
+"""Pairs of a textured slanted plane, rendered without interpolation: the texture is a formula, evaluated where geometry says."""
 
 from dataclasses import dataclass
 
@@ -38,7 +38,7 @@ def plane(
     """Render the plane d(x, y) = near + slope_x x + slope_y y.
 
     The texture T is a sum of random waves. Left(x, y) = T(x, y). A right pixel X sees the left column x with x - d(x, y) = X,
-    so x = (X + near + slope_y y) / (1 - slope_x). The right image stands `vertical_px` too low.
+    so x = (X + near + slope_y y) / (1 - slope_x). The right image is `vertical_px` too low.
     """
     rng = np.random.default_rng(seed)
     waves = rng.uniform(-2 * np.pi / shortest_px, 2 * np.pi / shortest_px, (WAVES, 2))

@@ -1,4 +1,4 @@
-"""The real programs as child processes: started, watched by condition, stopped by their own pid."""
+"""The real programs as child processes: started, awaited by condition, stopped by their own pid."""
 
 import json
 import os
@@ -22,8 +22,8 @@ class Program:
         module: what `python -m` runs.
         arguments: of its command line.
         folder: for its output.
-        name: of the files there.
-        more: variables beside those of this process.
+        name: of the output files.
+        more: environment variables in addition to those of this process.
     """
 
     def __init__(
@@ -32,14 +32,14 @@ class Program:
         self.out = folder / f"{name}.out"
         self.err = folder / f"{name}.err"
         with self.out.open("wb") as out, self.err.open("wb") as err:
-            # What a program remembers between its lives stays in the test's own folder, too.
+            # What a program remembers between runs stays in the test's own folder too.
             environment = {**os.environ, "XDG_CONFIG_HOME": str(folder / "config"), **(more or {})}
             command = [sys.executable, "-P", "-m", module, *arguments]
             self.process = subprocess.Popen(command, stdout=out, stderr=err, env=environment)
 
     @property
     def stderr(self) -> str:
-        """What it has logged so far."""
+        """Its log so far."""
         return self.err.read_text(errors="replace")
 
     def json(self) -> Any:
@@ -51,11 +51,11 @@ class Program:
         self.process.send_signal(number)
 
     def wait(self) -> int:
-        """Wait for its end; gives the exit code."""
+        """Wait for it to end; returns the exit code."""
         return self.process.wait(PATIENCE_S)
 
     def stop(self, number: signal.Signals = signal.SIGTERM) -> int:
-        """Ask it to end; gives the exit code."""
+        """Ask it to end; returns the exit code."""
         self.send(number)
         return self.wait()
 
@@ -64,7 +64,7 @@ class Program:
 def program(
     module: str, arguments: list[str], folder: Path, name: str, more: Mapping[str, str] | None = None
 ) -> Iterator[Program]:
-    """Run a program for the length of a block."""
+    """Run a program while the block lasts."""
     running = Program(module, arguments, folder, name, more)
     try:
         yield running
@@ -75,17 +75,17 @@ def program(
 
 
 def board(arguments: list[str], folder: Path, name: str = "board", more: Mapping[str, str] | None = None) -> Any:
-    """Run board-agent for the length of a block."""
+    """Run board-agent while the block lasts."""
     return program("board_agent.cli", arguments, folder, name, more)
 
 
 def host(arguments: list[str], folder: Path, name: str = "host", more: Mapping[str, str] | None = None) -> Any:
-    """Run phone-host for the length of a block."""
+    """Run phone-host while the block lasts."""
     return program("phone_host.cli", arguments, folder, name, more)
 
 
 def until(condition: Callable[[], bool], what: str) -> None:
-    """Wait for a condition; fails after a minute saying what did not come."""
+    """Wait for a condition; after a minute, fail and say what is missing."""
     deadline = time.monotonic() + PATIENCE_S
     while not condition():
         assert time.monotonic() < deadline, f"not within {PATIENCE_S:.0f} s: {what}"
@@ -93,17 +93,17 @@ def until(condition: Callable[[], bool], what: str) -> None:
 
 
 def lines(path: Path) -> int:
-    """Whole lines in a file; 0 while there is none."""
+    """Number of whole lines in a file; 0 if it does not exist."""
     return path.read_bytes().count(b"\n") if path.exists() else 0
 
 
 def ledgers(out: Path) -> list[dict[str, Any]]:
-    """All whole lines of delays.jsonl; of one that is just being written a part may be there."""
+    """All whole lines of delays.jsonl; a line being written may be incomplete and is left out."""
     return [json.loads(line) for line in (out / "delays.jsonl").read_text().rpartition("\n")[0].splitlines()]
 
 
 def free_port() -> int:
-    """A TCP port of the loopback interface that nobody has now."""
+    """A TCP port of the loopback interface that nobody uses now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -1,4 +1,4 @@
-"""A serial cable between two pseudo terminals: it may be slow, late, spoil bytes, be pulled and plugged in again. Runs in a thread."""
+"""A serial cable between two pseudo terminals. It can be slow, delay or corrupt bytes, be pulled and plugged in again. Runs in a thread."""
 
 import errno
 import os
@@ -15,7 +15,7 @@ from typing import Final, Self
 Spoil = Callable[[bytes], bytes]
 
 _HELD_BYTES: Final = 128 * 1024
-"""What a direction holds at most; then the ends feel it."""
+"""The most that a direction holds; beyond this the ends have to wait."""
 
 _GRAIN_BYTES: Final = 32
 _GRAIN_NS: Final = 200_000
@@ -23,7 +23,7 @@ _TICK_S: Final = 0.005
 
 
 class _Way:
-    """One direction: bytes leave at a rate, arrive after a delay."""
+    """One direction: bytes leave at a limited rate and arrive after a delay."""
 
     def __init__(self, bytes_per_s: float, delay_ns: int) -> None:
         self.bytes_per_s, self.delay_ns = bytes_per_s, delay_ns
@@ -75,10 +75,10 @@ class PtyLine:
     """A cable with two ends, each a path that stays the same when the cable is plugged in again.
 
     Args:
-        folder: where the two paths are made.
-        bytes_per_s: what each direction carries; 0: as fast as it goes.
-        delay_ns: from leaving one end to arriving at the other.
-        urgent: put it before ordinary work where that is permitted: a real line never waits for a processor.
+        folder: where the two paths are created.
+        bytes_per_s: rate of each direction; 0: unlimited.
+        delay_ns: from one end to the other.
+        urgent: give it priority over ordinary work where permitted: a real line never waits for a processor.
     """
 
     def __init__(self, folder: Path, bytes_per_s: float = 0, delay_ns: int = 0, *, urgent: bool = False) -> None:
@@ -99,7 +99,7 @@ class PtyLine:
         return f"serial:{board}", f"serial:{host}"
 
     def plug(self) -> None:
-        """Put the cable in: both devices appear."""
+        """Plug the cable in: both devices appear."""
         with self._lock:
             for path in self.paths:
                 master, slave = pty.openpty()
@@ -110,7 +110,7 @@ class PtyLine:
                 os.close(slave)
 
     def pull(self) -> None:
-        """Pull the cable: both devices vanish, and who has them open is told."""
+        """Pull the cable: both devices vanish, and processes that have them open are notified."""
         with self._lock:
             for path in self.paths:
                 path.unlink()
@@ -120,7 +120,7 @@ class PtyLine:
             self.ways = tuple(_Way(way.bytes_per_s, way.delay_ns) for way in self.ways)  # type: ignore[assignment]  # two of them
 
     def inject(self, data: bytes) -> None:
-        """Let bytes appear at both ends that nobody has sent."""
+        """Make bytes appear at both ends that nobody has sent."""
         with self._lock:
             for way in self.ways:
                 way.put(data, time.monotonic_ns())
@@ -153,7 +153,7 @@ class PtyLine:
             if any(idle) or not readers:  # an end that nobody has open always looks readable
                 time.sleep(min(wait_s, 0.001) if len(readers) > idle.count(True) else wait_s)
             else:
-                with suppress(OSError, ValueError):  # pulled meanwhile
+                with suppress(OSError, ValueError):  # pulled in the meantime
                     select.select(readers, [], [], wait_s)
 
     def _directions(self) -> list[tuple[tuple[int, int], _Way]]:
@@ -163,7 +163,7 @@ class PtyLine:
         return [((board, host), self.ways[0]), ((host, board), self.ways[1])]
 
     def _step(self, source: int, target: int, way: _Way) -> bool:
-        """Read and write what there is; gives whether nobody has the source's end open."""
+        """Read and write what is available; returns whether nobody has the source's end open."""
         absent = False
         try:
             if not way.is_full and (data := os.read(source, 65536)):

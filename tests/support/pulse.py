@@ -1,4 +1,4 @@
-"""Whether processes ran: for a test that fails because one fell silent, and must say whether it stood still or had nothing to hear."""
+"""Whether processes ran: tells a test that fails on a silent process whether it stood still or had nothing to hear."""
 
 import threading
 import time
@@ -12,21 +12,21 @@ from tests.support.programs import Program
 
 _LOOK_S: Final = 0.05
 _LONG_NS: Final = 1_500_000_000
-"""Half of the silence that is borne: who did not run for so long is what was silent, not the link."""
+"""Half of the tolerated silence: a process that did not run for this long caused the silence, not the link."""
 
 
 @dataclass(slots=True)
 class _Beat:
-    """The longest time in which a process did not run, ns, and for how much of it it wanted to.
+    """The longest time in which a process did not run, ns, and for how much of it it wanted to run.
 
     Attributes:
         ran_ns: processor time of all its threads so far.
-        waited_ns: time in which they waited for a core.
+        waited_ns: time for which they waited for a core.
         since_ns: when it was last seen to have run.
-        since_waited_ns: what they had waited until then.
+        since_waited_ns: their total waiting time at that moment.
         longest_ns: the longest time without running.
-        longest_waited_ns: what they waited for a core in it.
-        at: when that began, wall time.
+        longest_waited_ns: how long they waited for a core during it.
+        at: when that began, wall-clock time.
     """
 
     ran_ns: int
@@ -38,7 +38,7 @@ class _Beat:
     at: str = ""
 
     def take(self, ran_ns: int, waited_ns: int, now_ns: int) -> None:
-        """Take what the kernel says now."""
+        """Add the kernel's current values."""
         rested_ns = now_ns - self.since_ns
         if rested_ns > self.longest_ns:
             self.longest_ns, self.longest_waited_ns = rested_ns, waited_ns - self.since_waited_ns
@@ -49,7 +49,7 @@ class _Beat:
 
 
 class Pulse:
-    """Looks twenty times a second at how long the threads of some programs have run and have waited for a core (/proc/PID/task/*/schedstat).
+    """Samples twenty times a second how long a program's threads have run and have waited for a core (/proc/PID/task/*/schedstat).
 
     Args:
         programs: by name.
@@ -68,13 +68,13 @@ class Pulse:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Look no more."""
+        """Stop sampling."""
         self._stopping.set()
         self._thread.join()
 
     @property
     def told(self) -> str:
-        """What was seen, and which of the two it was; and the logs."""
+        """A report of what was seen, whether a process stood still or heard nothing, and the logs."""
         found = [self._tell(name, beat) for name, beat in self._beats.items()]
         stood = [name for name, beat in self._beats.items() if beat.longest_ns >= _LONG_NS]
         verdict = f"did not run: {' and '.join(stood)}" if stood else "all ran: the link itself was silent, or slow"
@@ -101,7 +101,7 @@ class Pulse:
 
 
 def _times_ns(pid: int) -> tuple[int, int]:
-    """How long all threads of a process have run, and have waited for a core (scheduler/sched-stats.rst in the kernel's documentation)."""
+    """How long all threads of a process have run and have waited for a core (scheduler/sched-stats.rst in the kernel's documentation)."""
     ran_ns = waited_ns = 0
     for task in Path(f"/proc/{pid}/task").iterdir():
         ran, waited, _ = (task / "schedstat").read_text(encoding="ascii").split()

@@ -9,7 +9,7 @@ _CONTRACT: Final = "pure modules: no I/O, no threads, no clock"
 
 
 def pure_modules() -> dict[str, Path]:
-    """Every pure module by its name, with its file; of a listed package all that is in it."""
+    """Every pure module by name, with its file; for a listed package, everything in it."""
     linter = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
     [listed] = [contract["source_modules"] for contract in linter["contracts"] if contract["name"] == _CONTRACT]
     found = {}

@@ -1,4 +1,4 @@
-"""Two unlike cameras with known geometry, and points seen by both through their full models."""
+"""Two unlike cameras with known geometry, and points that both see through their full models."""
 
 from dataclasses import dataclass, replace
 
@@ -11,7 +11,7 @@ from phone_host.scene.scene import unlike_rig as scene_rig
 
 
 def unlike_rig(right_centre_m: tuple[float, float, float] = (0.1, 0.004, -0.006), turn: float = 1.0) -> Rig:
-    """A 640x480 camera on the left and a finer, longer 1280x720 one, turned by some degrees, on the right.
+    """A 640x480 camera on the left and, on the right, a 1280x720 one with a longer focal length, turned by some degrees.
 
     Args:
         right_centre_m: the right camera's centre in the left one's axes, m.
@@ -43,7 +43,7 @@ class SeenPoints:
 
 
 def project_points(points_m: NDArray[np.float64], rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where both cameras see points of the left camera's axes, (N, 2) px each, through the full distortion."""
+    """Where both cameras see points given in the left camera's axes, (N, 2) px each, through the full distortion."""
     turn = cv2.Rodrigues(rig.R_right_left)[0]
     left, _ = cv2.projectPoints(points_m, np.zeros(3), np.zeros(3), rig.left.matrix, rig.left.distortion)
     right, _ = cv2.projectPoints(points_m, turn, rig.t_right_left_m, rig.right.matrix, rig.right.distortion)
@@ -54,7 +54,7 @@ def points_seen_by_both(rig: Rig, count: int, seed: int) -> SeenPoints:
     """Random points 0.4 m to 3 m away that lie inside both images."""
     random = np.random.default_rng(seed)
     depth = random.uniform(0.4, 3.0, count)
-    # Slopes up to 0.45: both models are invertible there, farther out none of their pixels lies.
+    # Slopes up to 0.45: both models are invertible there, and none of their pixels lies farther out.
     points = np.column_stack([random.uniform(-0.45, 0.45, (count, 2)) * depth[:, np.newaxis], depth])
     left, right = project_points(points, rig)
     seen = _inside(left, rig.left) & _inside(right, rig.right)
@@ -67,10 +67,10 @@ def _inside(points_px: NDArray[np.float64], model: CameraModel) -> NDArray[np.bo
 
 
 def small_rig() -> Rig:
-    """The demo's rig with pixels twice as wide and high: a quarter of them."""
+    """The demo's rig with pixels twice as wide and high, so a quarter as many."""
 
     def small(model: CameraModel) -> CameraModel:
-        # The middle of the first pixel is 0, so that the middle of the first two is 0.5.
+        # The centre of the first pixel is 0, so the centre of the first two is 0.5.
         half = np.array([[0.5, 0.0, -0.25], [0.0, 0.5, -0.25], [0.0, 0.0, 1.0]])
         return replace(model, matrix=half @ model.matrix, width_px=model.width_px // 2, height_px=model.height_px // 2)
 

@@ -1,4 +1,4 @@
-"""A frame and a ledger as they may come; a test says what differs: `replace(LEDGER, done_ns=5)`."""
+"""A typical frame and ledger; a test says what differs: `replace(LEDGER, done_ns=5)`."""
 
 from typing import Final
 

@@ -1,7 +1,8 @@
-"""A board and hosts wired together in memory, on simulated time, over connections that may lose, repeat and break.
+"""A board and hosts wired together in memory, in simulated time, over connections that may lose and repeat messages, and break.
 
-Each lane of each link is a connection with a queue for each direction: order holds within a queue, never between two. A connection that breaks takes
-what was under way with it; the side that had dialled gets word of it and a fresh connection. The world itself checks what must always hold.
+Each lane of each link is a connection with a queue for each direction: order holds within a queue, never between two. A
+connection that breaks loses its messages under way; the side that dialled is notified and gets a fresh connection. The
+world itself checks the invariants.
 """
 
 from collections import deque
@@ -57,12 +58,12 @@ Place = tuple[int, Lane]
 
 
 class Broken:
-    """Word to the side that had dialled: the connection broke."""
+    """Notice to the side that dialled: the connection broke."""
 
 
 @dataclass(slots=True)
 class Wire:
-    """One life of a lane's connection."""
+    """One lane's connection, until it breaks."""
 
     to_board: "deque[Message | Broken]" = field(default_factory=deque)
     to_host: "deque[Message | Broken]" = field(default_factory=deque)
@@ -70,7 +71,7 @@ class Wire:
 
 @dataclass(slots=True)
 class HostNode:
-    """A host with its account of what it was told."""
+    """A host with a record of what it was told."""
 
     number: int
     session: HostSession
@@ -112,28 +113,28 @@ class World:
         self.board = self._new_board()
         self.add_host()
 
-    # What may happen.
+    # Events.
 
     def add_host(self) -> HostNode:
-        """One more host comes."""
+        """Add one more host."""
         self.hosts.append(HostNode(len(self.hosts), HostSession("", [{}])))
         return self.restart_host(self.hosts[-1])
 
     def restart_board(self) -> None:
-        """The board's process dies and a new life begins."""
+        """The board's process dies and a new session begins."""
         self.board = self._new_board()
         for host in self.hosts:
             for place in self.places:
                 self.break_lane(host, place)
 
     def sleep_board(self) -> None:
-        """The board's machine is suspended and wakes: its clock stood still."""
+        """The board's machine is suspended and wakes up: its clock stood still."""
         self.lives += 1
         self.boot_id = f"boot-{self.lives}"
         self.board.begin_clock(self.boot_id)
 
     def restart_host(self, host: HostNode) -> HostNode:
-        """A host's process dies without a word and a new one begins."""
+        """A host's process dies without notice and a new one starts."""
         self.lives += 1
         numbers = sorted({link for link, _ in self.places})
         dialled: list[dict[Lane, bytes]] = [
@@ -146,7 +147,7 @@ class World:
         return fresh
 
     def break_lane(self, host: HostNode, place: Place, *, tell: bool = True) -> None:
-        """A connection breaks: what was under way is gone, the dialler gets word and a new connection."""
+        """A connection breaks: messages under way are lost; the dialler is notified and gets a new connection."""
         self.lives += 1
         link, lane = place
         name = connection_name(link, f"{host.number}-{lane.name}-{self.lives}".encode())
@@ -165,19 +166,19 @@ class World:
             queue.append(Broken())
 
     def cut_link(self, link: int) -> None:
-        """Nothing arrives over this link any more, without word to anybody."""
+        """Nothing arrives over this link any more, and nobody is notified."""
         self.cut |= {(link, lane) for lane in Lane}
 
     def mend_link(self, link: int) -> None:
-        """The link works again; what was under way is gone."""
+        """The link works again; messages under way are lost."""
         for lane in Lane:
             self.cut.discard((link, lane))
 
     def deliver(self, host: HostNode, place: Place, *, to_board: bool, keep: bool = False) -> bool:
-        """Let one message arrive; `keep` leaves a second copy of it under way."""
+        """Deliver one message; `keep` leaves a second copy of it under way."""
         queue = host.wires[place].to_board if to_board else host.wires[place].to_host
         if place in self.cut:
-            news = [item for item in queue if isinstance(item, Broken)]  # each side learns of its own end
+            news = [item for item in queue if isinstance(item, Broken)]  # each side is notified of its own end
             queue.clear()
             queue.extend(news)
         if not queue:
@@ -190,17 +191,17 @@ class World:
         return True
 
     def drop(self, host: HostNode, place: Place, *, to_board: bool) -> None:
-        """Lose one message without a sound."""
+        """Lose one message silently."""
         queue = host.wires[place].to_board if to_board else host.wires[place].to_host
         if queue and not isinstance(queue[0], Broken):
             queue.popleft()
 
     def inject(self, host: HostNode, frame: FrameMessage) -> None:
-        """A transport delivers a frame that it had delivered before."""
+        """A transport delivers a frame a second time."""
         self._host_takes(host, (0, Lane.FRAMES), frame)
 
     def pass_time(self, duration_ns: int) -> None:
-        """Let time pass; both sides do what it demands, the board sends what it may, hosts grant what they like."""
+        """Let time pass: both sides do what is due, the board sends what it may, hosts grant credit as they like."""
         self.now_ns += duration_ns
         self.shoot()
         if self.now_ns >= self.board.due_ns:
@@ -233,13 +234,13 @@ class World:
                 self.sent[self.board.session] += 1
 
     def settle(self, duration_ns: int = 2000 * MS) -> None:
-        """Everything arrives, at once and in order, while time passes."""
+        """Everything arrives at once and in order while time passes."""
         for _ in range(duration_ns // STEP_NS):
             self.pass_time(STEP_NS)
             self.deliver_all()
 
     def deliver_all(self) -> None:
-        """Let everything under way arrive, and the answers to it."""
+        """Deliver everything under way, and the answers to it."""
         for _ in range(2000):
             moved = [
                 self.deliver(host, place, to_board=to_board)
@@ -257,7 +258,7 @@ class World:
         sent = self.sent[self.board.session]
         return BoardCounts(sent, sent)
 
-    # How the shells of both sides behave.
+    # The behaviour of both sides' shells.
 
     def _new_board(self) -> BoardSession:
         self.lives += 1
@@ -351,13 +352,13 @@ class World:
             self.credit[host.board_session] = max(known, message.below_index)
         for place, name in host.names.items():
             if name == connection:
-                # Who listens takes a connection's lane from a knock; a board that dials tells it of a mistake.
+                # A listener learns a connection's lane from a knock; a board that dials reports a mistake to it.
                 assert self.board_dials or not isinstance(message, HostHello) or message.lane is place[1]
                 host.wires[place].to_board.append(message)
 
 
 def frame(session: str, sent_index: int) -> FrameMessage:
-    """A frame as it was once sent."""
+    """A frame as it was sent before."""
     return FrameMessage(
         session=session,
         sent_index=sent_index,
@@ -372,5 +373,5 @@ def frame(session: str, sent_index: int) -> FrameMessage:
 
 
 def _dialled(place: Place) -> bytes:
-    """What the side that dials calls a connection."""
+    """The dialling side's name for a connection."""
     return connection_name(place[0], place[1].name.encode())

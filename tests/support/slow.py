@@ -1,4 +1,4 @@
-"""A stereo core that takes its time."""
+"""A slow stereo core."""
 
 import time
 
@@ -11,13 +11,13 @@ class SlowMatcher:
     """Finds nothing, slowly: stands in for a matcher that is far slower than the camera.
 
     Args:
-        seconds: for each pair.
+        seconds: time per pair.
     """
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
 
     def match(self, pair: RectifiedPair) -> Disparity:
-        """Wait, then give an empty map."""
+        """Wait, then return an empty map."""
         time.sleep(self._seconds)
         return np.full(pair.left.shape[:2], np.nan, np.float32)

@@ -1,8 +1,8 @@
-"""A board, a host and their cameras on simulated time, whose clocks step, sleep and are lied about. The world knows when each image was really exposed.
+"""A board, a host and their cameras in simulated time. Their clocks step, sleep and are lied about; the world knows each image's true exposure time.
 
-Both roles of the session, the reception with its border, and the pair queue are the real ones; the wires keep their order and take their time. True
-time runs evenly; each machine's clock is true time plus a shift. A machine that sleeps is not run and its clock stands still, a program that
-is stopped is not run and its clock goes on.
+Both roles of the session, the reception with its border, and the pair queue are the real ones; the wires preserve order
+and have latency. True time runs evenly; each machine's clock is true time plus a shift. A sleeping machine does not run
+and its clock stands still; a stopped program does not run but its clock goes on.
 """
 
 import random
@@ -47,7 +47,7 @@ _NAMES: Final = {lane: connection_name(0, lane.name.encode()) for lane in Lane}
 
 @dataclass(slots=True)
 class Machine:
-    """A machine's clock, and until when (true time, ns) it or its program is not there."""
+    """A machine's clock, and until when (true time, ns) it or its program does not run."""
 
     shift_ns: int
     asleep_until_ns: int = 0
@@ -61,8 +61,8 @@ class SteppingWorld:
 
     Args:
         latency_ns: of the wires.
-        jitter: frames take up to this part of the latency longer, all else up to a quarter of that.
-        seed: of everything that is left to chance.
+        jitter: frames take up to this part of the latency longer, everything else up to a quarter of that.
+        seed: for everything that is left to chance.
     """
 
     def __init__(self, latency_ns: int, jitter: float, seed: int) -> None:
@@ -94,7 +94,7 @@ class SteppingWorld:
         """What the board's CLOCK_MONOTONIC shows."""
         return self.true_ns + self.board.shift_ns
 
-    # What may happen.
+    # Events.
 
     def run(self, duration_ns: int) -> None:
         """Let true time pass."""
@@ -107,23 +107,23 @@ class SteppingWorld:
             self._run_board()
             self._deliver("host")
             self._run_host()
-            while len(self.queue._fifo):  # its counts would be made anew at each step
+            while len(self.queue._fifo):  # its counts would be rebuilt at each step
                 pair = self.queue.take()
                 assert pair is not None
                 self.witness.judge(pair, self.queue.tolerance_ns)
 
     def step(self, which: Machine, by_ns: int) -> None:
-        """A clock steps while everything runs. A frame that waits in the board's outbox meanwhile has marks of both clocks, which nobody can tell: it is lost here."""
+        """A clock steps while everything runs. A frame in the board's outbox then has marks of both clocks, undetectably: it is lost here."""
         which.shift_ns += by_ns
         if which is self.board:
             self._outbox = None
         self.witness.stepped(self.true_ns)
 
     def sleep(self, which: Machine, duration_ns: int, *, told: bool) -> None:
-        """A machine sleeps: it is not run, and its clock stands still. When it wakes its kernel tells, or does not.
+        """A machine sleeps: it does not run, and its clock stands still. When it wakes, its kernel reports the sleep or does not.
 
-        What is under way to a host that is not told looks as if it had just come, and nothing can tell (decision 0009, 11): it is lost here, and what
-        had come before is not judged.
+        Messages under way to a host that is not told look as if they had just arrived, undetectably (decision 0009,
+        11): they are lost here, and earlier arrivals are not judged.
         """
         if which is self.host and not told:
             self.witness.slept_untold(self.host_clock())
@@ -135,19 +135,19 @@ class SteppingWorld:
         which.stopped_until_ns = self.true_ns + duration_ns
 
     def lose(self, lane: Lane, to: str) -> None:
-        """The oldest message under way is lost without a sound."""
+        """Silently lose the oldest message under way."""
         wire = self._wire(lane, to)
         if wire:
             wire.popleft()
 
     def repeat(self, lane: Lane, to: str) -> None:
-        """The oldest message under way comes twice."""
+        """Deliver the oldest message under way twice."""
         wire = self._wire(lane, to)
         if wire:
             wire.appendleft(wire[0])
 
     def break_lane(self, lane: Lane) -> None:
-        """A connection breaks: both sides are told, what was under way is gone."""
+        """A connection breaks: both sides are told, and messages under way are lost."""
         self._wire(lane, "board").clear()
         self._wire(lane, "host").clear()
         for outgoing in self._board.unreachable(_NAMES[lane]):
@@ -155,19 +155,19 @@ class SteppingWorld:
         self.reception.interrupted(_NAMES[lane], self.host_clock())
 
     def restart_board(self) -> None:
-        """The board's program dies and begins anew; its machine's clock goes on."""
+        """The board's program dies and starts again; its machine's clock goes on."""
         self._new_board()
         for lane in Lane:
             self.break_lane(lane)
 
     def lie(self, message: Message) -> None:
-        """The board says something more, on the lane where it belongs."""
+        """The board says something extra, on the lane where it belongs."""
         self._wire(Lane.FRAMES if isinstance(message, FrameMessage) else Lane.CONTROL, "host").append(
             (self.true_ns, message)
         )
 
     def false_frame(self, by_ns: int) -> FrameMessage:
-        """A frame that the board might send next, with stamps that are off; its image is of this moment."""
+        """A frame that the board might send next, with wrong stamps; its image is exposed now."""
         board_ns = self.board_clock()
         self.witness.board_exposed(self._board.session, 10**9 + self._sequence, self.true_ns - _BOARD_GRABS_NS)
         self.witness.sent(self._board.session, 10**9 + self._sequence, self._apart_ns + 2 * PERIOD_NS)
@@ -186,7 +186,7 @@ class SteppingWorld:
             payload=b"",
         )
 
-    # What is watched.
+    # Observation.
 
     @property
     def _apart_ns(self) -> int:
@@ -194,7 +194,7 @@ class SteppingWorld:
         return self.board.shift_ns - self.host.shift_ns
 
     def check_accounts(self) -> None:
-        """Frames and pairs are conserved."""
+        """Check that frames and pairs are conserved."""
         counts, account = self.queue.counts, self.reception.account
         assert counts.received == counts.paired + sum(n for _, n in counts.board_orphans) + counts.held_board
         received = sum(session.received for session in account.sessions)
@@ -211,7 +211,7 @@ class SteppingWorld:
 
     @property
     def _swift_ns(self) -> int:
-        """The longest that an answer takes which has waited nowhere."""
+        """The longest time that an answer takes if it waits nowhere."""
         return round(2 * self.latency_ns * (1 + self._jitter / 4)) + 4 * _STEP_NS
 
     # The listener of the reception.
@@ -226,13 +226,13 @@ class SteppingWorld:
         assert estimate is not None
         self.witness.bounded(estimate.bound_at(self.board_clock()))
 
-    # How the shells of both sides behave.
+    # The behaviour of both sides' shells.
 
     def _is_there(self, machine: Machine) -> bool:
         return self.true_ns >= max(machine.asleep_until_ns, machine.stopped_until_ns)
 
     def _wake(self) -> None:
-        """Clocks of machines that sleep stand still; who wakes is told first of all."""
+        """Clocks of sleeping machines stand still; a machine that wakes is told first of all."""
         for machine in (self.host, self.board):
             if self.true_ns < machine.asleep_until_ns:
                 machine.shift_ns -= _STEP_NS

@@ -1,4 +1,4 @@
-"""A host's reception and a board's session that answer each other at once, on simulated time."""
+"""A host's reception and a board's session that answer each other at once, in simulated time."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ class Talk:
 
     Args:
         dialled: whether the host called the board.
-        sink: where frames go; None: to a pair queue beside an own camera with a clock.
+        sink: where frames go; None: to a pair queue beside a host camera with a clock.
         camera: the board's.
     """
 
@@ -49,7 +49,7 @@ class Talk:
         self.begin("first")
 
     def begin(self, session: str) -> None:
-        """A new life of the board."""
+        """Begin a new session of the board."""
         self.board = BoardSession(session, "boot", self.camera)
         self.sent = 0
 
@@ -61,7 +61,7 @@ class Talk:
             self.answer()
 
     def answer(self) -> None:
-        """Let everything that was said be answered."""
+        """Deliver everything that was said, and the answers."""
         while self.said:
             outgoing = self.said.pop(0)
             message: Message = outgoing.message
@@ -90,5 +90,5 @@ class Talk:
         return replace(made, **changes)  # type: ignore[arg-type]
 
     def show(self, frame: FrameMessage) -> None:
-        """A frame comes."""
+        """Deliver a frame."""
         self.reception.receive(NAMES[Lane.FRAMES], frame, self.now_ns)

@@ -8,7 +8,7 @@ METADATA = {"process_name", "process_sort_index", "thread_name", "thread_sort_in
 
 
 def checked(text: str) -> list[dict[str, Any]]:
-    """All events of a trace in the JSON object form; fails where one breaks a rule."""
+    """All events of a trace in the JSON object form; fails if one breaks a rule."""
     trace = json.loads(text)
     assert set(trace) >= {"traceEvents"}
     assert trace.get("displayTimeUnit", "ms") in {"ms", "ns"}
@@ -39,7 +39,7 @@ def checked(text: str) -> list[dict[str, Any]]:
 
 
 def check_order(events: list[dict[str, Any]]) -> None:
-    """Names come first and once for each process and thread, and every process that shows anything has one; then all events by their time."""
+    """Names come first, once per process and thread, and every process with events has one; then all events in order of time."""
     names = [event for event in events if event["ph"] == "M"]
     shown = events[len(names) :]
     assert all(event["ph"] != "M" for event in shown)
@@ -50,7 +50,7 @@ def check_order(events: list[dict[str, Any]]) -> None:
 
 
 def check_nesting(events: list[dict[str, Any]]) -> None:
-    """Slices of one thread lie apart or within each other; to 1 ns, the grain of what is written."""
+    """Slices of one thread are disjoint or nested, to 1 ns, the resolution of the output."""
     threads: dict[tuple[int, int], list[tuple[float, float]]] = {}
     for event in events:
         if event["ph"] == "X":
@@ -67,7 +67,7 @@ def check_nesting(events: list[dict[str, Any]]) -> None:
 
 
 def check_flows(events: list[dict[str, Any]]) -> None:
-    """Each flow begins once and ends once, later, both bound to a slice that is there at that moment: a flow's place is its enclosing slice."""
+    """Each flow begins once and ends once, later, both bound to a slice present at that moment: a flow's place is its enclosing slice."""
     flows: dict[tuple[str, str, int], list[dict[str, Any]]] = {}
     places = {(event["pid"], event["tid"], event["ts"]) for event in events if event["ph"] == "X"}
     for event in events:
@@ -76,5 +76,5 @@ def check_flows(events: list[dict[str, Any]]) -> None:
             assert (event["pid"], event["tid"], event["ts"]) in places
     for ends in flows.values():
         assert [end["ph"] for end in ends] == ["s", "f"]
-        assert ends[1]["bp"] == "e"  # else it would bind to the next slice, not to the enclosing one
+        assert ends[1]["bp"] == "e"  # otherwise it would bind to the next slice, not to the enclosing one
         assert all(one["ts"] <= other["ts"] for one, other in pairwise(ends))

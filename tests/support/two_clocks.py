@@ -34,7 +34,7 @@ class TwoClocks:
     def wave(
         self, number: int, host_ns: int, chance: random.Random, *, least_ns: int, jitter_ns: int, echoes: int = 5
     ) -> tuple[list[Echo], int]:
-        """Echoes back to back, each way `least_ns` plus exponential jitter of that mean; and the host's time behind them."""
+        """Back-to-back echoes, each way `least_ns` plus exponential jitter with that mean, and the host's time after them."""
         measured = []
         for _ in range(echoes):
             there, back = (least_ns + round(chance.expovariate(1) * jitter_ns) for _ in range(2))

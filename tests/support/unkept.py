@@ -1,4 +1,4 @@
-"""A sink for receivers that are watched by themselves."""
+"""A sink for receivers that are tested alone."""
 
 from common.protocol.message import CameraDescription
 from phone_host.model import BoardFrame
@@ -6,7 +6,7 @@ from phone_host.sync.quarantine import Disbelief
 
 
 class Unkept:
-    """Takes every frame and keeps none: pairing is no part of what is watched.
+    """Takes every frame and keeps none: pairing is not under test.
 
     Args:
         slots: how many frames the board may send ahead; None: as many as the link carries.
@@ -16,7 +16,7 @@ class Unkept:
         self._slots = slots
 
     def begin(self, camera: CameraDescription) -> None:
-        """A life of the board begins."""
+        """A session of the board begins."""
 
     def change_period(self, board_period_ns: int) -> None:
         """The board's camera has another rate."""
@@ -25,14 +25,14 @@ class Unkept:
         """A clock may have stood still."""
 
     def room(self) -> int | None:
-        """There is always as much."""
+        """The room is always the same."""
         return self._slots
 
     def objection(self, frame: BoardFrame) -> Disbelief | None:
         """None: every frame is wanted."""
 
     def add_board(self, frame: BoardFrame) -> None:
-        """A frame ends its way."""
+        """The frame ends here."""
 
     def tick(self) -> None:
         """Time passes."""

@@ -1,4 +1,4 @@
-"""Two ends of a line in virtual time: a rate, a delay, and what spoils bytes. Nothing sleeps; the same seed gives the same run."""
+"""Two ends of a line in virtual time, with a rate, a delay, and a way to corrupt bytes. Nothing sleeps; the same seed gives the same run."""
 
 import heapq
 from collections.abc import Callable
@@ -12,7 +12,7 @@ Spoil = Callable[[bytes], bytes]
 
 _GRAIN_BYTES = 16
 _GRAIN_NS = 250_000
-"""A line hands on what it has after this many bytes or this much time."""
+"""A line passes data on after this many bytes or this much time."""
 
 
 @dataclass(slots=True)
@@ -20,11 +20,11 @@ class Way:
     """One direction.
 
     Attributes:
-        bytes_per_s: how fast bytes leave; what has not left waits in a queue without end.
+        bytes_per_s: how fast bytes leave; bytes that have not left wait in an unlimited queue.
         delay_ns: from leaving to arriving.
-        spoil: what becomes of the bytes on the way.
-        chop: gives how many bytes come at one go; by default what leaves in 250 us, 16 at least.
-        nap_ns: whoever reads is awake only so often.
+        spoil: what happens to the bytes on the way.
+        chop: gives the number of bytes that arrive at once; by default what leaves in 250 us, but at least 16.
+        nap_ns: the reader wakes only at this interval.
     """
 
     bytes_per_s: float
@@ -57,7 +57,7 @@ class VirtualLine:
 
     @classmethod
     def of(cls, bytes_per_s: float, delay_ns: int, spoil: Spoil = bytes, frame_bytes: int = 1) -> "VirtualLine":
-        """A line with two like directions."""
+        """A line with two equal directions."""
         ends = {side: Duplex(side, 17, frame_bytes) for side in LinkEnd}
         return cls(ends, {side: Way(bytes_per_s, delay_ns, spoil) for side in LinkEnd})
 
@@ -78,7 +78,7 @@ class VirtualLine:
                     heapq.heappush(self._arrivals, arrival)
 
     def run(self, until_ns: int, act: Callable[["VirtualLine"], None] = lambda _: None) -> None:
-        """Let time pass; `act` is called after everything that happens."""
+        """Let time pass; `act` is called after every event."""
         act(self)
         self.write()
         while self.now_ns < until_ns:
@@ -101,7 +101,7 @@ class VirtualLine:
             self.run(self.now_ns + 10_000_000)
 
     def packets(self, side: LinkEnd) -> list[Whole]:
-        """The packets that came to an end."""
+        """The packets received by an end."""
         return [event for _, event in self.came[side] if isinstance(event, Whole)]
 
     def _note(self, side: LinkEnd, events: list[Whole | Change]) -> None:

@@ -1,4 +1,4 @@
-"""Who knows when each image of a simulated world was really exposed, and tells which pairs should not have been made."""
+"""Knows when each image of a simulated world was really exposed, and reports pairs that should not have been made."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -6,15 +6,16 @@ from typing import Final
 from phone_host.model import FramePair
 
 PERIOD_NS: Final = 33_333_333
-"""Of both cameras."""
+"""Period of both cameras."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WrongPair:
-    """A pair whose images were exposed too far apart, although what was known of the clocks said otherwise.
+    """A pair whose images were exposed too far apart, although the known state of the clocks said otherwise.
 
-    `excusable`: since the last echo that was answered the clocks had stepped, and when the board sent the frame by less than two periods in all. (A frame
-    that is under way while the host's machine is stopped looks like any other; only the next echo tells.)
+    `excusable`: the clocks had stepped since the last answered echo, and by less than two periods in all when the board
+    sent the frame. (A frame under way while the host's machine is stopped looks like any other; only the next echo
+    tells.)
     """
 
     session: str
@@ -25,14 +26,14 @@ class WrongPair:
 
 
 class Witness:
-    """What is true of a world, beside what its board and host believe. All times are true ones, ns, unless a clock is named.
+    """The truth about a world, apart from what its board and host believe. All times are true, ns, unless a clock is named.
 
     Args:
         apart_ns: how far the board's clock is ahead of the host's, ns.
 
     Attributes:
         pairs: how many were judged.
-        wrong: those of them that should not have been made.
+        wrong: those that should not have been made.
     """
 
     def __init__(self, apart_ns: int) -> None:
@@ -48,19 +49,19 @@ class Witness:
 
     @property
     def unsettled(self) -> bool:
-        """Whether a clock has stepped and no echo that was asked for since then has been answered."""
+        """Whether a clock has stepped and no echo requested since then has been answered."""
         return self._asked_ns < self._stepped_ns
 
     def board_exposed(self, session: str, sequence: int, true_ns: int) -> None:
-        """An image of the board was exposed."""
+        """The board exposed an image."""
         self._board_exposed[session, sequence] = true_ns
 
     def host_exposed(self, sequence: int, true_ns: int) -> None:
-        """An image of the host was exposed."""
+        """The host exposed an image."""
         self._host_exposed[sequence] = true_ns
 
     def sent(self, session: str, sequence: int, apart_ns: int) -> None:
-        """The board sent a frame, its clock so far ahead of the host's."""
+        """The board sent a frame, with its clock this far ahead of the host's."""
         self._apart_at_sending[session, sequence] = apart_ns
 
     def stepped(self, true_ns: int) -> None:
@@ -68,11 +69,11 @@ class Witness:
         self._stepped_ns = true_ns
 
     def slept_untold(self, host_ns: int) -> None:
-        """The host's machine falls asleep and will not be told; what came before then, by its clock, is not judged."""
+        """The host's machine falls asleep and will not be told; what arrived before then, by its clock, is not judged."""
         self._untold_ns = host_ns
 
     def bounded(self, bound_ns: int) -> None:
-        """The host believes its estimate of the clocks within this bound."""
+        """The host assumes that its estimate of the clocks is within this bound."""
         self._bound_ns = max(self._bound_ns, bound_ns)
 
     def asked(self, wave: int, true_ns: int, apart_ns: int) -> None:
@@ -80,13 +81,13 @@ class Witness:
         self._asked[wave] = true_ns, apart_ns
 
     def answered(self, wave: int, true_ns: int, swift_ns: int) -> None:
-        """An answer came. One that took longer than `swift_ns` waited while a program was stopped: it bounds nothing by which a step could be seen."""
+        """An answer came. If it took longer than `swift_ns`, it waited while a program was stopped: no step can be detected from it."""
         asked_ns, apart_ns = self._asked.get(wave, (0, 0))
         if asked_ns > self._asked_ns and true_ns - asked_ns <= swift_ns:
             self._asked_ns, self._settled_ns = asked_ns, apart_ns
 
     def judge(self, pair: FramePair, tolerance_ns: int) -> None:
-        """A pair was made within a tolerance of the time skew."""
+        """A pair was made, with a tolerance for the time skew."""
         self.pairs += 1
         message = pair.board.message
         known = message.session, message.sequence

@@ -1,6 +1,6 @@
-/* Counts who copies much at once, for bench_board: LD_PRELOAD=copies.so COPIES=FILE PROGRAM. On SIGUSR2 the counts so far go to FILE, a line
- * for each object that called memcpy or memmove with at least 4 KiB: `OBJECT CALLS BYTES`. Every such copy of a program linked to
- * libc passes here; loops of a program's own and what the kernel copies do not. */
+/* Counts large copies by caller, for bench_board: LD_PRELOAD=copies.so COPIES=FILE PROGRAM. On SIGUSR2 it writes the counts so far to FILE,
+ * one line for each object that called memcpy or memmove with at least 4 KiB: `OBJECT CALLS BYTES`. It sees every such copy of a
+ * program linked to libc, but neither the program's own loops nor copies by the kernel. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -33,7 +33,7 @@ static void count(void *from, size_t size) {
     }
 }
 
-/* Word by word where both ends allow it; the speed of a counted program is of no interest. */
+/* Word by word where both ends are aligned; the speed of a counted program does not matter. */
 static void *move(void *to, const void *from, size_t size) {
     uint8_t *out = to;
     const uint8_t *in = from;

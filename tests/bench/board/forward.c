@@ -1,8 +1,8 @@
-/* The board's job in C, for bench_board: V4L2 buffers of a webcam go to a ZeroMQ socket, nothing else. `forward DEVICE WIDTH HEIGHT FPS ADDRESS`
+/* The board's job in C, for bench_board: V4L2 buffers of a webcam go to a ZeroMQ socket, nothing more. `forward DEVICE WIDTH HEIGHT FPS ADDRESS`
  *
- * Each frame is a message of two parts, a header of sequence, stamp, size and send time, and the JPEG, which zmq_send copies out of the
- * ring. Only the newest of several filled buffers is sent, and a JPEG's first and last bytes are looked at, as board-agent does both.
- * libzmq's functions are declared here: a cross compiler then needs the library alone, not the development package of its architecture. */
+ * Each frame is a message of two parts: a header (sequence, stamp, size and send time) and the JPEG, which zmq_send copies out of the
+ * ring. Like board-agent, it sends only the newest of several filled buffers and checks a JPEG's first and last bytes. It declares
+ * libzmq's functions itself, so that a cross compiler needs the library alone, not the development package of its architecture. */
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/videodev2.h>
@@ -36,7 +36,7 @@ static struct v4l2_buffer buffer_of(unsigned index) {
     return (struct v4l2_buffer){.index = index, .type = V4L2_BUF_TYPE_VIDEO_CAPTURE, .memory = V4L2_MEMORY_MMAP};
 }
 
-static int take(struct v4l2_buffer *buffer) { /* 1: taken, 0: none is filled */
+static int take(struct v4l2_buffer *buffer) { /* 1: taken, 0: no buffer is filled */
     *buffer = buffer_of(0);
     if (ioctl(camera, VIDIOC_DQBUF, buffer) == 0)
         return 1;
