@@ -26,7 +26,7 @@ class Whose(Enum):
 
 
 class How(Enum):
-    """What else is so meanwhile."""
+    """What else happens at the same time."""
 
     PLAIN = "plain"
     ASLEEP = "asleep"
@@ -51,7 +51,7 @@ class Step:
 
     @property
     def words(self) -> str:
-        """For people."""
+        """A description for people."""
         how = "" if self.how is How.PLAIN else f" ({self.how.value})"
         return f"{self.by_ns / S:+g} s{how}" if abs(self.by_ns) >= S else f"{self.by_ns / MS:+g} ms{how}"
 
@@ -66,7 +66,7 @@ LONG: Final = (Step(-7 * S), Step(-4 * S, How.ASLEEP), Step(7 * S, How.GIVEN_UP)
 
 
 def step(clock: ShiftedClock, mine: Program, other: Program, this: Step, watched: Scene) -> None:
-    """Let a clock step.
+    """Step a clock.
 
     Args:
         clock: which.
@@ -107,7 +107,7 @@ def _run(whose: Whose, steps: Sequence[Step], folder: Path, rounds: Rounds) -> O
 
 
 def attack(whose: Whose, name: str, steps: Sequence[Step]) -> Attack:
-    """An attack of some steps, one after the other."""
+    """An attack of several steps, one after the other."""
     load = f"the {whose.value}'s clocks: " + ", ".join(this.words for this in steps)
     run: Callable[[Path, Rounds], Outcome] = partial(_run, whose, steps)
     return Attack(f"clock: {whose.value}, {name}", load, run)
