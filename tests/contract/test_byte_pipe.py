@@ -113,7 +113,7 @@ def test_whole_unaltered_and_in_order_or_not_at_all(
     _exchange(line, early, line.now_ns + 3 * S)
     for pipe in pipes.values():
         pipe.badness = 0.0
-    line.run(line.now_ns + 3 * S)  # for this long, packets that were under way when bytes were lost may count as lost too
+    line.run(line.now_ns + 3 * S)  # for this long, packets under way at the last loss may count as lost too
     late = _packets([(Lane.FRAMES, 3000), (Lane.CONTROL, 30), (Lane.FRAMES, 0)], seed + 1, "late")
     _exchange(line, late, line.now_ns + 3 * S)
     for side in LinkEnd:

@@ -49,7 +49,7 @@ def goodbye_for_account(old: Message, new: Message) -> bool:
 
 
 def named_lane(old: Message, new: Message) -> bool:
-    """The loss of a frames' lane is now named; before, the control lane was knocked for. A 0.1 host greets on both lanes, whichever is named."""
+    """A knock for a lost frames lane now names that lane; it used to name the control lane. A 0.1 host greets on both lanes, whichever is named."""
     return isinstance(old, Knock) and old.lane is Lane.CONTROL and new == Knock(Lane.FRAMES, old.session)
 
 

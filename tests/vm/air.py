@@ -1,4 +1,4 @@
-"""Shell commands that put two virtual Bluetooth adapters on the air of one guest."""
+"""Shell commands that put two virtual Bluetooth adapters of one guest on the air."""
 
 AIR = """
 modprobe -a hci_vhci rfcomm

@@ -17,7 +17,7 @@ _LIMIT_S: Final = 1500
 
 
 def run_contract(guest: Guest, transport: str) -> str:
-    """Run it on one transport, with the sources of this checkout; fails as it fails.
+    """Run it on one transport, with the sources of this checkout; fails if the suite fails.
 
     Returns:
         The last line of pytest: how many passed, how many were skipped.
