@@ -18,7 +18,7 @@ MS = 1_000_000
 BYTES_PER_S = 200_000
 
 FRAMES_OF = {"serial": 1, "rfcomm": FRAME_BYTES}
-"""What a transport carries bytes in."""
+"""Bytes per piece, for each transport."""
 
 Sent = tuple[Lane, bytes, bytes]
 
@@ -32,7 +32,7 @@ PACKETS = st.lists(
 
 
 class Pipe:
-    """What spoils one direction of the pipe.
+    """Spoils one direction of the pipe.
 
     Args:
         seed: of everything that happens in it.

@@ -57,7 +57,7 @@ Difference = Callable[[Message, Message], bool]
 
 BOARD_SAYS_OTHERWISE: dict[str, Sequence[Difference]] = {
     "goodbye_of_the_host": [goodbye_for_account],
-    "goodbye_of_the_board": [goodbye_for_account],  # its own goodbye was answered by one
+    "goodbye_of_the_board": [goodbye_for_account],  # its own goodbye was answered with one
     "the_board_dials": [goodbye_for_account],
     "a_break": [named_lane, goodbye_for_account],
     "busy": [named_lane, named_lane, goodbye_for_account],  # the stranger that was served had no frames lane
@@ -65,7 +65,7 @@ BOARD_SAYS_OTHERWISE: dict[str, Sequence[Difference]] = {
 }
 
 HOST_FORGETS: dict[str, int] = {"a_break": 1, "two_links": 1}
-"""In these scenes a 0.1 board loses its frames' lane and knocks for the control lane, by which today's boards say that they have forgotten the host."""
+"""In these scenes a 0.1 board loses its frames lane and knocks for the control lane; today's boards knock for that only when they have forgotten the host."""
 
 
 @pytest.mark.parametrize("scene", SCENES)

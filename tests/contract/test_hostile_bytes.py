@@ -21,7 +21,7 @@ from tests.support.messages import mutated
 CORPUS = Path(__file__).parents[1] / "fuzz" / "corpus"
 S = 1_000_000_000
 PATIENCE_NS = 3 * S
-"""So long after a unit nothing of it counts as under way any more, whatever became of it."""
+"""This long after a unit, nothing of it counts as under way any more, whatever became of it."""
 
 
 class Pair:
@@ -45,7 +45,7 @@ class Pair:
     def written(self, header: bytes, payload: bytes) -> bytes:
         """The bytes of one frame that the host has not seen yet."""
         self.now_ns += PATIENCE_NS
-        self.board.take(self.now_ns)  # what is late is written off
+        self.board.take(self.now_ns)  # late packets are written off
         assert self.board.put(Lane.FRAMES, header, payload)
         parts = []
         while data := self.board.take(self.now_ns):

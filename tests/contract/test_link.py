@@ -1,4 +1,4 @@
-"""What every transport must do; a new one adds itself to TRANSPORTS."""
+"""What every transport must do. A new transport adds itself to TRANSPORTS."""
 
 import random
 import re
@@ -40,7 +40,7 @@ class Ends:
     board_listens: bool
     opened: list[Link] = field(default_factory=list)
     uris: tuple[str, str] | None = None
-    """Of a cable, whose two ends have different names."""
+    """A cable's two ends have different names."""
     keys: tuple[KeyFolder, KeyFolder] | None = None
 
     def _open(self, *, listens: bool) -> End:

@@ -22,7 +22,7 @@ from tests.support.programs import board, free_port, host
 from tests.support.rigs import small_rig
 
 OFFSET_MS = 13.0
-"""The own camera's stamps are late by this: its replay shows image k so much after k / fps, and says so."""
+"""The host camera's stamps are late by this: its replay shows image k this long after k / fps, and says so."""
 
 FPS, SECONDS = 10, 2.0
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")

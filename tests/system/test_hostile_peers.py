@@ -25,10 +25,10 @@ from tests.support.pulse import Pulse
 
 _GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00"
 _MOST_LINES = 12
-"""A start takes six lines; strangers may add one each ten seconds."""
+"""A start takes six lines; strangers may add one every ten seconds."""
 
 _MOST_KB = 24 * 1024
-"""What a flood may cost: a thousand half-open connections take about 10 KB each in ZeroMQ."""
+"""What a flood may cost: each of a thousand half-open connections takes about 10 KB in ZeroMQ."""
 
 
 class Target:

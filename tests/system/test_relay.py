@@ -144,7 +144,7 @@ def test_a_reader_that_does_not_read_is_felt_by_the_writer(tmp_path: Path) -> No
                 quiet_since = time.monotonic()
             except BlockingIOError:
                 time.sleep(0.01)
-            # The limit: its own buffer, three of the relay's and the reader's (the reader's as the system sizes it), and the line.
+            # The limit: its own buffer, three of the relay's and the reader's (the latter as the system sizes it), and the line.
             assert taken < 1_000_000
         assert host >= 0
 

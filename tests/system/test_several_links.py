@@ -41,7 +41,7 @@ def cable(tmp_path: Path) -> Iterator[PtyLine]:
 
 
 FAR_AWAY = Profile(name="far away", carrier="tcp", bytes_per_s=0, delay_ns=250_000_000)
-"""So much slower than the cable that the choice between the two never hangs on how busy the machine is."""
+"""So much slower than the cable that the choice between the two never depends on how busy the machine is."""
 
 
 @pytest.fixture

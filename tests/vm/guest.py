@@ -26,7 +26,7 @@ OPEN_TO_ALL: Final = f"tcp://*:{LINK_PORT}?insecure=1"
 UNIT: Final = "board-agent"
 
 _BOOT_S: Final = 180.0
-"""Boot takes 11 s on an idle machine, 56 s were seen on a busy one."""
+"""Boot takes 11 s on an idle machine; 56 s were seen on a busy one."""
 
 _COMMAND_LINE: Final = "quiet loglevel=4 panic=-1 mitigations=off nokaslr selinux=0 apparmor=0 audit=0 random.trust_cpu=on net.ifnames=0 systemd.show_status=0"
 

@@ -20,10 +20,10 @@ from tests.vm.guest import Guest
 
 FPS: Final = 10
 FRAMES: Final = 600
-"""A minute of numbered images: a number names one moment of it."""
+"""A minute of numbered images: a number identifies one moment of it."""
 
 SLACK_S: Final = 0.01
-"""For the guest's clock as the host knows it, and for what is rounded: a tenth of a period."""
+"""Margin for the guest's clock as the host knows it, and for rounding: a tenth of a period."""
 
 NUMBER_ROWS: Final = 12
 _NUMBER_COLUMNS: Final = 12 * BITS
@@ -31,7 +31,7 @@ _NUMBER_COLUMNS: Final = 12 * BITS
 _DELAYS: Final = ("capture_ns", "outbox_ns", "propagation_ns", "pairing_ns", "queuing_ns", "processing_ns")
 
 Skew = Callable[[int, int], float]
-"""From the numbers of a pair's left and right image the least time that can have been between their stamps, s."""
+"""Maps the image numbers of a pair (left, right) to the shortest time that can have been between their stamps, s."""
 
 
 def webcam_skew(
@@ -106,7 +106,7 @@ class Stream:
         return lines(self.out / "delays.jsonl")
 
     def more(self, pairs: int, when: str) -> None:
-        """Wait for so many further pairs."""
+        """Wait for this many further pairs."""
         wanted = self.pairs + pairs
         deadline = time.monotonic() + PATIENCE_S
         while self.pairs < wanted:

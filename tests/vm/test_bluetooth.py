@@ -18,10 +18,10 @@ from tests.vm.webcam import Webcam
 pytestmark = pytest.mark.timeout(1800)  # each test boots a board of its own
 
 BOARD, HOST = "00:AA:01:00:00:00", "00:AA:01:01:00:01"
-"""Addresses that btvirt gives."""
+"""Addresses that btvirt assigns."""
 
 _BOARD_SEEN, _HOST_SEEN = "/org/bluez/hci1/dev_00_AA_01_00_00_00", "/org/bluez/hci0/dev_00_AA_01_01_00_01"
-"""What the daemon calls each where the other knows it."""
+"""The daemon's names for each adapter as the other one sees it."""
 
 CHANNEL = 1
 

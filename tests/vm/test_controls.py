@@ -20,7 +20,7 @@ AUTOMATISMS = {
     uvc.WHITE_BALANCE: (uvc.WHITE_BALANCE_AUTO, 0),
     uvc.FOCUS: (uvc.FOCUS_AUTO, 0),
 }
-"""By value: its automatism, and the value that switches it off."""
+"""For each value: its automatic mode, and the setting that switches that off."""
 
 
 EXPOSURE_ABSOLUTE, FOCUS_ABSOLUTE = 0x009A0902, 0x009A090A
@@ -58,7 +58,7 @@ def check_order(requests: list[tuple[tuple[int, int], int]]) -> None:
 
 
 def check_stamps(out: Path, webcam: Webcam, first: int) -> None:
-    """From that pair on the stamps lie where the webcam's own record puts them; checked only where that is known to 5 ms, which a busy machine may not give."""
+    """From pair `first` on, the stamps lie where the webcam's own record puts them; checked only where that is known to 5 ms, which a busy machine may not give."""
     told = list(zip(saved_numbers(out), ledgers(out), strict=True))[first:]
     sharp = [
         (left, right, ledger)

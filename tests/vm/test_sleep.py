@@ -14,7 +14,7 @@ from tests.vm.webcam import Webcam
 pytestmark = pytest.mark.timeout(600)  # the first test boots the board
 
 SLEEP_S = 1
-"""Shorter than the silence after which a host gives its board up: then nothing but the board itself tells of it."""
+"""Shorter than the silence after which a host gives up its board: then only the board itself reports the sleep."""
 
 
 @pytest.fixture(scope="module")

@@ -86,7 +86,7 @@ CONTROLS: Final = {
 
 _CAMERA_BITS: Final = (
     1 << 1 | 1 << 2 | 1 << 3 | 1 << 5 | 1 << 17
-)  # exposure mode, priority, time; focus, its auto: table 3-6
+)  # exposure mode, priority, time; focus, automatic focus: table 3-6
 _PROCESSING_BITS: Final = 1 << 0 | 1 << 6 | 1 << 9 | 1 << 10 | 1 << 12  # table 3-8
 
 

@@ -61,24 +61,24 @@ class Webcam:
         smaller: Sequence[bytes] = (),
     ) -> None:
         self.late_ns: dict[int, tuple[int, int]] = {}
-        """By number of the image in `frames`, the last time: how much later than due its first bytes left, and how much later the guest's
-        driver had taken them. It stamped them in between; on a busy machine that may be long."""
+        """By image number in `frames`, for its last showing: how much later than due its first bytes left, and how much later the guest's
+        driver had taken them. The driver stamped them in between; on a busy machine that may be long."""
         self.truncate_every = 0
-        """Every which frame loses its second half; 0: none."""
+        """Every n-th frame loses its second half; 0: none."""
         self.truncated = 0
         self.hung = False
-        """Whether its firmware has stopped: it answers nothing, but is on the bus."""
+        """Whether its firmware has hung: it answers nothing, but stays on the bus."""
         self.starts = 0
         """How often a driver has started the stream."""
         self.streaming = False
         self.start_phase_ns: int | None = None
         self.start_latency_ns: int | None = None
         self.phase_ns = 0
-        """How much later than k / fps it exposes since the newest start."""
+        """How much later than k / fps it exposes since the latest start."""
         self.settings: dict[tuple[int, int], int] = {}
-        """Its controls as they stand, by (unit, selector)."""
+        """Its current controls, by (unit, selector)."""
         self.found: dict[tuple[int, int], int] = {}
-        """What automatisms find, where it is not what they found when it was made."""
+        """What automatic modes find, if it differs from the original values."""
         self.set_requests: list[tuple[tuple[int, int], int]] = []
         """Every control that a driver has set, with the value, in order."""
         self._frames, self._fps, self._readout_ns = frames, fps, readout_ns
@@ -281,7 +281,7 @@ class _Device:
         return min(self._camera._fps, round(1e7 / interval))
 
     def _image(self) -> int:
-        """The next image number: at half the rate every other image is shown."""
+        """The image for the next number: at half the rate every other image is shown."""
         return self._number * self._camera._fps // self._rate_hz()
 
     def _delay_ns(self) -> int:

@@ -26,7 +26,7 @@ ATTACKS: Final[tuple[Attack, ...]] = (
     *crowds.LONG,
 )
 _START_S: Final = 4.0
-"""Start and end of the programs take about so much of an attack's share."""
+"""About this much of an attack's share goes to starting and ending the programs."""
 
 
 def main() -> int:

@@ -8,10 +8,10 @@ from statistics import quantiles
 from typing import Final
 
 MOST_MEMORY: Final = 1.3
-"""Peak of a process under attack, in multiples of its peak before."""
+"""Peak memory of a process under attack, in multiples of its peak before."""
 
 MOST_GAP_S: Final = (1.0, 2.0)
-"""Without pairs after the cause is gone: median and p95 of all rounds (DESIGN, section 7)."""
+"""Time without pairs after the cause is gone: median and p95 of all rounds (DESIGN, section 7)."""
 
 
 class Rounds:
@@ -38,7 +38,7 @@ class Outcome:
     """What an attack has found so far.
 
     Attributes:
-        frames: of the board that came to the host.
+        frames: of the board that arrived at the host.
         pairs: made by the host.
         wrong: pairs of frames that do not belong together.
         gaps_s: time from the end of each cause to the first of many pairs.
@@ -86,9 +86,9 @@ class Attack:
     """One attack.
 
     Attributes:
-        name: of one or a few words.
-        load: what is done, in words.
-        run: does it in a folder; gives what it has shown.
+        name: one or a few words.
+        load: what the attack does, in words.
+        run: attacks, with its files in a folder; returns what it found.
     """
 
     name: str

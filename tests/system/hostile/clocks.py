@@ -34,7 +34,7 @@ class How(Enum):
     SILENT = "silent"
     """The other side is stopped for a second around the step."""
     GIVEN_UP = "given up"
-    """The other side is stopped for longer than silence is borne."""
+    """The other side is stopped for longer than the silence timeout."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Step:
     """One step.
 
     Attributes:
-        by_ns: how far; negative: the machine stands still for so long.
+        by_ns: how far; negative: the machine stands still for this long.
         how: what else is so.
     """
 
@@ -57,7 +57,7 @@ class Step:
 
 
 _SILENT_S: Final = {How.SILENT: 0.5, How.GIVEN_UP: 1.8}
-"""Before the step and behind it."""
+"""Before and after the step."""
 
 LARGE: Final = (Step(7 * S), Step(-2 * S), Step(-2 * S, How.ASLEEP), Step(13 * S, How.SILENT))
 AT_THE_LIMIT: Final = (Step(2 * PERIOD_NS + 33_333), Step(-2 * PERIOD_NS - 33_333))
@@ -69,9 +69,9 @@ def step(clock: ShiftedClock, mine: Program, other: Program, this: Step, watched
     """Step a clock.
 
     Args:
-        clock: which.
-        mine: its process.
-        other: the one at the other end.
+        clock: the clock to step.
+        mine: the process of that clock.
+        other: the process at the other end.
         this: the step.
         watched: told of steps that cannot be noticed at once.
     """
@@ -118,6 +118,6 @@ SHORT: Final = tuple(
     for whose in Whose
     for name, steps in (("large", LARGE), ("two periods", AT_THE_LIMIT), ("small", SMALL))
 )
-"""In CI, too."""
+"""These run in CI, too."""
 
 LONG_ONLY: Final = tuple(attack(whose, "long", LONG) for whose in Whose)

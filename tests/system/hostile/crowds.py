@@ -23,15 +23,15 @@ _LIMIT: Final = 256
 _CALLERS: Final = 400
 _MEASURED_S: Final = 5.0
 _MOST_CPU: Final = 0.1
-"""Of a core, at the limit of file descriptors."""
+"""Share of a core, at the limit of file descriptors."""
 
 _BOMBS_COME: Final = 120
-"""Pairs from the first ones to those behind the bombs, which the server sends as number 120 to 129."""
+"""Pairs from the first one to those after the bombs, which the server sends as numbers 120 to 129."""
 
 _GREETING: Final = b"\xff" + bytes(8) + b"\x7f\x03\x00" + b"NULL".ljust(20, b"\0") + bytes(32)
 _READY: Final = b"\x05READY\x0bSocket-Type\x00\x00\x00\x06DEALER"
 _PEER: Final = _GREETING + b"\x04" + bytes((len(_READY),)) + _READY
-"""All that ZeroMQ wants to hear of a peer (ZMTP 3.1): then it keeps the connection for as long as the peer likes."""
+"""All that ZeroMQ requires of a peer (ZMTP 3.1): after this it keeps the connection as long as the peer likes."""
 
 
 def cpu_s(program: Program) -> float:

@@ -37,7 +37,7 @@ _MOST: Final = 2**53
 _FLOOD_S: Final = 2.0
 _WAVE: Final = 3
 _KNOWN_S: Final = 11.0
-"""Longer than the clock's youth (waves.py)."""
+"""Longer than the clock counts as young (waves.py)."""
 
 _MOST_BYTES: Final = 6 * 2**30
 """The host gets no more address space than this, so that a bomb that goes off spoils a test and not the machine."""
@@ -244,7 +244,7 @@ def attack(name: str, lies: Sequence[Lie]) -> Attack:
 
 
 def _settled(lie: Lie) -> Lie:
-    """The same attack when the clock is well known and echoes have become rare."""
+    """The same lie when the clock is well known and echoes have become rare."""
 
     def tell(board: LyingBoard) -> None:
         time.sleep(_KNOWN_S)
@@ -263,9 +263,9 @@ SHORT: Final = (
     attack("hellos", HELLOS),
     _NO_END,
 )
-"""In CI: many lies to one host."""
+"""These run in CI: many lies to one host."""
 
 SHORT_BOMBS: Final = (attack("bombs", BOMBS),)
 
 SINGLE: Final = (*(attack(lie.name, (lie,)) for lie in STAMPS + _LATE + ORDER + HELLOS + BOMBS), _NO_END)
-"""Each to a host of its own, again and again."""
+"""Each is told to a host of its own, again and again."""

@@ -41,7 +41,7 @@ from tests.support.numbered import HEIGHT_PX, WIDTH_PX
 from tests.system.hostile.scene import FPS, FRAMES, PERIOD_NS, Pair, film
 
 Twist = Callable[[Message], Iterable[Message]]
-"""What becomes of a message on its way out."""
+"""Turns an outgoing message into what is sent instead."""
 
 _STEP_MS: Final = 2
 _MOST_S: Final = 20.0
@@ -89,7 +89,7 @@ class LyingBoard:
 
     @property
     def counts(self) -> BoardCounts:
-        """Its honest account."""
+        """The honest account of its frames."""
         return self._outbox.counts
 
     def true_ns(self, pair: Pair) -> int:
@@ -162,7 +162,7 @@ class LyingBoard:
             self.say(lane, Knock(lane, self.session.session))
 
     def a_frame(self, payload: bytes, index: int) -> FrameMessage:
-        """Send a current frame that nobody asked for."""
+        """Return a current frame that nobody asked for."""
         ns = now.monotonic_ns()
         frame = self._frame(ns, ns, payload)
         return FrameMessage(
@@ -182,7 +182,7 @@ class LyingBoard:
         self.say(Lane.FRAMES, End(self.session.session, self.counts))
 
     def stop(self) -> None:
-        """End the connection without a word."""
+        """Stop the board without a goodbye."""
         self._stopping = True
         self._thread.join()
         self._link.close()

@@ -25,16 +25,16 @@ PERIOD_NS: Final = 1_000_000_000 // FPS
 TOLERANCE_NS: Final = PERIOD_NS // 2
 
 _SLACK_NS: Final = 1_000_000
-"""What the stated uncertainty may be wrong by on a machine where others work: the ledger has no hard bound, and the steps that are looked for are ten times that."""
+"""Tolerated error of the stated uncertainty on a busy machine: the ledger has no hard bound, and the steps to be detected are ten times that."""
 
 _HOLE_NS: Final = 400_000_000
 _STREAM_NS: Final = 700_000_000
-"""Pairs for so long without such a hole are a stream; a few of them are not: an estimate may still be about to break."""
+"""Pairs for this long without such a hole are a stream; a few pairs are not: an estimate may still be about to break."""
 
 _SETTLED: Final = 30
 _MOST_LINES: Final = 24
 _MOST_LINES_EACH: Final = 8
-"""Of a log: what belongs to start and end, and what each outage may add."""
+"""Limits for a log: lines for start and end, and what each outage may add."""
 
 _LOG_LINE: Final = re.compile(r"\d{4}-\d\d-\d\d [\d:,]+ (DEBUG|INFO|WARNING|ERROR) ")
 _OWN_WORDS: Final = ("phone-host", "board-agent", "warning: ")
@@ -271,7 +271,7 @@ class Scene:
 
 
 _WAVE_NS: Final = 750_000_000
-"""Two waves of echoes are half a second apart; the answer is here a few ms later, on a busy machine some more."""
+"""Two waves of echoes are half a second apart; the answer is here a few ms later, somewhat more on a busy machine."""
 
 
 def judge_account(report: Any, outcome: Outcome) -> None:
