@@ -125,7 +125,7 @@ class Frames(NoFrames):
         self.taken: list[BoardFrame] = []
 
     def room(self) -> int:
-        """As many as the old host allowed."""
+        """As many frames as the old host allowed."""
         return SLOTS
 
     def add_board(self, frame: BoardFrame) -> None:
@@ -173,7 +173,7 @@ def reception_of(head: dict[str, Any], sink: NoFrames) -> Reception:
 
 
 def meet(reception: Reception, step: dict[str, Any], words: list[Words]) -> None:
-    """Replay to a reception what the old host received; when to allow frames, and over which link, is its own choice."""
+    """Let a reception receive what the old host received; when to allow frames, and over which link, is its own choice."""
     ns = step["ns"]
     match step["do"]:
         case "receive":

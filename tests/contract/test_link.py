@@ -121,7 +121,7 @@ def _sockets(address: str) -> None:
 
 @pytest.fixture
 def _open_to_all(ends: Ends) -> None:
-    """Only for transports that report what strangers send."""
+    """Only for transports on which strangers are heard."""
     if ends.keys is not None:
         pytest.skip("strangers are not heard where keys are asked for; tests/system/test_hostile_peers.py shows it")
 

@@ -23,7 +23,7 @@ def bench(arguments: list[str], folder: Path) -> Any:
 
 
 def boards_of(running: Program) -> list[int]:
-    """Pids of the board-agent processes that this process started."""
+    """Pids of the board-agent processes that a program started."""
     return boards_below(running.process.pid)
 
 

@@ -1,4 +1,4 @@
-"""`phone-host run` without --link finds the right board, in a network namespace of its own."""
+"""`phone-host run` without --link finds the right board, in a network of its own."""
 
 import json
 import os

@@ -43,7 +43,7 @@ def installed(bare_guest: Guest, before: str, package: Path) -> Iterator[Guest]:
 
 
 def test_the_service_runs_after_installation_and_names_what_is_missing(installed: Guest) -> None:
-    """Without further configuration the service is enabled and up, and its status names the camera that is not there yet."""
+    """Without configuration the service is enabled and up, and its status names the camera that is not there yet."""
     assert installed.show("UnitFileState") == "enabled"
     installed.until("ActiveState", "active", "the service is up")
     installed.until("StatusText", "waiting for the camera", "the service says what is missing")

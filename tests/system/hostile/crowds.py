@@ -49,7 +49,7 @@ def _dial(port: int) -> socket.socket:
 
 
 def _descriptors(folder: Path, rounds: Rounds) -> Outcome:
-    """More callers than the board has descriptors, each a valid peer that stays: the board rests, and frames keep flowing."""
+    """More callers than the board has descriptors, each a valid peer that stays: the board stays nearly idle, and frames keep flowing."""
     outcome = Outcome()
     port = free_port()
     address = f"tcp://127.0.0.1:{port}"

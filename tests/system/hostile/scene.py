@@ -329,7 +329,7 @@ def board_and_host(
 
 
 def board_arguments(address: str) -> list[str]:
-    """The same, with a board that shows the film."""
+    """Arguments of a board that shows the film."""
     return ["run", "--camera", camera(), "--link", address, "--json", "--log-level", "info"]
 
 
