@@ -1,4 +1,4 @@
-"""Serial and RFCOMM over a byte pipe that chops, delays, corrupts and drops: packets come whole, unaltered and in order, or not at all."""
+"""Serial and RFCOMM over a byte pipe that chops, delays, corrupts and drops: packets arrive whole, unaltered and in order, or not at all."""
 
 import random
 from collections import deque
@@ -18,7 +18,7 @@ MS = 1_000_000
 BYTES_PER_S = 200_000
 
 FRAMES_OF = {"serial": 1, "rfcomm": FRAME_BYTES}
-"""What a transport carries bytes in."""
+"""Bytes per piece, for each transport."""
 
 Sent = tuple[Lane, bytes, bytes]
 
@@ -32,11 +32,11 @@ PACKETS = st.lists(
 
 
 class Pipe:
-    """What spoils one direction of the pipe.
+    """Spoils one direction of the pipe.
 
     Args:
-        seed: of all that happens in it.
-        badness: how often, of the pieces that pass, one is spoiled.
+        seed: of everything that happens in it.
+        badness: how often a passing piece is spoiled.
     """
 
     def __init__(self, seed: int, badness: float) -> None:
@@ -44,11 +44,11 @@ class Pipe:
         self._chance = random.Random(seed)
 
     def __call__(self, data: bytes) -> bytes:
-        """What comes out for a piece that goes in."""
+        """Return what comes out when a piece goes in."""
         return self._spoiled(data) if self._chance.random() < self.badness else data
 
     def chop(self) -> int:
-        """How many bytes the next piece has: often few, seldom many."""
+        """Return the size of the next piece: often a few bytes, seldom many."""
         return self._chance.choice((1, 2, 7, 16, 61, 300, 5000))
 
     def _spoiled(self, data: bytes) -> bytes:
@@ -65,7 +65,7 @@ class Pipe:
 
 
 def _exchange(line: VirtualLine, packets: dict[LinkEnd, list[Sent]], until_ns: int) -> None:
-    """Send what each end has, as the link takes it; what it does not take until then stays unsent."""
+    """Send what each end has as the link takes it; what it has not taken by the end stays unsent."""
     waiting = {side: deque(own) for side, own in packets.items()}
 
     def act(on: VirtualLine) -> None:
@@ -77,7 +77,7 @@ def _exchange(line: VirtualLine, packets: dict[LinkEnd, list[Sent]], until_ns: i
 
 
 def _packets(kinds: list[tuple[Lane, int]], seed: int, word: str) -> dict[LinkEnd, list[Sent]]:
-    """Packets of these sizes for both ends, no two of them alike."""
+    """Packets of these sizes for both ends, no two alike."""
     chance = random.Random(seed)
     return {
         side: [(lane, f"{word} {number}".encode(), chance.randbytes(size)) for number, (lane, size) in enumerate(kinds)]
@@ -86,7 +86,7 @@ def _packets(kinds: list[tuple[Lane, int]], seed: int, word: str) -> dict[LinkEn
 
 
 def _came(line: VirtualLine, side: LinkEnd, lane: Lane) -> list[Sent]:
-    """What came to an end on a lane."""
+    """The packets that arrived at an end on a lane."""
     came = [event for _, event in line.came[side] if isinstance(event, Whole) and event.lane is lane]
     return [(lane, bytes(whole.header), bytes(whole.payload)) for whole in came]
 
@@ -102,7 +102,7 @@ def _came(line: VirtualLine, side: LinkEnd, lane: Lane) -> list[Sent]:
 def test_whole_unaltered_and_in_order_or_not_at_all(
     transport: str, kinds: list[tuple[Lane, int]], delay_ms: int, badness: float, seed: int
 ) -> None:
-    """Whatever the pipe does, what comes was sent, once, in order and unaltered, all of it if the pipe only chops; once it is sound all comes again."""
+    """Whatever the pipe does, packets that arrive were sent: once, in order, unaltered. If it only chops, all arrive; once it is sound, all arrive again."""
     line = VirtualLine.of(BYTES_PER_S, delay_ms * MS, frame_bytes=FRAMES_OF[transport])
     line.meet()
     pipes = {side: Pipe(seed + side.value, badness) for side in LinkEnd}
@@ -113,7 +113,7 @@ def test_whole_unaltered_and_in_order_or_not_at_all(
     _exchange(line, early, line.now_ns + 3 * S)
     for pipe in pipes.values():
         pipe.badness = 0.0
-    line.run(line.now_ns + 3 * S)  # so long what was under way when bytes were lost may count as such
+    line.run(line.now_ns + 3 * S)  # for this long, packets under way at the last loss may count as lost too
     late = _packets([(Lane.FRAMES, 3000), (Lane.CONTROL, 30), (Lane.FRAMES, 0)], seed + 1, "late")
     _exchange(line, late, line.now_ns + 3 * S)
     for side in LinkEnd:

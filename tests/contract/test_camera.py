@@ -1,4 +1,4 @@
-"""What every camera must do; a new one adds its openers to CAMERAS. Behind that, what a replay promises beyond it."""
+"""What every camera must do. A new camera adds its openers to CAMERAS. After that: what a replay promises beyond it."""
 
 import select
 from collections.abc import Callable, Iterator
@@ -29,9 +29,9 @@ class Set:
     """A camera on simulated time.
 
     Attributes:
-        camera: open.
-        now_ns: the time.
-        server: what serves its images, if anything.
+        camera: an open camera.
+        now_ns: the current time.
+        server: the server of its images, if any.
     """
 
     camera: Camera
@@ -40,11 +40,11 @@ class Set:
 
     @property
     def is_real(self) -> bool:
-        """Whether it lives in real time, not in ours."""
+        """Whether it runs in real time instead of simulated time."""
         return self.camera.pollable is not None
 
     def next(self) -> list[Grab]:
-        """Let time pass until the camera has something, and take that."""
+        """Advance time until the camera has something, and read it."""
         if self.camera.pollable is not None:
             assert select.select([self.camera.pollable], [], [], 60)[0]
             self.now_ns = now.monotonic_ns()
@@ -55,7 +55,7 @@ class Set:
         return self.camera.read(self.now_ns)
 
     def take(self, count: int) -> list[Grab]:
-        """At least this many grabs, or all up to the end."""
+        """Read at least this many grabs, or all up to the end."""
         grabs: list[Grab] = []
         while len(grabs) < count and not (grabs and isinstance(grabs[-1], Ended)):
             grabs += self.next()
@@ -63,7 +63,7 @@ class Set:
 
 
 def fill(folder: Path, images: int = IMAGES) -> list[bytes]:
-    """Put JPEGs frame1.jpg ... there; gives their bytes in name order."""
+    """Write JPEGs frame1.jpg ... to a folder; return their bytes in name order."""
     folder.mkdir(exist_ok=True)
     contents = [jpeg(seed=i) for i in range(images)]
     for i, content in enumerate(contents):
@@ -72,7 +72,7 @@ def fill(folder: Path, images: int = IMAGES) -> list[bytes]:
 
 
 def replay(options: str) -> Callable[[Path], Set]:
-    """Opens a replay of five JPEGs."""
+    """Open a replay of five JPEGs."""
 
     def opened(folder: Path) -> Set:
         fill(folder)
@@ -82,7 +82,7 @@ def replay(options: str) -> Callable[[Path], Set]:
 
 
 def served(folder: Path) -> Set:
-    """Opens a server of five JPEGs."""
+    """Open a server of five JPEGs."""
     fill(folder)
     server = MjpegServer(folder, 30, "early_boundary")
     return Set(open_camera(server.uri, CLOCK, now.monotonic_ns()), now.monotonic_ns(), server)
@@ -108,7 +108,7 @@ def opened(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Set]:
 
 
 def test_description_fits_the_frames(opened: Set) -> None:
-    """Size and encoding of every frame are those of the description, and its bytes are a whole image of that size."""
+    """Each frame has the size and encoding of the description, and its bytes are a whole image of that size."""
     description = opened.camera.description
     assert description.period_ns > 0
     for grab in opened.take(IMAGES):
@@ -122,7 +122,7 @@ def test_description_fits_the_frames(opened: Set) -> None:
 
 
 def test_sequence_counts_every_grab(opened: Set) -> None:
-    """Grabs are numbered from 0 without a gap while they are read in time."""
+    """Grabs are numbered from 0 without a gap as long as they are read in time."""
     grabs = [grab for grab in opened.take(2 * IMAGES) if not isinstance(grab, Ended)]
     expected = 0
     for grab in grabs:
@@ -132,7 +132,7 @@ def test_sequence_counts_every_grab(opened: Set) -> None:
 
 
 def test_stamps_rise_and_are_on_the_named_clock(opened: Set) -> None:
-    """Exposures rise strictly, a frame is grabbed when it is read, and both stamps are on the machine's clock."""
+    """Exposures strictly increase, a frame is grabbed when it is read, and both stamps are on the machine's clock."""
     frames = [grab for grab in opened.take(2 * IMAGES) if isinstance(grab, Frame)]
     for before, after in pairwise(frames):
         assert before.exposed < after.exposed
@@ -143,7 +143,7 @@ def test_stamps_rise_and_are_on_the_named_clock(opened: Set) -> None:
 
 
 def test_reading_never_waits_nor_repeats(opened: Set) -> None:
-    """A camera that goes by the clock gives nothing before its time and nothing twice; one on demand gives one grab a read."""
+    """A clock-paced camera returns nothing early and nothing twice; one on demand returns one grab per read."""
     if opened.camera.description.pacing is Pacing.DEMAND:
         assert [len(opened.next()) for _ in range(IMAGES)] == [1] * IMAGES
         return
@@ -158,7 +158,7 @@ def test_reading_never_waits_nor_repeats(opened: Set) -> None:
 
 
 def test_frames_follow_each_other_at_the_stated_period(opened: Set) -> None:
-    """The mean distance of exposures is the description's period, to the nanosecond of its rounding."""
+    """The mean distance of exposures is the period in the description, to the nanosecond of rounding."""
     if opened.is_real:
         pytest.skip("its stamps are arrivals")
     frames = [grab for grab in opened.take(IMAGES) if isinstance(grab, Frame)]
@@ -167,7 +167,7 @@ def test_frames_follow_each_other_at_the_stated_period(opened: Set) -> None:
 
 
 def test_every_mode_that_is_offered_can_be_had_and_left(opened: Set) -> None:
-    """What a camera offers begins with what it gives; told so, its frames and its description follow, numbered on, and back again it is as before."""
+    """The first mode on offer is the current one. After a change, frames and description follow and numbering goes on; changing back restores the first mode."""
     camera = opened.camera
     first = camera.description
     opened.take(1)
@@ -199,7 +199,7 @@ def test_every_mode_that_is_offered_can_be_had_and_left(opened: Set) -> None:
 
 
 def test_a_rest_is_harmless(opened: Set) -> None:
-    """Told twice that nobody listens and twice that somebody does, a camera runs on, and says so."""
+    """Told twice that nobody listens and twice that somebody does, a camera keeps running and says so."""
     opened.take(1)
     for _ in range(2):
         opened.camera.pause()
@@ -209,11 +209,11 @@ def test_a_rest_is_harmless(opened: Set) -> None:
     assert opened.camera.health.state is CameraState.RUNNING
 
 
-# A replay's own promises.
+# What only a replay promises.
 
 
 def test_on_the_clock_image_k_is_exposed_at_k_over_fps(tmp_path: Path) -> None:
-    """Image number k of CLOCK_MONOTONIC is exposed at k / fps exactly, and is file k modulo their number."""
+    """On CLOCK_MONOTONIC, image k is exposed exactly at k / fps and shows file k modulo the number of files."""
     contents = fill(tmp_path)
     camera = open_camera(f"replay:{tmp_path}?fps=30&loop=1", CLOCK, START_NS)
     frames = camera.read(START_NS + 1_000_000_000)
@@ -227,7 +227,7 @@ def test_on_the_clock_image_k_is_exposed_at_k_over_fps(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rung", range(10))
 def test_a_slower_replay_still_agrees_with_a_fast_one(tmp_path: Path, rung: int) -> None:
-    """Slowed down at any moment, a replay shows images of the other one's grid, each with the stamp and bytes that it has there, at even distances."""
+    """Slowed down at any moment, a replay shows images of the original grid at even distances, each with the stamp and bytes it has there."""
     fill(tmp_path)
     slow, fast = (open_camera(f"replay:{tmp_path}?fps=25&loop=1", CLOCK, START_NS) for _ in range(2))
     then_ns = START_NS + 1_000_000_000
@@ -248,7 +248,7 @@ def test_a_slower_replay_still_agrees_with_a_fast_one(tmp_path: Path, rung: int)
 
 @pytest.mark.parametrize("later_ns", [1, 33_333_333, 1_234_567_891, 3600 * 10**9])
 def test_two_replays_agree_whenever_they_were_started(tmp_path: Path, later_ns: int) -> None:
-    """Two replays on one machine show the same number at the same moment with the same stamp."""
+    """Two replays on one machine show the same number with the same stamp at the same moment."""
     fill(tmp_path / "a")
     fill(tmp_path / "b")
     early = open_camera(f"replay:{tmp_path}/a?fps=25&loop=1", CLOCK, START_NS)
@@ -264,7 +264,7 @@ def test_two_replays_agree_whenever_they_were_started(tmp_path: Path, later_ns: 
 
 
 def test_without_loop_every_image_is_shown_once_then_it_ends(tmp_path: Path) -> None:
-    """On the clock and on demand: the files in name order, each once, then Ended, again and again."""
+    """On the clock and on demand: files come in name order, each once, then Ended on every read."""
     contents = fill(tmp_path, images=11)
     for pace in ("clock", "demand"):
         opened = Set(open_camera(f"replay:{tmp_path}?pace={pace}", CLOCK, START_NS), START_NS)
@@ -275,7 +275,7 @@ def test_without_loop_every_image_is_shown_once_then_it_ends(tmp_path: Path) -> 
 
 
 def test_on_demand_stamps_are_first_plus_k_over_fps(tmp_path: Path) -> None:
-    """However irregular the demand, stamps are the first read's time (or the anchor) + k / fps; with loop it goes round."""
+    """However irregular the demand, stamps are the time of the first read (or the anchor) + k / fps; with loop the film repeats."""
     contents = fill(tmp_path)
     for anchor_ns in (None, 777):
         camera = open_camera(f"replay:{tmp_path}?fps=24&pace=demand&loop=1", CLOCK, START_NS)
@@ -292,7 +292,7 @@ def test_on_demand_stamps_are_first_plus_k_over_fps(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("options", ["fps=30", "pace=demand"])
 def test_a_truncated_jpeg_is_a_spoiled_grab(tmp_path: Path, options: str) -> None:
-    """A file that lost its end comes as Spoiled under its own number; the frames around it are not disturbed."""
+    """A truncated file arrives as Spoiled under its own number; the frames around it are unaffected."""
     contents = fill(tmp_path)
     (tmp_path / "frame3.jpg").write_bytes(contents[2][:-100])
     opened = Set(open_camera(f"replay:{tmp_path}?{options}", CLOCK, START_NS), START_NS)
@@ -305,7 +305,7 @@ def test_a_truncated_jpeg_is_a_spoiled_grab(tmp_path: Path, options: str) -> Non
 
 @pytest.mark.parametrize("suffix", [".pgm", ".ppm", ".png"])
 def test_other_images_are_sent_without_loss(tmp_path: Path, suffix: str) -> None:
-    """PGM, PPM and PNG files arrive as PNG with exactly their pixels."""
+    """PGM, PPM and PNG files arrive as PNG with exactly the same pixels."""
     image = picture(40, 30)
     pixels = image[..., 0] if suffix == ".pgm" else image
     (tmp_path / f"a{suffix}").write_bytes(encoded(suffix, np.ascontiguousarray(pixels)))
@@ -319,13 +319,13 @@ def test_other_images_are_sent_without_loss(tmp_path: Path, suffix: str) -> None
 
 
 def spoil_nothing(folder: Path) -> None:
-    """No image at all."""
+    """A folder without images."""
     for path in folder.iterdir():
         path.unlink()
 
 
 def test_steering_moves_the_grid_of_exposures(opened: Set) -> None:
-    """A camera that says its grid can be moved exposes later by just so much from then on; any other one takes no notice."""
+    """A camera whose grid can be moved exposes later by exactly the given time from then on; any other camera ignores the request."""
     if opened.is_real:
         pytest.skip("its stamps are arrivals")
     period_ns = opened.camera.description.period_ns
@@ -338,22 +338,22 @@ def test_steering_moves_the_grid_of_exposures(opened: Set) -> None:
 
 
 def spoil_size(folder: Path) -> None:
-    """One image of another size."""
+    """One image differs in size."""
     (folder / "frame4.jpg").write_bytes(jpeg(48, 24))
 
 
 def spoil_kind(folder: Path) -> None:
-    """One image of another encoding."""
+    """One image differs in encoding."""
     (folder / "frame4.jpg").write_bytes(encoded(".png", picture()))
 
 
 def spoil_text(folder: Path) -> None:
-    """One file that is no image."""
+    """One file is no image."""
     (folder / "frame4.jpg").write_text("not an image")
 
 
 def spoil_folder(folder: Path) -> None:
-    """A folder that is called like an image."""
+    """A folder is named like an image."""
     (folder / "frame4.jpg").unlink()
     (folder / "frame4.jpg").mkdir()
 
@@ -369,7 +369,7 @@ def spoil_folder(folder: Path) -> None:
     ],
 )
 def test_a_bad_folder_is_refused_by_name(tmp_path: Path, spoil: Callable[[Path], None], named: str) -> None:
-    """A replay of no images, unlike ones or other files is bad data, told in one line with the file's name."""
+    """A replay without images, with unlike images or with other files is bad data; the message is one line with the file's name."""
     folder = tmp_path / "images"
     fill(folder)
     spoil(folder)
@@ -380,19 +380,19 @@ def test_a_bad_folder_is_refused_by_name(tmp_path: Path, spoil: Callable[[Path],
 
 
 def test_a_missing_folder_is_unavailable(tmp_path: Path) -> None:
-    """A folder that is not there may come: exit code 3, with its name."""
+    """A missing folder may still appear: exit code 3, with its name."""
     with pytest.raises(UnavailableError, match="nowhere") as caught:
         open_camera(f"replay:{tmp_path}/nowhere", CLOCK, START_NS)
     assert caught.value.exit_code == 3
 
 
 def test_files_that_vanish_later_are_told(tmp_path: Path) -> None:
-    """A film too long for memory whose files are taken away ends with an error that names the file, not with a crash."""
+    """If the files of a film too long for memory disappear, it ends with an error that names the file, not with a crash."""
     big = jpeg() + bytes(200)
     for i in range(3):
         (tmp_path / f"{i}.jpg").write_bytes(big)
     camera = open_camera(f"replay:{tmp_path}?pace=demand&loop=1", CLOCK, START_NS)
-    camera.close()  # forgets what it had in memory
+    camera.close()  # drops what is cached in memory
     (tmp_path / "0.jpg").unlink()
     with pytest.raises(TandemError, match=r"0\.jpg"):
         camera.read(START_NS)

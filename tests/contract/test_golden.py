@@ -1,6 +1,6 @@
-"""Neighbouring versions: today's two roles in the place of those that were recorded (tests/golden), message by message.
+"""Neighbouring versions: today's two roles replace those that were recorded (tests/golden), message by message.
 
-Where today's role deliberately says something else, the difference is named here, with what the older program makes of it. That was seen live: commit
+Where today's role deliberately says something else, the difference is named here, with what the older program makes of it. This was tested live: commit
 aa28bce and this version, each as board and as host, over ipc, tcp and a serial line, 50 pairs each, every frame accounted for (decision 0027).
 """
 
@@ -44,12 +44,12 @@ pytestmark = pytest.mark.parametrize("version", RECORDED)
 
 
 def goodbye_for_account(old: Message, new: Message) -> bool:
-    """A host's goodbye is answered by a goodbye with the account, where a status was. A 0.1 host takes either for the last account behind the last frame."""
+    """A host's goodbye is answered by a goodbye with the account, where it used to be a status. A 0.1 host takes either for the last account after the last frame."""
     return isinstance(old, Status) and new == Bye(old.counts)
 
 
 def named_lane(old: Message, new: Message) -> bool:
-    """A lost frames' lane is named, where the control lane was knocked for. A 0.1 host greets on both lanes, whichever is named."""
+    """A knock for a lost frames lane now names that lane; it used to name the control lane. A 0.1 host greets on both lanes, whichever is named."""
     return isinstance(old, Knock) and old.lane is Lane.CONTROL and new == Knock(Lane.FRAMES, old.session)
 
 
@@ -57,20 +57,20 @@ Difference = Callable[[Message, Message], bool]
 
 BOARD_SAYS_OTHERWISE: dict[str, Sequence[Difference]] = {
     "goodbye_of_the_host": [goodbye_for_account],
-    "goodbye_of_the_board": [goodbye_for_account],  # its own goodbye was answered by one
+    "goodbye_of_the_board": [goodbye_for_account],  # its own goodbye was answered with one
     "the_board_dials": [goodbye_for_account],
     "a_break": [named_lane, goodbye_for_account],
-    "busy": [named_lane, named_lane, goodbye_for_account],  # the stranger that was served had no lane for frames
+    "busy": [named_lane, named_lane, goodbye_for_account],  # the stranger that was served had no frames lane
     "two_links": [named_lane, named_lane, named_lane, goodbye_for_account],
 }
 
 HOST_FORGETS: dict[str, int] = {"a_break": 1, "two_links": 1}
-"""In these scenes a 0.1 board loses its frames' lane and knocks for the control lane, by which today's boards say that they have forgotten the host."""
+"""In these scenes a 0.1 board loses its frames lane and knocks for the control lane; today's boards knock for that only when they have forgotten the host."""
 
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_todays_board_answers_a_host_of_then_as_the_board_of_then(version: str, scene: str) -> None:
-    """The same messages at the same times on the same connections, byte for byte, save for the differences that are named."""
+    """The same messages go out at the same times on the same connections, byte for byte, except for the named differences."""
     head, steps = read(version, scene)
     then, today = recorded(steps, "board"), replay_board(head, steps).said
     assert [(words.ns, words.connection) for words in today] == [(words.ns, words.connection) for words in then]
@@ -83,7 +83,7 @@ def test_todays_board_answers_a_host_of_then_as_the_board_of_then(version: str, 
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_todays_host_says_to_a_board_of_then_what_the_host_of_then_said(version: str, scene: str) -> None:
-    """The same messages at the same times, byte for byte; where a board of then seems to have forgotten the host, up to there."""
+    """The same messages at the same times, byte for byte; if the old board seems to have forgotten the host, up to that point."""
     head, steps = read(version, scene)
     then, today = recorded(steps, "host"), replay_host(head, steps).said
     words = all_words(steps)
@@ -102,7 +102,7 @@ def test_todays_host_says_to_a_board_of_then_what_the_host_of_then_said(version:
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_todays_host_knows_what_became_of_every_frame_of_then(version: str, scene: str) -> None:
-    """Each frame that came is taken, each that the board tells of and that did not come is lost; nothing is doubted, and the end is known as such."""
+    """Each frame that came is taken; each that the board reports and that did not come is lost. Nothing is doubted, and the end is recognised."""
     head, steps = read(version, scene)
     noticed = replay_host(head, steps).noticed
     came = frames_for_host(steps)
@@ -113,31 +113,31 @@ def test_todays_host_knows_what_became_of_every_frame_of_then(version: str, scen
     assert max(account.sent for account in counts) == len(came) + lost
     leaving = scene in {"goodbye_of_the_board", "busy"}
     assert any(event == Vanished(orderly=True) for event in noticed) is leaving
-    # A status behind the last frame answers the goodbye of a host, but one may also have been under way: it is believed, and not called the last.
+    # A status after the last frame answers a host's goodbye, but may also have been under way before it: it is believed, but not called the last.
     assert [event.last for event in noticed if isinstance(event, Counted)][-1] is leaving
     assert all(event == Refused(RefusalReason.BUSY) for event in noticed if isinstance(event, Refused))
 
 
 class Frames(NoFrames):
-    """A sink that keeps the frames that were believed."""
+    """A sink that keeps believed frames."""
 
     def __init__(self) -> None:
         self.taken: list[BoardFrame] = []
 
     def room(self) -> int:
-        """As many as the host of then allowed."""
+        """As many frames as the old host allowed."""
         return SLOTS
 
     def add_board(self, frame: BoardFrame) -> None:
-        """Keep it."""
+        """Keep a frame."""
         self.taken.append(frame)
 
 
 @pytest.mark.parametrize(
     "scene", [scene for scene in SCENES if scene != "two_links"]
-)  # a reception chooses links by itself
+)  # a reception chooses links itself
 def test_the_reception_believes_a_board_of_then(version: str, scene: str) -> None:
-    """Every frame passes the border, the clock is what it was in the recording, and the account ends as the board's did."""
+    """Every frame passes the border, the clock matches the recording, and the final account is the board's."""
     head, steps = read(version, scene)
     sink = Frames()
     reception = reception_of(head, sink)
@@ -158,10 +158,10 @@ def test_the_reception_believes_a_board_of_then(version: str, scene: str) -> Non
     assert reception.tail_known is (scene in {"goodbye_of_the_board", "busy"})
     assert estimates
     for estimate in estimates:
-        # The host's clock minus the board's, from how the recorder set the board's clock.
+        # Host's clock minus board's clock, from how the recorder set the board's clock.
         truth_ns = round((estimate.reference_ns - OFFSET_NS) * 50_000 / 50_001) - estimate.reference_ns
         assert estimate.low_ns - 2 <= truth_ns <= estimate.high_ns + 2
-        assert abs(estimate.offset_ns - truth_ns) < 2 * MS  # half of what the lanes differ by is 1 ms
+        assert abs(estimate.offset_ns - truth_ns) < 2 * MS  # half the difference of the lanes is 1 ms
         assert board_ns(estimate.reference_ns + truth_ns) == pytest.approx(estimate.reference_ns, abs=2)
 
 
@@ -173,7 +173,7 @@ def reception_of(head: dict[str, Any], sink: NoFrames) -> Reception:
 
 
 def meet(reception: Reception, step: dict[str, Any], words: list[Words]) -> None:
-    """Let a reception meet what the host of then met; when it lets frames come, and over which link, is its own choice."""
+    """Let a reception receive what the old host received; when to allow frames, and over which link, is its own choice."""
     ns = step["ns"]
     match step["do"]:
         case "receive":
@@ -188,7 +188,7 @@ def meet(reception: Reception, step: dict[str, Any], words: list[Words]) -> None
 
 
 def frames_for_host(steps: list[dict[str, Any]]) -> list[FrameMessage]:
-    """The frames that reached the host."""
+    """The frames that arrived at the host."""
     words = all_words(steps)
     came = [received(step, words) for step in steps if step["who"] == "host" and step["do"] == "receive"]
     return [message for message in came if isinstance(message, FrameMessage)]
@@ -196,7 +196,7 @@ def frames_for_host(steps: list[dict[str, Any]]) -> list[FrameMessage]:
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_equal_messages_have_equal_bytes(version: str, scene: str) -> None:
-    """Today's decoder reads every recorded message, and today's encoder gives its header back to the byte."""
+    """Today's decoder reads every recorded message, and today's encoder reproduces its header byte for byte."""
     words = all_words(read(version, scene)[1])
     assert words
     for word in words:
@@ -205,13 +205,13 @@ def test_equal_messages_have_equal_bytes(version: str, scene: str) -> None:
 
 
 def test_the_recordings_hold_every_kind_of_message(version: str) -> None:
-    """Nothing of the protocol is left out."""
+    """The recordings cover every message of the protocol."""
     kinds = {type(word.message) for scene in SCENES for word in all_words(read(version, scene)[1])}
     assert {*kinds, Refusal} == set(Message.__args__)
 
 
 def test_a_refusal_of_a_version_is_said_as_then(version: str) -> None:
-    """In the envelope of whichever version asked; a host of now that gets one without the board's own version beside it knows that the board is older."""
+    """A refusal comes in the envelope of the version that asked. If it lacks the board's own version, today's host knows that the board is older."""
     (refusals,) = read(version, "refusals")[1]
     for asked, header in refusals.items():
         assert encode_for_any_version(int(asked), Refusal(RefusalReason.VERSION)).hex() == header
@@ -224,7 +224,7 @@ def test_a_refusal_of_a_version_is_said_as_then(version: str) -> None:
 
 
 def test_accounts_never_go_back(version: str) -> None:
-    """The counts that today's board tells a host of then only grow, whichever message holds them."""
+    """The counts that today's board sends to an old host only grow, whichever message holds them."""
     for scene in SCENES:
         head, steps = read(version, scene)
         told = [word.message for word in replay_board(head, steps).said]

@@ -1,4 +1,4 @@
-"""Neighbouring versions on byte streams: what a serial line and Bluetooth carried, and the words of an enrolment, as they were recorded (tests/golden)."""
+"""Neighbouring versions on byte streams: recorded serial and Bluetooth streams, and the words of an enrolment (tests/golden)."""
 
 from typing import Any
 
@@ -52,7 +52,7 @@ def packet_of(whole: Whole) -> Packet:
 def test_the_bytes_of_then_are_the_same_packets_in_pieces_of_any_size(
     version: str, kind: str, who: str, data: st.DataObject
 ) -> None:
-    """However the recorded stream is chopped, no byte of it is garbage, and the packets are those that were put in."""
+    """However the recorded stream is chopped, no byte is garbage, and the packets that went in come out."""
     _, steps = read(version, kind)
     stream = written(steps, who)
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=300)))
@@ -73,7 +73,7 @@ def test_the_bytes_of_then_are_the_same_packets_in_pieces_of_any_size(
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("who", SIDES)
 def test_an_end_of_today_writes_what_the_end_of_then_wrote(version: str, kind: str, who: str) -> None:
-    """Told the same at the same times, it meets the other end, hears its packets and writes the same bytes."""
+    """Given the same input at the same times, it meets the other end, hears its packets and writes the same bytes."""
     head, steps = read(version, kind)
     other = "board" if who == "host" else "host"
     end = Duplex(SIDES[who], NUMBERS[who], head["frame_bytes"])
@@ -101,7 +101,7 @@ def test_an_end_of_today_writes_what_the_end_of_then_wrote(version: str, kind: s
 
 
 def words(steps: list[dict[str, Any]], who: str) -> list[Word]:
-    """What one side said, as today's reader reads it, a byte at a time."""
+    """What one side said, read by today's reader one byte at a time."""
     reader = WordReader()
     stream = b"".join(bytes.fromhex(step["says"]) for step in steps if step.get("who") == who)
     read_words = [word for at in range(len(stream)) for word in reader.feed(stream[at : at + 1])]
@@ -113,7 +113,7 @@ def words(steps: list[dict[str, Any]], who: str) -> list[Word]:
 @pytest.mark.parametrize("version", RECORDED)
 @pytest.mark.parametrize(("name", "proves"), [("enrolment", True), ("enrolment-wrong-code", False)])
 def test_a_board_of_today_enrols_a_host_of_then(version: str, name: str, *, proves: bool) -> None:
-    """It answers each recorded word with the recorded answer, and trusts the host exactly if the code was right."""
+    """It answers each recorded word with the recorded answer, and trusts the host if and only if the code was right."""
     _, steps = read(version, name)
     desk = Desk(BOARD, chance_of("board"))
     outputs = [output for word in words(steps, "host") for output in desk.receive(b"host", word, START_NS)]
@@ -125,7 +125,7 @@ def test_a_board_of_today_enrols_a_host_of_then(version: str, name: str, *, prov
 @pytest.mark.parametrize("version", RECORDED)
 @pytest.mark.parametrize(("name", "proves"), [("enrolment", True), ("enrolment-wrong-code", False)])
 def test_a_host_of_today_enrols_with_a_board_of_then(version: str, name: str, *, proves: bool) -> None:
-    """It says the recorded words, and holds the board for proved exactly if the code was right."""
+    """It says the recorded words, and accepts the board as proved if and only if the code was right."""
     _, steps = read(version, name)
     code = Desk(BOARD, chance_of("board")).code(START_NS)
     asking = Asking(HOST, chance_of("host"))

@@ -1,4 +1,4 @@
-"""Neighbouring versions in files: rig.yaml, delays.jsonl and report.json as a demo of an older version wrote them (tests/golden), and files of newer ones."""
+"""Neighbouring versions in files: rig.yaml, delays.jsonl and report.json from an older version's demo (tests/golden), and files of newer versions."""
 
 import json
 import re
@@ -25,7 +25,7 @@ MARKS = ("exposed_ns", "grabbed_ns", "sent_ns", "received_ns", "queued_ns", "deq
 
 @pytest.mark.parametrize("version", RECORDED)
 def test_an_old_rig_is_read(version: str, tmp_path: Path) -> None:
-    """A rig without a version is of format 1: sizes, baseline and side are the demo's, and a time offset can be stored in it."""
+    """A rig without a version has format 1: sizes, baseline and side are the demo's, and a time offset can be stored in it."""
     old = FOLDER / version / "rig.yaml"
     rig = read_rig(old)
     assert [(camera.width_px, camera.height_px) for camera in (rig.left, rig.right)] == [(640, 480), (800, 600)]
@@ -38,7 +38,7 @@ def test_an_old_rig_is_read(version: str, tmp_path: Path) -> None:
 
 
 def test_a_rig_states_its_format(tmp_path: Path) -> None:
-    """What is written begins with the version of its format; whole numbers up to ours are read, with a point or without."""
+    """Files are written with their format version first; whole numbers up to ours are read, with or without a decimal point."""
     path = tmp_path / "rig.yaml"
     write_rig(path, unlike_rig(), rectify_rig(unlike_rig()))
     lines = path.read_text().splitlines()
@@ -50,7 +50,7 @@ def test_a_rig_states_its_format(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("value", [str(RIG_FORMAT + 1), "1000000", f"{RIG_FORMAT + 1}."])
 def test_a_newer_rig_is_refused(value: str, tmp_path: Path) -> None:
-    """The refusal names the file, its format, ours, and what to update."""
+    """The refusal names the file, its format, our format and what to update."""
     path = rig_of_format(tmp_path, value)
     with pytest.raises(DataError) as caught:
         read_rig(path)
@@ -61,13 +61,13 @@ def test_a_newer_rig_is_refused(value: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("value", ["0", "-1", "1.5", "one", "[ 1 ]", ".Nan", ".Inf"])
 def test_what_is_no_format_is_refused(value: str, tmp_path: Path) -> None:
-    """A version that is no whole number above 0 makes the whole file doubtful."""
+    """A version that is not a whole number above 0 makes the whole file invalid."""
     with pytest.raises(DataError, match="format_version"):
         read_rig(rig_of_format(tmp_path, value))
 
 
 def test_a_newer_rig_ends_a_command_with_one_line(tmp_path: Path) -> None:
-    """Exit 4, and one line on stderr, before anything is opened."""
+    """Exit 4 and one line on stderr, before anything is opened."""
     path = rig_of_format(tmp_path, str(RIG_FORMAT + 1))
     link, camera = f"ipc://{tmp_path}/none", f"replay:{write_film(tmp_path / 'film', 1)}"
     with host(["run", "--link", link, "--camera", camera, "--calibration", str(path)], tmp_path) as program:
@@ -77,7 +77,7 @@ def test_a_newer_rig_ends_a_command_with_one_line(tmp_path: Path) -> None:
 
 
 def rig_of_format(folder: Path, value: str) -> Path:
-    """A sound rig that says that its format is this."""
+    """A valid rig that claims this format version."""
     path = folder / "rig.yaml"
     write_rig(path, unlike_rig(), rectify_rig(unlike_rig()))
     text = path.read_text()
@@ -94,7 +94,7 @@ def documented_keys(heading: str) -> set[str]:
 
 @pytest.mark.parametrize("version", RECORDED)
 def test_old_ledgers_mean_what_is_documented(version: str) -> None:
-    """Each line has documented keys only; its marks are in order, its delays lie between them and add up to the nanosecond."""
+    """Each line has only documented keys; its marks are in order, its delays lie between them and add up to the nanosecond."""
     assert LEDGER_FORMAT == 1, "a reader of older lines is needed"
     lines = (FOLDER / version / "delays.jsonl").read_text(encoding="utf-8").splitlines()
     assert lines
@@ -113,7 +113,7 @@ def test_old_ledgers_mean_what_is_documented(version: str) -> None:
 
 @pytest.mark.parametrize("version", RECORDED)
 def test_old_reports_mean_what_new_ones_mean(version: str) -> None:
-    """Without a version a report is of format 1: the delays and counts in it are those of today's, and the counts hold."""
+    """A report without a version has format 1: its delays and counts are the same as today's, and the counts balance."""
     assert REPORT_FORMAT == 1, "a reader of older reports is needed"
     report: dict[str, Any] = json.loads((FOLDER / version / "report.json").read_text(encoding="utf-8"))
     assert report.get("format_version", 1) == 1

@@ -1,4 +1,4 @@
-"""What every reader of foreign bytes must do: the protocol's figures with fixed seeds, and each fuzz target over its corpus."""
+"""What every reader of foreign bytes must do: the protocol's limits with fixed seeds, and each fuzz target over its corpus."""
 
 import random
 import tracemalloc
@@ -21,11 +21,11 @@ from tests.support.messages import mutated
 CORPUS = Path(__file__).parents[1] / "fuzz" / "corpus"
 S = 1_000_000_000
 PATIENCE_NS = 3 * S
-"""So long after a unit nothing of it counts as under way any more, whatever became of it."""
+"""This long after a unit, nothing of it counts as under way any more, whatever became of it."""
 
 
 class Pair:
-    """Two ends that have met, and the time; what the board writes may be spoiled before the host reads it."""
+    """Two connected ends and the time; what the board writes may be spoiled before the host reads it."""
 
     def __init__(self) -> None:
         self.board, self.host = Duplex(LinkEnd.LISTENER, 17), Duplex(LinkEnd.DIALLER, 17)
@@ -35,7 +35,7 @@ class Pair:
             self.exchange()
 
     def exchange(self, data: bytes = b"") -> list[Whole | Change]:
-        """Let the host read these bytes and then silence; the board gets all answers. Gives what the host was told."""
+        """Let the host read these bytes and then silence; the board gets all answers. Return what the host was told."""
         events = self.host.feed(data + self.board.take(self.now_ns), self.now_ns)
         self.now_ns += GAP_NS
         events += self.host.silence(self.now_ns)
@@ -43,9 +43,9 @@ class Pair:
         return events
 
     def written(self, header: bytes, payload: bytes) -> bytes:
-        """The bytes of one frame, which the host has not seen yet."""
+        """The bytes of one frame that the host has not seen yet."""
         self.now_ns += PATIENCE_NS
-        self.board.take(self.now_ns)  # what is late is written off
+        self.board.take(self.now_ns)  # late packets are written off
         assert self.board.put(Lane.FRAMES, header, payload)
         parts = []
         while data := self.board.take(self.now_ns):
@@ -54,12 +54,12 @@ class Pair:
 
 
 def whole(events: list[Whole | Change]) -> list[tuple[bytes, bytes]]:
-    """Header and payload of the packets among these."""
+    """Header and payload of the packets in a list."""
     return [(bytes(event.header), bytes(event.payload)) for event in events if isinstance(event, Whole)]
 
 
 def test_ten_million_random_bytes_on_a_line() -> None:
-    """10^7 random bytes are no packet to an end that has met the other, hold less than two megabytes, and the good packet behind them comes."""
+    """10^7 random bytes yield no packet at a connected end and occupy less than two megabytes; the good packet after them arrives."""
     chance, pair = random.Random(11), Pair()
     tracemalloc.start()
     for _ in range(100):
@@ -86,7 +86,7 @@ def test_ten_million_random_bytes_as_headers() -> None:
 
 
 def test_a_hundred_thousand_mutated_packets() -> None:
-    """10^5 spoiled headers of all kinds are refused, or read as a sound message; nothing else is raised."""
+    """10^5 spoiled headers of all kinds are refused or read as a valid message; nothing else is raised."""
     chance = random.Random(13)
     headers = [encode(message)[0] for message in SOUND_MESSAGES]
     for number in range(100_000):
@@ -98,7 +98,7 @@ def test_a_hundred_thousand_mutated_packets() -> None:
 
 
 def test_of_a_hundred_thousand_frames_with_flipped_bits_none_comes_altered() -> None:
-    """Of 10^5 frames with one to eight bits flipped none comes altered, and the sound frame behind every tenth of them always comes."""
+    """Of 10^5 frames with one to eight flipped bits none arrives altered, and the sound frame after every tenth of them always arrives."""
     chance, pair = random.Random(14), Pair()
     marks = BoardMarks(exposed_ns=10**12, grabbed_ns=10**12 + 1, sent_ns=10**12 + 2)
     for number in range(100_000):
@@ -126,7 +126,7 @@ def test_of_a_hundred_thousand_frames_with_flipped_bits_none_comes_altered() -> 
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_what_fuzzing_has_found_stays_mended(name: str) -> None:
-    """Every input of a target's corpus, and every sound one it begins with, breaks none of the target's promises."""
+    """No corpus input of a target, and no valid starting input, breaks any of the target's promises."""
     kept = [path.read_bytes() for path in sorted((CORPUS / name).glob("*"))]
     for data in [*TARGETS[name].seeds(), *kept]:
         TARGETS[name].run(data)

@@ -1,4 +1,4 @@
-"""What every transport must do; a new one adds itself to TRANSPORTS."""
+"""What every transport must do. A new transport adds itself to TRANSPORTS."""
 
 import random
 import re
@@ -29,7 +29,7 @@ MB = 2**20
 
 @dataclass(slots=True)
 class Ends:
-    """Opens both ends of one address, again and again, and closes what is left over.
+    """Open both ends of one address repeatedly, and close what is left over.
 
     Attributes:
         address: of both ends, or of the board's.
@@ -40,14 +40,14 @@ class Ends:
     board_listens: bool
     opened: list[Link] = field(default_factory=list)
     uris: tuple[str, str] | None = None
-    """Of a cable, whose two ends have different names."""
+    """A cable's two ends have different names."""
     keys: tuple[KeyFolder, KeyFolder] | None = None
 
     def _open(self, *, listens: bool) -> End:
         uri = self.listening if listens else self.address
         if self.uris is not None:
             uri = self.uris[0 if listens else 1]
-        if not self.board_listens:  # the options that swap the two
+        if not self.board_listens:  # the options that swap the roles
             uri += "&" if "?" in uri else "?"
             uri += "bind=1" if listens else "connect=1"
         board_asks = listens == self.board_listens
@@ -58,15 +58,15 @@ class Ends:
 
     @property
     def listening(self) -> str:
-        """The address as the listener takes it: with keys on every network, since loopback alone needs none."""
+        """The address for the listener: with keys on every network, since loopback alone needs none."""
         return self.address if self.keys is None else self.address.replace("127.0.0.1", "*")
 
     def listen(self) -> End:
-        """The end that waits."""
+        """The listening end."""
         return self._open(listens=True)
 
     def dial(self) -> End:
-        """The end that dials."""
+        """The dialling end."""
         return self._open(listens=False)
 
     def close(self, end: End) -> None:
@@ -77,7 +77,7 @@ class Ends:
 
 @pytest.fixture(params=TRANSPORTS)
 def address(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    """A free address of each transport that this machine has."""
+    """A free address for each transport that this machine has."""
     try:
         match request.param:
             case "tcp" | "curve":
@@ -96,7 +96,7 @@ def address(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 @pytest.fixture(params=["board listens", "host listens"])
 def ends(request: pytest.FixtureRequest, address: str, tmp_path: Path) -> Iterator[Ends]:
-    """Both ends of each transport, with either side as the one that binds."""
+    """Both ends of each transport, with either side as the listener."""
     made = Ends(address, request.param == "board listens")
     if request.node.callspec.params["address"] == "curve":
         made.keys = acquainted(tmp_path, address)
@@ -112,7 +112,7 @@ def ends(request: pytest.FixtureRequest, address: str, tmp_path: Path) -> Iterat
 
 @pytest.fixture
 def _sockets(address: str) -> None:
-    """Only for transports that a stranger can connect to."""
+    """Only for transports that strangers can connect to."""
     if address.startswith("serial:"):
         pytest.skip("nobody else can connect to a serial line; test_serial.py lets garbage appear on one")
     if address.startswith("rfcomm:"):
@@ -121,20 +121,20 @@ def _sockets(address: str) -> None:
 
 @pytest.fixture
 def _open_to_all(ends: Ends) -> None:
-    """Only for transports on which a stranger is heard."""
+    """Only for transports on which strangers are heard."""
     if ends.keys is not None:
         pytest.skip("strangers are not heard where keys are asked for; tests/system/test_hostile_peers.py shows it")
 
 
 @pytest.fixture
 def pair(ends: Ends) -> tuple[End, End, dict[Lane, bytes]]:
-    """A listener and a dialler that have met, and the listener's names of the connections."""
+    """A listener and a dialler that are connected, and the listener's names of the connections."""
     listener, dialler = ends.listen(), ends.dial()
     return listener, dialler, meet(listener, dialler)
 
 
 def test_who_dials_has_the_lanes(ends: Ends) -> None:
-    """The dialler has a connection for each lane, the listener none of its own; both know their transport's name."""
+    """The dialler has a connection for each lane, the listener none of its own; both know the name of their transport."""
     listener, dialler = ends.listen(), ends.dial()
     assert set(dialler.link.dialled) == set(Lane)
     assert listener.link.dialled == {}
@@ -142,7 +142,7 @@ def test_who_dials_has_the_lanes(ends: Ends) -> None:
 
 
 def test_packets_arrive_whole_and_in_order(pair: tuple[End, End, dict[Lane, bytes]]) -> None:
-    """Headers with payloads of any size come out as they went in and in order, on both lanes and in both directions."""
+    """Headers with payloads of any size arrive unaltered and in order, on both lanes and in both directions."""
     listener, dialler, names = pair
     chance = random.Random(1)
     sizes = [0, 1, 0, 255, 256, 65535, 65536, 65537, 300_000, 2 * MB + 1, 0, 7]
@@ -159,7 +159,7 @@ def test_packets_arrive_whole_and_in_order(pair: tuple[End, End, dict[Lane, byte
 
 
 def test_the_greatest_payload_passes(pair: tuple[End, End, dict[Lane, bytes]]) -> None:
-    """A payload of exactly the greatest size arrives as it is."""
+    """A payload of exactly the maximum size arrives unaltered."""
     listener, dialler, names = pair
     payload = random.Random(2).randbytes(MB) * (MAX_PAYLOAD_BYTES // MB)
     send_until_sent(listener, names[Lane.FRAMES], b"great", payload, dialler)
@@ -169,12 +169,12 @@ def test_the_greatest_payload_passes(pair: tuple[End, End, dict[Lane, bytes]]) -
 
 @pytest.mark.parametrize("size", [0, 100_000])
 def test_a_reader_that_does_not_read_makes_the_link_full(pair: tuple[End, End, dict[Lane, bytes]], size: int) -> None:
-    """When nobody reads, sends end in FULL without waiting; what was taken arrives whole and in order once somebody reads."""
+    """When nobody reads, sends end in FULL without waiting; accepted packets arrive whole and in order once somebody reads."""
     listener, dialler, names = pair
     connection = names[Lane.FRAMES]
     taken: list[bytes] = []
     refusals = 0
-    # A link that paces itself gives a frame up after ten looks of 100 ms, however long the machine sleeps between two.
+    # A link that paces itself gives up a frame after ten looks of 100 ms, however long the machine sleeps between two.
     enough = 8 if listener.link.self_paced else 200
     while refusals < enough:
         header = b"%d" % len(taken)
@@ -185,7 +185,7 @@ def test_a_reader_that_does_not_read_makes_the_link_full(pair: tuple[End, End, d
             assert result is SendResult.FULL
             refusals += 1
             for pollable in listener.link.pollables:
-                zmq.zmq_poll([(pollable, zmq.POLLIN)], 1)  # lets the transport move what it can
+                zmq.zmq_poll([(pollable, zmq.POLLIN)], 1)  # lets the transport move data
     assert len(taken) * max(size, 1) < 64 * MB
     wait_until(lambda: len(dialler.packets) >= len(taken), dialler, listener)
     assert dialler.headers == taken
@@ -195,7 +195,7 @@ def test_a_reader_that_does_not_read_makes_the_link_full(pair: tuple[End, End, d
 
 
 def test_one_full_lane_does_not_stop_the_other(pair: tuple[End, End, dict[Lane, bytes]]) -> None:
-    """While frames are stuck, control still gets through, both ways."""
+    """While frames are stuck, control still gets through in both directions."""
     listener, dialler, names = pair
     refusals = 0
     while refusals < 50:
@@ -207,7 +207,7 @@ def test_one_full_lane_does_not_stop_the_other(pair: tuple[End, End, dict[Lane, 
 
 
 def test_before_the_peer_is_there_a_dialler_is_full(ends: Ends) -> None:
-    """Nothing is queued for a listener that has not come; when it comes, only what was taken then arrives."""
+    """Nothing is queued for a listener that has not come; once it comes, only packets accepted from then on arrive."""
     dialler = ends.dial()
     for connection in dialler.link.dialled.values():
         assert dialler.link.send(connection, b"too early", b"") is SendResult.FULL
@@ -217,7 +217,7 @@ def test_before_the_peer_is_there_a_dialler_is_full(ends: Ends) -> None:
 
 
 def test_a_listener_that_restarts_is_found_again(ends: Ends) -> None:
-    """The dialler hears of the break on every lane and, without being told, finds the listener that comes back; twice."""
+    """The dialler is told of the break on every lane and reconnects on its own when the listener returns; twice."""
     listener, dialler = ends.listen(), ends.dial()
     meet(listener, dialler)
     for life in range(2):
@@ -232,7 +232,7 @@ def test_a_listener_that_restarts_is_found_again(ends: Ends) -> None:
 
 
 def test_a_dialler_that_restarts_is_a_new_connection(pair: tuple[End, End, dict[Lane, bytes]], ends: Ends) -> None:
-    """A dialler that left is unreachable, and the one that comes after it has connections of other names."""
+    """A dialler that left is unreachable; the next one has connections with other names."""
     listener, dialler, names = pair
     ends.close(dialler)
     for name in names.values():
@@ -247,7 +247,7 @@ def test_a_dialler_that_restarts_is_a_new_connection(pair: tuple[End, End, dict[
 
 @pytest.mark.parametrize("leaver", ["listener", "dialler"])
 def test_who_left_much_unread_is_met_again(pair: tuple[End, End, dict[Lane, bytes]], ends: Ends, leaver: str) -> None:
-    """An end that closes while much that it has not read waits for it is met again when it comes back, and packets flow."""
+    """An end that closes with much unread data can come back and reconnect, and packets flow."""
     listener, dialler, names = pair
     talker, connections = (dialler, dialler.link.dialled) if leaver == "listener" else (listener, names)
     refusals = 0
@@ -271,7 +271,7 @@ def test_who_left_much_unread_is_met_again(pair: tuple[End, End, dict[Lane, byte
 def test_what_was_received_before_the_break_comes_before_its_news(
     pair: tuple[End, End, dict[Lane, bytes]], ends: Ends
 ) -> None:
-    """What a listener said on a connection, if it is still delivered after the break, is told before that connection's `Broken`."""
+    """If a listener's words on a connection are still delivered after the break, they come before that connection's `Broken`."""
     listener, dialler, names = pair
     order: list[tuple[str, bytes]] = []
     for connection in names.values():
@@ -288,7 +288,7 @@ def test_what_was_received_before_the_break_comes_before_its_news(
 
 
 def test_closing_in_the_middle_is_clean(pair: tuple[End, End, dict[Lane, bytes]], ends: Ends) -> None:
-    """A sender that closes with packets under way neither hangs nor hurts the reader: what arrives is a whole beginning of what was sent."""
+    """A sender that closes with packets under way neither hangs nor harms the reader: what arrives is an unbroken prefix of what was sent."""
     listener, dialler, names = pair
     sent = 0
     while listener.link.send(names[Lane.FRAMES], b"%d" % sent, bytes(200_000)) is SendResult.SENT:
@@ -301,7 +301,7 @@ def test_closing_in_the_middle_is_clean(pair: tuple[End, End, dict[Lane, bytes]]
 
 
 def test_a_taken_address_is_told_at_once(ends: Ends) -> None:
-    """A second listener on the same address is refused, naming it, and the first one works on."""
+    """A second listener on the same address is refused by an error that names it, and the first one keeps working."""
     listener = ends.listen()
     with pytest.raises(UnavailableError, match=re.escape(ends.listening.partition("?")[0])) as caught:
         ends.listen()
@@ -310,12 +310,12 @@ def test_a_taken_address_is_told_at_once(ends: Ends) -> None:
 
 
 def test_an_unknown_connection_is_unreachable(ends: Ends) -> None:
-    """A packet for somebody who never came is UNREACHABLE."""
+    """A packet to a peer that never came is UNREACHABLE."""
     assert ends.listen().link.send(b"nobody", b"x", b"y") is SendResult.UNREACHABLE
 
 
 def test_an_oversize_packet_is_not_delivered(pair: tuple[End, End, dict[Lane, bytes]]) -> None:
-    """A packet above the limit costs its sender the connection, which comes back; the listener and the other lane live on."""
+    """A packet above the limit costs its sender the connection, which comes back; the listener and the other lane stay up."""
     listener, dialler, _ = pair
     frames = dialler.link.dialled[Lane.FRAMES]
     send_until_sent(dialler, frames, b"huge", bytes(MAX_PAYLOAD_BYTES + 1), listener)
@@ -326,7 +326,7 @@ def test_an_oversize_packet_is_not_delivered(pair: tuple[End, End, dict[Lane, by
 
 @pytest.mark.usefixtures("_sockets", "_open_to_all")
 def test_foreign_packets_are_garbage(pair: tuple[End, End, dict[Lane, bytes]], ends: Ends) -> None:
-    """A ZeroMQ stranger's packets of three or more parts are reported as garbage, its short ones as packets; the link lives on."""
+    """A ZeroMQ stranger's packets of three or more parts are reported as garbage, its short ones as packets; the link stays up."""
     listener, dialler, _ = pair
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     stranger = context.socket(zmq.DEALER)
@@ -344,7 +344,7 @@ def test_foreign_packets_are_garbage(pair: tuple[End, End, dict[Lane, bytes]], e
 
 @pytest.mark.usefixtures("_sockets")
 def test_strangers_without_zeromq_cost_nothing(pair: tuple[End, End, dict[Lane, bytes]], ends: Ends) -> None:
-    """Random bytes, half a greeting or silence from plain sockets never make a message, and the link lives on."""
+    """Random bytes, half a greeting or silence from plain sockets never yield a message, and the link stays up."""
     listener, dialler, names = pair
     kind, _, where = ends.address.partition("://")
     listener.packets.clear()
@@ -365,13 +365,13 @@ def test_strangers_without_zeromq_cost_nothing(pair: tuple[End, End, dict[Lane, 
     meet(listener, dialler, b"and now ")
     assert len([name for name, _, _ in listener.packets if name in names.values()]) == 4
     for name, header, payload in listener.packets:
-        if name not in names.values():  # ZeroMQ takes what it can for the packets of an old version of its own
+        if name not in names.values():  # ZeroMQ takes what it can as packets of an old protocol version of its own
             with pytest.raises(ProtocolError):
                 decode(header, payload)
 
 
 def test_ipc_is_for_its_owner_only_and_takes_over_a_dead_socket(tmp_path: Path) -> None:
-    """An ipc path has mode 0600, and the socket file of a listener that was killed is used again."""
+    """An ipc path has mode 0600, and the socket file left by a killed listener is reused."""
     path = tmp_path / "link"
     with socket.socket(socket.AF_UNIX) as dead:
         dead.bind(str(path))
@@ -387,7 +387,7 @@ def test_ipc_is_for_its_owner_only_and_takes_over_a_dead_socket(tmp_path: Path) 
 
 
 def test_ipc_never_removes_a_file_of_another_kind(tmp_path: Path) -> None:
-    """A path that holds a file of the user's is refused, and the file stays as it was."""
+    """A path that holds one of the user's files is refused, and the file stays unchanged."""
     path = tmp_path / "notes.txt"
     path.write_text("precious")
     with pytest.raises(UnavailableError, match=r"notes\.txt"):

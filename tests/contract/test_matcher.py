@@ -1,4 +1,4 @@
-"""What every matcher keeps. A new matcher adds one line to MATCHERS."""
+"""What every matcher must do. A new matcher adds one line to MATCHERS."""
 
 import cv2
 import numpy as np
@@ -21,14 +21,14 @@ every_matcher = pytest.mark.parametrize("name", MATCHERS, ids=lambda name: name.
 
 
 def shifted(width_px: int, height_px: int, by_px: int, seed: int = 0) -> RectifiedPair:
-    """A noise image and the same seen `by_px` further left: its disparity is `by_px` wherever both images show it."""
+    """A noise image and the same image shifted left by `by_px`: its disparity is `by_px` wherever both images show it."""
     wide = np.asarray(cv2.blur(noise(width_px + by_px, height_px, seed), (3, 3)), np.uint8)
-    # Left shows the columns 0 .. W-1, right the columns by .. by+W-1: column c stands at c left and at c - by right.
+    # Left shows the columns 0 .. W-1, right the columns by .. by+W-1: column c lies at c left and at c - by right.
     return RectifiedPair(wide[:, :width_px], wide[:, by_px:])
 
 
 def test_every_matcher_is_under_contract() -> None:
-    """No matcher that a user can name is missing from this suite."""
+    """This suite tests every matcher that a user can name."""
     assert set(MATCHERS) == set(MatcherName)
 
 
@@ -43,7 +43,7 @@ def test_every_matcher_is_under_contract() -> None:
 def test_shape_type_and_range(
     name: MatcherName, size: tuple[int, int], disparities: int, seed: int, other_seed: int
 ) -> None:
-    """Any size and any N give float32 of the image's size, each value NaN or in [0, N), for like and unlike images."""
+    """Any size and any N give float32 of the image's size, each value NaN or in [0, N), for similar and dissimilar images."""
     height, width = size
     pair = RectifiedPair(noise(width, height, seed), np.roll(noise(width, height, seed + other_seed), -3, axis=1))
     disparity = create_matcher(MatchSettings(name, disparities)).match(pair)
@@ -63,7 +63,7 @@ def test_single_pixel_has_no_disparity(name: MatcherName) -> None:
 @every_matcher
 @pytest.mark.parametrize("disparities", [8, 16, 23, 64])
 def test_finds_a_whole_pixel_shift(name: MatcherName, disparities: int) -> None:
-    """A texture shifted by 7 px has disparity 7 where both images show it, whatever N above 7 is."""
+    """A texture shifted by 7 px has disparity 7 where both images show it, for every N above 7."""
     disparity = create_matcher(MatchSettings(name, disparities)).match(shifted(120, 60, 7))
     seen = disparity[4:-4, 7 + 4 : -4]
     assert (np.abs(seen - 7) < 0.2).mean() > 0.95
@@ -84,7 +84,7 @@ def test_slanted_plane_below_a_sixth_of_a_pixel(name: MatcherName, slope_x: floa
 
 @every_matcher
 def test_what_the_right_camera_cannot_see_gets_no_foreground_value(name: MatcherName) -> None:
-    """The strip of background that a near square hides from the right camera is not given the square's disparity."""
+    """Where a near square hides the background from the right camera, the background does not get the square's disparity."""
     background_px, square_px = 4, 24
     wide = shifted(240, 120, background_px, seed=3)
     left, right = wide.left.copy(), wide.right.copy()
@@ -92,7 +92,7 @@ def test_what_the_right_camera_cannot_see_gets_no_foreground_value(name: Matcher
     left[30:90, 100:180] = square
     right[30:90, 100 - square_px : 180 - square_px] = square
     disparity = create_matcher(MatchSettings(name, 40)).match(RectifiedPair(left, right))
-    # Left of the square: the right camera sees the square up to x = 180 - 24 = 156, so background seen at x - 4 in 76 .. 95.
+    # Left of the square: the right camera sees the square up to x = 180 - 24 = 156, so it sees background at x - 4 in 76 .. 95.
     hidden = disparity[36:84, 82:96]
     assert (np.abs(hidden - square_px) < 2).mean() < 0.1
 
@@ -119,7 +119,7 @@ def test_result_depends_on_the_pair_alone(name: MatcherName) -> None:
 
 @every_matcher
 def test_result_does_not_depend_on_threads(name: MatcherName) -> None:
-    """The same bits come out for any number of OpenCV's threads."""
+    """The result is bit-identical for any number of OpenCV threads."""
     pair = plane(width_px=400, height_px=250, seed=7).pair
     before = cv2.getNumThreads()
     results = set()
@@ -134,7 +134,7 @@ def test_result_does_not_depend_on_threads(name: MatcherName) -> None:
 
 @every_matcher
 def test_colour_and_grey_are_both_taken(name: MatcherName) -> None:
-    """A pair in colours that are all grey gives what the grey pair gives, also when only one of the two is in colour."""
+    """A pair in colours that are all grey gives the same result as the grey pair, even if only one image is in colour."""
     pair = plane(seed=8).pair
     left, right = (np.repeat(image[..., None], 3, axis=2) for image in (pair.left, pair.right))
     matcher = create_matcher(MatchSettings(name, 48))
@@ -145,7 +145,7 @@ def test_colour_and_grey_are_both_taken(name: MatcherName) -> None:
 
 @every_matcher
 def test_input_is_only_read(name: MatcherName) -> None:
-    """Read-only views into larger arrays are matched as they are, and nothing in them changes."""
+    """Read-only views into larger arrays are matched directly and not modified."""
     whole = plane(seed=9).pair
     left, right = whole.left[5:-6, 3:-8], whole.right[5:-6, 3:-8]
     for view in (left, right):
@@ -159,7 +159,7 @@ def test_input_is_only_read(name: MatcherName) -> None:
 
 @every_matcher
 def test_images_of_two_sizes_are_refused_in_one_line(name: MatcherName) -> None:
-    """A pair that was not rectified to one size is the data's fault, and the message names both sizes."""
+    """A pair that was not rectified to one size is an error in the data, and the message names both sizes."""
     pair = RectifiedPair(noise(40, 30), noise(41, 30))
     with pytest.raises(DataError) as caught:
         create_matcher(MatchSettings(name, 16)).match(pair)
@@ -179,7 +179,7 @@ def test_what_is_no_image_is_refused(name: MatcherName, shape: tuple[int, ...]) 
 
 @every_matcher
 def test_sixteen_bits_are_refused(name: MatcherName) -> None:
-    """Images of 16 bits must be reduced before; a matcher does not guess their white level."""
+    """Images of 16 bits must be reduced first; a matcher does not guess their white level."""
     image = np.zeros((8, 8), np.uint16)
     with pytest.raises(DataError):
         create_matcher(MatchSettings(name, 16)).match(RectifiedPair(image, image))  # type: ignore[arg-type]
@@ -187,7 +187,7 @@ def test_sixteen_bits_are_refused(name: MatcherName) -> None:
 
 @pytest.mark.parametrize("disparities", [0, -1])
 def test_an_empty_search_range_is_refused(disparities: int) -> None:
-    """Less than one disparity is a setting that makes no sense."""
+    """Less than one disparity is an invalid setting."""
     with pytest.raises(SettingsError):
         MatchSettings(disparities=disparities)
 
@@ -195,7 +195,7 @@ def test_an_empty_search_range_is_refused(disparities: int) -> None:
 @every_matcher
 @pytest.mark.parametrize("disparities", [1, 16, 64])
 def test_what_has_no_texture_has_no_disparity(name: MatcherName, disparities: int) -> None:
-    """Images of one grey, or of even rows, look the same wherever they are put: no pixel gets a value, least of all 0, infinitely far."""
+    """Images of a uniform grey, or of uniform rows, match at any shift: no pixel gets a value, least of all 0, which means infinitely far."""
     matcher = create_matcher(MatchSettings(name, disparities))
     stripes = np.repeat(noise(1, 50, seed=3), 70, axis=1)
     for left, right in (
@@ -209,7 +209,7 @@ def test_what_has_no_texture_has_no_disparity(name: MatcherName, disparities: in
 
 @every_matcher
 def test_a_black_border_has_no_disparity(name: MatcherName) -> None:
-    """Rows above the scene that rectification has painted black get no value; the scene below keeps its own."""
+    """Rows above the scene that rectification has painted black get no value; the scene below keeps its values."""
     pair = plane(seed=12).pair
     left, right = (np.vstack([np.zeros((24, image.shape[1]), np.uint8), image]) for image in (pair.left, pair.right))
     matcher = create_matcher(MatchSettings(name, 48))

@@ -1,4 +1,4 @@
-"""The Python API and its examples: real boards behind it, and programs that are slow, that leave, that fail."""
+"""The Python API and its examples, with real boards, and with programs that are slow, that leave, or that fail."""
 
 import json
 import subprocess
@@ -32,26 +32,26 @@ def film(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def live(film: Path, tmp_path: Path) -> Iterator[tuple[str, str]]:
-    """A board that shows 30 frames a second for ever; gives its link and a camera for the host that shows the same."""
+    """A board that shows 30 frames a second for ever; return its link and a camera for the host that shows the same."""
     link, camera = f"ipc://{tmp_path}/link", f"replay:{film}?fps=30&loop=1"
     with board(["run", "--camera", camera, "--link", link], tmp_path):
         yield link, camera
 
 
 class Counting:
-    """A matcher of a program's own."""
+    """A matcher that belongs to a user's program."""
 
     def __init__(self) -> None:
         self.calls = 0
 
     def match(self, pair: RectifiedPair) -> Disparity:
-        """Count; everything has disparity 8."""
+        """Count calls; every pixel has disparity 8."""
         self.calls += 1
         return np.full(pair.left.shape[:2], 8, np.float32)
 
 
 def test_stills_are_given_one_by_one(film: Path, tmp_path: Path) -> None:
-    """Where both cameras show stills, a slow program gets every pair, in order, with the right images, its own matcher's disparity and delays that add up."""
+    """With still images on both sides a slow program gets every pair, in order, with the right images, its own matcher's disparity and delays that add up."""
     link, matcher = f"ipc://{tmp_path}/link", Counting()
     camera = f"replay:{film}?pace=demand"
     results = []
@@ -79,7 +79,7 @@ def test_stills_are_given_one_by_one(film: Path, tmp_path: Path) -> None:
 
 
 def test_a_slow_program_gets_the_newest_and_holds_nobody_up(live: tuple[str, str]) -> None:
-    """While a program sleeps over one result, pairs are processed as before; the next result is one of the newest, and what it missed is counted."""
+    """While a program sleeps over one result, pairs are processed as before; the next result is one of the newest, and missed results are counted."""
     link, camera = live
     with open_scanner(link=link, camera=camera) as scanner:
         results = iter(scanner)
@@ -98,7 +98,7 @@ def test_a_slow_program_gets_the_newest_and_holds_nobody_up(live: tuple[str, str
 
 
 def test_a_program_may_leave_at_any_time(live: tuple[str, str]) -> None:
-    """After `break` in the middle of a lossless scan all of its threads are gone."""
+    """After `break` in the middle of a lossless scan all its threads have ended."""
     link, camera = live
     before = set(threading.enumerate())
     with open_scanner(link=link, camera=camera, lossless=True) as scanner:
@@ -109,7 +109,7 @@ def test_a_program_may_leave_at_any_time(live: tuple[str, str]) -> None:
 
 
 def test_what_ends_a_run_is_raised(live: tuple[str, str], film: Path, tmp_path: Path) -> None:
-    """No board in time, and a matcher that fails, come out of the iterator as what they are."""
+    """If no board answers in time, or a matcher fails, the iterator raises that very error."""
     with (
         open_scanner(link=f"ipc://{tmp_path}/nobody", camera=f"replay:{film}?loop=1", wait_s=0.2) as scanner,
         pytest.raises(UnavailableError),
@@ -141,7 +141,7 @@ def test_what_ends_a_run_is_raised(live: tuple[str, str], film: Path, tmp_path: 
     ],
 )
 def test_arguments_of_no_sense_are_told_at_once(wrong: dict[str, object], film: Path, tmp_path: Path) -> None:
-    """A wrong argument is a SettingsError before anything is opened for long."""
+    """A wrong argument is a SettingsError, and nothing stays open."""
     usual = {"link": f"ipc://{tmp_path}/link", "camera": f"replay:{film}?loop=1"}
     with pytest.raises(SettingsError):
         open_scanner(**(usual | wrong), disparities=16)  # type: ignore[arg-type]
@@ -149,7 +149,7 @@ def test_arguments_of_no_sense_are_told_at_once(wrong: dict[str, object], film: 
 
 @pytest.mark.parametrize("example", ["save_every_tenth_cloud", "plot_delays", "own_matcher"])
 def test_the_examples_do_what_they_say(example: str, live: tuple[str, str], tmp_path: Path) -> None:
-    """Each example ends well and leaves what it announces."""
+    """Each example ends with success and leaves the files it announces."""
     matrix = np.array([[150.0, 0, WIDTH_PX / 2], [0, 150.0, HEIGHT_PX / 2], [0, 0, 1]])
     model = CameraModel(width_px=WIDTH_PX, height_px=HEIGHT_PX, matrix=matrix, distortion=np.zeros(5))
     rig = Rig(left=model, right=model, R_right_left=np.eye(3), t_right_left_m=np.array([-0.1, 0, 0]))
@@ -175,7 +175,7 @@ def test_the_examples_do_what_they_say(example: str, live: tuple[str, str], tmp_
 
 
 def test_what_was_opened_is_let_go_where_the_rest_cannot_be(film: Path, tmp_path: Path) -> None:
-    """A folder in use ends `open_scanner` without a descriptor left open, a scanner that was never entered is closed, and one runs once."""
+    """A folder in use ends `open_scanner` without an open descriptor, a scanner that was never entered is closed, and one runs only once."""
     link, camera, out = f"ipc://{tmp_path}/link", f"replay:{film}?loop=1", tmp_path / "out"
     scanner = open_scanner(link=link, camera=camera, out=out)
     before = len(list(Path("/proc/self/fd").iterdir()))

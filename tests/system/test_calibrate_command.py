@@ -33,7 +33,7 @@ def _report(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def boards(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Eight rendered pairs of two unlike cameras, and five ways to spoil a pair."""
+    """Eight rendered pairs of two unlike cameras, and five kinds of spoiled pair."""
     folder = tmp_path_factory.mktemp("boards")
     left, right = folder / "left", folder / "right"
     left.mkdir()
@@ -43,10 +43,10 @@ def boards(tmp_path_factory: pytest.TempPathFactory) -> Path:
         cv2.imwrite(str(left / f"left{index}.png"), pair[0])
         cv2.imwrite(str(right / f"right{index:02d}.png"), pair[1])
     images = pairs[-1]
-    (left / "left8.png").write_bytes((left / "left8.png").read_bytes()[:2000])  # cut
+    (left / "left8.png").write_bytes((left / "left8.png").read_bytes()[:2000])  # truncated
     cv2.imwrite(str(left / "left9.png"), np.full((480, 640), 128, np.uint8))  # no board
     cv2.imwrite(str(right / "right09.png"), images[1])
-    cv2.imwrite(str(left / "left10.png"), cv2.resize(images[0], (320, 240)))  # other size
+    cv2.imwrite(str(left / "left10.png"), cv2.resize(images[0], (320, 240)))  # different size
     cv2.imwrite(str(right / "right10.png"), images[1])
     cv2.imwrite(str(right / "right11.png"), images[1])  # no partner
     return folder
@@ -54,7 +54,7 @@ def boards(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def few(boards: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Four of those pairs, a cut one and one without a partner: enough for a calibration that is not asked for its figures."""
+    """Four of those pairs, one truncated and one without a partner: enough for a calibration whose figures are not checked."""
     folder = tmp_path_factory.mktemp("few")
     for side, names in (("left", ("left{}.png", "012389")), ("right", ("right{:02d}.png", "01238"))):
         (folder / side).mkdir()
@@ -66,7 +66,7 @@ def few(boards: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def small(few: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same at a quarter of their size: enough to look for a board that is not there."""
+    """The same at a quarter of the size: enough to search for a missing calibration board."""
     folder = tmp_path_factory.mktemp("small")
     for side in ("left", "right"):
         (folder / side).mkdir()
@@ -80,7 +80,7 @@ def small(few: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_unlike_cameras_are_calibrated_and_every_pair_is_accounted_for(boards: Path, tmp_path: Path) -> None:
-    """Baseline and sizes come out, spoiled pairs are named with their reason, rig.yaml and report.json are written."""
+    """Baseline and sizes are reported, spoiled pairs are named with their reason, rig.yaml and report.json are written."""
     out = tmp_path / "new" / "rig.yaml"
     done = _phone_host(
         "calibrate", boards / "left", boards / "right", "--board", "9x6", "--square", "2.5cm", "--out", out, "--json",
@@ -123,7 +123,7 @@ def test_the_table_names_every_pair(few: Path, tmp_path: Path) -> None:
 
 
 def test_swapped_sides_are_exit_4_with_the_remedy_and_a_report(few: Path, tmp_path: Path) -> None:
-    """LEFT and RIGHT swapped: verdict reject, the remedy says so, no rig.yaml that could be used by mistake; the old one is moved aside."""
+    """LEFT and RIGHT swapped: verdict reject, the remedy says so, and no rig.yaml remains that could be used by mistake; the old one is moved aside."""
     (tmp_path / "rig.yaml").write_text("%YAML:1.0\n# of an earlier run")
     done = _phone_host(
         "calibrate", few / "right", few / "left", "--board", "9x6", "--square", "25mm",
@@ -140,7 +140,7 @@ def test_swapped_sides_are_exit_4_with_the_remedy_and_a_report(few: Path, tmp_pa
 
 
 def test_too_few_pairs_are_exit_4_with_a_report(small: Path, tmp_path: Path) -> None:
-    """A wrong --board finds nothing: one line on stderr, the reasons as JSON on stdout and in report.json, an old rig is moved aside."""
+    """A wrong --board finds nothing: one line on stderr, the reasons as JSON on stdout and in report.json, and an old rig is moved aside."""
     (tmp_path / "rig.yaml").write_text("%YAML:1.0\n# of an earlier run")
     done = _phone_host(
         "calibrate", small / "left", small / "right", "--board", "12x9", "--square", "25mm",
@@ -160,7 +160,7 @@ def test_too_few_pairs_are_exit_4_with_a_report(small: Path, tmp_path: Path) -> 
 
 
 def test_views_that_contradict_each_other_are_rejected_with_files(boards: Path, tmp_path: Path) -> None:
-    """Corners of a smaller board found here and there on the real one fit nothing: reject, exit 4, and --board is named."""
+    """Corners of a smaller board, detected here and there on the real one, do not fit: reject, exit 4, and --board is named."""
     done = _phone_host(
         "calibrate", boards / "left", boards / "right", "--board", "5x4", "--square", "25mm",
         "--out", tmp_path / "rig.yaml", "--json",
@@ -173,7 +173,7 @@ def test_views_that_contradict_each_other_are_rejected_with_files(boards: Path, 
 
 
 def test_usage_errors_are_exit_2(boards: Path, tmp_path: Path) -> None:
-    """A board or a length that makes no sense, and one folder for both sides."""
+    """An invalid board or length, and one folder for both sides."""
     sides = boards / "left", boards / "right"
     for arguments, word in (
         ((*sides, "--board", "9by6", "--square", "25mm"), "--board"),
@@ -187,7 +187,7 @@ def test_usage_errors_are_exit_2(boards: Path, tmp_path: Path) -> None:
 
 
 def test_a_photograph_is_not_replaced(boards: Path, tmp_path: Path) -> None:
-    """--out that names a file which is no calibration, such as a picture, is exit 3 at once; the file stays."""
+    """If --out names a file that is no calibration, such as a picture, exit 3 follows at once; the file stays."""
     picture = tmp_path / "left0.png"
     picture.write_bytes((boards / "left" / "left0.png").read_bytes())
     done = _phone_host(
@@ -199,7 +199,7 @@ def test_a_photograph_is_not_replaced(boards: Path, tmp_path: Path) -> None:
 
 
 def test_what_is_no_file_is_not_replaced(boards: Path, tmp_path: Path) -> None:
-    """--out that is a folder or a pipe, or lies in a file, is exit 3 at once; it stays what it was."""
+    """If --out is a folder or a pipe, or lies in a file, exit 3 follows at once; it stays unchanged."""
     (tmp_path / "file").write_text("no folder")
     os.mkfifo(tmp_path / "pipe")
     for out, said in (("", "is not a file"), ("pipe", "pipe is not a file"), ("file/rig.yaml", "file is not a folder")):
@@ -230,7 +230,7 @@ def _calibrate_real(left: str, right: str, board: str, square: str, out: Path) -
 
 @pytest.mark.data
 def test_simplestereo_rig_as_published(tmp_path: Path) -> None:
-    """Stereo RMS at most 0.20 px; baseline 80.17 mm as published in rig.json, within 0.4 mm; its scene becomes a cloud."""
+    """Stereo RMS is at most 0.20 px; baseline is 80.17 mm as published in rig.json, within 0.4 mm; its scene becomes a cloud."""
     rig = tmp_path / "rig.yaml"
     report = _calibrate_real("simplestereo_rig1/calib/*_L.png", "simplestereo_rig1/calib/*_R.png", "7x6", "60.5mm", rig)
     assert report["rms_px"]["stereo"] <= 0.20
@@ -251,14 +251,14 @@ def test_simplestereo_rig_as_published(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert _report(done)["points"] > 150_000
-    # The instrument stands where the boards stood: 1.2 m to 1.4 m away.
+    # The instrument stands where the calibration boards stood: at 1.2 m to 1.4 m.
     depth_m = read_ply(tmp_path / "cloud.ply").points_m[:, 2]
     assert 1.1 < np.median(depth_m[(depth_m > 0.8) & (depth_m < 2)]) < 1.5
 
 
 @pytest.mark.data
 def test_opencv_sample_rig(tmp_path: Path) -> None:
-    """Stereo RMS at most 0.30 px on OpenCV's own pairs, all 13 used."""
+    """Stereo RMS is at most 0.30 px on OpenCV's own pairs, all 13 used."""
     report = _calibrate_real(
         "opencv_stereo_calib/left*", "opencv_stereo_calib/right*", "9x6", "25mm", tmp_path / "rig.yaml"
     )
@@ -268,7 +268,7 @@ def test_opencv_sample_rig(tmp_path: Path) -> None:
 
 @pytest.mark.data
 def test_pairs_that_were_not_exposed_together_are_rejected(tmp_path: Path) -> None:
-    """Of 29 hand-held pairs the few whose rows do not meet are out, and RMS is below the published 0.249 px."""
+    """Of 29 hand-held pairs the few whose rows do not align are rejected, and RMS is below the published 0.249 px."""
     report = _calibrate_real(
         "sourishg_rig/calib_imgs/1/left*", "sourishg_rig/calib_imgs/1/right*", "9x6", "25mm", tmp_path / "rig.yaml"
     )
@@ -279,7 +279,7 @@ def test_pairs_that_were_not_exposed_together_are_rejected(tmp_path: Path) -> No
 
 @pytest.mark.data
 def test_squares_measured_in_the_cloud_have_their_size(tmp_path: Path) -> None:
-    """From the calibration to the cloud: the 25 mm squares of a board in a scene that no calibration saw measure 25 mm to 2 %."""
+    """From calibration to cloud: 25 mm squares of a board, in a scene that was not used for calibration, measure 25 mm to 2 %."""
     rig_file = tmp_path / "rig.yaml"
     report = _calibrate_real("stereopi_rig/pairs/left*", "stereopi_rig/pairs/right*", "9x6", "25mm", rig_file)
     assert report["rms_px"]["stereo"] <= 0.25
@@ -296,11 +296,11 @@ def test_squares_measured_in_the_cloud_have_their_size(tmp_path: Path) -> None:
     corners = find_corners(left, Board(9, 6, 0.025))
     points_m = read_ply(tmp_path / "o" / "cloud.ply").points_m.astype(np.float64)
     pixels = project(points_m, rectifier.geometry)[:, :2]
-    # Each corner's point: its ray, at the depth of the nearest pixel that has one.
+    # Each corner's point lies on its ray, at the depth of the nearest pixel that has one.
     nearest = np.array([np.linalg.norm(pixels - corner, axis=1).argmin() for corner in corners])
     rays = np.column_stack([corners - [rectifier.geometry.cx_px, rectifier.geometry.cy_px], np.zeros(54)])
     rays = rays / rectifier.geometry.focal_px + [0, 0, 1]
     grid = (rays * points_m[nearest, 2:]).reshape(6, 9, 3)
-    # Across several squares: single corners carry the disparity's noise.
+    # Measure across several squares: single corners carry the disparity's noise.
     width_m = np.linalg.norm(grid[:, -1] - grid[:, 0], axis=1) / 8
     assert np.median(width_m) == pytest.approx(0.025, rel=0.02)

@@ -1,4 +1,4 @@
-"""`phone-host calibrate-time` as a user starts it: a board process, a film of known time offset, rig.yaml, and what `run` makes of it."""
+"""`phone-host calibrate-time` as a user starts it: a board process, a film of known time offset, rig.yaml, and its use by `run`."""
 
 import json
 import shutil
@@ -22,7 +22,7 @@ from tests.support.programs import board, free_port, host
 from tests.support.rigs import small_rig
 
 OFFSET_MS = 13.0
-"""The own camera's stamps are late by this: its replay shows image k so much after k / fps, and says so."""
+"""The host camera's stamps are late by this: its replay shows image k this long after k / fps, and says so."""
 
 FPS, SECONDS = 10, 2.0
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -30,7 +30,7 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 @pytest.fixture(scope="module")
 def film(tmp_path_factory: pytest.TempPathFactory) -> Film:
-    """A cube and a ball that swing up and down, seen by a small copy of the demo's rig; it repeats."""
+    """A cube and a ball swing up and down, seen by a small copy of the demo's rig; the film repeats."""
     swing = Motion(amplitude_m=(0.04, 0.09, 0.0), phase_rad=(0.5, 0.0, 0.0), period_s=SECONDS)
     base = demo_scene()
     names = {"wall", "table", "poster", "cube", "ball"}
@@ -43,7 +43,7 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Film:
 
 @pytest.fixture
 def rig_file(tmp_path: Path) -> Path:
-    """That rig, its time offset not measured."""
+    """That rig, with its time offset not yet measured."""
     path = tmp_path / "rig.yaml"
     rig = small_rig()
     write_rig(path, rig, rectify_rig(rig))
@@ -62,7 +62,7 @@ def address(film: Film, tmp_path: Path) -> Iterator[str]:
 
 
 def test_a_moving_scene_sets_the_clocks_of_a_run(film: Film, rig_file: Path, address: str, tmp_path: Path) -> None:
-    """The offset of two streams is found within its uncertainty, stored, found again from the kept frames, and `run` pairs by it."""
+    """The offset of two streams is found within its uncertainty, stored, found again from the kept frames, and used by `run` for pairing."""
     own = f"{film.replay_uri(film.right)}&phase_ms={OFFSET_MS:g}"
     out = tmp_path / "timing"
     measure = ["calibrate-time", "--by", "scene", "--calibration", str(rig_file), "--out", str(out), "--json"]
@@ -87,16 +87,16 @@ def test_a_moving_scene_sets_the_clocks_of_a_run(film: Film, rig_file: Path, add
         assert running.wait() == 0, running.stderr
         scanned = running.json()
     assert scanned["time_offset_ms"]["measured"]
-    # Both films are exposed at the same moments: what is left of the 13 ms is the error of the measurement and of the clock.
+    # Both films are exposed at the same moments: the rest of the 13 ms is the error of the measurement and of the clock.
     assert scanned["time_skew_ms"]["p50"] <= report["uncertainty_ns"] / 1e6 + 1
 
 
 def test_a_lamp_filmed_by_two_streams(tmp_path: Path) -> None:
-    """A lamp seen by two cameras that expose 13 ms apart, one of whose stamps are late by 18 ms: that is found, without any rig."""
+    """A lamp is seen by two cameras that expose 13 ms apart, one with stamps 18 ms late: the offset is found without any rig."""
     fps, lap_s, apart_s, late_ms = 20, 12.0, 0.013, 18.0
     switches = np.cumsum(np.random.default_rng(4).uniform(0.12, 0.5, 200))
     switches = switches[switches < lap_s - 0.2]
-    switches = switches[: len(switches) // 2 * 2]  # dark where the film begins anew
+    switches = switches[: len(switches) // 2 * 2]  # dark where the film restarts
     for side, after_s in (("left", 0.0), ("right", apart_s)):
         (tmp_path / side).mkdir()
         for number in range(int(fps * lap_s)):
@@ -120,7 +120,7 @@ def test_a_lamp_filmed_by_two_streams(tmp_path: Path) -> None:
 def test_what_cannot_be_measured_is_said_in_one_line(
     by: str, words: str, film: Film, address: str, tmp_path: Path
 ) -> None:
-    """A film without the pattern or the lamp is bad data: exit 4, one line with its remedy."""
+    """A film without the pattern or the lamp is bad data: exit 4 and one line with its remedy."""
     arguments = ["calibrate-time", "--by", by, "--link", address, "--camera", film.replay_uri(film.right)]
     with host([*arguments, "--seconds", "4"], tmp_path) as running:
         assert running.wait() == 4
@@ -145,7 +145,7 @@ def test_options_of_no_use_are_refused(arguments: list[str], words: str, tmp_pat
 
 
 def test_a_page_that_cannot_be_written_names_its_own_option(tmp_path: Path) -> None:
-    """Where the pattern cannot be written the exit code is 3 and the remedy another --pattern."""
+    """If the pattern cannot be written, the exit code is 3 and the remedy is another --pattern."""
     with host(["calibrate-time", "--pattern", "/dev/null/pattern.html"], tmp_path) as running:
         assert running.wait() == 3
         assert "another --pattern" in running.stderr
@@ -153,7 +153,7 @@ def test_a_page_that_cannot_be_written_names_its_own_option(tmp_path: Path) -> N
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")
 def test_a_browser_shows_the_pattern(tmp_path: Path) -> None:
-    """The written page, opened in a real browser, shows a pattern that can be read and that has begun to count."""
+    """In a real browser, the written page shows a readable pattern that has begun to count."""
     page, path = tmp_path / "pattern.html", tmp_path / "screen.png"
     with host(["calibrate-time", "--pattern", str(page)], tmp_path) as running:
         assert running.wait() == 0

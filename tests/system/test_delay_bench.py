@@ -23,7 +23,7 @@ def bench(arguments: list[str], folder: Path) -> Any:
 
 
 def boards_of(running: Program) -> list[int]:
-    """Pids of the board-agent processes that it started."""
+    """Pids of the board-agent processes that a program started."""
     return boards_below(running.process.pid)
 
 
@@ -43,7 +43,7 @@ def is_running(pid: int) -> bool:
 
 
 def test_every_delay_is_measured_and_every_frame_accounted_for(tmp_path: Path) -> None:
-    """One run over ipc: the object on stdout is the file's, delays are plausible sums, counts are conserved."""
+    """One run over ipc: stdout holds the same object as the file, delays are plausible sums, counts are conserved."""
     with bench([*SHORT, "--json", "--out", str(tmp_path / "out")], tmp_path) as running:
         assert running.wait() == 0, running.stderr
     report = running.json()
@@ -56,7 +56,7 @@ def test_every_delay_is_measured_and_every_frame_accounted_for(tmp_path: Path) -
     assert run["measured_pairs"] > 0
     delays, whole = run["delays"], run["whole_run"]
     parts = ("capture", "outbox", "propagation", "pairing", "queuing", "processing")
-    # Means add up as the delays of each pair do; the report is rounded to the ns.
+    # The mean delays add up as each pair's delays do; the report is rounded to the ns.
     assert delays["end_to_end"]["mean_ms"] == pytest.approx(sum(delays[name]["mean_ms"] for name in parts), abs=1e-4)
     stages = sum(stage["mean_ms"] for stage in run["stages"].values())
     assert 0 < stages <= delays["processing"]["mean_ms"] + 1e-4
@@ -98,7 +98,7 @@ def test_every_delay_is_measured_and_every_frame_accounted_for(tmp_path: Path) -
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_2(arguments: list[str], word: str, tmp_path: Path) -> None:
-    """What makes no sense is refused before anything is started, with what would."""
+    """Invalid settings are refused before anything starts; the message says what would be valid."""
     with bench(arguments, tmp_path) as running:
         assert running.wait() == 2
     assert word in running.stderr
@@ -106,14 +106,14 @@ def test_wrong_usage_is_one_line_and_exit_2(arguments: list[str], word: str, tmp
 
 
 def test_a_serial_line_is_made_where_there_is_none_and_a_missing_radio_is_said(tmp_path: Path) -> None:
-    """`--links serial,rfcomm`: pairs come over a pseudo terminal; without two Bluetooth adapters the report and one line say why not."""
+    """`--links serial,rfcomm`: pairs come over a pseudo terminal; without two Bluetooth adapters the report and one line say why rfcomm was left out."""
     with bench(["--links", "serial,rfcomm", *SHORT[2:], "--json"], tmp_path) as running:
         assert running.wait() == 0, running.stderr
     report = running.json()
     assert {run["link"] for run in report["runs"]} | {one["link"] for one in report["not_run"]} == {"serial", "rfcomm"}
     serial = report["runs"][0]
     assert serial["measured_pairs"] > 0
-    # All bytes of the frames went through the line between the two processes.
+    # All bytes of the frames passed over the line between the two processes.
     assert serial["line"]["to_host_bytes"] > serial["measured_pairs"] * serial["mean_frame_bytes"]
     for one in report["not_run"]:
         assert "Bluetooth" in one["reason"]
@@ -121,7 +121,7 @@ def test_a_serial_line_is_made_where_there_is_none_and_a_missing_radio_is_said(t
 
 
 def test_an_emulated_interface_is_as_slow_as_its_profile(tmp_path: Path) -> None:
-    """No frame over the emulated Bluetooth comes faster than its bytes take at 80 kB/s and its least delay, but for the clock's bound."""
+    """No frame over the emulated Bluetooth arrives sooner than its bytes take at 80 kB/s plus the least delay, within the clock's bound."""
     with bench(["--emulate", "bluetooth", *SHORT[2:], "--seconds", "4", "--json"], tmp_path) as running:
         assert running.wait() == 0, running.stderr
     (run,) = running.json()["runs"]
@@ -132,7 +132,7 @@ def test_an_emulated_interface_is_as_slow_as_its_profile(tmp_path: Path) -> None
 
 
 def test_a_board_elsewhere_is_measured_with_its_own_camera(tmp_path: Path) -> None:
-    """A board named by its URI shows what its camera shows; the command says that it is not set from here, and leaves the board alone."""
+    """A board named by its URI shows what its camera shows; the command says that it does not configure that board, and leaves it alone."""
     address = f"tcp://127.0.0.1:{free_port()}"
     images = write_film(tmp_path / "images", 8)
     with board(["run", "--camera", f"replay:{images}?fps=20&loop=1", "--link", address], tmp_path) as serving:
@@ -147,7 +147,7 @@ def test_a_board_elsewhere_is_measured_with_its_own_camera(tmp_path: Path) -> No
 
 
 def test_an_absent_board_elsewhere_is_exit_3(tmp_path: Path) -> None:
-    """A board that is not there is named before anything is measured."""
+    """A missing board is reported before anything is measured."""
     address = f"tcp://127.0.0.1:{free_port()}"
     with bench(["--links", f"ipc,{address}", *SHORT[2:]], tmp_path) as running:
         assert running.wait() == 3
@@ -155,7 +155,7 @@ def test_an_absent_board_elsewhere_is_exit_3(tmp_path: Path) -> None:
 
 
 def test_profiles_are_listed() -> None:
-    """`--emulate list` names every interface with its rate and where that comes from, also as one JSON object."""
+    """`--emulate list` names every interface with its rate and the source of that rate, also as one JSON object."""
     command = [sys.executable, "-m", "phone_host.bench.cli", "--emulate", "list"]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     listed = json.loads(subprocess.run([*command, "--json"], capture_output=True, text=True, check=True).stdout)
@@ -164,7 +164,7 @@ def test_profiles_are_listed() -> None:
 
 
 def test_a_matrix_foretells_each_run_from_the_others(tmp_path: Path) -> None:
-    """Two qualities and two rates over one link: sizes differ, so there is a line with an interval, a prediction for each run, and settings not run."""
+    """Two qualities and two rates over one link: the sizes differ, so the report has a line with an interval, a prediction for each run, and settings not run."""
     with bench(
         [
             "--links",
@@ -191,7 +191,7 @@ def test_a_matrix_foretells_each_run_from_the_others(tmp_path: Path) -> None:
     assert line["slope_low_ns_per_byte"] <= line["slope_ns_per_byte"] <= line["slope_high_ns_per_byte"]
     for one in report["predictions"]:
         rate_hz = int(one["images"].split()[-2])
-        # The camera sets the rate, but for a machine that is busy with other things: then it is less, measured and foretold.
+        # The camera sets the rate; on a busy machine both the measured and the predicted rate are lower.
         assert 0 < one["predicted"]["pair_rate_hz"] <= 1.01 * rate_hz
         assert one["predicted"]["end_to_end_p50_ms"] > 0
     settings = {one["setting"]: one["predicted"] for one in report["not_run_settings"] if one["link"] == "ipc"}
@@ -203,7 +203,7 @@ def test_a_matrix_foretells_each_run_from_the_others(tmp_path: Path) -> None:
     enough = sum(run["measured_pairs"] >= 10 for run in report["runs"])
     assert errors["held_out"]["predicted_runs"] == errors["queues_alone"]["predicted_runs"] == enough
     assert {one["link"] for one in report["not_run_settings"]} > {"bluetooth (serial)", "wifi (tcp)"}
-    # A frame of the greatest runs over 115200 baud: 11 520 bytes a second, and no result comes faster than a frame.
+    # Predict a run of the largest frames over 115200 baud: 11 520 bytes a second, and no result comes faster than a frame.
     asked = settings["fps=5,link=uart"]
     frame_bytes = max(run["mean_frame_bytes"] for run in report["runs"])
     assert asked["propagation_p50_ms"] == pytest.approx(1 + frame_bytes / 11.52, rel=0.1)
@@ -211,7 +211,7 @@ def test_a_matrix_foretells_each_run_from_the_others(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_is_said_and_the_table_is_not_lost(tmp_path: Path) -> None:
-    """When the files cannot be written the command has printed its report all the same, and exits 3 with one line that names the folder."""
+    """If the files cannot be written, the command still prints its report, and exits 3 with one line that names the folder."""
     out = tmp_path / "disk"
     out.mkdir()
     bench_run = [sys.executable, "-P", "-m", "phone_host.bench.cli", *SHORT, "--json", "--out", str(out)]
@@ -226,7 +226,7 @@ def test_a_full_disk_is_said_and_the_table_is_not_lost(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_cannot_be_made_is_exit_3(tmp_path: Path) -> None:
-    """Results that could not be written are said at once, not after a minute of measuring."""
+    """Results that could not be written are reported at once, not after a minute of measuring."""
     (tmp_path / "taken").write_text("a file")
     with bench([*SHORT, "--out", str(tmp_path / "taken" / "out")], tmp_path) as running:
         assert running.wait() == 3
@@ -235,7 +235,7 @@ def test_a_folder_that_cannot_be_made_is_exit_3(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 0)])
 def test_a_signal_ends_the_benchmark_and_its_children(number: signal.Signals, code: int, tmp_path: Path) -> None:
-    """In the middle of a run, Ctrl-C ends it with 130 and SIGTERM with 0, what was measured so far, and no process left behind."""
+    """In the middle of a run, Ctrl-C ends it with 130 and SIGTERM with 0; results so far are kept, and no process is left behind."""
     with bench([*SHORT, "--seconds", "600", "--json"], tmp_path) as running:
         until(lambda: bool(boards_of(running)), "a board process of the benchmark")
         (board,) = boards_of(running)
@@ -245,7 +245,7 @@ def test_a_signal_ends_the_benchmark_and_its_children(number: signal.Signals, co
 
 
 def test_a_board_that_ctrl_c_reached_first_gives_its_account(tmp_path: Path) -> None:
-    """A terminal's Ctrl-C goes to the board's process, too: that it has ended with 130 before it was asked to is no failure."""
+    """A terminal's Ctrl-C reaches the board's process, too: if it ends with 130 before it was asked to, that is no failure."""
     images = write_film(tmp_path / "images", 4)
     with board_process(f"replay:{images}?fps=20&loop=1", f"ipc://{tmp_path}/link") as serving:
         until((tmp_path / "link").exists, "the board's socket")
@@ -257,7 +257,7 @@ def test_a_board_that_ctrl_c_reached_first_gives_its_account(tmp_path: Path) -> 
 
 
 def test_what_was_measured_before_ctrl_c_is_written(tmp_path: Path) -> None:
-    """Interrupted in the second of two runs: exit 130, and the first run stands in the files and on stdout."""
+    """Interrupted in the second of two runs: exit 130, and the first run is in the files and on stdout."""
     out = tmp_path / "out"
     with bench([*SHORT[:4], "--fps", "10,20", "--seconds", "1", "--json", "--out", str(out)], tmp_path) as running:
         until(lambda: bool(boards_of(running)), "a board process of the first run")
@@ -273,7 +273,7 @@ def test_what_was_measured_before_ctrl_c_is_written(tmp_path: Path) -> None:
 
 
 def test_a_board_that_dies_is_one_clear_line(tmp_path: Path) -> None:
-    """When the board process is killed under it, the benchmark says so and exits 3."""
+    """If the board process is killed during a run, the benchmark says so and exits 3."""
     with bench([*SHORT, "--seconds", "600"], tmp_path) as running:
         until(lambda: bool(boards_of(running)), "a board process of the benchmark")
         subprocess.run(["kill", "-9", *(str(pid) for pid in boards_of(running))], check=True)
@@ -282,7 +282,7 @@ def test_a_board_that_dies_is_one_clear_line(tmp_path: Path) -> None:
 
 
 def test_help_opens_with_examples() -> None:
-    """The first thing that --help shows below the usage is how to call it."""
+    """Below the usage line, --help first shows how to call the command."""
     done = subprocess.run(
         [sys.executable, "-m", "phone_host.bench.cli", "--help"], capture_output=True, text=True, check=True
     )

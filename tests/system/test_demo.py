@@ -11,7 +11,7 @@ from tests.support.programs import host, ledgers, lines, until
 
 
 def test_the_demo_leaves_a_full_and_true_report(tmp_path: Path) -> None:
-    """After some seconds there are cloud, picture, page, delays and report; every checked pair shows one moment and its depth is right."""
+    """After some seconds there are cloud, picture, page, delays and report; every checked pair shows one moment with correct depth."""
     out = tmp_path / "demo"
     with host(["demo", "--seconds", "4", "--out", str(out), "--json"], tmp_path) as demo:
         assert demo.wait() == 0, demo.stderr
@@ -21,7 +21,7 @@ def test_the_demo_leaves_a_full_and_true_report(tmp_path: Path) -> None:
     truth = report["truth"]
     assert truth["pairs"] > 0
     assert truth["wrong_pairs"] == 0
-    # The issue's figures hold without noise; the demo's sensors have noise and JPEG, and its farthest wall stands at 2.5 m.
+    # The issue's figures hold without noise; the demo's sensors have noise and JPEG, and its farthest wall is at 2.5 m.
     assert truth["depth_percent"] <= 0.6
     assert truth["disparity_px"] <= 0.15
     assert truth["density"] >= 0.95
@@ -42,7 +42,7 @@ def test_the_demo_leaves_a_full_and_true_report(tmp_path: Path) -> None:
 
 
 def test_an_interrupted_demo_ends_both_programs_and_keeps_its_report(tmp_path: Path) -> None:
-    """Ctrl-C in the middle ends with exit 130, report and page written, and no board process left behind."""
+    """Ctrl-C in the middle ends with exit 130; report and page are written, and no board process is left behind."""
     out = tmp_path / "demo"
     with host(["demo", "--seconds", "600", "--out", str(out)], tmp_path) as demo:
         until(lambda: lines(out / "delays.jsonl") >= 5, "five pairs")
@@ -54,7 +54,7 @@ def test_an_interrupted_demo_ends_both_programs_and_keeps_its_report(tmp_path: P
 
 
 def test_a_demo_that_cannot_write_says_so(tmp_path: Path) -> None:
-    """A folder that cannot be made ends the demo with exit 3 and one line that names it; nonsense seconds with exit 2."""
+    """A folder that cannot be created ends the demo with exit 3 and one line that names it; invalid seconds end it with exit 2."""
     for arguments, code, culprit in (
         (["--out", "/proc/nowhere"], 3, "/proc/nowhere"),
         (["--seconds", "0"], 2, "--seconds"),

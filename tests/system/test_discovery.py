@@ -1,4 +1,4 @@
-"""`phone-host run` without --link finds the board that is meant, in a network that this machine has to itself."""
+"""`phone-host run` without --link finds the right board, in a network of its own."""
 
 import json
 import os
@@ -34,7 +34,7 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def played(scene: str, film: Path, folder: Path) -> list[dict[str, Any]]:
-    """Play a scene of tests/support/discovery_scenes.py in a network of its own."""
+    """Run a scene of tests/support/discovery_scenes.py in a network of its own."""
     pytest.importorskip("zeroconf")
     if not shutil.which("ip") or subprocess.run([*_ALONE, "true"], capture_output=True, check=False).returncode:
         pytest.skip("this machine gives no network of one's own (unshare -rn, ip)")
@@ -47,14 +47,14 @@ def played(scene: str, film: Path, folder: Path) -> list[dict[str, Any]]:
 
 
 def test_a_board_that_announces_itself_is_found(film: Path, tmp_path: Path) -> None:
-    """The only board that both announces itself and answers is taken; one that is announced but gone does not count."""
+    """The only board that both announces itself and answers is chosen; a board that is announced but gone does not count."""
     (said,) = played("announced", film, tmp_path)
     assert said["code"] == 0, said["err"]
     assert "found tcp://127.0.0.2:6001" in said["err"]
 
 
 def test_several_boards_are_listed(film: Path, tmp_path: Path) -> None:
-    """With two boards the host ends with exit 3 and one line that names both and the option to choose."""
+    """With two boards the host ends with exit 3 and one line that names both and the option to choose with."""
     (said,) = played("several", film, tmp_path)
     assert said["code"] == 3
     last = said["err"].splitlines()[-1]
@@ -63,7 +63,7 @@ def test_several_boards_are_listed(film: Path, tmp_path: Path) -> None:
 
 
 def test_the_last_board_comes_first(film: Path, tmp_path: Path) -> None:
-    """A board that was used before is taken though another one announces itself, too; when it is gone, the other one."""
+    """A board that was used before is chosen even if another one announces itself; when it is gone, the other one is."""
     first, again, other = played("last", film, tmp_path)
     assert (first["code"], again["code"], other["code"]) == (0, 0, 0), (first, again, other)
     assert "found tcp://127.0.0.2:6001" in first["err"]
@@ -79,7 +79,7 @@ def test_a_board_on_this_machine_is_found(film: Path, tmp_path: Path) -> None:
 
 
 def test_the_board_on_the_usb_cable_is_found_and_asks_for_keys(film: Path, tmp_path: Path) -> None:
-    """The gadget's address is tried; a board there that is no peer yet ends in one line with the command that pairs."""
+    """The gadget's address is tried; if the board there is no peer yet, one line names the command that pairs."""
     (said,) = played("gadget", film, tmp_path)
     assert "found tcp://192.168.7.2:5555" in said["err"]
     assert said["code"] == 3
@@ -87,7 +87,7 @@ def test_the_board_on_the_usb_cable_is_found_and_asks_for_keys(film: Path, tmp_p
 
 
 def test_from_a_cable_to_pairs_without_an_address(film: Path, tmp_path: Path) -> None:
-    """With a board on the cable `phone-host pair` and `phone-host run` need nothing but the code: the board is found, paired, and streams."""
+    """With a board on the cable, `phone-host pair` and `phone-host run` need only the code: the board is found, paired, and streams."""
     paired, said = played("cable", film, tmp_path)
     assert paired["code"] == 0, paired["err"]
     assert said["code"] == 0, said["err"]
@@ -96,7 +96,7 @@ def test_from_a_cable_to_pairs_without_an_address(film: Path, tmp_path: Path) ->
 
 
 def test_what_does_not_greet_as_zeromq_is_no_board(film: Path, tmp_path: Path) -> None:
-    """A foreign service on the usual port is passed over; when nothing else answers in time, one line says what was tried."""
+    """A foreign service on the usual port is ignored; if nothing else answers in time, one line says what was tried."""
     (said,) = played("foreign", film, tmp_path)
     assert said["code"] == 3
     last = said["err"].splitlines()[-1]
@@ -105,7 +105,7 @@ def test_what_does_not_greet_as_zeromq_is_no_board(film: Path, tmp_path: Path) -
 
 
 def test_the_board_announces_what_the_host_looks_for() -> None:
-    """The static service for avahi has the type and port that discovery expects, and takes the board's own name."""
+    """The static service for avahi has the type and port that discovery expects, and uses the board's own name."""
     group = ET.parse(ROOT / "deploy" / "board" / "tandemscan.service.xml").getroot()
     assert group.findtext("service/type") == SERVICE.removesuffix(".local.")
     assert group.findtext("service/port") == "5555"
@@ -115,7 +115,7 @@ def test_the_board_announces_what_the_host_looks_for() -> None:
 
 
 def test_the_package_brings_the_announcement(tmp_path: Path) -> None:
-    """The board's package puts the static service where avahi-daemon reads it, as a file that its owner may change, and recommends the daemon."""
+    """The board's package installs the static service where avahi-daemon reads it, as a file that its owner may change, and recommends the daemon."""
     if not shutil.which("dpkg-deb"):
         pytest.skip("dpkg-deb is missing")
     built = subprocess.run([ROOT / "deploy/board/build-deb", tmp_path], capture_output=True, text=True, check=True)
@@ -130,7 +130,7 @@ def test_the_package_brings_the_announcement(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["", "tcp://", "tcp://x:y", "ipc:///x", "\ud800", "tcp://127.0.0.1:5555 rm"])
 def test_a_spoiled_memory_is_no_board(text: str, tmp_path: Path) -> None:
-    """Whatever stands in the file of the last board is a tcp link or nothing."""
+    """Whatever the file of the last board contains, the result is a tcp link or nothing."""
     (tmp_path / "last-board").write_bytes(text.encode("utf-8", "surrogatepass"))
     assert _last(tmp_path) == []
     remember(tmp_path, "tcp://192.0.2.1:5555")
@@ -138,7 +138,7 @@ def test_a_spoiled_memory_is_no_board(text: str, tmp_path: Path) -> None:
 
 
 def test_the_memory_leads_nowhere(tmp_path: Path) -> None:
-    """A link or a pipe in place of the file of the last board is neither followed nor waited for; the next board that is used replaces it."""
+    """If a symbolic link or pipe replaces the file of the last board, it is neither followed nor waited for; the next board in use replaces it."""
     (tmp_path / "precious").write_text("tcp://192.0.2.7:5555")
     (tmp_path / "state").mkdir()
     for plant in (lambda path: path.symlink_to(tmp_path / "precious"), os.mkfifo):

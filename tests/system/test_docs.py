@@ -1,4 +1,4 @@
-"""The documentation's quick command lines, run as they are printed; and the worked example for contributors, followed to the letter."""
+"""The documentation's quick command lines, run as printed; and the worked example for contributors, followed to the letter."""
 
 import os
 import re
@@ -21,7 +21,7 @@ _SHIFT_PX = 7
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where a reader would be."""
+    """The folder where a reader would be."""
     here = tmp_path_factory.mktemp("reader")
     prepare(here)
     return here
@@ -29,18 +29,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("command", _QUICK, ids=lambda command: f"{command.page} {command.line}"[:90])
 def test_a_quick_command_does_what_the_page_says(command: Command, folder: Path) -> None:
-    """It ends with exit 0; a check of the machine may warn, not more."""
+    """The command ends with exit 0; a check of the machine may warn, but not fail."""
     done = run(command, folder)
     assert done.returncode == 0, done.stderr
 
 
 def test_there_are_quick_commands() -> None:
-    """The pages have some that anybody can run."""
+    """The pages have commands that anybody can run."""
     assert len(_QUICK) >= 4
 
 
 def test_the_matcher_of_contributing_is_found_by_its_name(tmp_path: Path) -> None:
-    """Its two files, installed as the page says, give a wall's one disparity."""
+    """Its two files, installed as the page says, give a wall's uniform disparity."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     package = tmp_path / "wall-matcher"
     package.mkdir()
@@ -61,7 +61,7 @@ def test_the_matcher_of_contributing_is_found_by_its_name(tmp_path: Path) -> Non
 
 
 def _write_wall(folder: Path) -> None:
-    """A wall seen by both: noise, shifted."""
+    """A wall seen by both cameras: noise, shifted."""
     wide = noise(120 + _SHIFT_PX, 80, 3)
     cv2.imwrite(str(folder / "left.png"), wide[:, :120])
     cv2.imwrite(str(folder / "right.png"), wide[:, _SHIFT_PX:])

@@ -13,7 +13,7 @@ from tests.support.programs import board, free_port, until
 
 
 def doctor(module: str, *arguments: str) -> tuple[int, dict[str, Any]]:
-    """Run a doctor to its end; gives the exit code, and the checks by what they checked."""
+    """Run a doctor to its end; return the exit code, and the checks by what they checked."""
     command = [sys.executable, "-P", "-m", module, "doctor", "--json", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
     assert "Traceback" not in done.stderr
@@ -33,7 +33,7 @@ def test_a_sound_board_is_exit_0(tmp_path: Path) -> None:
 
 
 def test_a_missing_camera_is_exit_4(tmp_path: Path) -> None:
-    """A camera that is not there fails with its remedy, and the other checks are made all the same."""
+    """A missing camera fails with its remedy, and the other checks are made all the same."""
     code, checks = doctor("board_agent.cli", "--camera", f"v4l2:{tmp_path}/none", "--link", f"ipc://{tmp_path}/link")
     assert code == 4
     assert checks["camera"]["verdict"] == "fail"
@@ -42,7 +42,7 @@ def test_a_missing_camera_is_exit_4(tmp_path: Path) -> None:
 
 
 def test_a_taken_port_names_who_has_it(tmp_path: Path) -> None:
-    """A port that this very test listens on fails with its process; the port is left as it was."""
+    """A port that this test itself listens on fails, and its process is named; the port is left as it was."""
     write_film(tmp_path / "film", 3)
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
@@ -54,7 +54,7 @@ def test_a_taken_port_names_who_has_it(tmp_path: Path) -> None:
 
 
 def test_a_running_board_keeps_its_link(tmp_path: Path) -> None:
-    """The doctor finds a running agent's ipc link taken and does not steal its path: the agent goes on listening there."""
+    """The doctor finds a running agent's ipc link taken and does not steal its path: the agent keeps listening there."""
     write_film(tmp_path / "film", 3)
     arguments = ["--camera", f"replay:{tmp_path}/film?loop=1", "--link", f"ipc://{tmp_path}/link"]
     with board(["run", *arguments], tmp_path) as agent:
@@ -68,7 +68,7 @@ def test_a_running_board_keeps_its_link(tmp_path: Path) -> None:
 
 
 def test_settings_that_make_no_sense_are_exit_2(tmp_path: Path) -> None:
-    """A bad URI is a settings mistake like with run: exit 2, one line, no checks."""
+    """A bad URI is a settings error as in `run`: exit 2, one line, no checks."""
     command = [sys.executable, "-P", "-m", "board_agent.cli", "doctor", "--camera", "v4l2:auto?size=big"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
@@ -76,7 +76,7 @@ def test_settings_that_make_no_sense_are_exit_2(tmp_path: Path) -> None:
 
 
 def test_the_table_has_a_line_for_each_check(tmp_path: Path) -> None:
-    """Without --json each line begins with its verdict, and what is not ok ends with a remedy."""
+    """Without --json each line begins with its verdict, and each that is not ok ends with a remedy."""
     command = [sys.executable, "-P", "-m", "board_agent.cli", "doctor", "--camera", f"v4l2:{tmp_path}/none"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
     lines = done.stdout.splitlines()
@@ -85,7 +85,7 @@ def test_the_table_has_a_line_for_each_check(tmp_path: Path) -> None:
 
 
 def test_a_host_asks_the_board(tmp_path: Path) -> None:
-    """A board that runs answers with its camera and its clock's uncertainty; with none there the port is said to be shut."""
+    """A running board answers with its camera and its clock's uncertainty; without a board the port is reported as closed."""
     write_film(tmp_path / "film", 3)
     uri = f"tcp://127.0.0.1:{free_port()}"
     own = f"replay:{tmp_path}/film?loop=1"
@@ -101,7 +101,7 @@ def test_a_host_asks_the_board(tmp_path: Path) -> None:
 
 
 def test_a_host_without_anything_given_is_judged_by_itself(tmp_path: Path) -> None:
-    """Python and its packages are named with their versions, no board is asked, and a rig that is none fails."""
+    """Python and its packages are listed with their versions, no board is asked, and an invalid rig fails."""
     code, checks = doctor("phone_host.cli", "--out", str(tmp_path))
     assert code == 0, checks
     assert {"python", "numpy", "cv2", "camera", "serial", "bluetooth", "board", "disk"} <= set(checks)
@@ -112,7 +112,7 @@ def test_a_host_without_anything_given_is_judged_by_itself(tmp_path: Path) -> No
 
 
 def test_two_wheels_of_opencv_are_found(tmp_path: Path) -> None:
-    """With the folder of a second OpenCV distribution on the path the conflict is named and fails."""
+    """If the folder of a second OpenCV distribution is on the path, the conflict is named and fails."""
     other = tmp_path / "site" / "opencv_python-4.10.0.84.dist-info"
     other.mkdir(parents=True)
     (other / "METADATA").write_text("Metadata-Version: 2.1\nName: opencv-python\nVersion: 4.10.0.84\n")

@@ -1,4 +1,4 @@
-"""Both programs get to know each other by a code, over real sockets, with the real commands."""
+"""Both programs enrol each other by a code, over real sockets, with the real commands."""
 
 import json
 import os
@@ -24,7 +24,7 @@ from tests.support.programs import board, host, program, until
 
 @pytest.fixture
 def rig(tmp_path: Path) -> Iterator[Rig]:
-    """A board that nobody knows yet."""
+    """A board that has no peers yet."""
     with on_every_network(tmp_path) as made:
         yield made
 
@@ -32,7 +32,7 @@ def rig(tmp_path: Path) -> Iterator[Rig]:
 def test_a_code_that_the_owner_is_shown_lets_a_host_in(rig: Rig) -> None:
     """`board-agent pair` shows a code; typed on the host it makes both trust each other, and the stream runs; then the door is closed.
 
-    The board's log, which more people read, tells that a host asks, and never the code.
+    The board's log, which others can read too, says that a host asks, but never shows the code.
     """
     code, out, err = rig.pair_by_code()
     assert code == 0, err
@@ -51,7 +51,7 @@ def test_a_code_that_the_owner_is_shown_lets_a_host_in(rig: Rig) -> None:
 
 
 def test_a_host_that_is_not_paired_is_told_so_in_one_line(rig: Rig) -> None:
-    """Before pairing `run` ends with exit 3 and the command that helps; so it does once the board has forgotten the host."""
+    """Before pairing, `run` ends with exit 3 and the command that helps; the same happens once the board has forgotten the host."""
     arguments = [
         "run",
         "--link",
@@ -78,7 +78,7 @@ def test_a_host_that_is_not_paired_is_told_so_in_one_line(rig: Rig) -> None:
 
 
 def test_the_owner_takes_in_a_second_host(rig: Rig) -> None:
-    """With a host known the door is closed; `board-agent pair` opens it, shows the code at once and tells who has come; --code takes it."""
+    """Once a host is known the door is closed; `board-agent pair` opens it, shows the code at once and says who has come; --code accepts it."""
     assert rig.pair_by_code()[0] == 0
     until(lambda: "pairing_closed" in rig.agent.stderr, "the door closes")
     second = ["--keys", str(rig.folder / "h2")]
@@ -98,7 +98,7 @@ def test_the_owner_takes_in_a_second_host(rig: Rig) -> None:
 
 
 def test_on_a_terminal_a_wrong_code_is_asked_again(rig: Rig) -> None:
-    """Who mistypes on a terminal gets another try with the new code; the old one is not taken again."""
+    """After a mistyped code, a terminal user gets another try with the new code; the old one is no longer accepted."""
     master, slave = pty.openpty()
     command = ["pair", "--link", rig.link, "--keys", rig.host_keys]
     err = rig.folder / "pair.err"
@@ -120,7 +120,7 @@ def test_on_a_terminal_a_wrong_code_is_asked_again(rig: Rig) -> None:
 
 
 def test_without_an_agent_pair_waits_and_says_so(tmp_path: Path) -> None:
-    """`board-agent pair` with nobody to talk to says what it waits for, and after its time ends with exit 3 and the remedy; so does the host's."""
+    """`board-agent pair` without an agent says what it waits for, and after its timeout ends with exit 3 and the remedy; so does the host's."""
     with program("board_agent.cli", ["pair", "--seconds", "2", "--keys", str(tmp_path)], tmp_path, "pair") as alone:
         assert alone.wait() == 3
     waiting, last = alone.stderr.splitlines()
@@ -130,7 +130,7 @@ def test_without_an_agent_pair_waits_and_says_so(tmp_path: Path) -> None:
 
 
 def test_the_owner_may_come_before_the_agent(tmp_path: Path) -> None:
-    """`board-agent pair` waits for an agent that has opened no link yet, because its camera is missing, and goes on when it is there."""
+    """`board-agent pair` waits for an agent that has opened no link because its camera is missing, and goes on once the camera is there."""
     camera = tmp_path / "film"
     config = tmp_path / "board.toml"
     port = ports()
@@ -172,7 +172,7 @@ def test_what_makes_no_sense_is_one_line(module: str, options: list[str], named:
 
 
 def test_a_folder_too_deep_for_a_socket_is_named(tmp_path: Path) -> None:
-    """Where no socket's path fits the owner is told so at once, and the wait ends with exit 3."""
+    """If no socket path is short enough, the owner is told at once, and the wait ends with exit 3."""
     deep = tmp_path / ("x" * 60) / ("y" * 60)
     deep.mkdir(parents=True)
     with program("board_agent.cli", ["pair", "--seconds", "1", "--keys", str(deep)], tmp_path, "deep") as waiting:
@@ -182,7 +182,7 @@ def test_a_folder_too_deep_for_a_socket_is_named(tmp_path: Path) -> None:
 
 
 def test_keys_are_shown_and_never_the_secret_one(tmp_path: Path) -> None:
-    """`keys` on both sides shows the public key, adds a peer by hand, and prints no secret."""
+    """On both sides `keys` shows the public key, adds a peer by hand, and prints no secret."""
     folder = KeyFolder(tmp_path / "b")
     other = zmq.curve_keypair()[0].decode()
     for module, add in (

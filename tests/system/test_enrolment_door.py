@@ -1,4 +1,4 @@
-"""Whoever is not meant at a board's door: silent strangers, guesses from many sides, codes typed twice, doors that are none."""
+"""Unwanted callers at a board's door: silent strangers, guesses from many sides, codes typed twice, and false doors."""
 
 import re
 import socket
@@ -20,13 +20,13 @@ from tests.support.programs import board, program, until
 
 @pytest.fixture
 def rig(tmp_path: Path) -> Iterator[Rig]:
-    """A board that nobody knows yet."""
+    """A board that has no peers yet."""
     with on_every_network(tmp_path) as made:
         yield made
 
 
 def test_one_code_and_one_account_of_tries_for_all_links(tmp_path: Path) -> None:
-    """A board with two links shows one code, good at either; wrong codes at one and at the other count together, whatever host they come from."""
+    """A board with two links shows one code, valid at either; wrong codes at both count together, whatever host they come from."""
     first = ports()
     second = next(port for port in iter(ports, None) if abs(port - first) > 1)
     write_film(tmp_path / "film", 10)
@@ -59,7 +59,7 @@ def test_one_code_and_one_account_of_tries_for_all_links(tmp_path: Path) -> None
 
 
 def test_strangers_that_say_nothing_keep_nobody_from_pairing(rig: Rig) -> None:
-    """Strangers ask and fall silent, or never end a word, or connect and say nothing at all: a host is paired meanwhile, and they are hung up on."""
+    """Strangers ask and fall silent, or never finish a word, or connect and say nothing: a host is paired meanwhile, and the strangers are disconnected."""
     door = ("127.0.0.1", int(rig.link.rpartition(":")[2]) + 1)
     ask = frame_word(Ask(Identity(bytes(32), "stranger")))
     until(lambda: "pairing_open" in rig.agent.stderr, "the door is open")
@@ -69,7 +69,7 @@ def test_strangers_that_say_nothing_keep_nobody_from_pairing(rig: Rig) -> None:
             with suppress(ConnectionError):  # made room for another one
                 stranger.sendall(said)
         until(lambda: "pairing_asked" in rig.agent.stderr, "a stranger has asked")
-        pairing = rig.pair()  # the code is the same for whoever asks
+        pairing = rig.pair()  # the code is the same for everyone who asks
         _, err = pairing.communicate(f"{rig.code()}\n", timeout=60)
         assert pairing.returncode == 0, err
         for stranger in strangers:
@@ -81,7 +81,7 @@ def test_strangers_that_say_nothing_keep_nobody_from_pairing(rig: Rig) -> None:
 
 
 def test_who_is_connected_when_the_door_closes_is_hung_up_on(rig: Rig) -> None:
-    """A stranger that connected while the door was open, and goes on asking, is cut off when it closes: nobody guesses behind it."""
+    """A stranger that connected while the door was open, and goes on asking, is cut off when it closes: nobody can guess after that."""
     until(lambda: "pairing_open" in rig.agent.stderr, "the door is open")
     door = ("127.0.0.1", int(rig.link.rpartition(":")[2]) + 1)
     assert rig.pair_by_code()[0] == 0
@@ -96,7 +96,7 @@ def test_who_is_connected_when_the_door_closes_is_hung_up_on(rig: Rig) -> None:
 
 
 def test_a_code_typed_before_is_refused_by_every_later_process(rig: Rig) -> None:
-    """Somebody in the middle learns some bits each time a code is proved to him: a host proves one once, however often it is started."""
+    """A man in the middle learns some bits each time a code is proved to him: a host proves a code only once, however often it is started."""
     assert rig.pair_wrongly() == 4
     (typed,) = KeyFolder(Path(rig.host_keys)).spent_codes()
     assert typed not in rig.codes()
@@ -112,7 +112,7 @@ def test_a_code_typed_before_is_refused_by_every_later_process(rig: Rig) -> None
 
 
 def test_a_door_that_drips_is_given_up(tmp_path: Path) -> None:
-    """What answers at a board's door without ever finishing a word, or with no word at all, ends `phone-host pair` with one line: 3, or 4."""
+    """A false door that never finishes a word, or says nothing at all, ends `phone-host pair` with one line: exit 3 or 4."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1] - 1
         for said, code, line in (
@@ -126,7 +126,7 @@ def test_a_door_that_drips_is_given_up(tmp_path: Path) -> None:
                 due = time.monotonic()
                 while (
                     pairing.poll() is None
-                ):  # far more often than the host waits, and too seldom to fill a word in that time
+                ):  # much more often than the host's timeout, and too seldom to complete a word in that time
                     if time.monotonic() >= due:
                         due += 0.5
                         with suppress(ConnectionError):
@@ -139,7 +139,7 @@ def test_a_door_that_drips_is_given_up(tmp_path: Path) -> None:
 
 
 def test_two_links_side_by_side_are_refused(tmp_path: Path) -> None:
-    """A link on the port where another one's new hosts are taken in ends the start with exit 2 and one line that names both and the remedy."""
+    """A link on the port of another link's door ends the start with exit 2 and one line that names both and the remedy."""
     write_film(tmp_path / "film", 3)
     port = ports()
     for other in (f"tcp://*:{port + 1}", f"tcp://127.0.0.1:{port + 1}"):
@@ -153,7 +153,7 @@ def test_two_links_side_by_side_are_refused(tmp_path: Path) -> None:
 
 
 def test_three_wrong_codes_are_followed_by_a_pause(rig: Rig) -> None:
-    """A wrong code ends with exit 4 and spends the code shown; after the third one nobody may try for a minute, until the owner says so."""
+    """A wrong code ends with exit 4 and uses up the code shown; after the third nobody may try for a minute, unless the owner allows it."""
     for _ in range(3):
         assert rig.pair_wrongly() == 4
     assert len(set(rig.codes())) == 4, "three that were spent, and the next one"
@@ -174,7 +174,7 @@ def test_three_wrong_codes_are_followed_by_a_pause(rig: Rig) -> None:
 
 
 def test_the_owner_is_told_that_the_door_cannot_be_opened(rig: Rig) -> None:
-    """While another program has the door's port `board-agent pair` says so and shows no code; it goes on when the port is free."""
+    """While another program has the door's port, `board-agent pair` says so and shows no code; it goes on when the port is free."""
     assert rig.pair_by_code()[0] == 0
     until(lambda: "pairing_closed" in rig.agent.stderr, "the door closes")
     door = int(rig.link.rpartition(":")[2]) + 1

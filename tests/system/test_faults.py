@@ -22,7 +22,7 @@ _NO_DEPTH = "phone-host: no --calibration and not --rectified: "
 
 
 def complaint(running: Program) -> str:
-    """The one line that a failed program says beside its log and the remark that it computes no depth."""
+    """The one line that a failed program prints beside its log and the note that it computes no depth."""
     said = [
         line for line in running.stderr.splitlines() if not _LOG_LINE.match(line) and not line.startswith(_NO_DEPTH)
     ]
@@ -32,7 +32,7 @@ def complaint(running: Program) -> str:
 
 
 def test_spoiled_jpegs_are_dropped_on_the_board_and_counted_with_their_reason(tmp_path: Path) -> None:
-    """Of 40 images every fourth is cut short: 30 are sent and paired, 10 are counted as spoiled, no pair shows two moments."""
+    """Of 40 images every fourth is truncated: 30 are sent and paired, 10 are counted as spoiled, no pair mixes two moments."""
     left = write_film(tmp_path / "left", 40, spoil_every=4)
     right = write_film(tmp_path / "right", 40)
     link, out = f"ipc://{tmp_path}/link", tmp_path / "out"
@@ -62,7 +62,7 @@ def test_spoiled_jpegs_are_dropped_on_the_board_and_counted_with_their_reason(tm
 
 
 def test_images_spoiled_on_the_host_cost_only_their_own_pairs(tmp_path: Path) -> None:
-    """When the own camera's images are cut short every fourth board frame finds no partner, the others are paired rightly."""
+    """If the host camera's images are truncated, every fourth board frame finds no partner; the others are paired correctly."""
     left = write_film(tmp_path / "left", 40)
     right = write_film(tmp_path / "right", 40, spoil_every=4)
     link, out = f"ipc://{tmp_path}/link", tmp_path / "out"
@@ -97,7 +97,7 @@ VERSIONS = pytest.mark.parametrize(
 def test_a_host_of_another_version_is_refused_in_its_own_words(
     theirs: int, *, board_is_older: bool, tmp_path: Path
 ) -> None:
-    """Its hello is answered in an envelope of its version, the board's log says in one line which side to update, and the board serves on."""
+    """Its hello is answered in an envelope of its version, the board's log says in one line which side to update, and the board goes on serving."""
     film, link = write_film(tmp_path / "film", 5), f"ipc://{tmp_path}/link"
     with board(["run", "--camera", f"replay:{film}?loop=1", "--link", link], tmp_path) as sender:
         context = zmq.Context()
@@ -107,7 +107,7 @@ def test_a_host_of_another_version_is_refused_in_its_own_words(
         assert stranger.poll(60_000)
         told = [msgpack.unpackb(stranger.recv()) for _ in range(2)]
         context.destroy(linger=0)
-        # A Refusal because of the version: in the board's own, which says what that is, and in the stranger's, which it can read.
+        # A Refusal because of the version comes twice: in the board's envelope, which states that version, and in the stranger's, which it can read.
         assert told == [[PROTOCOL_VERSION, 3, 1], [theirs, 3, 1]]
         with host(["run", "--camera", f"replay:{film}?loop=1", "--link", link, "--pairs", "2"], tmp_path) as receiver:
             assert receiver.wait() == 0
@@ -120,7 +120,7 @@ def test_a_host_of_another_version_is_refused_in_its_own_words(
 def test_a_board_of_another_version_ends_the_host_with_one_line(
     theirs: int, *, board_is_older: bool, tmp_path: Path
 ) -> None:
-    """The host ends with exit 3 and says in its only line which side must be updated."""
+    """The host ends with exit 3, and its only line says which side must be updated."""
     film, link = write_film(tmp_path / "film", 5), f"ipc://{tmp_path}/link"
     context = zmq.Context()
     other = context.socket(zmq.ROUTER)
@@ -139,7 +139,7 @@ def test_a_board_of_another_version_ends_the_host_with_one_line(
 
 
 def test_a_board_that_does_not_tell_its_version_is_the_older_one(tmp_path: Path) -> None:
-    """Boards of 0.1 refuse in the host's version only: the host says that the board is to be updated."""
+    """Boards of 0.1 refuse only in the host's version: the host says that the board must be updated."""
     film, link = write_film(tmp_path / "film", 5), f"ipc://{tmp_path}/link"
     context = zmq.Context()
     other = context.socket(zmq.ROUTER)
@@ -153,7 +153,7 @@ def test_a_board_that_does_not_tell_its_version_is_the_older_one(tmp_path: Path)
 
 
 def bad_folders(root: Path) -> dict[str, tuple[Path, int, str]]:
-    """Replay folders that cannot be replayed: path, exit code, what the message names."""
+    """Invalid replay folders: path, exit code, what the message names."""
     empty = root / "empty"
     empty.mkdir()
     mixed = write_film(root / "mixed", 3)
@@ -171,7 +171,7 @@ def bad_folders(root: Path) -> dict[str, tuple[Path, int, str]]:
 @pytest.mark.parametrize("kind", ["missing", "empty", "mixed", "text"])
 @pytest.mark.parametrize("side", ["board", "host"])
 def test_a_bad_replay_folder_ends_at_once_with_its_name(kind: str, side: str, tmp_path: Path) -> None:
-    """A folder that is missing, empty, of mixed sizes or holds no image ends either program with its exit code and the culprit's name."""
+    """A folder that is missing, empty, of mixed sizes or without images ends either program with its exit code and the culprit's name."""
     folder, code, culprit = bad_folders(tmp_path)[kind]
     start = board if side == "board" else host
     with start(["run", "--camera", f"replay:{folder}", "--link", f"ipc://{tmp_path}/link"], tmp_path) as running:
@@ -181,7 +181,7 @@ def test_a_bad_replay_folder_ends_at_once_with_its_name(kind: str, side: str, tm
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
 def test_an_unreadable_folder_ends_with_exit_3(tmp_path: Path) -> None:
-    """A folder without read permission is a device that cannot be had."""
+    """A folder without read permission is an unavailable device."""
     folder = write_film(tmp_path / "film", 3)
     folder.chmod(0)
     try:
@@ -249,7 +249,7 @@ def test_bad_options_of_the_host_end_with_one_line(
 
 @pytest.mark.parametrize("kind", ["tcp", "ipc"])
 def test_a_taken_address_ends_the_second_board_at_once(kind: str, tmp_path: Path) -> None:
-    """A second board on a taken port or path ends with exit 3 and names it; the first one goes on."""
+    """A second board on a taken port or path ends with exit 3 and names it; the first one keeps running."""
     film = write_film(tmp_path / "film", 5)
     link = f"tcp://127.0.0.1:{free_port()}" if kind == "tcp" else f"ipc://{tmp_path}/link"
     arguments = ["run", "--camera", f"replay:{film}?loop=1", "--link", link]
@@ -264,7 +264,7 @@ def test_a_taken_address_ends_the_second_board_at_once(kind: str, tmp_path: Path
 
 
 def test_too_few_pairs_before_the_stream_ends_is_exit_4(tmp_path: Path) -> None:
-    """A demand-paced replay of 6 images gives 6 pairs and exit 0; asked for 7 the host ends with exit 4; the board with 0 both times."""
+    """A demand-paced replay of 6 images gives 6 pairs and exit 0; asked for 7, the host ends with exit 4; the board ends with 0 both times."""
     film, link = write_film(tmp_path / "film", 6), f"ipc://{tmp_path}/link"
     arguments = ["run", "--camera", f"replay:{film}?pace=demand", "--link", link]
     for asked, code in (("6", 0), ("7", 4), ("0", 0)):
@@ -282,7 +282,7 @@ def test_too_few_pairs_before_the_stream_ends_is_exit_4(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)])
 def test_signals_end_both_programs_with_their_summary(number: signal.Signals, code: int, tmp_path: Path) -> None:
-    """SIGTERM ends with exit 0, Ctrl-C with 130; the account of all frames is printed either way and closes."""
+    """SIGTERM ends with exit 0, Ctrl-C with 130; either way the account of all frames is printed and balances."""
     film, link = write_film(tmp_path / "film", 10), f"ipc://{tmp_path}/link"
     out = tmp_path / "out"
     arguments = ["run", "--camera", f"replay:{film}?loop=1", "--link", link, "--json"]
@@ -310,7 +310,7 @@ exec "$@"
 
 
 def can_mount() -> bool:
-    """Whether a small disk can be had here: a tmpfs in a mount namespace of our own."""
+    """Whether a small disk is available here: a tmpfs in a mount namespace of our own."""
     probe = subprocess.run(
         ["unshare", "-rm", "sh", "-c", "mount -t tmpfs tmpfs /mnt"], capture_output=True, check=False
     )

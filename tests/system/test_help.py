@@ -31,14 +31,14 @@ def test_help_opens_with_examples(module: str, verb: list[str], tmp_path: Path) 
         module
     ]
     assert second.split("=")[0].strip().removeprefix("sudo ").startswith((name, "PHONE_HOST", "BOARD_AGENT"))
-    # Where verbs are still to be chosen there are none of their options.
+    # Where a verb is still to be chosen, the help shows none of its options.
     runs_as_it_is = bool(verb) or module == "phone_host.bench.cli"
     assert ("--debug" in running.out.read_text()) is runs_as_it_is
 
 
 @pytest.mark.parametrize("module", ["board_agent.cli", "phone_host.cli"])
 def test_a_bare_name_says_what_can_be_done(module: str, tmp_path: Path) -> None:
-    """Without a verb a program prints its examples and verbs, and that is no mistake."""
+    """Without a verb a program prints its examples and verbs; this is no error."""
     with program(module, [], tmp_path, "bare") as running:
         assert running.wait() == 0
     assert running.out.read_text().startswith("examples:")

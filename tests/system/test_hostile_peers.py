@@ -1,4 +1,4 @@
-"""Strangers at a board's tcp port, and an allowed host that talks nonsense: the stream goes on, the log stays short, memory bounded."""
+"""Strangers at a board's tcp port, and a trusted host that sends nonsense: the stream goes on, the log stays short, memory stays bounded."""
 
 import random
 import resource
@@ -25,10 +25,10 @@ from tests.support.pulse import Pulse
 
 _GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00"
 _MOST_LINES = 12
-"""A start takes six lines; strangers may add one each ten seconds."""
+"""A start takes six lines; strangers may add one every ten seconds."""
 
 _MOST_KB = 24 * 1024
-"""What a flood may cost: a thousand half-open connections take about 10 KB each in ZeroMQ."""
+"""What a flood may cost: each of a thousand half-open connections takes about 10 KB in ZeroMQ."""
 
 
 class Target:
@@ -55,7 +55,7 @@ class Target:
         return self.agent.stderr.count("\n")
 
     def dial(self) -> socket.socket:
-        """Connect as a stranger does."""
+        """Connect as a stranger."""
         return socket.create_connection(("127.0.0.1", self.port), timeout=10)
 
     @contextmanager
@@ -82,7 +82,7 @@ class Target:
             seen = lines(done)
             until(lambda: lines(done) > seen + 30 or running.process.poll() is not None, "frames still come")
             assert running.stop() == 0, running.stderr
-            # Each gives the other up after three seconds of silence; which of the two was silent the pulse tells.
+            # Each side gives up the other after three seconds of silence; the pulse tells which of the two was silent.
             assert running.stderr.count("board_found") == 1, f"the stream was interrupted; {pulse.told}"
 
 
@@ -107,7 +107,7 @@ def target(tmp_path: Path) -> Iterator[Target]:
 
 
 def test_strangers_do_not_disturb_a_stream(target: Target) -> None:
-    """Random bytes, HTTP, half a greeting, a greeting of another mechanism, silence and bytes one by one: nothing is heard of them."""
+    """Random bytes, HTTP, half a greeting, a greeting of another mechanism, silence and single bytes: none of it is heard."""
     chance = random.Random(1)
     null_greeting = _GREETING + b"NULL".ljust(20, b"\0") + bytes(32)
     curve_greeting = _GREETING + b"CURVE".ljust(20, b"\0") + bytes(32)
@@ -137,7 +137,7 @@ def test_strangers_do_not_disturb_a_stream(target: Target) -> None:
 
 
 def test_thousands_of_connections(target: Target) -> None:
-    """3000 quick connections and 350 that stay open, more than the board may have: the stream goes on, and all is given back."""
+    """3000 short connections and 350 that stay open, more than the board may have: the stream goes on, and all descriptors are released."""
     with target.streaming():
         before_kb, before_files = target.memory_kb, target.descriptors
         for _ in range(3000):
@@ -155,7 +155,7 @@ def test_thousands_of_connections(target: Target) -> None:
 
 
 def test_unknown_keys_get_nothing(target: Target) -> None:
-    """A hundred machines with keys of their own, which know the board's: none is heard, all together cost a line or two in the log."""
+    """A hundred machines with keys of their own, which know the board's key: none is heard, and together they cost a line or two in the log."""
     peer = Peer(name="board", key=KeyFolder(target.folder / "b").own().public, added="", address=target.link)
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     try:
@@ -182,7 +182,7 @@ def test_unknown_keys_get_nothing(target: Target) -> None:
 
 
 def test_an_allowed_host_that_talks_nonsense(target: Target) -> None:
-    """With the right key a peer can send anything: what is too long costs it its connection, what is no message is counted, nothing is kept."""
+    """A peer with the right key can send anything: an oversized packet costs it its connection, an invalid message is counted, nothing is kept."""
     keys = KeyFolder(target.folder / "h")
     chance = random.Random(2)
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
@@ -222,9 +222,9 @@ def test_an_allowed_host_that_talks_nonsense(target: Target) -> None:
 
 
 def test_garbage_at_the_door(target: Target) -> None:
-    """While the owner takes in a host: garbage, a ZeroMQ message that never ends, drops of bytes, asking without end, silence by the hundred.
+    """While the owner enrols a host: garbage, an endless ZeroMQ message, drops of bytes, endless questions, silence by the hundred.
 
-    The door keeps a few callers for seconds, and what they said last; the log gets a few lines; the stream goes on, and the owner's host is paired.
+    The door keeps only a few callers, for seconds, and their last words; the log gets a few lines; the stream goes on, and the owner's host is paired.
     """
     chance = random.Random(3)
     endless = _GREETING + b"NULL".ljust(20, b"\0") + bytes(32) + (b"\x01\xff" + bytes(255)) * 1000
@@ -255,7 +255,7 @@ def test_garbage_at_the_door(target: Target) -> None:
 
 
 def test_a_forgotten_host_gets_no_more_frames(target: Target) -> None:
-    """A host that is forgotten while it streams is cut off, though its connection lives; another key of the same name would be let in."""
+    """A host that is forgotten while it streams is cut off, though its connection is alive; another key of the same name would be let in."""
     out = target.folder / "out"
     arguments = [
         "run",

@@ -1,4 +1,4 @@
-"""A board's service that was taken over, and its owner who runs `sudo board-agent pair`: root gives it nothing. Links in a results folder."""
+"""A compromised board service, and its owner who runs `sudo board-agent pair`: root gives it nothing. Also links in a results folder."""
 
 import os
 import shutil
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="only root can act for
 
 @pytest.fixture
 def folder() -> Iterator[Path]:
-    """The service's folder of keys, to which everybody may pass."""
+    """The service's folder of keys, which everybody may traverse."""
     place = Path(tempfile.mkdtemp())
     place.chmod(0o755)
     folder = place / "service"
@@ -36,7 +36,7 @@ def folder() -> Iterator[Path]:
 
 @contextmanager
 def service(what: Callable[[], None]) -> Iterator[None]:
-    """The service that was taken over, for the length of a block."""
+    """The compromised service, for the length of a block."""
     child = os.fork()
     if not child:
         try:
@@ -54,7 +54,7 @@ def service(what: Callable[[], None]) -> Iterator[None]:
 
 
 def test_root_gives_up_its_rights_before_it_asks_the_service(folder: Path, tmp_path: Path) -> None:
-    """`sudo board-agent pair` is the service's user by the time it connects; what commands a terminal is not shown, what is a state is."""
+    """`sudo board-agent pair` is the service's user by the time it connects; terminal escapes are not shown, a state is."""
 
     def answer() -> None:
         sock = zmq.Context().socket(zmq.ROUTER)
@@ -83,7 +83,7 @@ def test_root_gives_up_its_rights_before_it_asks_the_service(folder: Path, tmp_p
 
 
 def test_a_link_to_a_socket_of_roots_is_not_connected_to(folder: Path, tmp_path: Path) -> None:
-    """Links, pipes and files that bear the name of a running agent's socket are passed over: root's own services get no call."""
+    """Links, pipes and files with the name of a running agent's socket are skipped: root's own services are not contacted."""
     with socket.socket(socket.AF_UNIX) as roots:
         roots.bind(str(folder.parent / "roots"))
         roots.listen()
@@ -100,7 +100,7 @@ def test_a_link_to_a_socket_of_roots_is_not_connected_to(folder: Path, tmp_path:
 
 
 def test_an_agent_that_root_runs_meets_its_owner(folder: Path, tmp_path: Path) -> None:
-    """An agent that root started by hand leaves its socket as the folder's owner, so that `pair`, which is that owner by then, reaches it."""
+    """An agent that root started by hand gives its socket to the folder's owner, so that `pair`, which runs as that owner by then, reaches it."""
     write_film(tmp_path / "film", 3)
     serving = ["run", "--camera", f"replay:{tmp_path}/film?pace=demand", "--link", f"tcp://*:{ports()}"]
     with program("board_agent.cli", [*serving, "--keys", str(folder)], tmp_path, "agent") as agent:
@@ -112,7 +112,7 @@ def test_an_agent_that_root_runs_meets_its_owner(folder: Path, tmp_path: Path) -
 
 @pytest.mark.parametrize("name", ["delays.jsonl", "report.json", "pair-000000"])
 def test_a_run_ends_before_it_begins_where_a_link_has_a_results_name(name: str, tmp_path: Path) -> None:
-    """`run` into a folder with a planted link ends with exit 3 and one line that names link and remedy; the target and all else stay."""
+    """`run` into a folder with a planted link ends with exit 3 and one line that names link and remedy; the target and all else stay unchanged."""
     write_film(tmp_path / "film", 3)
     (tmp_path / "precious").write_text("precious")
     out = tmp_path / "out"

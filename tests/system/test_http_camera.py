@@ -1,4 +1,4 @@
-"""A phone's MJPEG server as the host's own camera, beside servers that misbehave in every way that was heard of; real sockets, a real process."""
+"""A phone's MJPEG server as the host's own camera, and servers that misbehave in every known way; real sockets, a real process."""
 
 import itertools
 import json
@@ -57,7 +57,7 @@ def camera_of(uri: str) -> Iterator[HttpCamera]:
 
 
 def grabs(camera: HttpCamera, enough: Callable[[list[Grab]], bool]) -> list[Grab]:
-    """Read until it is enough."""
+    """Read until the condition holds."""
     came: list[Grab] = []
 
     def step() -> bool:
@@ -71,7 +71,7 @@ def grabs(camera: HttpCamera, enough: Callable[[list[Grab]], bool]) -> list[Grab
 
 
 def frames(came: list[Grab]) -> list[Frame]:
-    """The frames among these."""
+    """The frames among these grabs."""
     return [grab for grab in came if isinstance(grab, Frame)]
 
 
@@ -90,7 +90,7 @@ def frames(came: list[Grab]) -> list[Frame]:
     ],
 )
 def test_every_sloppy_manner(film: Path, manner: str) -> None:
-    """However a server parts its images, every one comes whole and unaltered, in order, with the measured period."""
+    """However a server splits its images, each arrives whole and unaltered, in order, with the measured period."""
     contents = [(film / f"{number}.jpg").read_bytes() for number in range(FRAMES)]
     with serving(film, manner) as server, camera_of(server.uri) as camera:
         came = frames(grabs(camera, lambda came: len(frames(came)) >= 20))
@@ -104,19 +104,19 @@ def test_every_sloppy_manner(film: Path, manner: str) -> None:
 
 
 def test_an_image_is_stamped_with_its_own_arrival(film: Path) -> None:
-    """A server that writes the next boundary with the image before it does not make stamps early: they follow the sending, less the latency."""
+    """A server that sends the next boundary together with the previous image does not make stamps early: they follow the sending, minus the latency."""
     fps = 10
     with serving(film, "early_boundary", fps=fps) as server, camera_of(f"{server.uri}?latency_ms=200") as camera:
         came = frames(grabs(camera, lambda came: len(frames(came)) >= 20))
         assert camera.health.latency_ns == 200_000_000
     period_ns = 1_000_000_000 // fps
-    # Sent at k / fps, arrived later: modulo the period the stamps lie just behind the grid. The swiftest of them tell.
+    # Sent at k / fps, arrived later: modulo the period the stamps lie just after the grid. The fastest ones show it.
     late_ns = sorted((frame.exposed.ns + 200_000_000) % period_ns for frame in came)
     assert late_ns[0] < period_ns // 2
 
 
 def test_truncated_images_are_told_of(film: Path) -> None:
-    """A cut image is a spoiled grab under its own number and is counted; all others come."""
+    """A truncated image is a spoiled grab under its own number and is counted; all others arrive."""
     with serving(film, "truncated") as server, camera_of(server.uri) as camera:
         came = grabs(camera, lambda came: sum(isinstance(grab, Spoiled) for grab in came) >= 4)
         faults = dict(camera.health.faults)
@@ -127,7 +127,7 @@ def test_truncated_images_are_told_of(film: Path) -> None:
 
 @pytest.mark.parametrize("manner", ["closes", "resets", "bad_chunks", "last_chunk", "hangs", "drips", "endless"])
 def test_a_server_that_goes_wrong_is_met_again(film: Path, manner: str) -> None:
-    """A server that hangs up, resets, ends its answer, garbles its chunks, hangs, drips or never ends an image is left, counted, and frames come again over a new connection."""
+    """If a server hangs up, resets, ends its answer, garbles its chunks, hangs, drips or never ends an image, it is dropped, counted and reconnected to."""
     with serving(film, manner) as server, camera_of(server.uri) as camera:
         grabs(camera, lambda _: camera.health.returned > 0)
         came = grabs(camera, lambda came: len(frames(came)) >= 5)
@@ -139,7 +139,7 @@ def test_a_server_that_goes_wrong_is_met_again(film: Path, manner: str) -> None:
 
 
 def test_a_server_that_is_away_is_waited_for(film: Path) -> None:
-    """A phone that is gone is looked for until it is back at the same address."""
+    """The host looks for a missing phone until it is back at the same address."""
     server = MjpegServer(film, FPS)
     with camera_of(server.uri) as camera:
         grabs(camera, lambda came: len(frames(came)) >= 3)
@@ -155,7 +155,7 @@ def test_a_server_that_is_away_is_waited_for(film: Path) -> None:
 
 
 def test_a_slow_reader_gets_the_newest(film: Path) -> None:
-    """Who did not read for a hundred images gets one frame, the newest, and word of all that it replaced."""
+    """After a hundred unread images, a reader gets one frame, the newest, and the count of those it replaced."""
     with serving(film, "plain", fps=100) as server, camera_of(server.uri) as camera:
         first = frames(grabs(camera, lambda came: len(frames(came)) >= 1))[-1]
         until(lambda: camera.newest_sequence >= first.sequence + 100, "a hundred images")
@@ -183,7 +183,7 @@ REFUSALS = {
 
 @pytest.mark.parametrize("manner", REFUSALS)
 def test_what_is_no_stream_is_told_with_its_remedy(film: Path, manner: str) -> None:
-    """A page, a single image, a refusal or another protocol is unavailable at once, in one line with its remedy."""
+    """A page, a single image, a refusal or another protocol is reported as unavailable at once, in one line with its remedy."""
     problem, remedy = REFUSALS[manner]
     with serving(film, manner) as server, pytest.raises(UnavailableError) as caught:
         open_camera(server.uri, "host", 0)
@@ -193,7 +193,7 @@ def test_what_is_no_stream_is_told_with_its_remedy(film: Path, manner: str) -> N
 
 
 def test_a_phone_that_is_turned(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """Images of another size than at the beginning are spoiled and counted by name, the change is told, and those of the first size come on."""
+    """Images that differ from the first size are spoiled and counted by name, the change is reported, and those of the first size keep coming."""
     mixed = write_film(tmp_path / "mixed", 20)
     upright = cv2.rotate(np.asarray(cv2.imread(str(mixed / "0.jpg"))), cv2.ROTATE_90_CLOCKWISE)
     for number in range(10, 20):
@@ -210,7 +210,7 @@ def test_a_phone_that_is_turned(tmp_path: Path, caplog: pytest.LogCaptureFixture
 
 @pytest.mark.parametrize("manner", ["bombs", "turning"])
 def test_images_that_claim_another_size(film: Path, manner: str, caplog: pytest.LogCaptureFixture) -> None:
-    """Images whose header claims a size that nobody asked for are spoiled by name and never handed on; the log gets a few lines, however many they are."""
+    """Images whose header claims an unrequested size are spoiled by name and never handed on; the log gets a few lines, however many they are."""
     with serving(film, manner) as server, camera_of(server.uri) as camera:
         came = grabs(camera, lambda came: sum(isinstance(grab, Spoiled) for grab in came) >= 40)
         assert dict(camera.health.faults)[FrameFault.OTHER_SIZE] >= 40
@@ -219,14 +219,14 @@ def test_images_that_claim_another_size(film: Path, manner: str, caplog: pytest.
 
 
 def test_a_phone_beyond_the_limit(tmp_path: Path) -> None:
-    """A server whose images have more pixels than the limit is refused at once, with both."""
+    """A server whose images have more pixels than the limit is refused at once; the message names both."""
     film = write_film(tmp_path / "film", 20)
     with serving(film, "plain") as server, pytest.raises(ImageSizeError, match=r"160x120 px.*limit is 0.0"):
         open_camera(server.uri, "host", now.monotonic_ns(), 10_000)
 
 
 def test_nobody_there_is_told(film: Path) -> None:
-    """A port that nobody listens on, and a name that nobody has, are unavailable at once."""
+    """A port with no listener, and an unknown name, are reported as unavailable at once."""
     del film
     for uri in (f"http://127.0.0.1:{free_port()}/video", "http://phone.invalid/video"):
         with pytest.raises(UnavailableError, match=r"refuses|has no address|does not answer"):
@@ -238,13 +238,13 @@ def test_nobody_there_is_told(film: Path) -> None:
     [("no_image", "no JPEG image within 10 s"), ("mute", "does not answer"), ("drips_head", "does not answer")],
 )
 def test_silence_is_told(film: Path, manner: str, said: str) -> None:
-    """A server that answers nothing, or sends nothing that is an image, is unavailable in the end."""
+    """A server that answers nothing, or sends nothing that is an image, is reported as unavailable in the end."""
     with serving(film, manner) as server, pytest.raises(UnavailableError, match=said):
         open_camera(server.uri, "host", 0)
 
 
 def test_a_password_opens(film: Path) -> None:
-    """Name and password of the address open a server that asks for them, whatever letters they have; wrong ones are told without being shown."""
+    """Name and password in the address open a server that asks for them, whatever characters they have; wrong ones are reported without being shown."""
     with serving(film, "password") as server:
         _, _, rest = server.uri.partition("//")
         with camera_of(f"http://{USER}:a%3Ab%40c%2F%25@{rest}") as camera:
@@ -257,7 +257,7 @@ def test_a_password_opens(film: Path) -> None:
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl here to make a certificate")
 def test_https(film: Path, tmp_path: Path) -> None:
-    """An https server is refused for its own certificate unless that is accepted; http and https mixed up are told."""
+    """An https server with a self-signed certificate is refused unless that is accepted; http and https mixed up are reported."""
     certificate = tmp_path / "both.pem"
     key = tmp_path / "key.pem"
     request = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=phone"]
@@ -275,7 +275,7 @@ def test_https(film: Path, tmp_path: Path) -> None:
 
 
 def test_it_ends_at_once_and_leaves_nothing(film: Path) -> None:
-    """Closing twice is harmless, is not held up by a server that hangs, and leaves no thread."""
+    """Closing twice is harmless, is not delayed by a server that hangs, and leaves no thread."""
     with serving(film, "hangs") as server:
         camera = open_camera(server.uri, "host", 0)
         assert isinstance(camera, HttpCamera)
@@ -286,7 +286,7 @@ def test_it_ends_at_once_and_leaves_nothing(film: Path) -> None:
 
 
 def test_a_board_and_a_phone_are_paired(tmp_path: Path) -> None:
-    """phone-host pairs a replay board with an HTTP camera that shows the same film, and its report tells the camera's figures."""
+    """phone-host pairs a replay board with an HTTP camera that shows the same film, and its report has the camera's figures."""
     fps, out = 4, tmp_path / "out"
     film = write_film(tmp_path / "film", 100)
     link = f"ipc://{tmp_path}/board"
@@ -305,14 +305,14 @@ def test_a_board_and_a_phone_are_paired(tmp_path: Path) -> None:
     assert own["jitter_ms"] >= 0
     assert own["stamp_uncertainty_ms"] == pytest.approx(2 + own["jitter_ms"], abs=0.002)
     assert own["period_ms"] == pytest.approx(1000 / fps, rel=0.4)
-    # The server sends at the moment of the replay's exposure; an image that is held up by half a period has another partner.
+    # The server sends at the replay's moment of exposure; an image delayed by half a period gets another partner.
     agree = [left == right for left, right in saved_numbers(out)]
     assert sum(agree) > len(agree) / 2
     assert all(abs(ledger["time_skew_ns"]) <= 125_000_000 for ledger in ledgers(out))
 
 
 def test_a_phone_whose_latency_nobody_measured_makes_a_warning(tmp_path: Path) -> None:
-    """Before a moving scene the log, the report and the summary say that stamps of an uncalibrated phone make depth wrong, and name calibrate-time."""
+    """With a moving scene the log, the report and the summary say that stamps of an uncalibrated phone make depth wrong, and name calibrate-time."""
     fps, link = 20, f"ipc://{tmp_path}/board"
     film = write_moving_film(tmp_path / "moving", 100, 6)
     with (
@@ -333,7 +333,7 @@ def test_a_phone_whose_latency_nobody_measured_makes_a_warning(tmp_path: Path) -
 
 
 def test_the_doctor_looks_at_a_phone(film: Path, tmp_path: Path) -> None:
-    """phone-host doctor tells what a server gives, or why it gives nothing."""
+    """phone-host doctor says what a server gives, or why it gives nothing."""
     with serving(film, "plain") as server, host(["doctor", "--camera", server.uri], tmp_path, "sound") as doctor:
         doctor.wait()
         assert "160x120 every" in doctor.out.read_text()
@@ -343,7 +343,7 @@ def test_the_doctor_looks_at_a_phone(film: Path, tmp_path: Path) -> None:
 
 
 def test_an_absent_phone_ends_the_run(tmp_path: Path) -> None:
-    """phone-host run without its own camera ends at once with exit 3 and one line that names the address and not the password."""
+    """If its own camera is missing, phone-host run ends at once with exit 3 and one line that names the address but not the password."""
     uri = f"http://me:secret@127.0.0.1:{free_port()}/video"
     with host(["run", "--camera", uri, "--link", f"ipc://{tmp_path}/board"], tmp_path) as receiver:
         assert receiver.wait() == 3

@@ -1,4 +1,4 @@
-"""Images that would take gigabytes, from a board, an HTTP camera and files: refused by name, the memory stays, the run goes on."""
+"""Images that would take gigabytes, from a board, an HTTP camera and files: refused by name, memory stays normal, the run goes on."""
 
 import json
 import subprocess
@@ -25,7 +25,7 @@ PNG = PixelFormat.PNG
 
 @cache
 def bomb_frames() -> list[Lie]:
-    """Everything that claims or takes more than an image of 640x480."""
+    """All images that claim or take more than an image of 640x480."""
     texts = bombs.chunk(b"zTXt", b"a\0\0" + bombs.packed_zeros(7)) * 300
     large = bombs.black_png(12_000, 12_000)
     return [
@@ -46,7 +46,7 @@ def bomb_frames() -> list[Lie]:
 
 
 def peak_mb(program: Program) -> float:
-    """The most resident memory that a program ever had."""
+    """The peak resident memory of a program."""
     status = Path(f"/proc/{program.process.pid}/status").read_text()
     return int(status.split("VmHWM:")[1].split()[0]) / 1024
 
@@ -64,7 +64,7 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(
     film: Path, folder: Path, lies: Sequence[Lie], options: Sequence[str], size_px: tuple[int, int] | None = None
 ) -> tuple[float, dict[str, object], str]:
-    """Let a board show its film and its lies for a while; gives the host's peak in MB, its report and its log."""
+    """Let a board show its film and its lies for a while; return the host's peak in MB, its report and its log."""
     link, out = f"ipc://{folder}/link", folder / "out"
     camera = f"replay:{film}?fps={FPS}&loop=1"
     receiving = ["run", "--link", link, "--camera", camera, "--out", str(out), "--save-every", "0", "--json", *options]
@@ -81,7 +81,7 @@ def run(
 
 @pytest.mark.parametrize("options", [["--rectified", "--disparities", "16", "--matcher", "block"], []])
 def test_bombs_from_a_board(film: Path, tmp_path: Path, options: list[str]) -> None:
-    """A host that gets a bomb with every other frame pairs the others, counts each by its reason, and needs no more memory than without; its log stays short."""
+    """A host that gets a bomb with every other frame pairs the others, counts each bomb by its reason, and uses no more memory than without; its log stays short."""
     normal, quiet = (tmp_path / name for name in ("normal", "quiet"))
     for folder in (normal, quiet):
         folder.mkdir()
@@ -114,7 +114,7 @@ def test_a_board_that_claims_a_camera_of_a_bombs_size(film: Path, tmp_path: Path
 
 
 def test_corrupt_frames_are_counted_and_nothing_is_printed(film: Path, tmp_path: Path) -> None:
-    """JPEGs that are cut and closed in the middle are spoiled by name; libjpeg's words reach stderr in no other way than the log's."""
+    """JPEGs that are cut and closed in the middle are spoiled by name; libjpeg's messages reach stderr only through the log."""
     content = (film / "0.jpg").read_bytes()
     cut = content[: len(content) // 2] + b"\xff\xd9"
     _, report, log = run(film, tmp_path, [Lie(cut)], [])
@@ -148,13 +148,13 @@ def test_files_beyond_the_limit(tmp_path: Path, suffix: str) -> None:
         assert done.returncode == 4, done.stderr
         [line] = [line for line in done.stderr.splitlines() if "error" in line]
         assert size in line
-        if arguments[0] != "run" or suffix != ".jpg":  # no link takes 30000 px: that is told first
+        if arguments[0] != "run" or suffix != ".jpg":  # no link takes 30000 px: that is reported first
             assert "the limit is 64 MPx" in line
         assert "left" in line
 
 
 def test_a_higher_limit_is_taken(tmp_path: Path) -> None:
-    """--max-megapixels decides, from the option or the environment."""
+    """--max-megapixels sets the limit, from the option or the environment."""
     left, right = tmp_path / "left.png", tmp_path / "right.png"
     for path in (left, right):
         path.write_bytes(bombs.black_png(1200, 1000))
@@ -165,7 +165,7 @@ def test_a_higher_limit_is_taken(tmp_path: Path) -> None:
 
 
 def test_honest_images_that_fit_no_rig_end_the_run(film: Path, tmp_path: Path) -> None:
-    """Two cameras of different size are no lie but no rectified pair either: after ten pairs the run ends with both sizes and the remedy."""
+    """Two cameras of different size are no lie, but no rectified pair either: after ten pairs the run ends with both sizes and the remedy."""
     other = tmp_path / "other"
     other.mkdir()
     for number in range(4):

@@ -1,4 +1,4 @@
-"""Two real processes whose cameras are out of step: the phase is reported, and steered away where that is asked for."""
+"""Two real processes whose cameras are out of phase: the phase is reported, and steered to 0 on request."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ def film(folder: Path, images: int = 20) -> Path:
 
 @pytest.mark.parametrize(("arguments", "most_ms"), [([], 22.0), (["--align-phase"], 4.0)])
 def test_cameras_out_of_step_are_steered(arguments: list[str], most_ms: float, tmp_path: Path) -> None:
-    """Pairs of two cameras 21 ms out of step keep that skew, and the report says so; with --align-phase it falls below 4 ms."""
+    """Pairs of two cameras 21 ms out of phase keep that skew, and the report says so; with --align-phase it falls below 4 ms."""
     images, address = film(tmp_path / "film"), f"tcp://127.0.0.1:{free_port()}"
     uri = f"replay:{images}?fps={FPS}&loop=1"
     out = tmp_path / "out"
@@ -46,7 +46,7 @@ def test_cameras_out_of_step_are_steered(arguments: list[str], most_ms: float, t
 
 
 def test_the_boards_image_is_taken_to_the_hosts_moment(tmp_path: Path) -> None:
-    """With --interpolate every pair but perhaps the first passes through that stage, its cost stands beside the others, and the delays still add up."""
+    """With --interpolate every pair except perhaps the first passes through that stage, its cost is listed beside the others, and the delays still add up."""
     images, address = film(tmp_path / "film"), f"tcp://127.0.0.1:{free_port()}"
     uri = f"replay:{images}?fps={FPS}&loop=1"
     out = tmp_path / "out"
@@ -56,7 +56,7 @@ def test_the_boards_image_is_taken_to_the_hosts_moment(tmp_path: Path) -> None:
             assert running.wait() == 0, running.stderr
             report = running.json()
     records = ledgers(out)
-    # Reading the clock twice takes a microsecond, decoding and bending an image at least a hundred.
+    # Reading the clock twice takes a microsecond; decoding and warping an image takes at least a hundred.
     assert sum(record["stages_ns"]["interpolate"] > 50_000 for record in records) >= len(records) - 1
     assert all(sum(record["stages_ns"].values()) <= record["processing_ns"] for record in records)
     assert report["stages_ms"]["interpolate"]["p50"] > 0

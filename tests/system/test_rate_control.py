@@ -1,4 +1,4 @@
-"""The board lowers its camera's rate on a cable that is too slow, says so, and raises it again; nothing is lost from the account, no pair is wrong."""
+"""The board lowers its camera's rate on a cable that is too slow, says so, and raises it again; every frame is accounted for, no pair is wrong."""
 
 import json
 import socket
@@ -37,13 +37,13 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, int]:
 
 
 def rungs(program: Program) -> list[int]:
-    """The rungs to which a program says that the camera went."""
+    """The rungs that a program says the camera switched to."""
     steps = [line for line in program.stderr.splitlines() if "camera_stepped" in line]
     return [int(word.partition("=")[2]) for line in steps for word in line.split() if word.startswith("rung=")]
 
 
 def steps(out: Path) -> list[int]:
-    """How many periods of the film lie between the board's frames of each two pairs."""
+    """How many periods of the film lie between the board's frames of consecutive pairs."""
     exposed = [ledger["exposed_ns"] for ledger in ledgers(out)] if lines(out / "delays.jsonl") else []
     return [round((after - before) * FPS / 1e9) for before, after in pairwise(exposed)]
 
@@ -61,7 +61,7 @@ def check_account(out: Path, report: Any, account: Any) -> None:
 
 
 def test_the_rate_follows_the_line(film: tuple[str, int], tmp_path: Path) -> None:
-    """On a line for half of the frames the camera goes to half its rate, where none is replaced; on a fast one it is back at the whole, in one session."""
+    """On a line for half of the frames the camera drops to half its rate, and no frame is replaced; on a fast line it returns to the full rate, in one session."""
     uri, largest_bytes = film
     out = tmp_path / "out"
     slow_bytes_per_s = 1.15 * largest_bytes * FPS / 2
@@ -96,11 +96,11 @@ def test_the_rate_follows_the_line(film: tuple[str, int], tmp_path: Path) -> Non
 
 
 class TwoSizes(ReplayCamera):
-    """A replay that can show each image at half of its size: what a camera does that puts four pixels into one.
+    """A replay that can show each image at half its size: like a camera that bins four pixels into one.
 
     Args:
         folder: numbered images.
-        small: the same at half of their size.
+        small: the same at half their size.
     """
 
     def __init__(self, folder: Path, small: Path, now_ns: int) -> None:
@@ -117,7 +117,7 @@ class TwoSizes(ReplayCamera):
         self._shows_small = mode.size_px == self.offers.sizes_px[1]
 
     def read(self, now_ns: int) -> list[Grab]:
-        """Both films go on; one of them is seen."""
+        """Both films go on; one of them is shown."""
         both = super().read(now_ns), self._small.read(now_ns)
         return both[self._shows_small]
 
@@ -142,7 +142,7 @@ def two_sizes(film: Path, small: Path, uri: str) -> Iterator[Agent]:
 
 
 def test_smaller_images_are_paired_and_enlarged(film: tuple[str, int], tmp_path: Path) -> None:
-    """On a line for half of the bytes the camera gives half of the size; the host pairs those images at the full rate and enlarges them, none is refused."""
+    """On a line for half of the bytes the camera halves its image size; the host pairs those images at the full rate and enlarges them; none is refused."""
     uri, largest_bytes = film
     folder = Path(uri.removeprefix("replay:").partition("?")[0])
     small = tmp_path / "small"
@@ -174,7 +174,7 @@ def test_smaller_images_are_paired_and_enlarged(film: tuple[str, int], tmp_path:
 
 
 def test_without_leave_the_rate_stays(film: tuple[str, int], tmp_path: Path) -> None:
-    """A camera whose rate may not be lowered is left as it is on however slow a line; frames are replaced on the board."""
+    """A camera whose rate may not be lowered is left alone however slow the line; frames are replaced on the board."""
     uri, largest_bytes = film
     out = tmp_path / "out"
     with PtyLine(tmp_path, bytes_per_s=largest_bytes * FPS / 4, delay_ns=1_000_000) as line:

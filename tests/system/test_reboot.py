@@ -1,4 +1,4 @@
-"""A board that boots anew has another clock; a board-agent that is merely started again has the same one."""
+"""A board that reboots has another clock; a board-agent that is merely restarted has the same one."""
 
 import socket
 import threading
@@ -18,7 +18,7 @@ from tests.support.unkept import Unkept
 
 @contextmanager
 def life(folder: Path, address: str, boot_id: str) -> Iterator[None]:
-    """One life of a board-agent, on a machine of that boot."""
+    """One life of a board-agent, on a machine with this boot id."""
     camera = open_camera(f"replay:{folder}?fps=20&loop=1", "board", now.monotonic_ns())
     link = open_link(parse_link(address, listens_by_default=True))
     reader, writer = socket.socketpair()
@@ -35,7 +35,7 @@ def life(folder: Path, address: str, boot_id: str) -> Iterator[None]:
 
 
 def test_another_boot_is_another_clock(tmp_path: Path) -> None:
-    """The host goes on with what it knows of the clock when the process comes back, and begins anew when the machine was booted."""
+    """When the process comes back, the host keeps what it knows of the clock; when the machine has rebooted, it begins anew."""
     folder, address = tmp_path / "film", f"ipc://{tmp_path}/board"
     folder.mkdir()
     (folder / "0.jpg").write_bytes(jpeg())

@@ -1,4 +1,4 @@
-"""What a run says of its queue and of time, with real processes: a slow line, a moving scene, a terminal."""
+"""What a run reports of its queue and of time, with real processes: a slow line, a moving scene, a terminal."""
 
 import os
 import pty
@@ -13,7 +13,7 @@ from tests.support.pty_line import PtyLine
 
 
 def test_a_slow_line_starves_the_processor(tmp_path: Path) -> None:
-    """Over a line that carries a fraction of the cameras' rate the report blames the link, and what it asks for is more than the line gives."""
+    """Over a line that carries a fraction of the cameras' rate the report blames the link, and what it asks for exceeds what the line carries."""
     film = f"replay:{write_film(tmp_path / 'film', 200)}?fps=20&loop=1"
     with PtyLine(tmp_path, bytes_per_s=25_000, delay_ns=300_000) as line:
         board_uri, host_uri = line.uris
@@ -31,7 +31,7 @@ def test_a_slow_line_starves_the_processor(tmp_path: Path) -> None:
 
 
 def test_skew_and_motion_make_a_warning_and_rest_makes_none(tmp_path: Path) -> None:
-    """With cameras of unlike rates before a moving scene the run warns in its log and its report; before a still one it does not."""
+    """With cameras of unlike rates and a moving scene the run warns in its log and its report; with a still scene it does not."""
     moving = write_moving_film(tmp_path / "moving", 100, 6)
     still = write_moving_film(tmp_path / "still", 2, 0)
     doubted = {}
@@ -52,7 +52,7 @@ def test_skew_and_motion_make_a_warning_and_rest_makes_none(tmp_path: Path) -> N
         doubted[name] = [warning["doubt"] for warning in report["warnings"]]
         assert ("depth_doubtful" in receiver.stderr) is (name == "moving")
         if name == "moving":
-            # 6 px in 1/20 s are 120 px/s, but for the moments at which it turns or a pair is left out.
+            # 6 px in 1/20 s are 120 px/s, except when the motion turns or a pair is left out.
             assert 60 < report["image_motion_px_per_s"] < 240
         else:
             assert report["image_motion_px_per_s"] < 5
@@ -61,7 +61,7 @@ def test_skew_and_motion_make_a_warning_and_rest_makes_none(tmp_path: Path) -> N
 
 
 def test_the_terminal_shows_regime_and_warning(tmp_path: Path) -> None:
-    """In a terminal the live view says who waits for whom, and warns in words; processing's stages and the clock's hard bound stand beside."""
+    """In a terminal the live view says who waits for whom, and warns in words; the stages of processing and the clock's hard bound are shown beside."""
     film, link = write_moving_film(tmp_path / "moving", 100, 6), f"ipc://{tmp_path}/link"
     out = tmp_path / "out"
     command = [sys.executable, "-P", "-m", "phone_host.cli", "run", "--camera", f"replay:{film}?fps=15&loop=1"]

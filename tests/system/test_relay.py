@@ -1,4 +1,4 @@
-"""The emulated line as a process, measured by plain sockets and terminals: nothing of our protocol takes part."""
+"""The emulated line as a process, measured with plain sockets and terminals: our protocol is not involved."""
 
 import os
 import socket
@@ -48,7 +48,7 @@ def line(kind: str, profile: Profile, folder: Path) -> Iterator[tuple[RelayProce
 
 
 def sent_all(descriptor: int, data: bytes) -> threading.Thread:
-    """Write it all in a thread."""
+    """Write all of it in a thread."""
 
     def write() -> None:
         rest = memoryview(data)
@@ -61,7 +61,7 @@ def sent_all(descriptor: int, data: bytes) -> threading.Thread:
 
 
 def read_all(descriptor: int, count: int, came: Callable[[int], None] = lambda _: None) -> bytes:
-    """Read so many bytes; `came` is told how many there are so far."""
+    """Read this many bytes; `came` is told how many there are so far."""
     data = bytearray()
     while len(data) < count:
         block = os.read(descriptor, 65536)
@@ -73,7 +73,7 @@ def read_all(descriptor: int, count: int, came: Callable[[int], None] = lambda _
 
 @pytest.mark.parametrize("kind", ["tcp", "ipc", "serial"])
 def test_a_line_that_adds_nothing_gives_every_byte_both_ways(kind: str, tmp_path: Path) -> None:
-    """A megabyte of every byte value comes out as it went in, in both directions, and the account says so."""
+    """A megabyte of all byte values comes out unaltered in both directions, and the account says so."""
     data = bytes(range(256)) * 4096
     with line(kind, NOTHING, tmp_path) as (relay, board, host):
         for source, target in ((board, host), (host, board)):
@@ -86,9 +86,9 @@ def test_a_line_that_adds_nothing_gives_every_byte_both_ways(kind: str, tmp_path
 
 @pytest.mark.parametrize("name", ["bluetooth", "usb-serial", "usb-ethernet", "ethernet"])
 def test_the_rate_is_the_profiles(name: str, tmp_path: Path) -> None:
-    """Bytes never come faster than the profile says (beyond what the line holds), and somewhere in the run as fast as it says.
+    """Bytes never arrive faster than the profile allows (beyond what the line holds), and somewhere in the run as fast as it allows.
 
-    The second half waits for a stretch of half a second that reaches 95 % of the rate: a busy machine may take longer, never be faster.
+    The second half waits for a stretch of half a second that reaches 95 % of the rate: a busy machine may take longer, but is never faster.
     """
     profile = NAMED[name]
     stretch_bytes = int(profile.bytes_per_s / 2)
@@ -105,16 +105,16 @@ def test_the_rate_is_the_profiles(name: str, tmp_path: Path) -> None:
                 lambda count, marks=marks: marks.append((time.monotonic(), count)),  # type: ignore[misc]
             )
             writer.join()
-            # From the first bytes on: what came with them had waited in the line.
+            # Count from the first bytes on: whatever came with them had waited in the line.
             (begun, before), (ended, after) = marks[0], marks[-1]
             rates.append((after - before) / (ended - begun))
-            # A late reader finds at most what the line and the sockets behind it hold at one go.
+            # A late reader finds at most what the line and the sockets behind it hold at once.
             assert after - before <= profile.bytes_per_s * (ended - begun) * 1.01 + profile.held_bytes + 128 * 1024
 
 
 @pytest.mark.parametrize("name", ["bluetooth", "usb-serial", "usb-ethernet", "wifi"])
 def test_the_delay_is_the_profiles(name: str, tmp_path: Path) -> None:
-    """A single byte never arrives before the profile's delay, and some come within that delay plus jitter and 1 ms."""
+    """A single byte never arrives before the profile's delay, and some arrive within that delay plus jitter and 1 ms."""
     profile = replace(NAMED[name], stall_share=0.0)
     byte_s = 1 / profile.bytes_per_s
     late_s: list[float] = []
@@ -130,7 +130,7 @@ def test_the_delay_is_the_profiles(name: str, tmp_path: Path) -> None:
 
 
 def test_a_reader_that_does_not_read_is_felt_by_the_writer(tmp_path: Path) -> None:
-    """The line holds little: a writer whose peer does not read can put in no more than queue and buffers take."""
+    """The line holds little: if its peer does not read, a writer can put in no more than queue and buffers hold."""
     profile = NAMED["bluetooth"]
     with line("tcp", profile, tmp_path) as (_, board, host):
         with socket.socket(fileno=os.dup(board)) as board_socket:
@@ -144,13 +144,13 @@ def test_a_reader_that_does_not_read_is_felt_by_the_writer(tmp_path: Path) -> No
                 quiet_since = time.monotonic()
             except BlockingIOError:
                 time.sleep(0.01)
-            # Its own buffer and three of the relay's and the reader's (the reader's as the system sizes it), and the line.
+            # The limit: its own buffer, three of the relay's and the reader's (the latter as the system sizes it), and the line.
             assert taken < 1_000_000
         assert host >= 0
 
 
 def test_the_end_of_one_side_is_told_to_the_other_behind_the_last_byte(tmp_path: Path) -> None:
-    """A side that writes and closes: the other reads all of it, then the end; as over a cable."""
+    """If one side writes and closes, the other reads all of it and then the end, as over a cable."""
     profile = NAMED["wifi"]
     with line("tcp", profile, tmp_path) as (_, board, host):
         os.write(board, b"goodbye" * 1000)
@@ -164,7 +164,7 @@ def test_the_end_of_one_side_is_told_to_the_other_behind_the_last_byte(tmp_path:
 
 @pytest.mark.parametrize("kind", ["tcp", "ipc"])
 def test_a_host_that_comes_before_the_board_is_kept_waiting(kind: str, tmp_path: Path) -> None:
-    """While nobody listens at the board's end a connection is not closed, so that the host sees no peer that hangs up; it serves once the board is there."""
+    """While nobody listens at the board's end, a connection stays open, so that the host sees no peer hang up; it carries data once the board is there."""
     family = socket.AF_INET if kind == "tcp" else socket.AF_UNIX
     with socket.socket(family) as board, socket.socket(family) as host:
         board.bind(("127.0.0.1", 0) if kind == "tcp" else str(tmp_path / "board"))

@@ -1,4 +1,4 @@
-"""Either side is killed and comes back, in any order: the stream returns, nothing wrong is paired, everything is counted."""
+"""Either side is killed and comes back, in any order: the stream returns, nothing is paired wrongly, everything is counted."""
 
 import signal
 from pathlib import Path
@@ -10,12 +10,12 @@ from tests.support.numbered import saved_numbers, write_film
 from tests.support.programs import board, free_port, host, ledgers, lines, until
 
 FPS = 20
-FRAMES = 1000  # 50 s: longer than any test here, so that a number names one moment
+FRAMES = 1000  # 50 s: longer than any test here, so that a number identifies one moment
 
 
 @pytest.fixture(scope="module")
 def film(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A replay URI of numbered images; on the clock, so that two replays show the same number at the same time."""
+    """A replay URI of numbered images, clock-paced, so that two replays show the same number at the same time."""
     folder = write_film(tmp_path_factory.mktemp("film") / "numbered", FRAMES)
     return f"replay:{folder}?fps={FPS}&loop=1"
 
@@ -37,7 +37,7 @@ def check_pairs(out: Path) -> None:
 
 
 def check_account(session: dict[str, Any]) -> None:
-    """A session whose end is known adds up on both sides of the link."""
+    """A session that ended in order balances on both sides of the link."""
     assert session["tail"] == "known"
     assert session["grabbed"] == session["sent"] + sum(session["dropped"].values()) + session["waiting"]
     assert session["waiting"] in {0, 1}
@@ -70,7 +70,7 @@ def test_a_killed_board_comes_back_and_the_host_goes_on(film: str, link: str, tm
 
 
 def test_a_killed_host_comes_back_and_the_board_goes_on(film: str, link: str, tmp_path: Path) -> None:
-    """After SIGKILL of the host a new one gets the stream from the same board session, beginning with fresh frames."""
+    """After SIGKILL of the host a new one gets the stream from the same board session, starting with fresh frames."""
     arguments = ["run", "--camera", film, "--link", link]
     with board([*arguments, "--json"], tmp_path) as sender:
         outs = [tmp_path / f"out{number}" for number in range(3)]
@@ -92,7 +92,7 @@ def test_a_killed_host_comes_back_and_the_board_goes_on(film: str, link: str, tm
 
 
 def test_a_host_may_come_long_before_its_board(film: str, link: str, tmp_path: Path) -> None:
-    """A host that was started first finds the board when it comes, and the asked number of pairs ends it with exit 0."""
+    """A host that was started first finds the board when it comes, and ends with exit 0 after the requested number of pairs."""
     out = tmp_path / "out"
     arguments = ["run", "--camera", film, "--link", link]
     with host([*arguments, "--out", str(out), "--pairs", "5", "--save-every", "1"], tmp_path) as receiver:
@@ -104,7 +104,7 @@ def test_a_host_may_come_long_before_its_board(film: str, link: str, tmp_path: P
 
 
 def test_who_listens_may_be_swapped(film: str, link: str, tmp_path: Path) -> None:
-    """With ?bind=1 on the host and ?connect=1 on the board the same stream flows, also after the board was killed."""
+    """With ?bind=1 on the host and ?connect=1 on the board the same stream flows, even after the board was killed."""
     out = tmp_path / "out"
     with host(
         ["run", "--camera", film, "--link", f"{link}?bind=1", "--out", str(out), "--save-every", "1"], tmp_path
@@ -122,7 +122,7 @@ def test_who_listens_may_be_swapped(film: str, link: str, tmp_path: Path) -> Non
 
 
 def test_a_stopped_board_process_is_missed_and_found_again(film: str, link: str, tmp_path: Path) -> None:
-    """A board frozen by SIGSTOP until the host gave it up goes on in the same session; frames it sent into the void are lost, not paired."""
+    """A board frozen by SIGSTOP until the host gave it up continues in the same session; frames it sent meanwhile are lost, not paired."""
     out = tmp_path / "out"
     arguments = ["run", "--camera", film, "--link", link]
     with (
@@ -143,7 +143,7 @@ def test_a_stopped_board_process_is_missed_and_found_again(film: str, link: str,
 
 
 def test_a_second_host_is_told_busy(film: str, link: str, tmp_path: Path) -> None:
-    """While one host is served another one ends with exit 3 and one line that says busy; the first does not lose its stream."""
+    """While one host is served, another ends with exit 3 and one line that says busy; the first keeps its stream."""
     out = tmp_path / "out"
     arguments = ["run", "--camera", film, "--link", link]
     with (
@@ -165,7 +165,7 @@ def test_a_second_host_is_told_busy(film: str, link: str, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("fps", [2, 500])
 def test_a_demand_paced_film_begins_anew_with_its_board(fps: int, link: str, tmp_path: Path) -> None:
-    """After a kill of the board both replays begin again with image 0, whether the film is slower or faster than the clock."""
+    """After the board is killed both replays restart at image 0, whether the film is slower or faster than the clock."""
     folder, out = write_film(tmp_path / "film", 200), tmp_path / "out"
     arguments = ["run", "--camera", f"replay:{folder}?fps={fps}&pace=demand", "--link", link]
     with host([*arguments, "--out", str(out), "--save-every", "1", "--pairs", "60", "--json"], tmp_path) as receiver:

@@ -1,4 +1,4 @@
-"""A pair that went through two processes and a link gives the same disparity, bit for bit, as the same files from disk."""
+"""A pair that passed through two processes and a link gives the same disparity, bit for bit, as the same files from disk."""
 
 import os
 from pathlib import Path
@@ -35,7 +35,7 @@ def real_pairs() -> dict[str, tuple[str, str, int]]:
 @pytest.mark.parametrize("matcher", ["sgbm", "block"])
 @pytest.mark.parametrize("name", real_pairs())
 def test_a_streamed_real_pair_equals_the_same_files(name: str, matcher: str, tmp_path: Path) -> None:
-    """disparity.pfm of `phone-host run` over ZeroMQ and of `phone-host stereo` are the same bytes, and hold a real map."""
+    """`phone-host run` over ZeroMQ and `phone-host stereo` write the same bytes to disparity.pfm, and they hold a real map."""
     left, right, disparities = real_pairs()[name]
     paths, link = [Path(SCAN_DATA) / left, Path(SCAN_DATA) / right], f"ipc://{tmp_path}/link"
     options = ["--rectified", "--disparities", str(disparities), "--matcher", matcher]

@@ -1,4 +1,4 @@
-"""Both programs over a serial cable: numbered images are paired right, through garbage and a pulled cable, and everything is counted."""
+"""Both programs over a serial cable: numbered images are paired correctly, through garbage and a pulled cable, and everything is counted."""
 
 import random
 import signal
@@ -19,20 +19,20 @@ FRAMES = 1000
 
 @pytest.fixture(scope="module")
 def film(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A replay URI of numbered images; on the clock, so that two replays show the same number at the same time."""
+    """A replay URI of numbered images, clock-paced, so that two replays show the same number at the same time."""
     folder = write_film(tmp_path_factory.mktemp("film") / "numbered", FRAMES)
     return f"replay:{folder}?fps={FPS}&loop=1"
 
 
 @pytest.fixture
 def cable(tmp_path: Path) -> Iterator[PtyLine]:
-    """A cable as fast as gadget serial on the board is thought to be."""
+    """A cable as fast as the board's gadget serial is assumed to be."""
     with PtyLine(tmp_path, bytes_per_s=3e6, delay_ns=300_000) as line:
         yield line
 
 
 def check(out: Path, report: Any, account: Any) -> None:
-    """All saved pairs show the same number twice, every ledger adds up, and no frame is unaccounted for."""
+    """Both images of every saved pair show the same number, every ledger adds up, and every frame is accounted for."""
     numbers = saved_numbers(out)
     assert numbers
     assert all(left == right for left, right in numbers)
@@ -48,7 +48,7 @@ def check(out: Path, report: Any, account: Any) -> None:
 
 
 def test_garbage_and_a_pulled_cable(film: str, cable: PtyLine, tmp_path: Path) -> None:
-    """Pairs flow, flow on after a burst of garbage, and come back after the cable was pulled and plugged in; in one session."""
+    """Pairs flow, keep flowing after a burst of garbage, and resume after the cable was pulled and plugged in; all in one session."""
     out = tmp_path / "out"
     board_uri, host_uri = cable.uris
     receiving = ["run", "--camera", film, "--link", host_uri, "--out", str(out), "--save-every", "1", "--json"]
@@ -73,7 +73,7 @@ def test_garbage_and_a_pulled_cable(film: str, cable: PtyLine, tmp_path: Path) -
 
 
 def test_a_line_that_spoils_bytes(film: str, cable: PtyLine, tmp_path: Path) -> None:
-    """On a line that flips a bit or loses bytes now and then, what is paired is right, and lost frames are counted as lost."""
+    """On a line that sometimes flips a bit or loses bytes, every pair is correct, and lost frames are counted as lost."""
     chance = random.Random(5)
 
     def spoil(data: bytes) -> bytes:
@@ -102,7 +102,7 @@ def test_a_line_that_spoils_bytes(film: str, cable: PtyLine, tmp_path: Path) -> 
 
 
 def test_either_side_may_be_killed(film: str, cable: PtyLine, tmp_path: Path) -> None:
-    """A killed board and then a killed host are replaced, and pairs flow again."""
+    """A board and then a host are killed and replaced; pairs flow again each time."""
     board_uri, host_uri = cable.uris
     sending, receiving = ["run", "--camera", film, "--link", board_uri], ["run", "--camera", film, "--link", host_uri]
     outs = [tmp_path / "out1", tmp_path / "out2"]
@@ -126,7 +126,7 @@ def test_either_side_may_be_killed(film: str, cable: PtyLine, tmp_path: Path) ->
 
 @pytest.mark.parametrize(("bytes_per_s", "pairs"), [(11_520, 8), (80_000, 40)], ids=["115200 baud", "80 kB/s"])
 def test_a_slow_line_carries_fresh_frames(film: str, bytes_per_s: float, pairs: int, tmp_path: Path) -> None:
-    """On a line that carries a tenth or the half of the frames each one that is sent was the newest, takes what its bytes need, and finds its partner."""
+    """On a line for a tenth or half of the frames, each frame sent was the newest, takes as long as its bytes need, and finds its partner."""
     out = tmp_path / "out"
     with PtyLine(tmp_path, bytes_per_s=bytes_per_s, delay_ns=5_000_000) as line:
         board_uri, host_uri = line.uris
@@ -147,13 +147,13 @@ def test_a_slow_line_carries_fresh_frames(film: str, bytes_per_s: float, pairs: 
     least = round(min(ledger["bytes"] for ledger in kept) / bytes_per_s * FPS)
     assert min(steps) >= max(
         1, least - 1
-    )  # between two that are sent the others were replaced on the board, none waits in the line
+    )  # frames between two sent ones were replaced on the board; none waits in the line
     (session,) = report["sessions"]
     assert session["dropped"]["replaced"] > 0
 
 
 def test_a_missing_port_is_told_in_one_line(film: str, tmp_path: Path) -> None:
-    """A port that is not there ends either program with exit 3 and one line that names it."""
+    """A missing port ends either program with exit 3 and one line that names it."""
     arguments = ["run", "--camera", film, "--link", f"serial:{tmp_path}/ttyNone"]
     for start, name in ((board, "board"), (host, "host")):
         with start(arguments, tmp_path, name) as program:
@@ -165,7 +165,7 @@ def test_a_missing_port_is_told_in_one_line(film: str, tmp_path: Path) -> None:
 
 
 def test_a_port_that_is_in_use_is_told(film: str, cable: PtyLine, tmp_path: Path) -> None:
-    """A second board on the same port ends with exit 3 and says that it is taken."""
+    """A second board on the same port ends with exit 3 and says that the port is taken."""
     arguments = ["run", "--camera", film, "--link", cable.uris[0], "--log-level", "info"]
     with board(arguments, tmp_path, "board1") as first:
         until(lambda: "serving" in first.stderr, "the first one serves")

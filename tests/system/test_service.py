@@ -1,4 +1,4 @@
-"""board-agent as a service manager sees it, without one: a datagram socket of the test listens in its place."""
+"""board-agent as a service manager sees it, without one: a datagram socket of the test takes its place."""
 
 import select
 import signal
@@ -14,7 +14,7 @@ from tests.support.programs import PATIENCE_S, board, host
 
 @pytest.fixture
 def manager(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
-    """A bound datagram socket, named in the environment of programs as systemd does."""
+    """A bound datagram socket, named in the programs' environment as systemd does it."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
         listener.bind(str(tmp_path / "notify"))
         listener.settimeout(PATIENCE_S)
@@ -24,14 +24,14 @@ def manager(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.
 
 
 def until_told(manager: socket.socket, word: str) -> str:
-    """Read datagrams until one holds the word; gives it."""
+    """Read datagrams until one contains the word; return that one."""
     while word not in (told := manager.recv(4096).decode()):
         pass
     return told
 
 
 def forget(manager: socket.socket) -> None:
-    """Take what waits in the socket: it holds some ten datagrams, and a program that may not wait loses what comes after them."""
+    """Drain the socket: it holds about ten datagrams, and a program that may not wait loses any further ones."""
     while select.select([manager], [], [], 0)[0]:
         manager.recv(4096)
 
@@ -39,7 +39,7 @@ def forget(manager: socket.socket) -> None:
 def test_a_camera_that_comes_late_is_waited_for(
     manager: socket.socket, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With wait_for_camera the agent is ready without a camera, says what is missing, streams once it is there, and says when it stops."""
+    """With wait_for_camera the agent is ready without a camera, says what is missing, streams once the camera is there, and says when it stops."""
     monkeypatch.setenv("BOARD_AGENT_WAIT_FOR_CAMERA", "true")
     film = tmp_path / "film"
     arguments = ["run", "--camera", f"replay:{film}?fps=10&loop=1", "--link", f"ipc://{tmp_path}/link"]
@@ -65,7 +65,7 @@ def test_a_camera_that_comes_late_is_waited_for(
 def test_a_signal_ends_the_wait_for_a_camera(
     manager: socket.socket, number: signal.Signals, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """While the camera is waited for SIGTERM ends with exit 0, Ctrl-C with 130, and the account of no frames is printed."""
+    """During the wait for a camera SIGTERM ends with exit 0, Ctrl-C with 130, and an account of no frames is printed."""
     monkeypatch.setenv("BOARD_AGENT_WAIT_FOR_CAMERA", "1")
     arguments = ["run", "--camera", f"replay:{tmp_path}/none", "--link", f"ipc://{tmp_path}/link", "--json"]
     with board(arguments, tmp_path) as sender:

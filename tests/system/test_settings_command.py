@@ -16,7 +16,7 @@ def settings(module: str, *arguments: str, **environment: str) -> subprocess.Com
 
 
 def test_every_setting_of_the_host_is_an_option_and_named_as_its_origin() -> None:
-    """Each setting that is given as an option shows its value and `--NAME`."""
+    """Each setting given as an option is shown with its value and `--NAME`."""
     given = {
         "link": "serial:/dev/ttyACM0", "camera": "replay:right", "calibration": "rig.yaml", "matcher": "block",
         "tolerance": "5", "fifo": "2:block", "align_phase": "board", "keys": "my-keys", "log_level": "info",
@@ -57,7 +57,7 @@ def test_every_setting_of_the_host_is_an_option_and_named_as_its_origin() -> Non
     ],
 )
 def test_what_run_would_refuse_is_refused(module: str, variable: str, value: str) -> None:
-    """A value of no use ends `settings` with exit 2 and one line that shows it."""
+    """An invalid value ends `settings` with exit 2 and one line that shows it."""
     done = settings(module, **{variable: value})
     assert done.returncode == 2
     assert done.stdout == ""

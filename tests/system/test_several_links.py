@@ -1,4 +1,4 @@
-"""Both programs over two links at once: one is taken away and given back; numbered images are paired right all the while, and all is counted."""
+"""Both programs over two links: one is taken away and given back; numbered images are paired correctly throughout, and everything is counted."""
 
 import signal
 import socket
@@ -23,42 +23,42 @@ from tests.support.programs import board, free_port, host, ledgers, lines, until
 from tests.support.pty_line import PtyLine
 
 FPS = 20
-FRAMES = 2000  # 100 s: longer than any test here, so that a number names one moment
+FRAMES = 2000  # 100 s: longer than any test here, so that a number identifies one moment
 
 
 @pytest.fixture(scope="module")
 def film(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A replay URI of numbered images; on the clock, so that two replays show the same number at the same time."""
+    """A replay URI of numbered images, clock-paced, so that two replays show the same number at the same time."""
     folder = write_film(tmp_path_factory.mktemp("film") / "numbered", FRAMES)
     return f"replay:{folder}?fps={FPS}&loop=1"
 
 
 @pytest.fixture
 def cable(tmp_path: Path) -> Iterator[PtyLine]:
-    """A cable as fast as gadget serial on the board is thought to be."""
+    """A cable as fast as the board's gadget serial is assumed to be."""
     with PtyLine(tmp_path, bytes_per_s=3e6, delay_ns=300_000) as line:
         yield line
 
 
 FAR_AWAY = Profile(name="far away", carrier="tcp", bytes_per_s=0, delay_ns=250_000_000)
-"""So much slower than the cable that the choice between the two never hangs on how busy the machine is."""
+"""So much slower than the cable that the choice between the two never depends on how busy the machine is."""
 
 
 @pytest.fixture
 def network(tmp_path: Path) -> Iterator[tuple[str, str]]:
-    """The board's address on a network that is far away, and where the host reaches it."""
+    """The board's address on a distant network, and the address at which the host reaches it."""
     board_uri = f"tcp://127.0.0.1:{free_port()}"
     with relay_process("tcp", board_uri, tmp_path, FAR_AWAY) as relay:
         yield relay.board, relay.host
 
 
 def with_links(verb: list[str], *links: str) -> list[str]:
-    """Arguments of a program with these links."""
+    """A program's arguments for these links."""
     return [*verb, *(word for link in links for word in ("--link", link))]
 
 
 def carriers(out: Path) -> list[str]:
-    """The links that pairs came over, each once for each time that it took over."""
+    """The links that carried pairs, in order; a link appears once for each time that it took over."""
     names = [ledger["link"] for ledger in ledgers(out)]
     return [name for number, name in enumerate(names) if number == 0 or names[number - 1] != name]
 
@@ -84,7 +84,7 @@ def check(out: Path, report: Any, account: Any) -> None:
 
 
 def test_a_pulled_cable_and_back(film: str, cable: PtyLine, network: tuple[str, str], tmp_path: Path) -> None:
-    """Pairs come over serial, over TCP when the cable is pulled, over serial again when it is back; in one session, each told with its link."""
+    """Pairs come over serial, over TCP when the cable is pulled, and over serial again when it is back; in one session, each reported with its link."""
     out = tmp_path / "out"
     board_uri, host_uri = cable.uris
     board_tcp, host_tcp = network
@@ -117,7 +117,7 @@ def test_a_pulled_cable_and_back(film: str, cable: PtyLine, network: tuple[str, 
 def test_a_line_that_falls_silent_gives_way(
     film: str, cable: PtyLine, network: tuple[str, str], tmp_path: Path
 ) -> None:
-    """A cable that swallows all bytes without a word gives way to TCP; no frame is paired twice or wrongly."""
+    """A cable that silently swallows all bytes is replaced by TCP; no frame is paired twice or wrongly."""
     out = tmp_path / "out"
     board_uri, host_uri = cable.uris
     board_tcp, host_tcp = network
@@ -140,7 +140,7 @@ def test_a_line_that_falls_silent_gives_way(
 
 
 def test_two_links_of_one_kind_and_one_that_comes_later(film: str, network: tuple[str, str], tmp_path: Path) -> None:
-    """Two addresses of one board have names of their own; a link whose device appears during the run is taken into use."""
+    """Two addresses of one board have names of their own; a link whose device appears during the run is used from then on."""
     out = tmp_path / "out"
     board_tcp, host_tcp = network
     serial = (f"serial:{tmp_path}/ttyBoard", f"serial:{tmp_path}/ttyHost")
@@ -178,14 +178,14 @@ def test_two_boards_are_refused(film: str, tmp_path: Path) -> None:
             assert "different boards" in told[0]
             assert "Traceback" not in receiver.stderr
         with host(with_links(["run", "--camera", film, "--pairs", "3"], links[1]), tmp_path, "host2") as other:
-            assert other.wait() == 0  # the second board was said goodbye to
+            assert other.wait() == 0  # the second board was sent a goodbye
         assert second.process.poll() is None
 
 
 def test_a_board_that_has_forgotten_the_host_is_still_heard_over_other_links(film: str, tmp_path: Path) -> None:
-    """A link on which this machine's key is refused is named in one line and done without while there is another; alone it ends the run with exit 3.
+    """A link that refuses this machine's key is named in one line and skipped while another link is up; if it is the only one, the run ends with exit 3.
 
-    Once the board knows the key that link is up without a restart, though it has been refused before and again meanwhile.
+    Once the board knows the key, that link comes up without a restart, although it was refused before and again meanwhile.
     """
     ipc, tcp = f"ipc://{tmp_path}/link", f"tcp://127.0.0.1:{free_port()}"
     board_keys, host_keys = acquainted(tmp_path, tcp)
@@ -213,10 +213,10 @@ def test_a_board_that_has_forgotten_the_host_is_still_heard_over_other_links(fil
 
 
 class RepeatingLink(ZeroMqListener):
-    """A transport that delivers every frame twice, if it has room for both."""
+    """A transport that delivers every frame twice if it has room for both."""
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
-        """Hand it over, and once more."""
+        """Send it twice."""
         result = super().send(connection, header, payload)
         if len(payload) and result is SendResult.SENT:
             super().send(connection, header, payload)
@@ -224,7 +224,7 @@ class RepeatingLink(ZeroMqListener):
 
 
 def test_a_frame_that_comes_twice_is_paired_once(film: str, tmp_path: Path) -> None:
-    """What a transport delivers again never reaches pairing: each frame makes one pair, the repetitions are counted, and the account holds."""
+    """What a transport delivers twice never reaches pairing: each frame makes one pair, the repetitions are counted, and the account balances."""
     out = tmp_path / "out"
     ipc = f"ipc://{tmp_path}/link"
     camera = open_camera(film, "board", now.monotonic_ns())
@@ -254,7 +254,7 @@ def test_a_frame_that_comes_twice_is_paired_once(film: str, tmp_path: Path) -> N
 
 @pytest.mark.parametrize("killed", ["board", "host"])
 def test_either_side_may_be_killed(film: str, killed: str, cable: PtyLine, tmp_path: Path) -> None:
-    """A killed board or host is replaced, and pairs flow again over the same two links."""
+    """A board and a host are killed and replaced; pairs flow again over the same two links."""
     board_uri, host_uri = cable.uris
     ipc = f"ipc://{tmp_path}/link"
     sending = with_links(["run", "--camera", film], board_uri, ipc)

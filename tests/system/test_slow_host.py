@@ -1,4 +1,4 @@
-"""A host ten times slower than the camera: the age of pairs stays bounded, the camera is never throttled, each drop is counted."""
+"""A host ten times slower than the camera: the age of pairs stays bounded, the camera is never throttled, every drop is counted."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ PERIOD_NS = 1_000_000_000 // FPS
 
 @pytest.mark.parametrize("fifo", ["1:drop-oldest", "1:drop-newest", "1:block", "3:drop-oldest"])
 def test_pairs_do_not_get_older_on_a_slow_host(fifo: str, tmp_path: Path) -> None:
-    """No pair waits longer than its policy says, the board goes on grabbing at its own pace, and the account closes."""
+    """No pair waits longer than its policy allows, the board keeps grabbing at its own pace, and the account balances."""
     film, link = write_film(tmp_path / "film", 60), f"ipc://{tmp_path}/link"
     uri, policy = f"replay:{film}?fps={FPS}&loop=1", FifoSettings.parse(fifo)
     kept: list[PairLedger] = []
@@ -48,8 +48,8 @@ def test_pairs_do_not_get_older_on_a_slow_host(fifo: str, tmp_path: Path) -> Non
         assert host.run(lambda: False) is EndReason.PAIRS_REACHED
         assert sender.stop() == 0
         account = sender.json()
-    # Age is told by what happened, not by a clock: while a pair waits, at most as many others are finished as the FIFO is deep. In a queue
-    # without bound the last of these twelve would have waited for all the others.
+    # Age is judged by events, not by a clock: while a pair waits, at most as many others are finished as the FIFO is deep. In an
+    # unbounded queue the last of these twelve would have waited for all the others.
     for ledger in kept:
         finished_meanwhile = sum(ledger.queued_ns < other.done_ns <= ledger.dequeued_ns for other in kept)
         assert finished_meanwhile <= policy.depth

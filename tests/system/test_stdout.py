@@ -1,4 +1,4 @@
-"""What is printed to a reader that has gone, or to a full disk."""
+"""Output to a reader that has gone, or to a full disk."""
 
 import os
 import subprocess
@@ -41,7 +41,7 @@ def test_a_full_disk_behind_stdout_is_one_line_and_exit_3(command: list[str]) ->
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 def test_a_reader_that_has_gone_is_no_error(command: list[str]) -> None:
-    """With the pipe's other end closed each command ends with exit 0 and not a word."""
+    """If the pipe's other end is closed, each command ends with exit 0 and without a word."""
     reader, writer = os.pipe()
     os.close(reader)
     try:
@@ -53,7 +53,7 @@ def test_a_reader_that_has_gone_is_no_error(command: list[str]) -> None:
 
 
 def test_the_exit_code_of_a_failed_command_outlives_its_reader() -> None:
-    """Wrong usage stays exit 2 when nobody reads stdout."""
+    """Wrong usage is exit 2 even if nobody reads stdout."""
     reader, writer = os.pipe()
     os.close(reader)
     try:

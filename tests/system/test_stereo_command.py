@@ -44,7 +44,7 @@ def shifted(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("matcher", ["sgbm", "block"])
 def test_a_rectified_pair_with_geometry_gives_all_four_files(shifted: Path, matcher: str) -> None:
-    """Disparity 12 everywhere, depth f b / (d + doffs) = 500 * 0.1 / (12 + 3) = 3.333 m, and --json prints the report."""
+    """Disparity is 12 everywhere, depth is f b / (d + doffs) = 500 * 0.1 / (12 + 3) = 3.333 m, and --json prints the report."""
     done = _phone_host(
         "stereo", shifted / "left.png", shifted / "right.png", "--rectified", "--disparities", 32, "--focal", 500,
         "--baseline", 100, "--doffs", 3, "--center", "99.5,59.5", "--matcher", matcher, "--out", shifted / "o", "--json",
@@ -65,7 +65,7 @@ def test_a_rectified_pair_with_geometry_gives_all_four_files(shifted: Path, matc
 
 
 def test_without_focal_length_there_is_no_cloud_and_the_command_says_so(shifted: Path) -> None:
-    """No cloud.ply is written, one of an earlier run is gone, and stdout names the missing options; one of the user's own ends it with exit 3."""
+    """No cloud.ply is written, that of an earlier run is removed, and stdout names the missing options; if cloud.ply is the user's own, the run ends with exit 3."""
     arguments = [shifted / "left.png", shifted / "right.png", "--rectified", "--disparities", 32]
     first = _phone_host(
         "stereo", *arguments, "--focal", 500, "--baseline", 100, "--center", "99,59", "--out", shifted / "o"
@@ -90,7 +90,7 @@ def test_without_focal_length_there_is_no_cloud_and_the_command_says_so(shifted:
 
 
 def test_16_bit_colour_and_grey_give_the_same_disparity_as_8_bit(shifted: Path) -> None:
-    """A 16-bit colour left image with an 8-bit grey right one matches as the plain pair does."""
+    """A 16-bit colour left image with an 8-bit grey right one matches like the plain pair."""
     left = cv2.imread(str(shifted / "left.png"), cv2.IMREAD_GRAYSCALE)
     assert left is not None
     cv2.imwrite(str(shifted / "deep.png"), np.dstack([left] * 3).astype(np.uint16) * 257)
@@ -180,7 +180,7 @@ def _bad_cases(folder: Path) -> dict[str, tuple[list[object], int, str]]:
 
 
 def test_bad_input_is_one_line_that_names_it_and_the_exit_code_says_whose_fault_it_is(shifted: Path) -> None:
-    """2 for options, 3 for a folder that cannot be had, 4 for bad data; never a traceback."""
+    """2 for options, 3 for an unusable folder, 4 for bad data; never a traceback."""
     for name, (arguments, code, word) in _bad_cases(shifted).items():
         done = _phone_host("stereo", *arguments)
         lines = [line for line in done.stderr.splitlines() if line.startswith("phone-host: error: ")]
@@ -200,7 +200,7 @@ def _scan_data() -> Path:
 
 @pytest.mark.data
 def test_motorcycle_in_metres(tmp_path: Path) -> None:
-    """Middlebury's Motorcycle with its published geometry: the median depth agrees with that of the ground truth to 1 %."""
+    """Middlebury's Motorcycle with its published geometry: the median depth agrees with the ground truth to 1 %."""
     scene = _scan_data() / "middlebury_2014_q" / "Motorcycle"
     images = sorted(path for path in scene.iterdir() if path.suffix == ".png")
     done = _phone_host(

@@ -1,4 +1,4 @@
-"""Shell commands that put two virtual Bluetooth adapters on the air of one guest."""
+"""Shell commands that put two virtual Bluetooth adapters of one guest on the air."""
 
 AIR = """
 modprobe -a hci_vhci rfcomm
@@ -17,7 +17,7 @@ for h in hci0 hci1; do for name in Powered Discoverable; do
     until busctl set-property org.bluez /org/bluez/$h org.bluez.Adapter1 $name b true; do sleep 0.2; done
 done; done 2>/dev/null
 """
-"""Adapters are switched on by the daemon: it refuses one that somebody else has, and does not know what hciconfig does behind its back."""
+"""The daemon switches adapters on: it refuses one that another program has, and does not notice what hciconfig does."""
 
 SWITCH_ON = "for h in hci0 hci1; do until hciconfig $h up && hciconfig $h piscan; do sleep 0.2; done; done 2>/dev/null"
-"""The same without a daemon; they can be found and dialled then."""
+"""The same without a daemon; after this the adapters can be found and dialled."""

@@ -1,4 +1,4 @@
-"""The booted board that all tests here share. `make test-board` builds its image; without one they are skipped."""
+"""The booted board that all tests here share. `make test-board` builds its image; without an image the tests are skipped."""
 
 import shutil
 import subprocess
@@ -20,7 +20,7 @@ CAMERA = f"v4l2:auto?size=320x240&fps={FPS}&readout_ms={READOUT_MS}"
 
 @contextmanager
 def booted(architecture: Architecture, disk: Path | None = None) -> Iterator[Guest]:
-    """A booted board without the package, for the length of a block; skips the test where there is no image of one."""
+    """A booted board without the package, for the length of a block; skips the test if there is no such image."""
     image = image_of(architecture)
     if not shutil.which(image.emulator):
         pytest.skip(f"{image.emulator} is missing: run make test-board")
@@ -45,7 +45,7 @@ def bare_guest() -> Iterator[Guest]:
 
 @pytest.fixture(scope="session")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The package, built from the present sources."""
+    """The package, built from the current sources."""
     built = subprocess.run(
         [ROOT / "deploy" / "board" / "build-deb", tmp_path_factory.mktemp("deb")],
         capture_output=True,
@@ -63,7 +63,7 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Film:
 
 @pytest.fixture(scope="module")
 def guest(bare_guest: Guest, package: Path) -> Guest:
-    """The board with its package installed, its camera's settings given, and its link open to everybody."""
+    """The board with its package installed, its camera configured, and its link open to everybody."""
     bare_guest.install(package)
     bare_guest.configure(CAMERA)
     return bare_guest
@@ -80,5 +80,5 @@ def webcam(guest: Guest, film: Film) -> Iterator[Webcam]:
 
 @pytest.fixture
 def skew(webcam: Webcam) -> Skew:
-    """The truth about pairs: what the webcam knows of its own exposures."""
+    """The ground truth for pairs: the webcam's record of its own exposures."""
     return webcam_skew(webcam.late_ns)

@@ -10,14 +10,14 @@ from tests.vm.guest import Guest
 _FILES: Final = ("tests/__init__.py", "tests/contract/__init__.py", "tests/contract/test_link.py")
 
 _PATIENCE_S: Final = 180
-"""For one condition: three times as long as elsewhere, as the processor is emulated."""
+"""For one condition: three times as long as elsewhere, because the processor is emulated."""
 
 _LIMIT_S: Final = 1500
-"""For all of it: a minute and a half on an idle machine."""
+"""For the whole suite: it takes a minute and a half on an idle machine."""
 
 
 def run_contract(guest: Guest, transport: str) -> str:
-    """Run it on one transport, with the sources of this checkout; fails as it fails.
+    """Run it on one transport, with the sources of this checkout; fails if the suite fails.
 
     Returns:
         The last line of pytest: how many passed, how many were skipped.

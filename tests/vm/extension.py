@@ -1,4 +1,4 @@
-"""Brings the host's end of a line that lies in the guest to a pseudo terminal on this machine, where the host's program runs."""
+"""Brings the host's end of a line in the guest to a pseudo terminal on this machine, where the host's program runs."""
 
 import os
 import pty
@@ -49,7 +49,7 @@ def extension(guest: Guest, *far_end: str) -> Iterator[str]:
 
 
 def _outwards(carrier: "subprocess.Popen[bytes]", master: int, stop: threading.Event) -> None:
-    """From the guest to the terminal; what its buffer cannot take waits."""
+    """Copy from the guest to the terminal; what its buffer cannot take waits."""
     assert carrier.stdout is not None
     while not stop.is_set() and (data := os.read(carrier.stdout.fileno(), 65536)):
         while data and not stop.is_set():
@@ -60,12 +60,12 @@ def _outwards(carrier: "subprocess.Popen[bytes]", master: int, stop: threading.E
 
 
 def _inwards(carrier: "subprocess.Popen[bytes]", master: int, stop: threading.Event) -> None:
-    """From the terminal to the guest; a terminal that nobody has open gives EIO."""
+    """Copy from the terminal to the guest; a terminal that nobody has open gives EIO."""
     assert carrier.stdin is not None
     while not stop.is_set():
         try:
             data = os.read(master, 65536)
-        except OSError:  # nothing there, or nobody
+        except OSError:  # no data, or nobody there
             time.sleep(_IDLE_S / 10)
             continue
         with suppress(BrokenPipeError):

@@ -1,6 +1,6 @@
-"""Runs in the guest: joins a line's host end with stdin and stdout, and opens it again whenever it was lost. Standard library only.
+"""Runs in the guest: joins a line's host end to stdin and stdout, and reopens it whenever it is lost. Standard library only.
 
-The last one dials as a host does, by the product's own code: it finds the board by its name, asks it for the channel, has the connection encrypted.
+The last form dials as a host does, with the product's own code: it finds the board by its name, asks it for the channel, and has the connection encrypted.
 
 far_end.py tty /dev/ttyACM0
 far_end.py rfcomm OWN_ADDRESS BOARD_ADDRESS CHANNEL
@@ -19,7 +19,7 @@ _RETRY_S = 0.1
 
 
 def open_line() -> int:
-    """Open the line; gives its descriptor, non-blocking."""
+    """Open the line; return its descriptor, non-blocking."""
     if sys.argv[1] == "tty":
         descriptor = os.open(sys.argv[2], os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         tty.setraw(descriptor)
@@ -36,7 +36,7 @@ def open_line() -> int:
 
 def dialled(uri: str) -> int:
     """Open the line as a host's link does."""
-    sys.path.insert(0, "/usr/lib/tandemscan")  # where only the guest has it
+    sys.path.insert(0, "/usr/lib/tandemscan")  # only the guest has it
     from common.errors import UnavailableError  # noqa: PLC0415 - from there
     from common.link.factory import open_link, parse_link  # noqa: PLC0415
     from common.link.stream import Opening  # noqa: PLC0415
@@ -52,7 +52,7 @@ def dialled(uri: str) -> int:
 
 
 def join(line: int) -> bool:
-    """Carry bytes both ways until the line is lost; gives whether stdin has ended."""
+    """Carry bytes both ways until the line is lost; return whether stdin has ended."""
     waiting = b""
     while True:
         readers = [line] if waiting else [line, 0]
@@ -72,7 +72,7 @@ def join(line: int) -> bool:
 
 
 def main() -> None:
-    """Go on until stdin ends."""
+    """Carry on until stdin ends."""
     while True:
         try:
             line = open_line()

@@ -1,6 +1,6 @@
-"""A booted board: Debian with its own kernel and systemd in QEMU, reached over ssh, its link's port on this machine.
+"""A booted board: Debian with its own kernel and systemd in QEMU, reached over ssh, with its link's port on this machine.
 
-Two network cards: eth0 for the test's orders and the webcam, eth1 for the board's link alone, so that a test can make the link bad and
+Two network cards: eth0 for the test's commands and the webcam, eth1 for the board's link alone, so that a test can degrade the link and
 nothing else. The disk image is never changed; what a test writes is gone when the guest stops.
 """
 
@@ -26,13 +26,13 @@ OPEN_TO_ALL: Final = f"tcp://*:{LINK_PORT}?insecure=1"
 UNIT: Final = "board-agent"
 
 _BOOT_S: Final = 180.0
-"""Boot takes 11 s on an idle machine, 56 s were seen on a busy one."""
+"""Boot takes 11 s on an idle machine; 56 s were seen on a busy one."""
 
 _COMMAND_LINE: Final = "quiet loglevel=4 panic=-1 mitigations=off nokaslr selinux=0 apparmor=0 audit=0 random.trust_cpu=on net.ifnames=0 systemd.show_status=0"
 
 
 class Architecture(Enum):
-    """What a board's processor is."""
+    """The processor architecture of a board."""
 
     AMD64 = "amd64"
     ARMHF = "armhf"
@@ -40,12 +40,12 @@ class Architecture(Enum):
 
 @dataclass(frozen=True, slots=True)
 class _Machine:
-    """How QEMU plays a board of one architecture.
+    """How QEMU emulates a board of one architecture.
 
     Attributes:
         program: the emulator.
         arguments: machine, processor, memory.
-        command_line: what the kernel is told beside _COMMAND_LINE.
+        command_line: kernel parameters beside _COMMAND_LINE.
     """
 
     program: str
@@ -57,11 +57,11 @@ _MACHINES: Final = {
     Architecture.AMD64: _Machine(
         "qemu-system-x86_64",
         ("-M", "q35", "-accel", "tcg,thread=multi,tb-size=512", "-cpu", "max", "-smp", "2", "-m", "512"),
-        # The HPET counts this machine's nanoseconds. The emulated TSC would be measured against it at boot, wrongly on a busy machine.
-        # The kernel checks its timer by counting ticks in a loop; on a busy machine too few come, and it hangs ("8254 timer not connected").
+        # The HPET counts this machine's nanoseconds. The emulated TSC would be calibrated against it at boot, wrongly on a busy machine.
+        # The kernel checks its timer by counting ticks in a loop; on a busy machine too few arrive, and it hangs ("8254 timer not connected").
         "console=ttyS0 clocksource=hpet tsc=unstable no_timer_check",
     ),
-    # As much memory and as many processors as a BeagleBone Black has; its Python is about as fast (0.7 s for 10^6 rounds of `x += i`).
+    # Memory and processors of a BeagleBone Black; Python is about as fast as there (0.7 s for 10^6 rounds of `x += i`).
     Architecture.ARMHF: _Machine(
         "qemu-system-arm",
         ("-M", "virt,highmem=off", "-accel", "tcg,tb-size=256", "-cpu", "cortex-a15", "-smp", "1", "-m", "512"),
@@ -84,17 +84,17 @@ class Image:
 
     @property
     def emulator(self) -> str:
-        """The program that runs it."""
+        """The emulator that runs it."""
         return _MACHINES[self.architecture].program
 
     @property
     def built(self) -> bool:
-        """Whether all of them are there."""
+        """Whether all files are there."""
         return all((self.folder / name).is_file() for name in ("rootfs.ext4", "vmlinuz", "initrd.img", "key"))
 
 
 def image_of(architecture: Architecture) -> Image:
-    """The image that .ci/board has built from the present scripts; its folder is named by them, so that a changed one never meets an old image."""
+    """The image that .ci/board has built from the current scripts; its folder is named after them, so that a changed script never meets an old image."""
     named = subprocess.run([_ROOT / ".ci" / "board", "folder"], capture_output=True, text=True, check=True)
     return Image(Path(named.stdout.strip()) / architecture.value, architecture)
 
@@ -105,7 +105,7 @@ class Guest:
     Args:
         image: what to boot.
         folder: for console, pid and ssh's socket.
-        disk: an image with a file system of its own, /dev/vdb in the guest; never changed either.
+        disk: an image with a file system of its own, /dev/vdb in the guest; it too is never changed.
     """
 
     def __init__(self, image: Image, folder: Path, disk: Path | None = None) -> None:
@@ -118,11 +118,11 @@ class Guest:
 
     @property
     def link(self) -> str:
-        """Where a host on this machine reaches the board's link."""
+        """The address at which a host on this machine reaches the board's link."""
         return f"tcp://127.0.0.1:{self.link_port}"
 
     def start(self) -> None:
-        """Boot, and wait until it takes orders."""
+        """Boot, and wait until the board accepts commands."""
         self._key.write_bytes((self._image.folder / "key").read_bytes())
         self._key.chmod(0o600)
         forwarded = ",".join(
@@ -166,11 +166,11 @@ class Guest:
 
     @property
     def boot_id(self) -> str:
-        """Id of this boot of the guest; empty while it cannot be asked."""
+        """Id of this boot of the guest; empty while the guest cannot be asked."""
         return self._ssh("cat /proc/sys/kernel/random/boot_id").stdout.strip()
 
     def reboot(self) -> None:
-        """Shut down in order, boot again, and wait until it takes orders."""
+        """Shut down properly, boot again, and wait until the board accepts commands."""
         before = self.boot_id
         self.code("systemctl --no-block reboot")
         self._await_boot(after=before)
@@ -178,19 +178,19 @@ class Guest:
     def suspend(self) -> None:
         """Suspend to memory: its CLOCK_MONOTONIC stands still.
 
-        vhci_hcd refuses with a device on its bus, and for a moment after that was pulled. QEMU 7.2 does it well once.
+        vhci_hcd refuses with a device on its bus, and for a moment after one was pulled. QEMU 7.2 does this correctly only once.
         """
         order = "echo deep >/sys/power/mem_sleep; until echo mem >/sys/power/state; do sleep 0.2; done"
         self.sh(f"systemd-run --quiet --no-block sh -c {shlex.quote(order)}")
         until(lambda: self.tell_emulator("query-status")["status"] == "suspended", "the board sleeps")
 
     def wake(self) -> None:
-        """End the sleep, and wait until the board takes orders."""
+        """End the sleep, and wait until the board accepts commands."""
         self.tell_emulator("system_wakeup")
         until(lambda: self.code("true") == 0, "the board is awake")
 
     def tell_emulator(self, order: str) -> dict[str, Any]:
-        """Give the emulator an order without arguments, in QEMU's machine protocol; gives its answer."""
+        """Send the emulator a command without arguments, in QEMU's machine protocol; return its answer."""
         with socket.socket(socket.AF_UNIX) as connection:
             connection.settimeout(PATIENCE_S)
             connection.connect(str(self._folder / "orders"))
@@ -201,7 +201,7 @@ class Guest:
                     speech.write(json.dumps({"execute": word}) + "\n")
                     speech.flush()
                     while "return" not in (answer := json.loads(speech.readline())):
-                        assert "event" in answer, answer  # it tells of a sleep unasked, too
+                        assert "event" in answer, answer  # it reports a sleep unasked, too
                 return dict(answer["return"])
 
     def _await_boot(self, after: str) -> None:
@@ -227,13 +227,13 @@ class Guest:
             self._process = None
 
     def sh(self, command: str) -> str:
-        """Run a shell command as root; gives its output, fails if it fails."""
+        """Run a shell command as root; return its output; fails if the command fails."""
         done = self._ssh(command)
         assert done.returncode == 0, f"{command}: exit {done.returncode}\n{done.stdout}{done.stderr}"
         return done.stdout
 
     def code(self, command: str) -> int:
-        """Run a shell command as root; gives its exit code."""
+        """Run a shell command as root; return its exit code."""
         return self._ssh(command).returncode
 
     def put(self, source: Path, folder: str) -> None:
@@ -259,7 +259,7 @@ class Guest:
         self.sh(f"dpkg -i /var/tmp/{package.name}")
 
     def configure(self, camera: str, *links: str, secured: bool = False) -> None:
-        """Set the service's camera and its links, by default one on every network, open to everybody unless it is to be secured, and restart it."""
+        """Set the service's camera and links (by default one on every network, open to everybody unless it should be secured), and restart it."""
         links = links or (f"tcp://*:{LINK_PORT}" if secured else OPEN_TO_ALL,)
         edits = (f'camera = "{camera}"', f"link = {json.dumps(links)}")
         script = " ".join(f"-e {shlex.quote(f's|^{edit.split()[0]} = .*|{_literal(edit)}|')}" for edit in edits)
@@ -267,15 +267,15 @@ class Guest:
         assert self.code(f"systemctl restart {UNIT}") == 0, f"{camera}, {links}: {self.journal()[-2000:]}"
 
     def show(self, name: str, unit: str = UNIT) -> str:
-        """Give one property of a unit, such as ActiveState or StatusText."""
+        """Return one property of a unit, such as ActiveState or StatusText."""
         return self.sh(f"systemctl show {unit} -p {name} --value").strip()
 
     def journal(self, unit: str = UNIT) -> str:
-        """Everything a unit has logged, this boot."""
+        """Return everything a unit has logged in this boot."""
         return self.sh(f"journalctl -b -u {unit} -o cat --no-pager")
 
     def until(self, name: str, wanted: str, what: str) -> None:
-        """Wait until a property of the service holds a text."""
+        """Wait until a property of the service contains a text."""
         deadline = time.monotonic() + PATIENCE_S
         while wanted not in (found := self.show(name)):
             late = (
@@ -293,7 +293,7 @@ class Guest:
         return GuestClock(self._ssh_command(f"python3 -u -c {shlex.quote(_ECHO)}"))
 
     def popen(self, command: str) -> "subprocess.Popen[bytes]":
-        """Start a command that goes on; the caller ends it."""
+        """Start a command that keeps running; the caller ends it."""
         return subprocess.Popen(self._ssh_command(command), stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def _ssh(self, command: str) -> "subprocess.CompletedProcess[str]":
@@ -325,7 +325,7 @@ _ECHO: Final = "import sys, time\nfor _ in sys.stdin: print(time.monotonic_ns())
 
 
 class GuestClock:
-    """Reads the guest's CLOCK_MONOTONIC from outside: the truth that the product's own estimate is checked against.
+    """Reads the guest's CLOCK_MONOTONIC from outside: the truth against which the product's own estimate is checked.
 
     Args:
         command: starts the echo.
@@ -338,7 +338,7 @@ class GuestClock:
         """Measure guest's clock minus this machine's.
 
         Returns:
-            The offset and its greatest error, ns: half of the shortest of 50 round trips.
+            The offset and its maximum error, ns: half of the shortest of 50 round trips.
         """
         readings = []
         for _ in range(50):

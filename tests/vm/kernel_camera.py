@@ -1,4 +1,4 @@
-"""Runs in the guest with the installed package's code: opens a camera that is no hardware (vivid, v4l2loopback), follows orders, prints as JSON what came.
+"""Runs in the guest with the installed package's code: opens a camera without hardware (vivid, v4l2loopback), follows orders, prints what came as JSON.
 
 kernel_camera.py OPTIONS ORDER...
     OPTIONS       of the camera's URI
@@ -23,7 +23,7 @@ _PATIENCE_S = 120
 
 
 def read(camera: Camera) -> list[Frame]:
-    """Wait as the agent does, for a moment at most; gives the sound frames."""
+    """Wait as the agent does, for a moment at most; return the sound frames."""
     poller = select.poll()
     if camera.pollable is not None:
         poller.register(camera.pollable, select.POLLIN | select.POLLPRI)
@@ -50,7 +50,7 @@ def main() -> None:
         health = health_values(camera.health)
         camera.close()
     last = frames[-1]
-    # YUYV has two bytes a pixel, a luma is the first of them; a JPEG has no rows.
+    # YUYV has two bytes a pixel, the first of them luma; a JPEG has no rows.
     step = max(1, len(last.payload) // (last.width_px * last.height_px))
     row = last.payload[400 * last.width_px * step : 401 * last.width_px * step : step]
     account = {"format": last.pixel_format.value, "bytes": len(last.payload), "row": list(row), "health": health}

@@ -1,4 +1,4 @@
-"""Runs in the guest: gives v4l2loopback's device JPEGs (start and end marker, no image between), ten a second, until it is ended.
+"""Runs in the guest: writes JPEGs to v4l2loopback's device (start and end marker, no image between), ten a second, until it is ended.
 
 loopback_writer.py DEVICE WIDTH HEIGHT
 """
@@ -15,7 +15,7 @@ _JPEG = b"\xff\xd8" + bytes(8000) + b"\xff\xd9"
 
 
 def main() -> None:
-    """Set the format, write for ever."""
+    """Set the format, then write for ever."""
     width_px, height_px = int(sys.argv[2]), int(sys.argv[3])
     pixels = struct.pack("<6I", width_px, height_px, _MJPG, _FIELD_NONE, 0, 4 * width_px * height_px)
     with Path(sys.argv[1]).open("wb", buffering=0) as device:

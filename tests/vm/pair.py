@@ -1,8 +1,8 @@
-"""Runs in the guest: pairs one of its two Bluetooth adapters with the other, by bluetoothd, as two people with two machines would.
+"""Runs in the guest: pairs one of its two Bluetooth adapters with the other through bluetoothd, as two people with two machines would.
 
 pair.py OWN_ADDRESS OTHER_ADDRESS
 
-Plays both people: looks for the other adapter, asks for pairing, says yes to whatever either is asked, trusts. By Debian's python3-dbus-fast.
+Plays both people: looks for the other adapter, asks for pairing, confirms every question, trusts. Uses Debian's python3-dbus-fast.
 """
 
 import asyncio
@@ -18,7 +18,7 @@ _YES = Variant("b", True)  # noqa: FBT003 - a value of D-Bus
 
 
 async def ask(bus: MessageBus, path: str, interface: str, member: str, signature: str = "", *body: Any) -> Any:
-    """Call a method of the daemon's; gives what it answers."""
+    """Call a method of the daemon; return its answer."""
     call = Message(
         destination=_BLUEZ, path=path, interface=interface, member=member, signature=signature, body=list(body)
     )
@@ -29,7 +29,7 @@ async def ask(bus: MessageBus, path: str, interface: str, member: str, signature
 
 
 async def found(bus: MessageBus, wanted: str, address: str, below: str = "") -> str:
-    """Wait until the daemon knows an adapter or a device of this address; gives its path."""
+    """Wait until the daemon knows an adapter or a device with this address; return its path."""
     while True:
         objects = await ask(bus, "/", "org.freedesktop.DBus.ObjectManager", "GetManagedObjects")
         for path, interfaces in objects.items():
@@ -39,7 +39,7 @@ async def found(bus: MessageBus, wanted: str, address: str, below: str = "") -> 
 
 
 async def main(own: str, other: str) -> None:
-    """Pair and trust, both ways."""
+    """Pair and trust, in both directions."""
     bus = await MessageBus(bus_type=BusType.SYSTEM).connect()
 
     def asked(message: Message) -> Message | None:

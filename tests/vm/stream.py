@@ -1,4 +1,4 @@
-"""A host outside the guest that pairs its own images with the board's, and the proof that each pair is right."""
+"""A host outside the guest that pairs its own images with the board's, and the proof that each pair is correct."""
 
 import json
 import re
@@ -20,10 +20,10 @@ from tests.vm.guest import Guest
 
 FPS: Final = 10
 FRAMES: Final = 600
-"""A minute of numbered images: a number names one moment of it."""
+"""A minute of numbered images: a number identifies one moment of it."""
 
 SLACK_S: Final = 0.01
-"""For the guest's clock as the host knows it, and for what is rounded: a tenth of a period."""
+"""Margin for the guest's clock as the host knows it, and for rounding: a tenth of a period."""
 
 NUMBER_ROWS: Final = 12
 _NUMBER_COLUMNS: Final = 12 * BITS
@@ -31,7 +31,7 @@ _NUMBER_COLUMNS: Final = 12 * BITS
 _DELAYS: Final = ("capture_ns", "outbox_ns", "propagation_ns", "pairing_ns", "queuing_ns", "processing_ns")
 
 Skew = Callable[[int, int], float]
-"""From the numbers of a pair's left and right image the least time that can have been between their stamps, s."""
+"""Maps the image numbers of a pair (left, right) to the shortest time that can have been between their stamps, s."""
 
 
 def webcam_skew(
@@ -40,8 +40,8 @@ def webcam_skew(
     """Time skew of the webcam and a replay on this machine: image k of both is due at k / FPS, and the board stamps it a little later.
 
     Args:
-        late_ns: by image number, least and greatest lateness; read anew for each pair, as it grows while the webcam runs.
-        right_late_ns: the same of the right view where that is a webcam's, too; None: a replay is never late.
+        late_ns: by image number, least and greatest lateness; read anew for each pair, since it grows while the webcam runs.
+        right_late_ns: the same for the right view if that is a webcam's, too; None: a replay is never late.
     """
     lap_s = FRAMES / FPS
 
@@ -106,7 +106,7 @@ class Stream:
         return lines(self.out / "delays.jsonl")
 
     def more(self, pairs: int, when: str) -> None:
-        """Wait for so many further pairs."""
+        """Wait for this many further pairs."""
         wanted = self.pairs + pairs
         deadline = time.monotonic() + PATIENCE_S
         while self.pairs < wanted:
@@ -119,7 +119,7 @@ class Stream:
         """Stop the host and check every pair, every delay and every count.
 
         Args:
-            skew: the truth.
+            skew: the true time skew.
 
         Returns:
             The host's report.
@@ -137,7 +137,7 @@ class Stream:
 def streaming(
     guest: Guest, right: Path, out: Path, arguments: tuple[str, ...] = (), link: str = ""
 ) -> Iterator[Stream]:
-    """Run a host against the guest's board for the length of a block; every pair is saved. Without a link over the guest's network."""
+    """Run a host against the guest's board for the length of a block; every pair is saved. The default link is the guest's network."""
     camera = f"replay:{right}?fps={FPS}&loop=1"
     command = [
         "run",
@@ -157,7 +157,7 @@ def streaming(
 
 
 def check_pairs(out: Path, skew: Skew) -> None:
-    """The images of every pair were exposed within half a period of each other, by the truth and not by the product's own word."""
+    """The images of every pair were exposed within half a period of each other, by ground truth and not by the product's own stamps."""
     numbers = saved_numbers(out)
     assert numbers
     wrong = [
@@ -167,21 +167,21 @@ def check_pairs(out: Path, skew: Skew) -> None:
 
 
 def check_delays(out: Path) -> None:
-    """No delay is negative, and they add up to the end-to-end delay to the nanosecond."""
+    """No delay is negative, and the delays add up to the end-to-end delay to the nanosecond."""
     for ledger in ledgers(out):
         assert sum(ledger[name] for name in _DELAYS) == ledger["end_to_end_ns"]
-        # The propagation delay is measured across two clocks: it may be too small by their uncertainty, no more.
+        # The propagation delay is measured across two clocks: it may be too small by their uncertainty, but no more.
         assert ledger["propagation_ns"] > -ledger["uncertainty_ns"], ledger
         assert all(ledger[name] >= 0 for name in _DELAYS if name != "propagation_ns"), ledger
 
 
 def check_counts(report: dict[str, Any]) -> None:
-    """What was grabbed was sent or dropped, what was sent was received or lost, what was received was paired, orphaned or is held."""
+    """Grabbed frames were sent or dropped, sent ones received or lost, received ones paired, orphaned or held."""
     frames = report["frames"]
     assert frames["received"] == frames["paired"] + frames["held"] + sum(frames["orphaned"].values()), frames
     for session in report["sessions"]:
         assert session["grabbed"] == session["sent"] + sum(session["dropped"].values()) + session["waiting"], session
-        if session["tail"] == "known":  # else frames may have come after the last account that did
+        if session["tail"] == "known":  # otherwise frames may have come after the last account that arrived
             assert session["sent"] == session["received"] + session["lost"], session
 
 
@@ -189,7 +189,7 @@ _STOPPED: Final = re.compile(r' stopped session=(\w+) grabbed=(\d+) sent=(\d+) d
 
 
 def board_accounts(journal: str) -> dict[str, dict[str, int]]:
-    """The accounts that ended sessions have left in the journal, by session: grabbed, sent, dropped (over all reasons)."""
+    """Accounts of ended sessions in the journal, by session: grabbed, sent, dropped (over all reasons)."""
     accounts = {}
     for session, grabbed, sent, _, dropped, _ in _STOPPED.findall(journal):
         reasons: dict[str, int] = json.loads(dropped.replace("'", '"'))
@@ -198,13 +198,13 @@ def board_accounts(journal: str) -> dict[str, dict[str, int]]:
 
 
 def kill(stream: Stream) -> None:
-    """End the host as a crash does."""
+    """Kill the host, as in a crash."""
     stream.receiver.send(signal.SIGKILL)
     stream.receiver.wait()
 
 
 def check_journal(guest: Guest) -> None:
-    """The service is up, each session it has closed is accounted for to the frame, and there was never a traceback."""
+    """The service is up, each session it has closed balances to the frame, and there was never a traceback."""
     guest.until("ActiveState", "active", "the service is up")
     journal = guest.journal()
     assert "Traceback" not in journal

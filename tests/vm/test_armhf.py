@@ -21,7 +21,7 @@ def bare_board() -> Iterator[Guest]:
 
 
 def test_the_basic_scenario(bare_board: Guest, package: Path, film: Film, tmp_path: Path) -> None:
-    """Installed, plugged, streamed, pulled and plugged again, restarted: every pair is the right one and every frame is accounted for."""
+    """Installed, plugged in, streaming, pulled and plugged in again, restarted: every pair is correct and every frame is accounted for."""
     board = bare_board
     assert board.sh("dpkg --print-architecture && nproc").split() == ["armhf", "1"]
     board.install(package)
@@ -42,7 +42,7 @@ def test_the_basic_scenario(bare_board: Guest, package: Path, film: Film, tmp_pa
     finally:
         webcam.close()
     first, second = report["sessions"]
-    # A board that gets no processor for 0.3 s while it says goodbye leaves its end unknown; test_faults shows that else it is known.
+    # If the board gets no processor for 0.3 s while it says goodbye, its end stays unknown; test_faults shows that otherwise it is known.
     assert second["tail"] == "known"
     assert first["lost"] == second["lost"] == 0
     check_journal(board)

@@ -1,4 +1,4 @@
-"""RFCOMM between two virtual Bluetooth controllers of the kernel's; a fresh guest for each test, as a test may leave the stack in disarray."""
+"""RFCOMM between two of the kernel's virtual Bluetooth controllers; each test gets a fresh guest, since a test may leave the stack in disarray."""
 
 import re
 from collections.abc import Iterator
@@ -18,10 +18,10 @@ from tests.vm.webcam import Webcam
 pytestmark = pytest.mark.timeout(1800)  # each test boots a board of its own
 
 BOARD, HOST = "00:AA:01:00:00:00", "00:AA:01:01:00:01"
-"""Addresses that btvirt gives."""
+"""Addresses that btvirt assigns."""
 
 _BOARD_SEEN, _HOST_SEEN = "/org/bluez/hci1/dev_00_AA_01_00_00_00", "/org/bluez/hci0/dev_00_AA_01_01_00_01"
-"""What the daemon calls each where the other knows it."""
+"""The daemon's names for each adapter as the other one sees it."""
 
 CHANNEL = 1
 
@@ -37,7 +37,7 @@ def radio() -> Iterator[Guest]:
 
 @pytest.fixture
 def serving(radio: Guest, package: Path, film: Film) -> Iterator[tuple[Guest, Webcam]]:
-    """The board's service on a channel of the first controller, its webcam plugged in."""
+    """The board's service on a channel of the first controller, with its webcam plugged in."""
     camera = Webcam(film.frames, FPS, READOUT_MS * 1_000_000)
     radio.install(package)
     try:
@@ -59,14 +59,14 @@ def test_the_contract_on_rfcomm(radio: Guest) -> None:
 def test_pairs_over_rfcomm_and_an_adapter_that_goes_and_comes(
     serving: tuple[Guest, Webcam], film: Film, tmp_path: Path
 ) -> None:
-    """Pairs are right over RFCOMM; the adapters switched off and on again, in either order, bring the same session of the same process back."""
+    """Pairs are correct over RFCOMM; after the adapters are switched off and on, in either order, the same session of the same process resumes."""
     guest, camera = serving
     process = guest.show("MainPID")
     far_end = ("rfcomm", HOST, BOARD, str(CHANNEL))
     with extension(guest, *far_end) as link, streaming(guest, film.right, tmp_path / "out", (), link) as stream:
         stream.more(30, "over RFCOMM")
         # btvirt does not tell one controller that the other has gone, as a radio does after its supervision timeout, and the kernel
-        # then takes the old connection for the new one: so the two go one after the other.
+        # then takes the old connection for the new one: so the two are switched off one after the other.
         for adapters in ("hci0 hci1", "hci1 hci0"):
             _switch_off_and_on(guest, adapters, stream)
             stream.more(10, f"after {adapters} came back")
@@ -86,7 +86,7 @@ def _switch_off_and_on(guest: Guest, adapters: str, stream: Stream) -> None:
 def test_a_paired_host_finds_the_board_by_name_and_a_forgotten_one_is_refused(
     package: Path, film: Film, tmp_path: Path
 ) -> None:
-    """Two adapters are paired by bluetoothd; a host then finds board and channel by the board's name, and pairs are right over the encrypted link; forgotten, it is told to pair."""
+    """Two adapters are paired by bluetoothd; a host then finds board and channel by the board's name, and pairs are correct over the encrypted link; once forgotten, it is told to pair."""
     with booted(Architecture.AMD64) as guest:
         guest.sh(AIR)
         guest.put(Path(__file__).with_name("pair.py"), "/srv")
@@ -114,10 +114,10 @@ def test_a_paired_host_finds_the_board_by_name_and_a_forgotten_one_is_refused(
             camera.close()
         for adapter, device in (("hci0", _HOST_SEEN), ("hci1", _BOARD_SEEN)):
             guest.sh(f"busctl call org.bluez /org/bluez/{adapter} org.bluez.Adapter1 RemoveDevice o {device}")
-        # With nobody known it would not even answer.
+        # With no known device it would not even answer.
         guest.sh("busctl set-property org.bluez /org/bluez/hci0 org.bluez.Adapter1 Discoverable b true")
         guest.sh(f"setsid python3 -u /srv/far_end.py dial rfcomm://{BOARD} </dev/null >/srv/refused 2>&1 &")
-        remedy = "pair the two devices with bluetoothctl"  # the radio may first have to find its way: a line of its own
+        remedy = "pair the two devices with bluetoothctl"  # the radio may first have to find its way: that is a line of its own
         until(lambda: remedy in guest.sh("cat /srv/refused"), "a stranger is told")
         assert guest.sh("cat /srv/refused").count(remedy) == 1
         check_journal(guest)
@@ -125,7 +125,7 @@ def test_a_paired_host_finds_the_board_by_name_and_a_forgotten_one_is_refused(
 
 
 def test_the_record_is_published_and_published_again(package: Path) -> None:
-    """With bluetoothd the channel is found by asking the board; a restarted daemon is told anew; a stopped service withdraws the record."""
+    """With bluetoothd the host finds the channel by asking the board; a restarted daemon is told again; a stopped service withdraws the record."""
     ask = f"""
 import socket, sys
 sys.path.insert(0, "/usr/lib/tandemscan")

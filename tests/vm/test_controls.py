@@ -1,4 +1,4 @@
-"""Exposure, white balance and focus are held for stereo, in the order that the driver demands, on a webcam that has all of them."""
+"""Exposure, white balance and focus are held for stereo, set in the order that the driver demands, on a webcam that has all of them."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,7 +20,7 @@ AUTOMATISMS = {
     uvc.WHITE_BALANCE: (uvc.WHITE_BALANCE_AUTO, 0),
     uvc.FOCUS: (uvc.FOCUS_AUTO, 0),
 }
-"""By value: its automatism, and the value that switches it off."""
+"""For each value: its automatic mode, and the setting that switches that off."""
 
 
 EXPOSURE_ABSOLUTE, FOCUS_ABSOLUTE = 0x009A0902, 0x009A090A
@@ -33,7 +33,7 @@ SET = (
 
 @pytest.fixture(autouse=True)
 def _sound_afterwards(guest: Guest, webcam: Webcam) -> Iterator[None]:
-    """After each test the service is up with its usual camera, its books balance and it has never shown a traceback."""
+    """After each test the service is up with its usual camera, its accounts balance and it has never shown a traceback."""
     assert webcam.plugged
     yield
     guest.configure(CAMERA)
@@ -41,7 +41,7 @@ def _sound_afterwards(guest: Guest, webcam: Webcam) -> Iterator[None]:
 
 
 def as_new(webcam: Webcam, guest: Guest) -> None:
-    """Take the camera's power away: its controls are as they were made."""
+    """Power-cycle the camera: its controls return to their defaults."""
     webcam.unplug()
     until(lambda: guest.code("test -e /dev/video0") != 0, "the node is gone")
     webcam.set_requests = []
@@ -50,7 +50,7 @@ def as_new(webcam: Webcam, guest: Guest) -> None:
 
 
 def check_order(requests: list[tuple[tuple[int, int], int]]) -> None:
-    """Each value was set after its automatism had been switched off, and dynamic frame rate before any of them."""
+    """Each value was set after its automatic mode had been switched off, and the dynamic frame rate before any of them."""
     order = [where for where, _ in requests]
     assert order.index(uvc.EXPOSURE_PRIORITY) < min(order.index(value) for value in AUTOMATISMS)
     for value, (automatism, off) in AUTOMATISMS.items():
@@ -58,7 +58,7 @@ def check_order(requests: list[tuple[tuple[int, int], int]]) -> None:
 
 
 def check_stamps(out: Path, webcam: Webcam, first: int) -> None:
-    """From that pair on the stamps lie where the webcam's own account puts them; checked where that is known to 5 ms, which a busy machine may not give."""
+    """From pair `first` on, the stamps lie where the webcam's own record puts them; checked only where that is known to 5 ms, which a busy machine may not give."""
     told = list(zip(saved_numbers(out), ledgers(out), strict=True))[first:]
     sharp = [
         (left, right, ledger)
@@ -75,7 +75,7 @@ def check_stamps(out: Path, webcam: Webcam, first: int) -> None:
 
 
 def test_the_driver_refuses_what_an_automatism_rules(guest: Guest, webcam: Webcam) -> None:
-    """The driver refuses to set the focus while it is automatic (EACCES): the order that is tested here is demanded."""
+    """The driver refuses to set the focus while it is automatic (EACCES): the tested order is really demanded."""
     as_new(webcam, guest)
     said = guest.sh(f"{SET.format(control=FOCUS_ABSOLUTE, value=30)} 2>&1; true")
     assert "PermissionError" in said
@@ -86,7 +86,7 @@ def test_the_driver_refuses_what_an_automatism_rules(guest: Guest, webcam: Webca
 def test_what_the_automatisms_found_is_held(
     guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
 ) -> None:
-    """Two seconds into the stream all automatisms are off and the values are those that they had found; a replugged camera gets them, too."""
+    """Two seconds into the stream all automatic modes are off and the values are those that they had found; a replugged camera gets them, too."""
     as_new(webcam, guest)
     guest.configure(CAMERA)
     with streaming(guest, film.right, tmp_path / "out") as stream:
@@ -105,7 +105,7 @@ def test_what_the_automatisms_found_is_held(
 
 
 def test_what_the_user_sets_is_set_before_the_first_frame(guest: Guest, webcam: Webcam) -> None:
-    """Exposure, white balance, focus and mains of the URI stand in the camera when its stream begins, each within its step."""
+    """Exposure, white balance, focus and mains frequency from the URI are set in the camera when its stream begins, each within its step."""
     as_new(webcam, guest)
     before = webcam.starts
     guest.configure(f"{CAMERA}&exposure_ms=20&white_balance=3997&focus=33&power_line=50")
@@ -121,7 +121,7 @@ def test_what_the_user_sets_is_set_before_the_first_frame(guest: Guest, webcam: 
 def test_without_lock_the_automatisms_stay_on(
     guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
 ) -> None:
-    """lock=0 leaves exposure, white balance and focus to the camera, also after the time in which they would be held."""
+    """lock=0 leaves exposure, white balance and focus to the camera, even after the time at which they would be held."""
     as_new(webcam, guest)
     guest.configure(f"{CAMERA}&lock=0")
     with streaming(guest, film.right, tmp_path / "out") as stream:
@@ -135,7 +135,7 @@ def test_without_lock_the_automatisms_stay_on(
 def test_stamps_follow_the_exposure_time(
     guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path, *, by_itself: bool
 ) -> None:
-    """Exposure goes from 10 to 24 ms while frames come, told by the driver or not: it is read anew, or the stamps would be 7 ms late."""
+    """Exposure goes from 10 to 24 ms during the stream, with or without a report by the driver: it is read again, or the stamps would be 7 ms late."""
     as_new(webcam, guest)
     guest.configure(f"{CAMERA}&lock=0" if by_itself else CAMERA)
     with streaming(guest, film.right, tmp_path / "out") as stream:

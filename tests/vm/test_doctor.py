@@ -1,4 +1,4 @@
-"""board-agent doctor on a booted board: what it says of each thing that keeps a board from streaming."""
+"""board-agent doctor on a booted board: what it reports about each thing that keeps a board from streaming."""
 
 import json
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.timeout(600)  # the first test boots the board
 
 @pytest.fixture(autouse=True)
 def _sound_afterwards(guest: Guest, webcam: Webcam) -> Iterator[None]:
-    """After each test the service is up, its books balance and it has never shown a traceback."""
+    """After each test the service is up, its accounts balance and it has never shown a traceback."""
     assert webcam.plugged
     yield
     guest.sh(f"systemctl start {UNIT}")
@@ -25,7 +25,7 @@ def _sound_afterwards(guest: Guest, webcam: Webcam) -> Iterator[None]:
 
 
 def doctor(guest: Guest, options: str = "") -> tuple[int, dict[str, Any]]:
-    """Run the doctor as root; gives its exit code, and the first check of each kind, or the one that failed."""
+    """Run the doctor as root; return the exit code, and the first check of each kind, or the one that failed."""
     shown = guest.sh(f"board-agent doctor --json {options} > /run/doctor.json; echo $?; cat /run/doctor.json")
     code, _, text = shown.partition("\n")
     found: dict[str, Any] = {}
@@ -36,7 +36,7 @@ def doctor(guest: Guest, options: str = "") -> tuple[int, dict[str, Any]]:
 
 
 def test_a_board_that_streams_is_well(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
-    """While the service streams nothing fails: it has camera and port, says its rate, and is not disturbed."""
+    """While the service streams nothing fails: the doctor finds its camera and port, reports its rate, and does not disturb it."""
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the doctor")
         guest.until("StatusText", "sent to the host", "the status tells the rate")
@@ -53,7 +53,7 @@ def test_a_board_that_streams_is_well(guest: Guest, film: Film, skew: Skew, tmp_
 
 
 def test_a_free_camera_is_proven_by_streaming(guest: Guest, webcam: Webcam) -> None:
-    """With the service stopped frames are taken, at the rate that is asked, with trusted stamps, over a bus that carries them."""
+    """With the service stopped frames are taken, at the requested rate, with trusted stamps, over a bus that can carry them."""
     guest.sh(f"systemctl stop {UNIT}")
     code, checks = doctor(guest)
     assert code == 0, checks
@@ -66,7 +66,7 @@ def test_a_free_camera_is_proven_by_streaming(guest: Guest, webcam: Webcam) -> N
 
 
 def test_a_format_that_is_not_offered_fails(guest: Guest) -> None:
-    """Asked for a size that the camera has not, the doctor lists those that it has."""
+    """If the camera lacks the requested size, the doctor lists the available ones."""
     code, checks = doctor(guest, "--camera 'v4l2:auto?size=1280x720'")
     assert code == 4
     assert checks["format"]["verdict"] == "fail"
@@ -74,7 +74,7 @@ def test_a_format_that_is_not_offered_fails(guest: Guest) -> None:
 
 
 def test_spoiled_frames_are_seen(guest: Guest, webcam: Webcam) -> None:
-    """Of a camera that cuts every third frame the doctor says how many were spoiled."""
+    """If a camera truncates every third frame, the doctor says how many were spoiled."""
     guest.sh(f"systemctl stop {UNIT}")
     webcam.truncate_every = 3
     code, checks = doctor(guest)
@@ -85,7 +85,7 @@ def test_spoiled_frames_are_seen(guest: Guest, webcam: Webcam) -> None:
 
 
 def test_an_absent_camera_fails(guest: Guest, webcam: Webcam) -> None:
-    """Unplugged, the camera is missing, the others are checked all the same, and the kernel's log has the unplugging."""
+    """If the camera is unplugged, it is missing, the other checks are made all the same, and the kernel's log shows the unplugging."""
     webcam.unplug()
     try:
         until(lambda: guest.code("test -e /dev/video0") != 0, "the node is gone")
@@ -99,7 +99,7 @@ def test_an_absent_camera_fails(guest: Guest, webcam: Webcam) -> None:
 
 
 def test_a_camera_without_driver_is_told_apart(guest: Guest) -> None:
-    """With the webcam on the bus and no driver bound to it the remedy is the driver."""
+    """If the webcam is on the bus but no driver is bound to it, the remedy is the driver."""
     guest.sh(f"systemctl stop {UNIT}")
     guest.sh("cd /sys/bus/usb/drivers/uvcvideo && for i in *:1.0; do echo $i > unbind; done")
     try:
@@ -114,7 +114,7 @@ def test_a_camera_without_driver_is_told_apart(guest: Guest) -> None:
 
 
 def test_wrong_permissions_fail_for_the_service_user(guest: Guest) -> None:
-    """A node that only root may open fails although root asks: the service could not."""
+    """A node that only root may open fails although root asks: the service could not open it."""
     guest.sh("chmod 600 /dev/video0")
     try:
         code, checks = doctor(guest)
@@ -125,7 +125,7 @@ def test_wrong_permissions_fail_for_the_service_user(guest: Guest) -> None:
 
 
 def test_a_taken_port_is_told_with_its_owner(guest: Guest) -> None:
-    """With another program on the link's port the doctor names it."""
+    """If another program has the link's port, the doctor names it."""
     guest.sh(f"systemctl stop {UNIT}")
     listen = "import socket; s = socket.create_server(('', 5555)); print(flush=True); input()"
     with guest.popen(f'python3 -u -c "{listen}"') as taker:
@@ -138,7 +138,7 @@ def test_a_taken_port_is_told_with_its_owner(guest: Guest) -> None:
 
 
 def test_a_getty_on_the_serial_link_fails(guest: Guest) -> None:
-    """A getty on the port of a serial link is named with the command that ends it; a port that is not there fails, too."""
+    """A getty on the port of a serial link is named with the command that stops it; a missing port fails, too."""
     code, checks = doctor(guest, "--link serial:/dev/ttyGS7")
     assert code == 4
     assert checks["link"]["verdict"] == "fail"
@@ -149,7 +149,7 @@ def test_a_getty_on_the_serial_link_fails(guest: Guest) -> None:
 
 
 def test_under_voltage_in_the_kernel_log_warns(guest: Guest) -> None:
-    """What a Raspberry Pi's kernel says of a weak supply, written into this kernel's log, is found with its age."""
+    """A Raspberry Pi kernel's message about a weak supply, written into this kernel's log, is found with its age."""
     before = doctor(guest)[1]["power"]
     assert before["verdict"] == "ok"
     guest.sh("echo 'hwmon hwmon1: Undervoltage detected!' > /dev/kmsg")

@@ -1,4 +1,4 @@
-"""Everything that befalls a board in months, on a booted one: after each fault the stream is back, no pair is wrong, every frame counted."""
+"""Everything that happens to a board in months, on a booted one: after each fault the stream is back, no pair is wrong, every frame is counted."""
 
 import time
 from collections.abc import Iterator
@@ -16,14 +16,14 @@ pytestmark = pytest.mark.timeout(600)  # the first test boots the board
 
 @pytest.fixture(autouse=True)
 def _sound_afterwards(guest: Guest, webcam: Webcam) -> Iterator[None]:
-    """After each test the service is up, its books balance and it has never shown a traceback."""
+    """After each test the service is up, its accounts balance and it has never shown a traceback."""
     assert webcam.plugged
     yield
     check_journal(guest)
 
 
 def test_pairs_are_right_and_delays_add_up(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
-    """50 pairs: the right images, one session, nothing lost, positive delays with an exact sum, and a status that tells the rate."""
+    """50 pairs: correct images, one session, nothing lost, positive delays with an exact sum, and a status that states the rate."""
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(50, "at the start")
         guest.until("StatusText", "sent to the host", "the status tells the rate")
@@ -35,7 +35,7 @@ def test_pairs_are_right_and_delays_add_up(guest: Guest, film: Film, skew: Skew,
 
 
 def test_the_clock_estimate_is_true(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
-    """The offset in every ledger is within its own stated uncertainty of the offset measured from outside."""
+    """The offset in every ledger is within its stated uncertainty of the offset measured from outside."""
     clock = guest.clock()
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(30, "at the start")
@@ -43,12 +43,12 @@ def test_the_clock_estimate_is_true(guest: Guest, film: Film, skew: Skew, tmp_pa
         stream.finish(skew)
     clock.close()
     for ledger in ledgers(tmp_path / "out"):
-        # The product adds its offset to the board's clock to get the host's.
+        # Added to the board's clock, the product's offset gives the host's.
         assert abs(ledger["offset_ns"] + offset_ns) <= ledger["uncertainty_ns"] + error_ns, ledger
 
 
 def test_a_killed_agent_is_restarted(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
-    """After SIGKILL systemd starts the agent anew and the same host pairs frames of the new session."""
+    """After SIGKILL systemd restarts the agent, and the same host pairs frames of the new session."""
     restarts = int(guest.show("NRestarts"))
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the kill")
@@ -60,7 +60,7 @@ def test_a_killed_agent_is_restarted(guest: Guest, film: Film, skew: Skew, tmp_p
 
 
 def test_a_hung_agent_is_restarted_by_the_watchdog(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
-    """An agent that stops going round its loop (SIGSTOP) is killed by the watchdog and started anew."""
+    """If the agent's loop stops (SIGSTOP), the watchdog kills it and it is started again."""
     restarts = int(guest.show("NRestarts"))
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the stop")
@@ -86,10 +86,10 @@ def test_a_restarted_service_says_goodbye(guest: Guest, film: Film, skew: Skew, 
 
 
 def test_wall_clock_jumps_change_nothing(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
-    """The date set to 1970 and back, as on a board without a clock that meets a time server, ends no session; nor is a service lost that starts in 1970."""
+    """The date set to 1970 and back, as on a board without a clock that meets a time server, ends no session; nor does a service that starts in 1970 fail."""
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the jump")
-        # Linux refuses a date before its own boot: 1970 began an hour or so before this one.
+        # Linux refuses a date before its own boot: here 1970 began about an hour before this boot.
         guest.sh("date -s @$(($(cut -d. -f1 /proc/uptime) + 3600))")
         stream.more(10, "in 1970")
         guest.sh(f"systemctl restart {UNIT}")
@@ -136,7 +136,7 @@ def test_a_full_disk_stops_nothing(guest: Guest, film: Film, skew: Skew, tmp_pat
 def test_a_bad_link_costs_frames_but_never_rightness(
     guest: Guest, film: Film, skew: Skew, shape: str, tmp_path: Path
 ) -> None:
-    """With delay, jitter and loss, and with a seventeenth of the rate that the frames need, the pairs that arrive are right; then full rate again."""
+    """With delay, jitter and loss, and with a seventeenth of the rate that the frames need, the pairs that arrive are correct; then the full rate returns."""
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "on a good link")
         guest.sh(f"tc qdisc add dev {NETWORK_CARD} root netem {shape}")
@@ -150,7 +150,7 @@ def test_a_bad_link_costs_frames_but_never_rightness(
 
 
 def test_a_cut_link_heals(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
-    """A cable pulled until both sides have given up, and plugged in again, brings the stream back."""
+    """A cable pulled until both sides have given up: when it is plugged in again, the stream returns."""
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the cut")
         guest.sh(f"ip link set {NETWORK_CARD} down")
@@ -166,7 +166,7 @@ def test_a_cut_link_heals(guest: Guest, film: Film, skew: Skew, tmp_path: Path) 
 def test_a_rebooted_board_comes_back_by_itself(
     guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
 ) -> None:
-    """After a reboot, which sets the board's clock to zero, the same host pairs the right images by the new clock."""
+    """After a reboot, which sets the board's clock to zero, the same host pairs the correct images by the new clock."""
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the reboot")
         webcam.unplug()  # its USB bus goes down with the board

@@ -1,4 +1,4 @@
-"""One USB cable as network card and serial port: the package's gadget on the kernel's dummy controller, its host end in the same machine."""
+"""One USB cable as network card and serial port: the package's gadget on the kernel's dummy controller, with its host end in the same machine."""
 
 import hashlib
 import re
@@ -17,7 +17,7 @@ from tests.vm.guest import NETWORK_CARD, OPEN_TO_ALL, Guest
 from tests.vm.stream import Film, Skew, check_journal, streaming
 from tests.vm.webcam import Webcam
 
-pytestmark = pytest.mark.timeout(1800)  # the first test boots the board, the contract suite runs in it
+pytestmark = pytest.mark.timeout(1800)  # the first test boots the board and runs the contract suite there
 
 GADGET = "board-gadget"
 BOARD_END = "/dev/tandemscan-host"
@@ -59,7 +59,7 @@ def serving(cabled: Guest, webcam: Webcam) -> Iterator[Guest]:
 
 
 def _serial_number(guest: Guest) -> str:
-    """The gadget's, as deploy/board/usb-gadget makes it of the machine's id."""
+    """The gadget's serial number, derived by deploy/board/usb-gadget from the machine's id."""
     return hashlib.sha256(f"tandemscan-serial-{guest.sh('cat /etc/machine-id').strip()}".encode()).hexdigest()[:12]
 
 
@@ -70,14 +70,14 @@ def _await_ends(guest: Guest) -> None:
 
 
 def test_the_contract_on_gadget_serial(cabled: Guest) -> None:
-    """The serial link keeps the links' contract on the real devices of a cable: order, integrity, sizes, restarts, back-pressure."""
+    """The serial link keeps the links' contract on a cable's real devices: order, integrity, sizes, restarts, back-pressure."""
     cabled.sh("systemctl stop board-agent")  # it may have the port
     told = run_contract(cabled, "gadget")
     assert re.match(r"\d\d passed", told), told
 
 
 def test_pairs_over_gadget_serial(serving: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
-    """30 pairs come over the cable's serial port: the right images, delays that add up, every frame counted."""
+    """30 pairs come over the cable's serial port: correct images, delays that add up, every frame counted."""
     with (
         extension(serving, "tty", HOST_END) as link,
         streaming(serving, film.right, tmp_path / "out", (), link) as stream,
@@ -89,12 +89,12 @@ def test_pairs_over_gadget_serial(serving: Guest, film: Film, skew: Skew, tmp_pa
 
 
 def test_the_port_is_the_services_alone(cabled: Guest) -> None:
-    """The board's end belongs to root and the service's group, and nobody else may read or write there."""
+    """The board's end belongs to root and the service's group; nobody else may read or write there."""
     assert cabled.sh(f"stat -L -c '%U %G %a' {BOARD_END}").split() == ["root", "tandemscan", "660"]
 
 
 def test_a_cable_pulled_and_replugged(serving: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
-    """Pulled while streaming, twice, the cable brings the same session of the same process back once it is plugged in again."""
+    """If the cable is pulled while streaming, twice, the same session of the same process resumes once it is plugged in again."""
     process = serving.show("MainPID")
     with (
         extension(serving, "tty", HOST_END) as link,
@@ -117,7 +117,7 @@ def test_a_cable_pulled_and_replugged(serving: Guest, film: Film, skew: Skew, tm
 def test_a_pulled_cable_gives_way_to_the_network_and_takes_over_again(
     cabled: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
 ) -> None:
-    """The stream goes on over TCP when the cable is pulled and comes back to it once plugged in: one session, every frame counted, each pair right."""
+    """The stream moves to TCP when the cable is pulled and returns once it is plugged in: one session, every frame counted, each pair correct."""
     assert webcam.plugged
     cabled.configure(CAMERA, f"serial:{BOARD_END}", OPEN_TO_ALL)
     cabled.until("StatusText", "waiting for a host", "the service has opened both links")
@@ -146,7 +146,7 @@ def test_a_pulled_cable_gives_way_to_the_network_and_takes_over_again(
 
 @contextmanager
 def _slow_network(guest: Guest) -> Iterator[None]:
-    """A second a frame over the network: the way to the cable's far end, which lies in the guest, takes half of one."""
+    """A frame over the network takes a second: the path to the cable's far end, which lies in the guest, accounts for half of it."""
     guest.sh(f"tc qdisc add dev {NETWORK_CARD} root netem rate 150kbit")
     try:
         yield
@@ -160,10 +160,10 @@ def _newest(out: Path) -> set[str]:
 
 
 def test_the_network_over_the_same_cable(cabled: Guest) -> None:
-    """The host end is a network card of its own name, behind which 192.168.7.2 answers; an address is offered to the host there.
+    """The host end is a network card with its own name, behind which 192.168.7.2 answers; the host is offered an address there.
 
-    The laptop's network manager has brought the card up before: the host's driver (usbnet) may never begin to receive where the gadget's word that
-    it is connected comes in the middle of bringing it up, 1 time in 60 here. That word comes once, and bringing the card up anew mends it.
+    The laptop's network manager has brought the card up before: the host's driver (usbnet) may never begin to receive if the gadget's report that
+    it is connected arrives while the card is coming up, 1 time in 60 here. That report comes once; bringing the card up again repairs it.
     """
     cabled.sh("ip link set tandemscan0 up")
     until(lambda: cabled.sh("cat /sys/class/net/tandemscan0/carrier").strip() == "1", "the card has heard the gadget")
@@ -179,7 +179,7 @@ def test_the_network_over_the_same_cable(cabled: Guest) -> None:
 
 
 def test_no_login_prompt_on_the_port(cabled: Guest) -> None:
-    """A getty that is started for the port does not run; without the gadget's own word, and on the console, it does."""
+    """A getty started for the port does not run; without the gadget's marker file, and on the console, it does."""
     prompt = "serial-getty@ttyGS0"
     cabled.sh(f"systemctl stop board-agent; systemctl start {prompt}")
     assert cabled.show("ConditionResult", prompt) == "no"
@@ -188,12 +188,12 @@ def test_no_login_prompt_on_the_port(cabled: Guest) -> None:
     assert cabled.show("ConditionResult", prompt) == "yes"
     assert cabled.show("ActiveState", prompt) == "active"
     cabled.sh(f"systemctl stop {prompt}; mv /run/board-gadget/unsaid /run/board-gadget/ttyGS0")
-    cabled.sh("udevadm trigger --action=add --settle /dev/ttyGS0")  # a prompt takes the port for root alone
+    cabled.sh("udevadm trigger --action=add --settle /dev/ttyGS0")  # a prompt reserves the port for root
     assert cabled.show("ActiveState", "serial-getty@ttyS0") == "active"
 
 
 def test_a_stop_leaves_nothing_though_the_port_is_open(serving: Guest) -> None:
-    """Stopped while the service has the port open, the gadget goes without a trace, and a new start is found by the service again."""
+    """Stopped while the service has the port open, the gadget leaves no trace, and the service finds it again after a new start."""
     process = serving.show("MainPID")
     serving.sh(f"systemctl stop {GADGET}")
     assert (
@@ -211,7 +211,7 @@ def test_a_stop_leaves_nothing_though_the_port_is_open(serving: Guest) -> None:
 
 
 def test_the_images_own_gadget_gives_way_and_gets_its_controller_back(cabled: Guest) -> None:
-    """Where another gadget has the only controller ours takes its place, says so, and gives it back when it stops."""
+    """If another gadget has the only controller, ours takes its place, says so, and gives it back when it stops."""
     other = f"{GADGETS}/image"
     cabled.sh(f"systemctl stop {GADGET}")
     parts = f"{other}/strings/0x409 {other}/configs/c.1 {other}/functions/ncm.other"
@@ -232,7 +232,7 @@ def test_the_images_own_gadget_gives_way_and_gets_its_controller_back(cabled: Gu
 
 
 def test_a_controller_that_a_module_holds_is_named(cabled: Guest) -> None:
-    """A controller that an old gadget module has cannot be taken: one line names both and the remedy, with exit 3."""
+    """A controller held by an old gadget module cannot be taken: one line names both and the remedy, with exit 3."""
     cabled.sh(f"systemctl stop {GADGET} && modprobe g_serial")
     try:
         assert cabled.code(f"systemctl start {GADGET}") != 0

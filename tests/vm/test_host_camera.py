@@ -1,4 +1,4 @@
-"""phone-host with a camera of its own by V4L2: the booted machine is board and host at once, each program has one of two webcams."""
+"""phone-host with its own V4L2 camera: the booted machine is board and host at once, and each program has one of two webcams."""
 
 import json
 import shutil
@@ -32,7 +32,7 @@ HOST = "PYTHONPATH=/mnt python3 -P -m phone_host.cli"
 
 
 def write_disk(folder: Path) -> Path:
-    """An image with phone-host and its packages as they are installed here, tests left out."""
+    """An image with phone-host and its packages as installed here, without tests."""
     root = folder / "root"
     for name in WHEELS:
         for file in metadata.files(name) or ():
@@ -76,14 +76,14 @@ def cameras(machine: Guest, film: Film) -> Iterator[tuple[Webcam, Webcam]]:
 
 
 def pairs_so_far(machine: Guest) -> int:
-    """Lines of the host's delays."""
+    """The lines of the host's delays."""
     return int(machine.sh("cat /srv/out/delays.jsonl 2>/dev/null | wc -l"))
 
 
 def test_two_webcams_are_paired_and_a_pulled_one_comes_back(
     machine: Guest, cameras: tuple[Webcam, Webcam], tmp_path: Path
 ) -> None:
-    """Every pair shows one moment by the webcams' own word; the host's camera, pulled and plugged in again, goes on, and its report tells so."""
+    """Every pair shows one moment by the webcams' own record; the host's camera, pulled and plugged in again, resumes, and the report says so."""
     left, right = cameras
     run = f"{HOST} run --link tcp://127.0.0.1:{LINK_PORT} --camera '{BY_ID.format('RIGHT')}' --out /srv/out --save-every 1 --json"
     host = machine.popen(f"cd /; {run} > /srv/report 2> /srv/host.err & echo $!; wait; cat /srv/report")
@@ -116,7 +116,7 @@ def test_two_webcams_are_paired_and_a_pulled_one_comes_back(
 
 
 def test_the_hosts_doctor_streams_from_its_camera(machine: Guest, cameras: tuple[Webcam, Webcam]) -> None:
-    """phone-host doctor finds its packages, proves the own camera by streaming, and gets the board's answer."""
+    """phone-host doctor finds its packages, verifies the host's camera by streaming, and gets the board's answer."""
     assert cameras[1].plugged
     asked = f"--link tcp://127.0.0.1:{LINK_PORT} --camera '{BY_ID.format('RIGHT')}' --wait 30 --out /srv/out --json"
     shown = machine.sh(f"cd / && {HOST} doctor {asked}")
@@ -127,12 +127,12 @@ def test_the_hosts_doctor_streams_from_its_camera(machine: Guest, cameras: tuple
 
 
 def folders(machine: Guest) -> list[str]:
-    """The folders of results that the user's unit has made, the oldest first."""
+    """The results folders that the user's unit has made, oldest first."""
     return machine.sh("ls -d ~/tandemscan-scans/* 2>/dev/null || true").split()
 
 
 def await_pairs(machine: Guest, runs: int) -> str:
-    """Wait until the newest of so many runs has 10 pairs; gives its folder."""
+    """Wait until the newest of this many runs has 10 pairs; return its folder."""
     until(lambda: len(folders(machine)) == runs, "a folder of its own for each start")
     newest = folders(machine)[-1]
     until(lambda: int(machine.sh(f"wc -l < {newest}/delays.jsonl")) >= 10, "10 pairs")
@@ -140,9 +140,9 @@ def await_pairs(machine: Guest, runs: int) -> str:
 
 
 def test_the_users_unit_pairs_frames(machine: Guest, cameras: tuple[Webcam, Webcam]) -> None:
-    """deploy/host's unit, with a settings file as it says, is understood without a warning, pairs frames and ends in order; a later start leaves the results."""
+    """deploy/host's unit, with a settings file as it describes, loads without a warning, pairs frames and ends properly; a later start keeps the results."""
     assert all(camera.plugged for camera in cameras)
-    # As a unit of the system manager its home folder is root's: there a checkout's command stands in for the one of `make venv`.
+    # As a unit of the system manager its home folder is root's: there, a checkout's command replaces the one of `make venv`.
     command = "~/tandemscan/.venv/bin/phone-host"
     machine.sh(
         f"install -D -m 755 /dev/stdin {command} <<'E'\n#!/bin/sh\ncd / && export PYTHONPATH=/mnt && exec python3 -P -m phone_host.cli \"$@\"\nE"

@@ -1,4 +1,4 @@
-"""Capture against the kernel's test driver vivid: raw formats, and failures that the driver itself injects."""
+"""Capture with the kernel's test driver vivid: raw formats, and failures that the driver itself injects."""
 
 import json
 import shlex
@@ -20,7 +20,7 @@ DROPPED: Final = "Percentage of Dropped Buffers"
 
 @pytest.fixture(scope="module")
 def vivid(guest: Guest) -> Iterator[Guest]:
-    """The board with one virtual capture device (single planes, no other node) that no service has."""
+    """The board with one virtual capture device (single-planar, no other node) that no service has open."""
     guest.sh(f"systemctl stop {UNIT} && modprobe vivid n_devs=1 node_types=0x1 multiplanar=1 && udevadm settle")
     guest.put(Path(__file__).with_name("kernel_camera.py"), "/srv")
     yield guest
@@ -28,7 +28,7 @@ def vivid(guest: Guest) -> Iterator[Guest]:
 
 
 def capture(guest: Guest, options: str, *orders: str) -> dict[str, Any]:
-    """Follow orders with the camera; gives what came."""
+    """Follow orders with the camera; return what came."""
     words = (f"size={WIDTH_PX}x{HEIGHT_PX}&fps=10&{options}", *orders)
     shown: dict[str, Any] = json.loads(guest.sh(f"python3 -P /srv/kernel_camera.py {shlex.join(words)}"))
     assert shown["sequences"] == sorted(set(shown["sequences"]))
@@ -48,15 +48,15 @@ def capture(guest: Guest, options: str, *orders: str) -> dict[str, Any]:
 def test_raw_images_are_sent_whole_or_as_luma(
     vivid: Guest, source: str, send: str, sent_as: str, length_bytes: int
 ) -> None:
-    """Each raw format has its length, and in it the driver's colour bars, which by their standard fall in luma from left to right."""
+    """Each raw format has its correct length and contains the driver's colour bars, whose luma falls from left to right by their standard."""
     shown = capture(vivid, f"format={source}&send={send}", "frames=3")
     assert (shown["format"], shown["bytes"]) == (sent_as, length_bytes)
-    bars = [shown["row"][(2 * bar + 1) * WIDTH_PX // 16] for bar in range(8)]  # the middle of each of eight
+    bars = [shown["row"][(2 * bar + 1) * WIDTH_PX // 16] for bar in range(8)]  # the middle of each of eight bars
     assert all(left > right for left, right in pairwise(bars)), bars
 
 
 def test_a_fatal_error_of_the_driver_is_outlived(vivid: Guest) -> None:
-    """After an error that ends the stream for good (EIO) the device is opened anew and frames go on, with the failure counted."""
+    """After an error that ends the stream for good (EIO) the device is reopened and frames continue, with the failure counted."""
     shown = capture(vivid, "format=grey", "frames=5", "Inject Fatal Streaming Error=1", "frames=5")
     assert shown["health"]["failures"] == 1
     assert shown["health"]["returned"] == 1
@@ -64,14 +64,14 @@ def test_a_fatal_error_of_the_driver_is_outlived(vivid: Guest) -> None:
 
 
 def test_a_flagged_frame_is_spoiled(vivid: Guest) -> None:
-    """A buffer that the driver flags as bad is no frame; it is counted, and the next ones come."""
+    """A buffer that the driver flags as bad is no frame; it is counted, and the next ones arrive."""
     shown = capture(vivid, "format=grey", "frames=5", "Inject V4L2_BUF_FLAG_ERROR=1", "frames=5")
     assert sum(shown["health"]["faults"].values()) == 1
     assert shown["health"]["failures"] == 0
 
 
 def test_frames_that_stay_away_are_a_stall(vivid: Guest) -> None:
-    """When the driver goes silent without an error the stream is begun anew until frames come again."""
+    """If the driver goes silent without an error, the stream is restarted until frames arrive again."""
     shown = capture(vivid, "format=grey", "frames=5", f"{DROPPED}=100", "await=stalls", f"{DROPPED}=0", "frames=5")
     assert shown["health"]["stalls"] >= 1
     assert shown["health"]["returned"] == 1

@@ -1,4 +1,4 @@
-"""Capture against v4l2loopback, by which other programs give their images to cameras' users: a first buffer that is none, a clock without a name."""
+"""Capture with v4l2loopback, by which other programs pass images to users of cameras: an invalid first buffer, and an unnamed clock."""
 
 import json
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.timeout(600)  # the first test boots the board
 
 @pytest.fixture(scope="module")
 def loopback(guest: Guest) -> Iterator[Guest]:
-    """The board with such a device, which a program of its own writes to and no service has."""
+    """The board with such a device; a writer of its own feeds it, and no service has it."""
     module = image_of(Architecture.AMD64).folder / "v4l2loopback.ko"
     if not module.is_file():
         pytest.skip(f"no {module}: .ci/board builds it where apt has the kernel's headers")
@@ -29,7 +29,7 @@ def loopback(guest: Guest) -> Iterator[Guest]:
 
 
 def test_its_first_buffer_is_no_frame_and_its_stamps_are_believed(loopback: Guest) -> None:
-    """The first buffer (never written, number 0) is spoiled, the jump of the numbers after it is no loss, and stamps of an unnamed clock that fit are taken."""
+    """The first buffer (never written, number 0) is spoiled, the jump in numbers after it is no loss, and plausible stamps of an unnamed clock are accepted."""
     loopback.sh("until board-agent cameras | grep -q MJPG; do sleep 0.1; done")
     order = "python3 -P /srv/kernel_camera.py 'size=320x240&fps=30&format=mjpeg' frames=20"
     shown = json.loads(loopback.sh(order))

@@ -14,7 +14,7 @@ from tests.vm.guest import UNIT, Guest
 
 pytestmark = pytest.mark.timeout(600)  # the first test boots the board
 
-# What a package may touch. /run and /proc live in memory; dpkg and systemd keep books of their own; ldconfig's cache is rewritten anyhow.
+# What a package may touch. /run and /proc live in memory; dpkg and systemd keep their own records; ldconfig's cache is rewritten anyhow.
 _EVERYTHING = (
     (
         "find / -xdev ( -path /run -o -path /proc -o -path /sys -o -path /tmp -o -path /root -o -path /var/log -o -path /var/lib/dpkg "
@@ -27,14 +27,14 @@ _EVERYTHING = (
 
 @pytest.fixture(scope="module")
 def before(bare_guest: Guest) -> str:
-    """Every file of the board, and its users, without the package."""
+    """Every file and user of the board, without the package."""
     bare_guest.code("dpkg --purge tandemscan-board")
     return bare_guest.sh(_EVERYTHING + "; cat /etc/passwd /etc/group")
 
 
 @pytest.fixture(scope="module")
 def installed(bare_guest: Guest, before: str, package: Path) -> Iterator[Guest]:
-    """The board with the package as it comes."""
+    """The board with the package in its default state."""
     assert before
     bare_guest.put(package, "/var/tmp")
     bare_guest.sh(f"dpkg -i /var/tmp/{package.name}")
@@ -43,7 +43,7 @@ def installed(bare_guest: Guest, before: str, package: Path) -> Iterator[Guest]:
 
 
 def test_the_service_runs_after_installation_and_names_what_is_missing(installed: Guest) -> None:
-    """Without any further word the service is enabled and up, and its status names the camera that is not there yet."""
+    """Without configuration the service is enabled and up, and its status names the camera that is not there yet."""
     assert installed.show("UnitFileState") == "enabled"
     installed.until("ActiveState", "active", "the service is up")
     installed.until("StatusText", "waiting for the camera", "the service says what is missing")
@@ -72,7 +72,7 @@ def test_the_unit_is_understood_without_a_warning(installed: Guest) -> None:
 
 
 def test_the_launcher_ignores_a_foreign_common(installed: Guest) -> None:
-    """board-agent started in a folder that holds somebody else's `common` prints its own settings; the conffile is understood."""
+    """board-agent started in a folder with a foreign `common` prints its own settings; the conffile is understood."""
     installed.sh("mkdir -p /tmp/x/common && echo 'raise SystemExit(9)' > /tmp/x/common/__init__.py")
     shown = installed.sh("cd /tmp/x && board-agent settings --json --config /etc/tandemscan/board-agent.toml")
     origins = {name: setting["origin"] for name, setting in json.loads(shown).items()}
@@ -81,7 +81,7 @@ def test_the_launcher_ignores_a_foreign_common(installed: Guest) -> None:
 
 
 def test_keys_are_those_of_the_service(installed: Guest) -> None:
-    """Without options `keys` shows the folder that the service's settings name."""
+    """Without options `keys` shows the folder named in the service's settings."""
     settings = "/etc/tandemscan/board-agent.toml"
     installed.sh(f"cp -p {settings} /var/tmp/good && sed -i 's,^keys = .*,keys = \"/run/other\",' {settings}")
     try:
@@ -99,7 +99,7 @@ def test_byte_code_is_compiled_on_installation(installed: Guest) -> None:
 
 
 def test_a_changed_conffile_outlives_an_upgrade_and_the_service_is_restarted(installed: Guest, package: Path) -> None:
-    """Installing again keeps the owner's settings and starts the new code."""
+    """A reinstallation keeps the owner's settings and starts the new code."""
     installed.sh("echo '# mine' >> /etc/tandemscan/board-agent.toml")
     process = installed.show("MainPID")
     installed.sh(f"dpkg -i /var/tmp/{package.name}")
@@ -108,7 +108,7 @@ def test_a_changed_conffile_outlives_an_upgrade_and_the_service_is_restarted(ins
 
 
 def test_a_settings_mistake_is_one_line_in_the_journal_and_heals_by_itself(installed: Guest) -> None:
-    """With a bad value the service says which one and keeps trying; once mended it comes up without being asked."""
+    """With an invalid value the service says which one and keeps trying; once it is corrected the service comes up unasked."""
     installed.sh("cp -p /etc/tandemscan/board-agent.toml /var/tmp/good")
     installed.write("/etc/tandemscan/board-agent.toml", 'camera = 7\nlink = ["tcp://*:5555"]\n')
     installed.code(f"systemctl restart {UNIT}")

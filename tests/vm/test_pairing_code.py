@@ -1,4 +1,4 @@
-"""A board and a host get to know each other as their owner would do it: over a network, with the code that the board's owner is shown."""
+"""A board and a host are paired as their owner would do it: over a network, with the code that the board's owner is shown."""
 
 import json
 import os
@@ -23,14 +23,14 @@ STATE = "/var/lib/tandemscan"
 
 @pytest.fixture(autouse=True)
 def _own_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The host's keys lie in a folder of the test's."""
+    """Keep the host's keys in a folder of the test's."""
     monkeypatch.setenv("PHONE_HOST_KEYS", str(tmp_path / "keys"))
 
 
 def test_pairing_by_the_code_that_the_owner_is_shown(
     guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
 ) -> None:
-    """On a network the board refuses a host; the code that `board-agent pair` shows pairs them, and stands in no journal; pairs of frames are right; a forgotten host is refused again."""
+    """On a network the board refuses a host; the code from `board-agent pair` pairs them and is in no journal; pairs of frames are correct; a forgotten host is refused again."""
     assert webcam.plugged
     guest.configure(CAMERA, secured=True)
     try:
@@ -79,7 +79,7 @@ def test_pairing_by_the_code_that_the_owner_is_shown(
 
 
 def check_state(guest: Guest, public: str) -> None:
-    """The board's folder of keys belongs to the service alone, whoever wrote it, and root's `keys` shows the host that was paired."""
+    """The board's folder of keys belongs to the service alone, whoever wrote to it, and root's `keys` shows the host that was paired."""
     for line in guest.sh(f"stat -c '%n %U %a' {STATE} {STATE}/key {STATE}/peers.json").splitlines():
         path, owner, mode = line.split()
         assert owner == "tandemscan", line
@@ -95,7 +95,7 @@ def check_state(guest: Guest, public: str) -> None:
 
 
 def test_the_owner_pairs_on_the_boards_terminal(guest: Guest, webcam: Webcam) -> None:
-    """`board-agent pair` as root shows a code that a host can use at once, and tells who came."""
+    """`board-agent pair` as root shows a code that a host can use at once, and says who came."""
     assert webcam.plugged
     guest.configure(CAMERA, secured=True)
     try:

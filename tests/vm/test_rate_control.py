@@ -1,4 +1,4 @@
-"""Rate control on a real driver: uvcvideo's camera gives less over a slow network and all over a swift one; and links whose devices are missing."""
+"""Rate control on a real driver: uvcvideo's camera gives less over a slow network and everything over a fast one; and links without their devices."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,7 +26,7 @@ SETTINGS: Final = "/etc/tandemscan/board-agent.toml"
 
 @pytest.fixture(scope="module")
 def halves(film: Film) -> list[bytes]:
-    """The left images at half of their size, as a camera gives them that puts four pixels into one."""
+    """The left images at half their size, as from a camera that bins four pixels into one."""
     small = []
     for jpeg in film.frames:
         image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
@@ -40,7 +40,7 @@ def halves(film: Film) -> list[bytes]:
 
 @pytest.fixture(scope="module")
 def webcam(guest: Guest, film: Film, halves: list[bytes]) -> Iterator[Webcam]:
-    """A webcam of two sizes, each at two rates, whose owner lets size and rate give way."""
+    """A webcam with two sizes, each at two rates, whose owner allows size and rate to be lowered."""
     camera = Webcam(film.frames, FPS, READOUT_MS * 1_000_000, MODEL, halves)
     camera.plug(guest)
     lowered = f"-e 's|^least_fps = .*|least_fps = {SLOW_FPS}|' -e 's|^adapt = .*|adapt = [\"rate\", \"size\"]|'"
@@ -52,7 +52,7 @@ def webcam(guest: Guest, film: Film, halves: list[bytes]) -> Iterator[Webcam]:
 
 @contextmanager
 def network_for(guest: Guest, frames: list[bytes], fps: float) -> Iterator[None]:
-    """A network that carries so many of these frames a second; headers of Ethernet, IP and TCP are a twentieth."""
+    """A network that carries this many of these frames a second; Ethernet, IP and TCP headers are a twentieth."""
     bits_per_s = round(1.05 * 8 * fps * sum(map(len, frames)) / len(frames))
     guest.sh(f"tc qdisc add dev {NETWORK_CARD} root netem rate {bits_per_s}bit limit 1000")
     try:
@@ -62,7 +62,7 @@ def network_for(guest: Guest, frames: list[bytes], fps: float) -> Iterator[None]
 
 
 def steps(out: Path) -> list[int]:
-    """How many of the film's periods lie between each two of the last eleven pairs; nothing while there are fewer."""
+    """How many of the film's periods lie between consecutive ones of the last eleven pairs; nothing while there are fewer."""
     if lines(out / "delays.jsonl") < 11:
         return []
     exposed = [ledger["exposed_ns"] for ledger in ledgers(out)[-11:]]
@@ -70,13 +70,13 @@ def steps(out: Path) -> list[int]:
 
 
 def rungs(log: str) -> list[int]:
-    """The rungs that a program has told of."""
+    """The rungs that a program has reported."""
     told = [line for line in log.splitlines() if "camera_stepped" in line]
     return [int(word.partition("=")[2]) for line in told for word in line.split() if word.startswith("rung=")]
 
 
 def climb(guest: Guest) -> None:
-    """Wait until the camera gives all again; where a stalled machine fails a trial the next step is waited for, up or down."""
+    """Wait until the camera is back at rung 0; if a stalled machine fails a trial, wait for the next step, up or down."""
     while (known := rungs(guest.journal()))[-1]:
         until(lambda known=known: rungs(guest.journal()) != known, "the next step")  # type: ignore[misc]  # bound now
 
@@ -84,7 +84,7 @@ def climb(guest: Guest) -> None:
 def test_rate_and_size_give_way_and_come_back(
     guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
 ) -> None:
-    """Half of the rate over a network for seven frames, half of the size, too, over one for two and a half, all again over the whole; each pair right."""
+    """On a network for seven frames the rate is halved, on one for two and a half the size, too, on the full one neither; each pair is correct."""
     out = tmp_path / "out"
     with streaming(guest, film.right, out) as stream:
         stream.more(20, "at the whole rate")
@@ -117,7 +117,7 @@ def test_rate_and_size_give_way_and_come_back(
 
 
 def test_an_adapter_that_is_missing_is_waited_for_beside_another_link(guest: Guest) -> None:
-    """Without a Bluetooth adapter a board with another link serves that one and says what it waits for; with no other it ends with exit 3."""
+    """Without a Bluetooth adapter a board with another link serves that one and says what it waits for; with no other link it ends with exit 3."""
     guest.sh("modprobe rfcomm; mkdir -p /srv/frames && printf 'P5 2 2 255\nabcd' >/srv/frames/1.pgm")
     frames, missing = "replay:/srv/frames?fps=10&loop=1", "rfcomm://*?unpaired=1"
     assert guest.code(f"board-agent run --camera '{frames}' --link '{missing}'") == 3

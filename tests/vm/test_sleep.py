@@ -1,4 +1,4 @@
-"""A board that sleeps: its CLOCK_MONOTONIC, which all stamps are of, stands still while the host's goes on."""
+"""A board that sleeps: its CLOCK_MONOTONIC, the clock of all stamps, stands still while the host's goes on."""
 
 import time
 from collections.abc import Iterator
@@ -14,19 +14,19 @@ from tests.vm.webcam import Webcam
 pytestmark = pytest.mark.timeout(600)  # the first test boots the board
 
 SLEEP_S = 1
-"""Shorter than the silence after which a host gives its board up: then nothing but the board itself tells of it."""
+"""Shorter than the silence after which a host gives up its board: then only the board itself reports the sleep."""
 
 
 @pytest.fixture(scope="module")
 def bare_guest() -> Iterator[Guest]:
-    """A board of this file's own: QEMU 7.2 wakes a guest well once."""
+    """A board of this file's own: QEMU 7.2 wakes a guest correctly only once."""
     with booted(Architecture.AMD64) as guest:
         yield guest
 
 
 @pytest.fixture(autouse=True)
 def _sound_afterwards(guest: Guest, webcam: Webcam) -> Iterator[None]:
-    """After each test the service is up, its books balance and it has never shown a traceback."""
+    """After each test the service is up, its accounts balance and it has never shown a traceback."""
     assert webcam.plugged
     yield
     check_journal(guest)
@@ -43,13 +43,13 @@ def offset_ns(guest: Guest) -> int:
 def test_a_board_that_was_suspended_streams_on(
     guest: Guest, webcam: Webcam, film: Film, skew: Skew, tmp_path: Path
 ) -> None:
-    """Suspended to memory and woken, the board goes on in the same session; its clock is learnt anew, no pair is wrong."""
+    """Suspended to memory and woken, the board continues in the same session; its clock is measured anew, no pair is wrong."""
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "before the sleep")
         before_ns = offset_ns(guest)
         webcam.unplug()  # a USB port without power has no camera
         guest.suspend()
-        time.sleep(SLEEP_S)  # the length of the sleep, no wait for anything
+        time.sleep(SLEEP_S)  # the length of the sleep, not a wait for something
         guest.wake()
         webcam.plug(guest)
         stream.more(20, "after the sleep")

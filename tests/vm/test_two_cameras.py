@@ -1,4 +1,4 @@
-"""Two webcams on one board: lasting names tell them apart, wherever and in whichever order they are plugged in."""
+"""Two webcams on one board: persistent names tell them apart, wherever and in whatever order they are plugged in."""
 
 import json
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ OPTIONS = CAMERA.partition("?")[2]
 
 @pytest.fixture(scope="module")
 def second(guest: Guest, film: Film) -> Iterator[Webcam]:
-    """Another camera of the same make with a serial number that sorts behind the first one's; it shows the same images."""
+    """Another camera of the same make, with a serial number that sorts after the first one's; it shows the same images."""
     camera = Webcam(film.frames, FPS, READOUT_MS * 1_000_000, uvc.Model(serial="TEST-B"))
     camera.plug(guest, usb_port=4)
     yield camera
@@ -46,7 +46,7 @@ def pair(webcam: Webcam, second: Webcam) -> Pair:
 
 @pytest.fixture(autouse=True)
 def _sound_afterwards(guest: Guest, webcam: Webcam, second: Webcam) -> Iterator[None]:
-    """After each test the service is up with its usual camera, its books balance and it has never shown a traceback."""
+    """After each test the service is up with its usual camera, its accounts balance and it has never shown a traceback."""
     assert webcam.plugged
     assert second.plugged
     until(lambda: guest.code(f"test -e {FIRST} -a -e {SECOND}") == 0, "both cameras have their names")
@@ -56,7 +56,7 @@ def _sound_afterwards(guest: Guest, webcam: Webcam, second: Webcam) -> Iterator[
 
 
 def test_both_are_listed_by_their_lasting_names(guest: Guest) -> None:
-    """`board-agent cameras` lists the two capture nodes of four, in the order of their names."""
+    """`board-agent cameras` lists the two capture nodes among four nodes, in the order of their names."""
     assert len(guest.sh("ls /dev | grep '^video'").split()) == 4  # each has a metadata node, too
     listed = json.loads(guest.sh("board-agent cameras --json"))["cameras"]
     assert [camera["path"] for camera in listed] == [FIRST, SECOND]
@@ -87,7 +87,7 @@ def test_auto_takes_the_first_name_not_the_first_number(
 def test_a_name_means_one_camera_and_outlives_another_port(
     guest: Guest, pair: Pair, film: Film, tmp_path: Path
 ) -> None:
-    """By its name in by-id the service streams from the second camera; pulled, it waits for just that one, in whatever port it comes back."""
+    """By its by-id name the service streams from the second camera; when it is pulled, the service waits for that one, in whatever port it returns."""
     guest.configure(f"v4l2:{SECOND}?{OPTIONS}")
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "of the second camera")
@@ -106,7 +106,7 @@ def test_a_name_means_one_camera_and_outlives_another_port(
 def test_both_stream_at_once_and_one_is_pulled(
     guest: Guest, pair: Pair, film: Film, skew: Skew, tmp_path: Path
 ) -> None:
-    """Two agents stream from one camera each; pulling one and plugging it in at another port leaves the other one's stream alone."""
+    """Two agents stream from one camera each; replugging one at another port does not disturb the other one's stream."""
     guest.configure(f"v4l2:{FIRST}?{OPTIONS}")
     other = f"board-agent run --camera 'v4l2:{SECOND}?{OPTIONS}' --link ipc:///run/second --json > /run/second.json"
     starts = pair.second.starts

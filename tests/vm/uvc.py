@@ -1,4 +1,4 @@
-"""What a small MJPEG webcam tells of itself: USB 2.0 and UVC 1.0 descriptors and its controls. Values only, no I/O.
+"""What a small MJPEG webcam reports about itself: USB 2.0 and UVC 1.0 descriptors and its controls. Values only, no I/O.
 
 Sources: USB 2.0 specification, chapter 9; USB Device Class Definition for Video Devices 1.0a, chapters 3 (descriptors) and 4 (requests).
 """
@@ -26,9 +26,9 @@ class Control:
     Attributes:
         size: bytes.
         least, most, step, default: its range.
-        automatism: (unit, selector) of the control that rules this one, if there is one.
-        automatic: values of that control with which it does.
-        found: the value that the automatism finds.
+        automatism: (unit, selector) of the control that sets this one automatically, if there is one.
+        automatic: values of that control with which it does so.
+        found: the value that the automatic mode finds.
     """
 
     size: int
@@ -41,7 +41,7 @@ class Control:
     found: int = 0
 
     def answer(self, request: int, current: int) -> bytes:
-        """What a GET request yields."""
+        """The answer to a GET request."""
         values = {
             GET_CUR: current,
             GET_MIN: self.least,
@@ -51,7 +51,7 @@ class Control:
         }
         if request == GET_LEN:
             return struct.pack("<H", self.size)
-        if request == GET_INFO:  # D0 may be read, D1 may be set, D3 changes by itself (table 4-3)
+        if request == GET_INFO:  # D0: may be read, D1: may be set, D3: changes by itself (table 4-3)
             return b"\x0b" if self.automatism else b"\x03"
         return values[request].to_bytes(self.size, "little")
 
@@ -67,8 +67,8 @@ WHITE_BALANCE_AUTO: Final = (_PROCESSING, 0x0B)
 CONTROLS: Final = {
     EXPOSURE_MODE: Control(
         size=1, least=0, most=8, step=9, default=8
-    ),  # as a bit map its "step" tells: 1 manual, 8 aperture priority
-    EXPOSURE_PRIORITY: Control(size=1, least=0, most=1, step=1, default=1),  # may the rate fall in the dark
+    ),  # as a bit map its "step" lists: 1 manual, 8 aperture priority
+    EXPOSURE_PRIORITY: Control(size=1, least=0, most=1, step=1, default=1),  # whether the rate may fall in the dark
     EXPOSURE: Control(
         size=4, least=1, most=2000, step=1, default=100, automatism=EXPOSURE_MODE, automatic=(2, 8), found=100
     ),  # 100 us
@@ -86,7 +86,7 @@ CONTROLS: Final = {
 
 _CAMERA_BITS: Final = (
     1 << 1 | 1 << 2 | 1 << 3 | 1 << 5 | 1 << 17
-)  # exposure mode, priority, time; focus, its auto: table 3-6
+)  # exposure mode, priority, time; focus, automatic focus: table 3-6
 _PROCESSING_BITS: Final = 1 << 0 | 1 << 6 | 1 << 9 | 1 << 10 | 1 << 12  # table 3-8
 
 
@@ -124,7 +124,7 @@ class Model:
         return _described(6, struct.pack("<HBBBBBB", 0x0200, 0xEF, 2, 1, 64, 1, 0))
 
     def string(self, index: int) -> bytes:
-        """String descriptor: 0 the languages (US English), then maker, product and serial number."""
+        """String descriptor: 0 for the languages (US English), then maker, product and serial number."""
         if index == 0:
             return _described(3, struct.pack("<H", 0x0409))
         return _described(3, ("tandemscan", self.name, self.serial)[index - 1].encode("utf-16le"))

@@ -1,7 +1,7 @@
-"""A webcam of this machine on the guest's USB bus: its kernel's own uvcvideo driver finds a camera on vhci_hcd, here sits the device.
+"""A webcam on the guest's USB bus, emulated on this machine: the guest kernel's own uvcvideo driver finds a camera on vhci_hcd; the device is here.
 
 The guest connects and hands the connection to its kernel, which from then on speaks USB/IP over it (the kernel's
-Documentation/usb/usbip_protocol.rst). The device runs outside the guest, so that it does not eat the board's time.
+Documentation/usb/usbip_protocol.rst). The device runs outside the guest, so that it does not use the board's processor time.
 """
 
 import math
@@ -41,14 +41,14 @@ class Webcam:
     """A camera that can be plugged into a guest.
 
     It shows image number floor(t * fps) of this machine's CLOCK_MONOTONIC, as a replay does, with the middle of its exposure at k / fps:
-    half the exposure time and half the readout later the first byte leaves. From `start_with_phase` on its sensor runs as most webcams' do:
+    the first byte leaves half the exposure time and half the readout later. After `start_with_phase` its sensor runs like that of most webcams:
     only while it streams, first exposed a fixed time after the start, so that each start gives it another phase.
 
     Args:
         frames: JPEGs, shown in turn.
-        fps: of its own accord; a driver that asks for less gets less.
+        fps: native rate; a driver that asks for less gets less.
         readout_ns: of its sensor.
-        model: what it is.
+        model: the make of webcam.
         smaller: the same JPEGs for a driver that asks for the model's second size; empty: the same for both.
     """
 
@@ -61,24 +61,24 @@ class Webcam:
         smaller: Sequence[bytes] = (),
     ) -> None:
         self.late_ns: dict[int, tuple[int, int]] = {}
-        """By number of the image in `frames`, the last time: how much later than due its first bytes left, and how much later the guest's
-        driver had taken them. It stamped them in between; on a busy machine that may be long."""
+        """By image number in `frames`, for its last showing: how much later than due its first bytes left, and how much later the guest's
+        driver had taken them. The driver stamped them in between; on a busy machine that may be long."""
         self.truncate_every = 0
-        """Every which frame loses its second half; 0: none."""
+        """Every n-th frame loses its second half; 0: none."""
         self.truncated = 0
         self.hung = False
-        """Whether its firmware has stopped: it answers nothing, but is on the bus."""
+        """Whether its firmware has hung: it answers nothing, but stays on the bus."""
         self.starts = 0
         """How often a driver has started the stream."""
         self.streaming = False
         self.start_phase_ns: int | None = None
         self.start_latency_ns: int | None = None
         self.phase_ns = 0
-        """How much later than k / fps it exposes since the newest start."""
+        """How much later than k / fps it exposes since the latest start."""
         self.settings: dict[tuple[int, int], int] = {}
-        """Its controls as they stand, by (unit, selector)."""
+        """Its current controls, by (unit, selector)."""
         self.found: dict[tuple[int, int], int] = {}
-        """What automatisms find, where it is not what they found when it was made."""
+        """What automatic modes find, if it differs from the original values."""
         self.set_requests: list[tuple[tuple[int, int], int]] = []
         """Every control that a driver has set, with the value, in order."""
         self._frames, self._fps, self._readout_ns = frames, fps, readout_ns
@@ -90,19 +90,19 @@ class Webcam:
 
     @property
     def plugged(self) -> bool:
-        """Whether a guest has it."""
+        """Whether it is plugged into a guest."""
         return self._thread is not None and self._thread.is_alive()
 
     def start_with_phase(self, phase_ns: int) -> None:
-        """Let the next start give exposures so much later than k / fps; every later start is as late after its own command as that one was."""
+        """Make the next start expose this much later than k / fps; every later start has the same delay after its own command."""
         self.start_phase_ns = phase_ns
 
     def find(self, where: tuple[int, int], value: int) -> None:
-        """Let the light change: an automatism that is on finds another value, and the camera goes by it at once."""
+        """Change the light: an active automatic mode finds another value, and the camera uses it at once."""
         self.found[where] = self.settings[where] = value
 
     def plug(self, guest: Guest, usb_port: int = 0) -> None:
-        """Plug it into a guest's USB port, and wait until the port took it."""
+        """Plug it into a guest's USB port, and wait until the port accepts it."""
         guest.sh("modprobe -a vhci_hcd uvcvideo")
         port = self._listener.getsockname()[1]
         attach = _PLUG.format(port=port, usb_port=usb_port, device=_DEVICE_ID + usb_port, speed=_HIGH_SPEED)
@@ -131,7 +131,7 @@ class Webcam:
             self._connection = None
 
     def close(self) -> None:
-        """Pull it and put it away."""
+        """Pull it and shut it down."""
         self.unplug()
         self._listener.close()
 
@@ -141,7 +141,7 @@ class Webcam:
 
 
 class _Device:
-    """One plugging-in: its requests, its controls, its stream."""
+    """One plugged-in period: its requests, its controls, its stream."""
 
     def __init__(self, camera: Webcam, connection: socket.socket) -> None:
         self._camera, self._socket = camera, connection
@@ -151,12 +151,12 @@ class _Device:
         self._streaming = False
         self._odd = False
         self._number = 0
-        self._newest = -1  # image, counted over all laps of the film
+        self._newest = -1  # image number, counted over all laps of the film
         self._rest = b""
-        self._ignored: set[int] = set()  # sequence numbers of requests that never got an answer
+        self._ignored: set[int] = set()  # sequence numbers of requests that were never answered
         self._taken: deque[tuple[int, int] | None] = (
             deque()
-        )  # (image, due_ns) of each transfer that the driver has not yet offered anew
+        )  # (image, due_ns) of each transfer that the driver has not yet resubmitted
         self._first: tuple[int, int] | None = None
         self._phase_ns = 0
 
@@ -229,7 +229,7 @@ class _Device:
             return known[kind][:length] if kind in known else None
         if request == 1:  # CLEAR_FEATURE of the endpoint: how a bulk camera is told to stop
             self._stop()
-        # GET_STATUS, GET_CONFIGURATION, GET_INTERFACE; what is set is taken as it is
+        # GET_STATUS, GET_CONFIGURATION, GET_INTERFACE; settings are accepted unchanged
         return {0: b"\0\0", 8: b"\1", 10: b"\0"}.get(request, b"")[:length]
 
     def _negotiate(self, request: int, selector: int, out: bytes, length: int) -> bytes:
@@ -247,7 +247,7 @@ class _Device:
         return (self._commit if selector == uvc.COMMIT else self._probe)[:length]
 
     def _note_taken(self) -> None:
-        """The driver offers a transfer anew as soon as it has taken what was in it, in the same order."""
+        """The driver resubmits a transfer as soon as it has taken its data, in the same order."""
         if self._taken and (first := self._taken.popleft()) is not None:
             image, due_ns = first
             self._camera.late_ns[image] = (self._camera.late_ns[image][0], time.monotonic_ns() - due_ns)
@@ -260,7 +260,7 @@ class _Device:
         now_ns = time.monotonic_ns()
         self._set_phase(now_ns)
         self._number = math.floor((now_ns - self._phase_ns - self._delay_ns()) * self._rate_hz() / 1e9) + 1
-        # No image twice, though a restart with a later phase could: an image's number names one moment.
+        # No image twice, though a restart with a later phase could show one: an image's number identifies one moment.
         while self._image() <= self._newest:
             self._number += 1
 
@@ -281,15 +281,15 @@ class _Device:
         return min(self._camera._fps, round(1e7 / interval))
 
     def _image(self) -> int:
-        """The image of the next number: at half of the rate every other one is shown."""
+        """The image for the next number: at half the rate every other image is shown."""
         return self._number * self._camera._fps // self._rate_hz()
 
     def _delay_ns(self) -> int:
-        """From the middle of an exposure to the first byte."""
+        """Time from the middle of an exposure to the first byte."""
         return (self._controls[uvc.EXPOSURE] * 100_000 + self._camera._readout_ns) // 2
 
     def _feed(self) -> float:
-        """Give image data to the transfers that wait for it; tells how long there is nothing to do, s."""
+        """Give image data to the waiting transfers; return how long there is nothing to do, s."""
         while self._streaming and self._waiting and not self._camera.hung:
             now_ns = time.monotonic_ns()
             if not self._rest:
@@ -316,7 +316,7 @@ class _Device:
         number, self._newest = self._number, self._image()
         self._number += 1
         due_ns += round(skipped * 1e9 / self._rate_hz())
-        due_ns -= self._phase_ns  # image k belongs to k / fps: what its exposure was later is told as lateness
+        due_ns -= self._phase_ns  # image k belongs to k / fps: any later exposure is reported as lateness
         image = self._newest % len(camera._frames)
         camera.late_ns[image] = (now_ns - due_ns, now_ns - due_ns)
         self._first = (image, due_ns)

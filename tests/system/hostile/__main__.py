@@ -1,6 +1,6 @@
-"""All attacks for minutes: `python -m tests.system.hostile [--help]`; `make attack` runs them for ten. Exit 4 when a limit is missed.
+"""All attacks, for minutes: `python -m tests.system.hostile [--help]`; `make attack` runs them for ten. Exit 4 if a limit is missed.
 
-Each attack gets an equal share of the time and is repeated in it, once at least. The tests beside this file run some of the same attacks once.
+Each attack gets an equal share of the time and is repeated within it, at least once. The tests beside this file run some of the same attacks once.
 """
 
 import argparse
@@ -26,11 +26,11 @@ ATTACKS: Final[tuple[Attack, ...]] = (
     *crowds.LONG,
 )
 _START_S: Final = 4.0
-"""Start and end of the programs take about so much of an attack's share."""
+"""About this much of an attack's share goes to starting and ending the programs."""
 
 
 def main() -> int:
-    """Run and print; 2 when no attack has such a name, 4 when a limit is missed."""
+    """Run and print; return 2 when a named attack does not exist, 4 when a limit is missed."""
     parser = argparse.ArgumentParser("python -m tests.system.hostile", description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0, help="for all attacks together (default: 10)")
     parser.add_argument("--only", metavar="WORD", help="attacks whose name contains this")
@@ -59,7 +59,7 @@ def _run(attack: Attack, share_s: float) -> Outcome:
     with tempfile.TemporaryDirectory(prefix="attack-", ignore_cleanup_errors=True) as folder:
         try:
             return attack.run(Path(folder), Rounds(share_s))
-        except AssertionError as error:  # no stream came up, or a condition was waited for in vain: the others go on
+        except AssertionError as error:  # no stream came up, or a wait timed out: the other attacks go on
             return Outcome(faults=[" ".join(str(error).split())[:200]])
 
 

@@ -1,4 +1,4 @@
-"""What an attack is, and what it has shown. Every attack is one `Attack`: the tests run it once, `make attack` runs it for minutes."""
+"""What an attack is and what it found. Every attack is one `Attack`: the tests run it once, `make attack` runs it for minutes."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -8,14 +8,14 @@ from statistics import quantiles
 from typing import Final
 
 MOST_MEMORY: Final = 1.3
-"""Peak of a process under attack, in multiples of its peak before."""
+"""Peak memory of a process under attack, in multiples of its peak before."""
 
 MOST_GAP_S: Final = (1.0, 2.0)
-"""Without pairs after the cause is gone: median and p95 of all rounds (DESIGN, section 7)."""
+"""Time without pairs after the cause is gone: median and p95 of all rounds (DESIGN, section 7)."""
 
 
 class Rounds:
-    """How often an attack is repeated: once at least, then until its time is over.
+    """How often an attack is repeated: at least once, then until its time is over.
 
     Args:
         seconds: its time; 0: once.
@@ -25,7 +25,7 @@ class Rounds:
         self._until = time.monotonic() + seconds
 
     def __iter__(self) -> Iterator[int]:
-        """Numbers of the rounds."""
+        """The numbers of the rounds."""
         number = 0
         yield number
         while time.monotonic() < self._until:
@@ -35,15 +35,15 @@ class Rounds:
 
 @dataclass(slots=True)
 class Outcome:
-    """What an attack has shown so far.
+    """What an attack has found so far.
 
     Attributes:
-        frames: of the board that came to the host.
-        pairs: that the host made.
+        frames: of the board that arrived at the host.
+        pairs: made by the host.
         wrong: pairs of frames that do not belong together.
-        gaps_s: from each time that the cause had gone to the first of many pairs.
-        memory: peak of the attacked process, in multiples of its normal one; 0: not looked at.
-        faults: what else must not be, in words.
+        gaps_s: time from the end of each cause to the first of many pairs.
+        memory: peak of the attacked process, in multiples of its normal peak; 0: not measured.
+        faults: everything else that must not happen, in words.
         figures: what else was measured, in words.
     """
 
@@ -57,7 +57,7 @@ class Outcome:
 
     @property
     def gap_s(self) -> tuple[float, float]:
-        """Median and p95 of the gaps, s; NaN where there was none."""
+        """Median and p95 of the gaps, s; NaN if there was none."""
         if len(self.gaps_s) < 2:
             only = self.gaps_s[0] if self.gaps_s else float("nan")
             return only, only
@@ -65,18 +65,18 @@ class Outcome:
         return cuts[9], cuts[18]
 
     def expect(self, holds: bool, otherwise: str) -> None:  # noqa: FBT001 - reads like an assertion
-        """Note a fault unless something holds."""
+        """Note a fault unless the condition holds."""
         if not holds and otherwise not in self.faults:
             self.faults.append(otherwise)
 
     def broken(self) -> list[str]:
-        """What does not hold, whatever the machine is busy with: counts and content."""
+        """The failed checks that do not depend on how busy the machine is: counts and content."""
         wrong = [f"{self.wrong} wrong pairs"] if self.wrong else []
         memory = [f"memory {self.memory:.2f} x normal"] if self.memory > MOST_MEMORY else []
         return wrong + memory + self.faults
 
     def missed(self) -> list[str]:
-        """What does not hold, the times of coming back included."""
+        """All failed checks, including the recovery times."""
         too_long = any(gap > limit for gap, limit in zip(self.gap_s, MOST_GAP_S, strict=True))
         return self.broken() + (["back too late"] if too_long else [])
 
@@ -86,9 +86,9 @@ class Attack:
     """One attack.
 
     Attributes:
-        name: of one or a few words.
-        load: what is done, in words.
-        run: does it in a folder; gives what it has shown.
+        name: one or a few words.
+        load: what the attack does, in words.
+        run: attacks, with its files in a folder; returns what it found.
     """
 
     name: str

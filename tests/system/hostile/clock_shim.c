@@ -1,6 +1,6 @@
 /* Steps CLOCK_MONOTONIC and CLOCK_BOOTTIME of one process: LD_PRELOAD this, with CLOCK_SHIM naming a file of two int64, the steps in ns.
- * The file is mapped: who writes there moves the clocks at once. What waits until a moment of the shifted clock is given the kernel's moment; what
- * waits for a length of time (poll, select, futex) is the kernel's alone and needs nothing. */
+ * The file is mapped: writing to it steps the clocks at once. Calls that wait until a time of the shifted clock get the kernel's time; calls that
+ * wait for a duration (poll, select, futex) depend only on the kernel and need no change. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 #define SECOND 1000000000LL
-#define NEVER_MONOTONIC 1000000000LL /* s: no machine runs for 31 years; a later deadline is one of CLOCK_REALTIME */
+#define NEVER_MONOTONIC 1000000000LL /* s: no machine runs for 31 years; a later deadline is on CLOCK_REALTIME */
 
 static const int64_t *steps;
 

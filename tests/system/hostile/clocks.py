@@ -26,7 +26,7 @@ class Whose(Enum):
 
 
 class How(Enum):
-    """What else is so meanwhile."""
+    """What else happens at the same time."""
 
     PLAIN = "plain"
     ASLEEP = "asleep"
@@ -34,7 +34,7 @@ class How(Enum):
     SILENT = "silent"
     """The other side is stopped for a second around the step."""
     GIVEN_UP = "given up"
-    """The other side is stopped for longer than silence is borne."""
+    """The other side is stopped for longer than the silence timeout."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Step:
     """One step.
 
     Attributes:
-        by_ns: how far; negative: the machine stands still for so long.
+        by_ns: how far; negative: the machine stands still for this long.
         how: what else is so.
     """
 
@@ -51,13 +51,13 @@ class Step:
 
     @property
     def words(self) -> str:
-        """For people."""
+        """A description for people."""
         how = "" if self.how is How.PLAIN else f" ({self.how.value})"
         return f"{self.by_ns / S:+g} s{how}" if abs(self.by_ns) >= S else f"{self.by_ns / MS:+g} ms{how}"
 
 
 _SILENT_S: Final = {How.SILENT: 0.5, How.GIVEN_UP: 1.8}
-"""Before the step and behind it."""
+"""Before and after the step."""
 
 LARGE: Final = (Step(7 * S), Step(-2 * S), Step(-2 * S, How.ASLEEP), Step(13 * S, How.SILENT))
 AT_THE_LIMIT: Final = (Step(2 * PERIOD_NS + 33_333), Step(-2 * PERIOD_NS - 33_333))
@@ -66,12 +66,12 @@ LONG: Final = (Step(-7 * S), Step(-4 * S, How.ASLEEP), Step(7 * S, How.GIVEN_UP)
 
 
 def step(clock: ShiftedClock, mine: Program, other: Program, this: Step, watched: Scene) -> None:
-    """Let a clock step.
+    """Step a clock.
 
     Args:
-        clock: which.
-        mine: its process.
-        other: the one at the other end.
+        clock: the clock to step.
+        mine: the process of that clock.
+        other: the process at the other end.
         this: the step.
         watched: told of steps that cannot be noticed at once.
     """
@@ -107,7 +107,7 @@ def _run(whose: Whose, steps: Sequence[Step], folder: Path, rounds: Rounds) -> O
 
 
 def attack(whose: Whose, name: str, steps: Sequence[Step]) -> Attack:
-    """An attack of some steps, one after the other."""
+    """An attack of several steps, one after the other."""
     load = f"the {whose.value}'s clocks: " + ", ".join(this.words for this in steps)
     run: Callable[[Path, Rounds], Outcome] = partial(_run, whose, steps)
     return Attack(f"clock: {whose.value}, {name}", load, run)
@@ -118,6 +118,6 @@ SHORT: Final = tuple(
     for whose in Whose
     for name, steps in (("large", LARGE), ("two periods", AT_THE_LIMIT), ("small", SMALL))
 )
-"""In CI, too."""
+"""These run in CI, too."""
 
 LONG_ONLY: Final = tuple(attack(whose, "long", LONG) for whose in Whose)

@@ -1,4 +1,4 @@
-"""Crowds at a board's port, a host's camera that sends bombs, programs that are stopped and killed, and noise on a wire."""
+"""Crowds at a board's port, a host camera that sends bombs, programs that are stopped and killed, and noise on a wire."""
 
 import os
 import random
@@ -23,19 +23,19 @@ _LIMIT: Final = 256
 _CALLERS: Final = 400
 _MEASURED_S: Final = 5.0
 _MOST_CPU: Final = 0.1
-"""Of a core, at the limit of file descriptors."""
+"""Share of a core, at the limit of file descriptors."""
 
 _BOMBS_COME: Final = 120
-"""Pairs from the first ones to those behind the bombs, which the server sends as number 120 to 129."""
+"""Pairs from the first one to those after the bombs, which the server sends as numbers 120 to 129."""
 
 _GREETING: Final = b"\xff" + bytes(8) + b"\x7f\x03\x00" + b"NULL".ljust(20, b"\0") + bytes(32)
 _READY: Final = b"\x05READY\x0bSocket-Type\x00\x00\x00\x06DEALER"
 _PEER: Final = _GREETING + b"\x04" + bytes((len(_READY),)) + _READY
-"""All that ZeroMQ wants to hear of a peer (ZMTP 3.1): then it keeps the connection for as long as the peer likes."""
+"""All that ZeroMQ requires of a peer (ZMTP 3.1): after this it keeps the connection as long as the peer likes."""
 
 
 def cpu_s(program: Program) -> float:
-    """Processor time of a process so far, proc_stat(5)."""
+    """Processor time that a process has used, proc_stat(5)."""
     fields = Path(f"/proc/{program.process.pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -49,7 +49,7 @@ def _dial(port: int) -> socket.socket:
 
 
 def _descriptors(folder: Path, rounds: Rounds) -> Outcome:
-    """More callers than the board has descriptors, each a sound peer that stays: the board rests, and frames go on."""
+    """More callers than the board has descriptors, each a valid peer that stays: the board stays nearly idle, and frames keep flowing."""
     outcome = Outcome()
     port = free_port()
     address = f"tcp://127.0.0.1:{port}"
@@ -94,7 +94,7 @@ def _http(folder: Path, rounds: Rounds) -> Outcome:
 
 
 def _both_stopped(folder: Path, rounds: Rounds) -> Outcome:
-    """Both programs stand still for longer than silence is borne; the link never broke, and nobody greets anew."""
+    """Both programs stand still for longer than the silence timeout; the link never broke, and nobody says hello again."""
     outcome = Outcome()
     with board_and_host(folder) as (agent, watched):
         for _ in rounds:
@@ -112,7 +112,7 @@ def _both_stopped(folder: Path, rounds: Rounds) -> Outcome:
 
 
 def _stop_storm(folder: Path, rounds: Rounds) -> Outcome:
-    """Either program, or both, stops and goes on again and again, for moments and for seconds."""
+    """Either program, or both, stops and continues again and again, for moments and for seconds."""
     outcome, chance = Outcome(), random.Random(4)
     with board_and_host(folder) as (agent, watched):
         for _ in rounds:
@@ -149,7 +149,7 @@ def _board_killed(folder: Path, rounds: Rounds) -> Outcome:
 
 
 def _host_killed(folder: Path, rounds: Rounds) -> Outcome:
-    """The host is killed and started again; the board gives the next one fresh frames."""
+    """The host is killed and started again; the board gives the next host fresh frames."""
     outcome = Outcome()
     address = f"tcp://127.0.0.1:{free_port()}"
     with board(board_arguments(address), folder) as agent:
@@ -171,7 +171,7 @@ def _host_killed(folder: Path, rounds: Rounds) -> Outcome:
 
 
 def _noise(chance: random.Random) -> Callable[[bytes], bytes]:
-    """Now and then a byte is flipped, lost, or comes from nowhere."""
+    """Now and then a byte is flipped, lost or inserted."""
 
     def spoil(data: bytes) -> bytes:
         if chance.random() > 0.05:
@@ -197,7 +197,7 @@ def _noisy(cable: PtyLine, seed: int) -> Iterator[None]:
 
 
 def _wire(folder: Path, rounds: Rounds) -> Outcome:
-    """A serial cable that spoils bytes both ways; what is paired is judged by what the images show, too."""
+    """A serial cable that spoils bytes in both directions; pairs are judged by image content as well."""
     outcome = Outcome()
     with PtyLine(folder, bytes_per_s=3e6, delay_ns=300_000) as cable:
         options = ("--save-every", "1")

@@ -1,4 +1,4 @@
-"""What a lying board tells a real host, one lie after the other; after each the stream has to go on as if nothing had been said."""
+"""The lies that a lying board tells a real host, one after the other; after each, the stream must go on as if nothing had been said."""
 
 import resource
 import time
@@ -37,7 +37,7 @@ _MOST: Final = 2**53
 _FLOOD_S: Final = 2.0
 _WAVE: Final = 3
 _KNOWN_S: Final = 11.0
-"""Longer than the clock's youth (waves.py)."""
+"""Longer than the clock counts as young (waves.py)."""
 
 _MOST_BYTES: Final = 6 * 2**30
 """The host gets no more address space than this, so that a bomb that goes off spoils a test and not the machine."""
@@ -57,7 +57,7 @@ class Lie:
 
 
 def _frames(name: str, change: Callable[[FrameMessage], FrameMessage], times: int = 1) -> Lie:
-    """The next frames are changed."""
+    """Change the next frames."""
 
     def changed(message: Message) -> Iterable[Message]:
         assert isinstance(message, FrameMessage)
@@ -83,7 +83,7 @@ def _set(frame: FrameMessage, exposed_ns: int, grabbed_ns: int, sent_ns: int) ->
 
 
 def _echoes(name: str, times: int, by_ns: int) -> Lie:
-    """The next echoes are off."""
+    """Falsify the next echoes."""
 
     def changed(message: Message) -> Iterable[Message]:
         assert isinstance(message, Pong)
@@ -113,7 +113,7 @@ def _index_beyond(board: LyingBoard, index: int) -> None:
 
 
 def _flood(board: LyingBoard) -> None:
-    """Frames of one byte, as fast as the socket takes them, for two seconds."""
+    """Send frames of one byte for two seconds, as fast as the socket takes them."""
     until = time.monotonic() + _FLOOD_S
     index = board.counts.sent + 1000
 
@@ -161,7 +161,7 @@ ORDER: Final = (
 
 
 def _camera(name: str, **claims: int) -> Lie:
-    """For a second the board is one with another camera."""
+    """For a second, be a board with another camera."""
 
     def tell(board: LyingBoard) -> None:
         board.do(lambda: board.begin_session(replace(board.camera, **claims)))  # type: ignore[arg-type]  # all of them are int
@@ -179,7 +179,7 @@ HELLOS: Final = (
 
 
 def _bombs(name: str, payload: Callable[[], bytes], pixel_format: PixelFormat, size_px: int = 0) -> Lie:
-    """The next ten frames are bombs; with a size their headers say so, too."""
+    """Make the next ten frames bombs; if a size is given, their headers claim it too."""
 
     def changed(frame: FrameMessage) -> FrameMessage:
         bomb = replace(frame, payload=payload(), pixel_format=pixel_format)
@@ -223,7 +223,7 @@ def _run(lies: Sequence[Lie], folder: Path, rounds: Rounds) -> Outcome:
 
 
 def _end_without_end(folder: Path, rounds: Rounds) -> Outcome:
-    """A board that says that no frame follows, and goes on: the run may end with that word, in order, or go on."""
+    """Say that no frame follows, and continue: the run may end with that message, in order, or go on."""
     outcome = Outcome()
     for number in rounds:
         within = folder / str(number)
@@ -239,12 +239,12 @@ def _end_without_end(folder: Path, rounds: Rounds) -> Outcome:
 
 
 def attack(name: str, lies: Sequence[Lie]) -> Attack:
-    """An attack of some lies, one after the other."""
+    """An attack of several lies, one after the other."""
     return Attack(f"board: {name}", "; ".join(lie.name for lie in lies), partial(_run, lies))
 
 
 def _settled(lie: Lie) -> Lie:
-    """The same when the clock is well known and echoes have become rare."""
+    """The same lie when the clock is well known and echoes have become rare."""
 
     def tell(board: LyingBoard) -> None:
         time.sleep(_KNOWN_S)
@@ -263,9 +263,9 @@ SHORT: Final = (
     attack("hellos", HELLOS),
     _NO_END,
 )
-"""In CI: many lies to one host."""
+"""These run in CI: many lies to one host."""
 
 SHORT_BOMBS: Final = (attack("bombs", BOMBS),)
 
 SINGLE: Final = (*(attack(lie.name, (lie,)) for lie in STAMPS + _LATE + ORDER + HELLOS + BOMBS), _NO_END)
-"""Each to a host of its own, again and again."""
+"""Each is told to a host of its own, again and again."""

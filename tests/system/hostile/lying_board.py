@@ -1,7 +1,7 @@
-"""A program that speaks the board's role with the product's own session, over a real link, and lies when it is told to.
+"""A program that plays the board's role with the product's own session, over a real link, and lies when told to.
 
-Its images are those of a replay on the same clock, and it remembers when each frame was truly exposed: that is what its pairs are judged by, whatever its
-stamps say. What a lie changes is put into words by hand (`wire.encode`), everything else as the board does it.
+Its images are those of a replay on the same clock, and it remembers the true exposure of each frame: its pairs are judged by that, whatever its
+stamps say. Lies are encoded by hand (`wire.encode`); everything else is done as the board does it.
 """
 
 import queue
@@ -41,14 +41,14 @@ from tests.support.numbered import HEIGHT_PX, WIDTH_PX
 from tests.system.hostile.scene import FPS, FRAMES, PERIOD_NS, Pair, film
 
 Twist = Callable[[Message], Iterable[Message]]
-"""What becomes of a message on its way out."""
+"""Turns an outgoing message into what is sent instead."""
 
 _STEP_MS: Final = 2
 _MOST_S: Final = 20.0
 
 
 def honest(message: Message) -> Iterable[Message]:
-    """As it is."""
+    """The original, unchanged."""
     return (message,)
 
 
@@ -89,27 +89,27 @@ class LyingBoard:
 
     @property
     def counts(self) -> BoardCounts:
-        """Its honest account."""
+        """The honest account of its frames."""
         return self._outbox.counts
 
     def true_ns(self, pair: Pair) -> int:
-        """When a pair's board frame was truly exposed."""
+        """Return the true exposure of a pair's board frame."""
         return self._exposed.get(pair.sequence, 0)
 
     def twist(self, twist: Twist) -> None:
-        """Let everything go through this from now on."""
+        """Pass everything through this filter from now on."""
         self._twist = twist
 
     def lie(
         self, kind: type[Message], times: int, change: Callable[[Message], Iterable[Message]], *, spoils: bool = False
     ) -> None:
-        """Change the next messages of a kind, and wait until that was done.
+        """Change the next messages of a kind, and wait until that is done.
 
         Args:
-            kind: of messages.
+            kind: of the messages.
             times: how many.
-            change: what becomes of one.
-            spoils: whether these are frames that cannot be used any more, with any partner.
+            change: turns a message into its lie.
+            spoils: whether the changed messages are frames that can no longer be paired.
         """
         done = threading.Event()
         left = times
@@ -131,7 +131,7 @@ class LyingBoard:
             self._twist = honest
 
     def do(self, job: Callable[[], object]) -> None:
-        """Do something in the board's thread, between two other things, and wait for it."""
+        """Run a job in the board's thread, between its other work, and wait for it."""
         done = threading.Event()
 
         def run() -> None:
@@ -142,27 +142,27 @@ class LyingBoard:
         assert done.wait(_MOST_S) or self._stopping, "the liar's thread does not answer"
 
     def say(self, lane: Lane, message: Message) -> SendResult:
-        """Say something on a lane of the host; to be called from a job."""
+        """Send a message on a lane of the host; call this from a job."""
         header, payload = encode(message)
         return self.say_bytes(lane, header, payload)
 
     def say_bytes(self, lane: Lane, header: bytes, payload: bytes | bytearray | memoryview = b"") -> SendResult:
-        """The same with any bytes."""
+        """Send any bytes likewise."""
         return self._link.send(self.lanes[lane], header, payload) if lane in self.lanes else SendResult.UNREACHABLE
 
     def say_parts(self, lane: Lane, parts: list[bytes]) -> None:
-        """The same with any number of parts, which no link of ours sends."""
+        """Send any number of parts likewise; none of our links does that."""
         self._link._socket.send_multipart([self.lanes[lane], *parts])
 
     def begin_session(self, camera: CameraDescription) -> None:
-        """Begin a new life with this camera, and let the host greet anew; to be called from a job."""
+        """Begin a new session with this camera, and have the host say hello again; call this from a job."""
         self._outbox = Outbox()
         self.session = BoardSession(now.random_id(), self._boot_id, camera)
         for lane in self.lanes:
             self.say(lane, Knock(lane, self.session.session))
 
     def a_frame(self, payload: bytes, index: int) -> FrameMessage:
-        """A frame of now that nobody asked for."""
+        """Return a current frame that nobody asked for."""
         ns = now.monotonic_ns()
         frame = self._frame(ns, ns, payload)
         return FrameMessage(
@@ -182,7 +182,7 @@ class LyingBoard:
         self.say(Lane.FRAMES, End(self.session.session, self.counts))
 
     def stop(self) -> None:
-        """End it without a word."""
+        """Stop the board without a goodbye."""
         self._stopping = True
         self._thread.join()
         self._link.close()
@@ -190,11 +190,11 @@ class LyingBoard:
             raise self.failure
 
     def __enter__(self) -> Self:
-        """Itself."""
+        """Return itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End it."""
+        """End the board."""
         self.stop()
 
     def _run(self) -> None:
@@ -275,7 +275,7 @@ class LyingBoard:
 
 
 def _stamped(message: Message) -> Message:
-    """With the time of sending, as the board puts it in at the last moment."""
+    """Insert the time of sending at the last moment, as the board does."""
     match message:
         case FrameMessage():
             return replace(message, marks=replace(message.marks, sent_ns=time.monotonic_ns()))

@@ -39,7 +39,7 @@ _END_NS: Final = 2**62
 
 
 class LyingHost:
-    """Somebody at a board's address, with both lanes.
+    """A peer at a board's address, with both lanes.
 
     Args:
         address: the board's.
@@ -51,21 +51,21 @@ class LyingHost:
         self._gone = False
 
     def say(self, message: Message, lane: Lane = Lane.CONTROL) -> bool:
-        """Say something; whether the link took it."""
+        """Send a message; return whether the link took it."""
         header, payload = encode(message)
         return self._link.send(self._link.dialled[lane], header, payload) is SendResult.SENT
 
     def greet(self) -> None:
-        """Be the board's host: say hello on both lanes."""
+        """Become the board's host: say hello on both lanes."""
         for lane in Lane:
             until(lambda lane=lane: self.say(HostHello(self._host_id, lane), lane), "the board is there")  # type: ignore[misc]  # bound now
 
     def read(self) -> int:
-        """Take what has come, and throw it away; gives how much it was."""
+        """Read everything that has come and discard it; return how much it was."""
         return sum(1 for _ in self._link.receive())
 
     def hush(self) -> None:
-        """Wait until the board has answered all that was said: what is still under way when a connection closes is lost, a goodbye, too."""
+        """Wait until the board has answered everything: what is under way when a connection closes is lost, even a goodbye."""
         quiet_s = time.monotonic()
         while time.monotonic() - quiet_s < _QUIET_S:
             if self.read():
@@ -73,11 +73,11 @@ class LyingHost:
             time.sleep(0.01)
 
     def flood(self, messages: Callable[[int], Sequence[tuple[Message, Lane]]], *, reads: bool) -> None:
-        """Say things for a while as fast as the link takes them.
+        """Send messages for a while, as fast as the link takes them.
 
         Args:
-            messages: what is said in round k.
-            reads: whether the answers are taken.
+            messages: to send in round k.
+            reads: whether the answers are read.
         """
         until_s, number = time.monotonic() + _FLOOD_S, 0
         while time.monotonic() < until_s:
@@ -89,7 +89,7 @@ class LyingHost:
                 self.read()
 
     def close(self) -> None:
-        """Go; a second time does nothing."""
+        """Disconnect; a second call does nothing."""
         if not self._gone:
             self._gone = True
             self._link.close()
@@ -97,7 +97,7 @@ class LyingHost:
 
 @contextmanager
 def lying_host(address: str) -> Iterator[LyingHost]:
-    """One for the length of a block."""
+    """Be connected for the length of a block."""
     liar = LyingHost(address)
     try:
         yield liar
@@ -107,12 +107,12 @@ def lying_host(address: str) -> Iterator[LyingHost]:
 
 @dataclass(frozen=True, slots=True)
 class Talk:
-    """What a host says to a board without end.
+    """What a lying host says to a board endlessly.
 
     Attributes:
         name: for people.
-        messages: what is said in round k.
-        reads: whether it takes the answers.
+        messages: to send in round k.
+        reads: whether it reads the answers.
     """
 
     name: str
@@ -136,7 +136,7 @@ TALKS: Final = (
 
 
 def _beside(talk: Talk, folder: Path, rounds: Rounds) -> Outcome:
-    """A board that streams to its own host is talked to by a stranger."""
+    """A stranger talks to a board that streams to its own host."""
     outcome = Outcome()
     address = f"tcp://127.0.0.1:{free_port()}"
     with board_and_host(folder, addresses=(address, address)) as (agent, watched):
@@ -154,7 +154,7 @@ def _beside(talk: Talk, folder: Path, rounds: Rounds) -> Outcome:
 
 
 def _instead(talk: Talk, folder: Path, rounds: Rounds) -> Outcome:
-    """The liar is the board's host, with credit without end and unread frames; when it goes, the next host gets its frames."""
+    """The liar is the board's host, with unlimited credit and unread frames; when it leaves, the next host gets its frames."""
     outcome = Outcome()
     address = f"tcp://127.0.0.1:{free_port()}"
     with board(board_arguments(address), folder) as agent:
@@ -190,7 +190,7 @@ def _judge_board(beside: Watched, agent: Program, outcome: Outcome) -> None:
 
 
 def _strangers(folder: Path, rounds: Rounds) -> Outcome:
-    """A host waits for its board to dial; strangers dial and tell of other versions, refuse, and say three bytes. The board comes later."""
+    """A host waits for its board to dial; strangers dial and claim other versions, refuse, and send three bytes. The board comes later."""
     outcome = Outcome()
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     words = [

@@ -1,4 +1,4 @@
-"""A running pair of programs under attack, and the judge of what comes out: pairs from delays.jsonl, accounts from report.json, memory and log of a process."""
+"""Both programs running under attack, and the judge of the outcome: pairs from delays.jsonl, accounts from report.json, memory and log of a process."""
 
 import atexit
 import json
@@ -25,16 +25,16 @@ PERIOD_NS: Final = 1_000_000_000 // FPS
 TOLERANCE_NS: Final = PERIOD_NS // 2
 
 _SLACK_NS: Final = 1_000_000
-"""What the stated uncertainty may be wrong by on a machine where others work: the ledger has no hard bound, and the steps that are looked for are ten times that."""
+"""Tolerated error of the stated uncertainty on a busy machine: the ledger has no hard bound, and the steps to be detected are ten times that."""
 
 _HOLE_NS: Final = 400_000_000
 _STREAM_NS: Final = 700_000_000
-"""Pairs for so long without such a hole are a stream; a few of them are not: an estimate may still be about to break."""
+"""Pairs for this long without such a hole are a stream; a few pairs are not: an estimate may still be about to break."""
 
 _SETTLED: Final = 30
 _MOST_LINES: Final = 24
 _MOST_LINES_EACH: Final = 8
-"""Of a log: what belongs to start and end, and what each outage may add."""
+"""Limits for a log: lines for start and end, and what each outage may add."""
 
 _LOG_LINE: Final = re.compile(r"\d{4}-\d\d-\d\d [\d:,]+ (DEBUG|INFO|WARNING|ERROR) ")
 _OWN_WORDS: Final = ("phone-host", "board-agent", "warning: ")
@@ -42,7 +42,7 @@ _OWN_WORDS: Final = ("phone-host", "board-agent", "warning: ")
 
 @cache
 def film() -> Path:
-    """A film of numbered images, written once; it goes with this process."""
+    """A film of numbered images, written once; deleted when this process ends."""
     folder = Path(mkdtemp(prefix="hostile-film-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return write_film(folder / "numbered", FRAMES)
@@ -55,17 +55,17 @@ def camera() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """One line of delays.jsonl, each stamp on the clock on which it was taken, ns.
+    """One line of delays.jsonl; each stamp is on the clock that took it, ns.
 
     Attributes:
         sequence: of the board's frame.
         board_ns: its exposure, board's clock.
         sent_ns: when it was sent, board's clock.
         host_ns: exposure of the host's frame.
-        received_ns: when the board's frame came.
+        received_ns: when the board's frame arrived.
         done_ns: when the pair was done.
-        offset_ns: host's clock - board's clock, as it was believed.
-        uncertainty_ns: as it was stated.
+        offset_ns: host's clock - board's clock, as estimated.
+        uncertainty_ns: as stated.
     """
 
     sequence: int
@@ -79,7 +79,7 @@ class Pair:
 
     @classmethod
     def read(cls, line: str) -> "Pair":
-        """Take one line."""
+        """Parse one line."""
         said = json.loads(line)
         exposed_ns, offset_ns = said["exposed_ns"], said["offset_ns"]
         return cls(
@@ -95,10 +95,10 @@ class Pair:
 
 
 class Watched:
-    """Looks at a process from outside.
+    """Watches a process from outside.
 
     Args:
-        program: which.
+        program: the watched process.
     """
 
     def __init__(self, program: Program) -> None:
@@ -106,16 +106,16 @@ class Watched:
         self._normal_bytes = 0
 
     def now_is_normal(self) -> None:
-        """Take the peak until now as the normal one."""
+        """Take the peak so far as the normal one."""
         self._normal_bytes = self._peak_bytes()
 
     @property
     def memory(self) -> float:
-        """The peak in multiples of the normal one; 0 where that is not known."""
+        """The peak in multiples of the normal one; 0 if unknown."""
         return self._peak_bytes() / self._normal_bytes if self._normal_bytes else 0.0
 
     def judge_log(self, outcome: Outcome) -> None:
-        """Look at what it has logged, and at what else wrote to its stderr."""
+        """Check its log, and whatever else was written to its stderr."""
         said = self._program.stderr
         most = _MOST_LINES + _MOST_LINES_EACH * len(outcome.gaps_s)
         outcome.expect("Traceback" not in said, "a traceback in the log")
@@ -130,13 +130,13 @@ class Watched:
 
 
 class Scene:
-    """A host that is attacked, or whose board is.
+    """A host under attack, or whose board is.
 
     Args:
         receiver: the host.
         out: its folder.
-        clocks: of board and host, where they are shifted.
-        true_board_ns: true exposure of a pair's board frame; None: as its stamp says, on the board's clock.
+        clocks: of board and host, if they are shifted.
+        true_board_ns: true exposure of a pair's board frame; None: its stamp, on the board's clock, is true.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class Scene:
         self._small_steps: list[int] = []
 
     def look(self) -> list[Pair]:
-        """Read what has been written since; gives all pairs."""
+        """Read what has been written since; return all pairs."""
         if self._path.exists():
             with self._path.open("rb") as file:
                 file.seek(self._offset)
@@ -168,20 +168,20 @@ class Scene:
         return self.pairs
 
     def settle(self) -> None:
-        """Wait until pairs flow, and take memory for normal then."""
+        """Wait until pairs flow, and take memory then as normal."""
         assert self._wait(lambda: len(self.look()) >= _SETTLED), f"no stream came up: {self.receiver.stderr[-2000:]}"
         self.watched.now_is_normal()
 
     def more(self, pairs: int) -> None:
-        """Wait for so many further pairs, or for the host's end."""
+        """Wait for this many further pairs, or for the host's end."""
         enough = len(self.look()) + pairs
         self._wait(lambda: len(self.look()) >= enough)
 
     def cause_gone(self, outcome: Outcome, name: str = "", at_ns: int | None = None) -> bool:
-        """The cause has gone: wait until pairs flow again, and note how long that took; whether they came.
+        """The cause has gone: wait until pairs flow again, and note how long that took; return whether they came.
 
         Args:
-            outcome: gets the gap, or a fault.
+            outcome: receives the gap, or a fault.
             name: of the cause, for the fault.
             at_ns: when it went, true time; None: now.
         """
@@ -197,11 +197,11 @@ class Scene:
         return True
 
     def small_step(self) -> None:
-        """A clock was stepped by less than two periods just now: until the next wave of echoes nobody can know."""
+        """A clock was just stepped by less than two periods: until the next wave of echoes nobody can know."""
         self._small_steps.append(time.monotonic_ns())
 
     def judge_pairs(self, outcome: Outcome) -> None:
-        """Count the pairs that are wrong by true exposure, and those whose offset is further from the truth than stated."""
+        """Count the pairs that are wrong by true exposure, and those whose offset error exceeds the stated uncertainty."""
         misstated = 0
         for pair in self.look():
             excused = any(0 <= self._on_host(pair.received_ns) - step_ns <= _WAVE_NS for step_ns in self._small_steps)
@@ -211,7 +211,7 @@ class Scene:
         outcome.expect(not misstated, f"{misstated} pairs whose offset is further from the truth than stated")
 
     def stop(self, outcome: Outcome) -> Any:
-        """End the host and judge its pairs, its report and its log; gives the report."""
+        """End the host and judge its pairs, its report and its log; return the report."""
         if self.receiver.process.poll() is None:
             outcome.memory = max(outcome.memory, self.watched.memory)
             self.receiver.send(signal.SIGTERM)
@@ -235,7 +235,7 @@ class Scene:
         return True
 
     def _stream_since(self, at_ns: int) -> int | None:
-        """When the first of many pairs of frames exposed after a moment was done, true time, ns."""
+        """True time at which the first of many pairs exposed after a given moment was done, ns."""
         done = [
             self._on_host(pair.done_ns)
             for pair in self.look()[-20 * FPS :]
@@ -251,14 +251,14 @@ class Scene:
         return None
 
     def _apart_ns(self, pair: Pair) -> int:
-        """By how much the two frames of a pair were truly exposed apart."""
+        """Return the true difference of exposure between the two frames of a pair."""
         told = self._told_board_ns
         board_ns = self._on_board(pair.board_ns) if told is None else told(pair)
         return abs(board_ns - self._on_host(pair.host_ns))
 
     def _offset_error_ns(self, pair: Pair) -> int:
         if self._told_board_ns is not None:
-            return 0  # a liar's clock has no truth
+            return 0  # a liar's clock has no true time
         board = self._board_clock.step_at(pair.sent_ns) if self._board_clock else 0
         own = self._host_clock.step_at(pair.received_ns) if self._host_clock else 0
         return abs(pair.offset_ns - (own - board))
@@ -271,11 +271,11 @@ class Scene:
 
 
 _WAVE_NS: Final = 750_000_000
-"""Two waves of echoes are half a second apart; the answer is here a few ms later, on a busy machine some more."""
+"""Two waves of echoes are half a second apart; the answer is here a few ms later, somewhat more on a busy machine."""
 
 
 def judge_account(report: Any, outcome: Outcome) -> None:
-    """Every frame and every pair is accounted for, and every frame that was dropped has a reason with a name."""
+    """Every frame and every pair is accounted for, and every dropped frame has a named reason."""
     frames, pairs = report["frames"], report["pairs_account"]
     orphaned = sum(frames["orphaned"].values())
     outcome.expect(
@@ -303,7 +303,7 @@ def scene(
     own: str = "",
     true_board_ns: Callable[[Pair], int] | None = None,
 ) -> Iterator[Scene]:
-    """A host that dials an address, where somebody else is to be; ended with the block."""
+    """A host that dials an address where somebody else is supposed to be; it ends with the block."""
     with _host(folder, address, ("--camera", own or camera(), *options), clocks[1]) as receiver:
         yield Scene(receiver, folder / "out", clocks, true_board_ns)
 
@@ -317,7 +317,7 @@ def board_and_host(
     options: Sequence[str] = (),
     own: str = "",
 ) -> Iterator[tuple[Program, Scene]]:
-    """Both real programs over loopback tcp, or at these addresses of board and host; pairs flowing."""
+    """Both real programs over loopback tcp, or at these addresses of board and host, once pairs flow."""
     tcp = f"tcp://127.0.0.1:{free_port()}"
     listens, dials = addresses or (tcp, tcp)
     with ExitStack() as held:
@@ -329,7 +329,7 @@ def board_and_host(
 
 
 def board_arguments(address: str) -> list[str]:
-    """Of a board that shows the film."""
+    """Arguments of a board that shows the film."""
     return ["run", "--camera", camera(), "--link", address, "--json", "--log-level", "info"]
 
 

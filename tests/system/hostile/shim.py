@@ -1,10 +1,10 @@
-"""A process whose clocks can be stepped from outside while it runs, and the way from its stamps back to the true time.
+"""A process whose clocks can be stepped from outside while it runs, and the conversion of its stamps back to true time.
 
-The true time is the kernel's CLOCK_MONOTONIC, which the shim shifts for one process alone. A `replay:` camera paces and stamps by the shifted clock, so its
-images do not show the true time; the record of steps does. The clock's life is a row of segments, each with its step: a stamp lies in one of them, and true
-time = stamp - step. A clock that steps forward leaves a gap, of which no moment ever was: what a replay claims to have exposed there (it makes up
-for what it missed) is handed over behind the gap, and is taken to be of the segment behind. A clock that is to lose time does so as in a suspend or a stopped
-machine: its process is stopped meanwhile, so that it never runs backwards; segments do not overlap.
+True time is the kernel's CLOCK_MONOTONIC, which the shim shifts for one process alone. A `replay:` camera paces and stamps by the shifted clock, so its
+images do not show the true time; the record of steps does. The clock's life is a series of segments, each with its step: a stamp lies in one of them, and true
+time = stamp - step. A clock that steps forward leaves a gap of moments that never existed. Exposures that a replay claims there (it makes up
+for what it missed) are handed over after the gap and count as part of the segment after it. A clock that should lose time does so as in a suspend or a stopped
+machine: its process is stopped meanwhile, so that the clock never runs backwards; segments do not overlap.
 """
 
 import atexit
@@ -30,7 +30,7 @@ _FOREVER: Final = 2**63
 
 @cache
 def shim_library() -> Path:
-    """Compile the shim, once; gives the shared object, which goes with this process."""
+    """Compile the shim once; return the shared object, which is deleted when this process ends."""
     folder = Path(mkdtemp(prefix="clock-shim-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     library = folder / "clock_shim.so"
@@ -41,11 +41,11 @@ def shim_library() -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A time in which the clock ran evenly.
+    """A period in which the clock ran evenly.
 
     Attributes:
         from_ns: true time of its beginning.
-        to_ns: of its end.
+        to_ns: true time of its end.
         step_ns: shifted clock - true time.
     """
 
@@ -58,7 +58,7 @@ class ShiftedClock:
     """The clocks of one process.
 
     Args:
-        control: file that is made for it.
+        control: file to create for it.
     """
 
     def __init__(self, control: Path) -> None:
@@ -71,7 +71,7 @@ class ShiftedClock:
 
     @property
     def environment(self) -> dict[str, str]:
-        """For the process whose clocks these are."""
+        """The environment for the process whose clocks these are."""
         return {"LD_PRELOAD": str(shim_library()), "CLOCK_SHIM": str(self._path)}
 
     @property
@@ -80,19 +80,19 @@ class ShiftedClock:
         return self._segments[-1].step_ns
 
     def jump(self, by_ns: int) -> None:
-        """Let both clocks go forward, from one reading to the next."""
+        """Step both clocks forward, from one reading to the next."""
         assert by_ns > 0
         at_ns = time.monotonic_ns()
         self._go_on(at_ns, at_ns, by_ns, boottime_by_ns=by_ns)
 
     def stand_still(self, program: Program, for_ns: int, *, asleep: bool, meanwhile: Callable[[], None]) -> None:
-        """Stop the process for a while, of which CLOCK_MONOTONIC does not know.
+        """Stop the process for a while that CLOCK_MONOTONIC does not count.
 
         Args:
-            program: whose clocks these are.
+            program: the process whose clocks these are.
             for_ns: how long.
-            asleep: whether CLOCK_BOOTTIME goes on meanwhile, as in a suspend; a virtual machine that is stopped knows nothing on any clock.
-            meanwhile: called once it stands.
+            asleep: whether CLOCK_BOOTTIME goes on meanwhile, as in a suspend; for a stopped virtual machine no clock does.
+            meanwhile: called once the process has stopped.
         """
         with stopped(program):
             from_ns = time.monotonic_ns()
@@ -101,14 +101,14 @@ class ShiftedClock:
             self._go_on(from_ns, time.monotonic_ns(), -for_ns, boottime_by_ns=0 if asleep else -for_ns)
 
     def true_ns(self, stamp_ns: int) -> int:
-        """The true time of a stamp of the shifted clock; of one in a gap that of the segment behind it."""
+        """The true time of a stamp of the shifted clock; a stamp in a gap belongs to the segment after it."""
         for segment in self._segments:
             if stamp_ns < segment.to_ns + segment.step_ns:
                 return stamp_ns - segment.step_ns
         raise AssertionError("the last segment has no end")
 
     def step_at(self, stamp_ns: int) -> int:
-        """The step in force when the shifted clock showed this."""
+        """The step in force when the shifted clock showed this time."""
         return stamp_ns - self.true_ns(stamp_ns)
 
     def _go_on(self, end_ns: int, begin_ns: int, by_ns: int, *, boottime_by_ns: int) -> None:
@@ -127,13 +127,13 @@ class stopped:  # noqa: N801 - a context manager, used like a function
         self._programs = programs
 
     def __enter__(self) -> None:
-        """Stop them, and wait until they stand."""
+        """Stop them, and wait until they have stopped."""
         for program in self._programs:
             program.send(signal.SIGSTOP)
         until(lambda: all(_is_stopped(program) for program in self._programs), "the process stands")
 
     def __exit__(self, *_: object) -> None:
-        """Let them go on."""
+        """Let them continue."""
         for program in self._programs:
             program.send(signal.SIGCONT)
 

@@ -1,4 +1,4 @@
-"""Images of a few bytes that ask for gigabytes, from the board and from the host's own camera: memory stays, the frames are dropped by name."""
+"""Images of a few bytes that demand gigabytes, from the board and from the host's own camera: memory stays normal, each drop is named."""
 
 from pathlib import Path
 
@@ -11,5 +11,5 @@ from tests.system.hostile.lies import SHORT_BOMBS
 
 @pytest.mark.parametrize("attack", [*SHORT_BOMBS, HTTP], ids=lambda attack: attack.name)
 def test_an_image_explodes(attack: Attack, tmp_path: Path) -> None:
-    """No image is decoded that is not as large as its camera's images are."""
+    """An image is only decoded if it has the size of its camera's images."""
     assert attack.run(tmp_path, Rounds()).broken() == []

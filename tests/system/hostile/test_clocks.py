@@ -1,4 +1,4 @@
-"""Clocks that step: no pair of frames from different moments, the stated uncertainty holds, pairs come back, every frame is accounted for."""
+"""Clocks that step: no pair of frames from different moments, the stated uncertainty holds, pairs resume, every frame is accounted for."""
 
 from pathlib import Path
 
@@ -10,5 +10,5 @@ from tests.system.hostile.clocks import SHORT
 
 @pytest.mark.parametrize("attack", SHORT, ids=lambda attack: attack.name)
 def test_a_clock_steps(attack: Attack, tmp_path: Path) -> None:
-    """Nothing wrong is paired, and the stream comes back, whatever steps one of the two clocks makes."""
+    """Whatever step either clock makes, nothing is paired wrongly and the stream recovers."""
     assert attack.run(tmp_path, Rounds()).broken() == []

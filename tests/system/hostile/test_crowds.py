@@ -1,4 +1,4 @@
-"""Crowds, bombs over HTTP, stops, kills and noise: nothing wrong is paired, the stream comes back, every frame is accounted for."""
+"""Crowds, bombs over HTTP, stops, kills and noise: nothing is paired wrongly, the stream recovers, every frame is accounted for."""
 
 from pathlib import Path
 
@@ -10,5 +10,5 @@ from tests.system.hostile.crowds import SHORT
 
 @pytest.mark.parametrize("attack", SHORT, ids=lambda attack: attack.name)
 def test_the_stream_survives(attack: Attack, tmp_path: Path) -> None:
-    """What is done to the programs from outside costs frames at most, each of them named."""
+    """What is done to the programs from outside costs at most frames, each of them accounted for by name."""
     assert attack.run(tmp_path, Rounds()).broken() == []

@@ -1,4 +1,4 @@
-"""A board that lies to its host: no pair with a frame that lied, the stream goes on, memory stays, every frame that is dropped is named."""
+"""A board that lies to its host: no pair contains a false frame, the stream goes on, memory stays normal, every dropped frame is named."""
 
 from pathlib import Path
 
@@ -10,5 +10,5 @@ from tests.system.hostile.lies import SHORT
 
 @pytest.mark.parametrize("attack", SHORT, ids=lambda attack: attack.name)
 def test_a_board_lies(attack: Attack, tmp_path: Path) -> None:
-    """Whatever a board says, the host uses nothing of it that cannot be, and goes on."""
+    """Whatever a board says, the host uses nothing that cannot be true, and goes on."""
     assert attack.run(tmp_path, Rounds()).broken() == []

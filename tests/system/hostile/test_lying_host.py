@@ -10,5 +10,5 @@ from tests.system.hostile.lying_host import SHORT
 
 @pytest.mark.parametrize("attack", SHORT, ids=lambda attack: attack.name)
 def test_a_host_lies(attack: Attack, tmp_path: Path) -> None:
-    """Whatever a host or a stranger says, frames go on to whom they belong."""
+    """Whatever a host or a stranger says, frames keep reaching the right host."""
     assert attack.run(tmp_path, Rounds()).broken() == []
