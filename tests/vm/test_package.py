@@ -147,6 +147,8 @@ def test_two_builds_are_equal_byte_for_byte(tmp_path: Path) -> None:
         for part in ("board_agent", "common", "deploy/board"):
             shutil.copytree(ROOT / part if not built else tmp_path / "022" / part, tree / part)
         shutil.copy(ROOT / "pyproject.toml", tree)
+        (tree / "docs").mkdir()
+        shutil.copy(ROOT / "docs" / "board.md", tree / "docs")
         command = f"umask {umask}; SOURCE_DATE_EPOCH=1700000000 deploy/board/build-deb"
         subprocess.run(["sh", "-c", command], cwd=tree, check=True, capture_output=True)
         (package,) = (tree / "dist").iterdir()
