@@ -16,7 +16,8 @@ from typing import Final
 from rich.console import Console
 from rich.table import Table
 
-from tests.docs.troubleshooting import Code, messages
+from tests.docs.message_texts import Code
+from tests.docs.troubleshooting import messages
 
 _ROOT: Final = Path(__file__).parents[2]
 _PASSIVE: Final = re.compile(

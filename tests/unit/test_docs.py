@@ -14,6 +14,7 @@ from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.docs import troubleshooting
 from tests.docs.commands import ROOT, Command, documented, pages
+from tests.docs.message_texts import Code
 from tests.support.rigs import unlike_rig
 from tests.support.samples import LEDGER
 
@@ -22,7 +23,7 @@ _PARSERS = {
     "board-agent": board_agent.cli.parser,
     "delay-bench": phone_host.bench.cli.parser,
 }
-_CODE = troubleshooting.Code(troubleshooting.packages())
+_CODE = Code(troubleshooting.packages())
 _COMMANDS = documented()
 
 

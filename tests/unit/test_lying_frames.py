@@ -19,6 +19,7 @@ from phone_host.stereo.interpolate import Interpolator
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
 from tests.support import bombs
+from tests.support.decoder_watch import watched_decoder
 from tests.support.pictures import encoded, jpeg, picture
 from tests.support.samples import FRAME
 
@@ -90,12 +91,11 @@ LIES = {
 
 
 @pytest.mark.parametrize("case", LIES)
-def test_a_lie_is_refused_by_name(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lie_is_refused_by_name(case: str) -> None:
     """Every lying frame is refused as spoiled, with its reason and the frame's name, and no decoder sees it."""
     pair, fault = LIES[case]
-    decodings: list[object] = []
-    monkeypatch.setattr(cv2, "imdecode", lambda *given: decodings.append(given))  # to see that OpenCV is not called
-    with pytest.raises(SpoiledImageError, match="frame 7") as caught:
+    decodings: list[int] = []
+    with watched_decoder(lambda: decodings.append(1)), pytest.raises(SpoiledImageError, match="frame 7") as caught:
         Pipeline(None, Side.LEFT, now.monotonic_ns).process(pair)
     assert caught.value.fault is fault
     assert not decodings or fault in {FrameFault.TOO_SHORT, FrameFault.TOO_MANY_SCANS}
@@ -122,17 +122,19 @@ def test_the_limit_is_a_setting() -> None:
 
 def test_a_smaller_image_of_a_lower_rung_is_still_enlarged() -> None:
     """A board that sends the same view with fewer pixels is accepted."""
-    done = Pipeline(None, Side.LEFT, now.monotonic_ns).process(pair_of(jpeg(32, 24), (32, 24), SIZE))
+    decodings: list[int] = []
+    with watched_decoder(lambda: decodings.append(1)):
+        done = Pipeline(None, Side.LEFT, now.monotonic_ns).process(pair_of(jpeg(32, 24), (32, 24), SIZE))
     assert done.pair.left.shape == (48, 64, 3)
+    assert len(decodings) == 2  # the watch of the tests above does see both images of a pair
 
 
-def test_sizes_that_do_not_fit_each_other_are_told_before_decoding(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sizes_that_do_not_fit_each_other_are_told_before_decoding() -> None:
     """With a core two true sizes that make no rectified pair are bad data, not spoiled images, and are reported before decoding."""
-    decodings: list[object] = []
-    monkeypatch.setattr(cv2, "imdecode", lambda *given: decodings.append(given))  # to see that OpenCV is not called
+    decodings: list[int] = []
     core = StereoCore(create_matcher(MatchSettings(MatcherName.SGBM, 16)))
     pair = pair_of(jpeg(*SIZE), SIZE, SIZE, own_px=(80, 60))
-    with pytest.raises(DataError, match=r"64x48.*80x60") as caught:
+    with watched_decoder(lambda: decodings.append(1)), pytest.raises(DataError, match=r"64x48.*80x60") as caught:
         Pipeline(core, Side.LEFT, now.monotonic_ns).process(pair)
     assert not isinstance(caught.value, SpoiledImageError)
     assert not decodings

@@ -13,6 +13,7 @@ from common.frame import FrameFault, SpoiledImageError
 from phone_host.stereo.images import decode, decode_pair
 from phone_host.stereo.overheard import overhear
 from tests.support import bombs
+from tests.support.decoder_watch import watched_decoder
 from tests.support.pictures import encoded, jpeg, picture
 
 SOUND = bombs.textured_jpeg()
@@ -152,16 +153,10 @@ def test_stderr_stays_what_it_is(capfd: pytest.CaptureFixture[str]) -> None:
     assert capfd.readouterr().err == "from C again\n"
 
 
-def test_words_of_other_libraries_are_logged(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_words_of_other_libraries_are_logged(caplog: pytest.LogCaptureFixture) -> None:
     """What another library prints while an image is decoded becomes a line in the log."""
     c_library = ctypes.CDLL(None)
     stream = ctypes.c_void_p.in_dll(c_library, "stderr")
-    real = cv2.imdecode
-
-    def talking(*given: object) -> object:
-        c_library.fprintf(stream, b"the radio is on fire\n")
-        return real(*given)  # type: ignore[call-overload]  # as it came
-
-    monkeypatch.setattr(cv2, "imdecode", talking)  # OpenCV stands in for a library on another thread
-    decode(SOUND)
+    with watched_decoder(lambda: c_library.fprintf(stream, b"the radio is on fire\n")):
+        decode(SOUND)
     assert "library_said text='the radio is on fire'" in caplog.text

@@ -1,0 +1,24 @@
+"""Sees when OpenCV decodes an image, with OpenCV left as it is: the interpreter reports its calls into C (sys.setprofile)."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+import cv2
+
+
+@contextmanager
+def watched_decoder(on_decoding: Callable[[], None]) -> Iterator[None]:
+    """Call `on_decoding` whenever this thread is about to enter `cv2.imdecode`, for the length of a block."""
+
+    def watch(_frame: FrameType, event: str, called: object) -> None:
+        if event == "c_call" and called is cv2.imdecode:
+            on_decoding()
+
+    before = sys.getprofile()
+    sys.setprofile(watch)
+    try:
+        yield
+    finally:
+        sys.setprofile(before)
