@@ -7,7 +7,15 @@ from common.ledger import PairLedger
 from phone_host.demo.demonstration import CheckedPair, DepthErrors
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.report.report_page import Figure, Headline, PageData, delay_series, page
-from phone_host.report.run_page import camera_table, notes, pictures, unused_table
+from phone_host.report.run_page import (
+    camera_table,
+    clock_figure,
+    end_to_end_figure,
+    notes,
+    pictures,
+    rate_figure,
+    unused_table,
+)
 
 _GOOD_PERCENT = 0.6
 """Depth error at 2 m that the stereo core's figures allow; the demo's scene lies between 0.7 and 2.5 m."""
@@ -55,15 +63,9 @@ def _verdict(errors: DepthErrors) -> tuple[Headline, str]:
 
 
 def _figures(run: RunSnapshot, errors: DepthErrors) -> tuple[Figure, ...]:
-    end_to_end, skew = run.delays.spread("end_to_end"), run.delays.spread("time_skew")
-    uncertainty = run.delays.spread("uncertainty")
+    skew = run.delays.spread("time_skew")
     return (
-        Figure(
-            label="pairs per second",
-            value=f"{run.pairs_per_second:.1f}",
-            unit="/s",
-            note=f"{run.processed} pairs in {run.seconds:.1f} s",
-        ),
+        rate_figure(run),
         Figure(
             label="depth error",
             value=f"{errors.depth_mm:.1f}",
@@ -76,19 +78,12 @@ def _figures(run: RunSnapshot, errors: DepthErrors) -> tuple[Figure, ...]:
             unit="%",
             note="of those that both cameras see",
         ),
-        Figure(
-            label="end-to-end",
-            value=f"{end_to_end.p50_ns / 1e6:.0f}",
-            unit="ms",
-            note=f"median; 99 % below {end_to_end.p99_ns / 1e6:.0f} ms",
-        ),
+        end_to_end_figure(run),
         Figure(
             label="time skew",
             value=f"{skew.p50_ns / 1e3:.0f}",
             unit="us",
             note=f"median; 99 % below {skew.p99_ns / 1e3:.0f} us",
         ),
-        Figure(
-            label="clock uncertainty", value=f"{uncertainty.p50_ns / 1e3:.0f}", unit="us", note="median over the pairs"
-        ),
+        clock_figure(run),
     )

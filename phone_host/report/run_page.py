@@ -103,27 +103,39 @@ def _verdict(run: RunSnapshot, judgement: Judgement, found: Sequence[Concern]) -
 
 
 def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
-    end_to_end, skew = run.delays.spread("end_to_end"), run.delays.spread("time_skew")
-    uncertainty = run.delays.spread("uncertainty")
-    pairs = f"{run.processed} pairs in {run.seconds:.1f} s"
+    skew = run.delays.spread("time_skew")
     return (
-        _measured("pairs per second", run.pairs_per_second, 1, "/s", pairs),
-        Figure(
-            label="end-to-end",
-            value=f"{end_to_end.p50_ns / 1e6:.0f}",
-            unit="ms",
-            note=f"median; 99 % below {end_to_end.p99_ns / 1e6:.0f} ms",
-        ),
+        rate_figure(run),
+        end_to_end_figure(run),
         Figure(
             label="time skew",
             value=f"{skew.p50_ns / 1e6:.1f}",
             unit="ms",
             note=f"median; 95 % below {skew.p95_ns / 1e6:.1f} ms",
         ),
-        Figure(
-            label="clock uncertainty", value=f"{uncertainty.p50_ns / 1e3:.0f}", unit="us", note="median over the pairs"
-        ),
+        clock_figure(run),
         _measured("image motion", run.motion_px_s, 0, "px/s", "the fastest tenth of the host camera's image"),
+    )
+
+
+def rate_figure(run: RunSnapshot) -> Figure:
+    """How many pairs per second were processed."""
+    pairs = f"{run.processed} pairs in {run.seconds:.1f} s"
+    return _measured("pairs per second", run.pairs_per_second, 1, "/s", pairs)
+
+
+def end_to_end_figure(run: RunSnapshot) -> Figure:
+    """The age of the results."""
+    spread = run.delays.spread("end_to_end")
+    note = f"median; 99 % below {spread.p99_ns / 1e6:.0f} ms"
+    return Figure(label="end-to-end", value=f"{spread.p50_ns / 1e6:.0f}", unit="ms", note=note)
+
+
+def clock_figure(run: RunSnapshot) -> Figure:
+    """How well the host knew the board's clock."""
+    spread = run.delays.spread("uncertainty")
+    return Figure(
+        label="clock uncertainty", value=f"{spread.p50_ns / 1e3:.0f}", unit="us", note="median over the pairs"
     )
 
 
