@@ -44,6 +44,61 @@ class StereoGeometry:
     doffs_px: float = 0.0
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Crop:
+    """A rectangle of the rectified left image. Only its pixels get a depth.
+
+    Attributes:
+        x_px: its first column, px.
+        y_px: its first row, px.
+        width_px: its width, px.
+        height_px: its height, px.
+    """
+
+    x_px: int
+    y_px: int
+    width_px: int
+    height_px: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DepthLimits:
+    """Between which depths a point is kept, and how certain its disparity is.
+
+    Attributes:
+        near_m: nearer points are cut, m; 0: none.
+        far_m: points are cut that have a coordinate beyond it, m.
+        disparity_error_px: the error of a disparity from which `far_m` and every depth's uncertainty follow, px.
+        from_rig: whether `far_m` follows from the rig; else the user gave it.
+    """
+
+    near_m: float
+    far_m: float
+    disparity_error_px: float
+    from_rig: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CutCounts:
+    """What became of a rectified left image's pixels. The six counts add up to all of them.
+
+    Attributes:
+        kept: have a point.
+        unmatched: the matcher found no disparity.
+        at_zero: their disparity is not above the noise of zero, so it is no measurement.
+        too_far: beyond the far limit.
+        too_near: nearer than the near limit.
+        outside: outside the crop.
+    """
+
+    kept: int = 0
+    unmatched: int = 0
+    at_zero: int = 0
+    too_far: int = 0
+    too_near: int = 0
+    outside: int = 0
+
+
 @dataclass(frozen=True, slots=True)
 class RectifiedPair:
     """Two images of equal size whose epipolar lines are their rows: a point at (x, y) left lies at (x - d, y) right."""
@@ -117,6 +172,9 @@ class Rig:
         rms_right_px: the same for the right camera.
         rms_stereo_px: reprojection RMS of the stereo calibration, px; NaN = not measured.
         time_offset: time offset between the two cameras' stamps.
+        zero_sigma_px: standard uncertainty of the disparity of infinitely far points, px, at the size of the rig's
+            images; NaN = not measured.
+        verdict: how the calibration judged itself (good, usable or reject); empty: not stated.
     """
 
     left: CameraModel
@@ -128,6 +186,8 @@ class Rig:
     rms_right_px: float = float("nan")
     rms_stereo_px: float = float("nan")
     time_offset: TimeOffset = TimeOffset()
+    zero_sigma_px: float = float("nan")
+    verdict: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -207,14 +267,20 @@ class Processed:
     Attributes:
         pair: the rectified images; without a core, the images as received.
         disparity: px; None without a core.
-        cloud: metres; None without a core or geometry.
+        cloud: metres, cut to the limits; None without a core or geometry.
         stages: time of each stage; `write` is still 0.
+        geometry: converts this disparity to metres; None without a core or geometry.
+        limits: to which the cloud was cut; None without a cloud.
+        cut: what became of the pixels; None without a core.
     """
 
     pair: RectifiedPair
     disparity: Disparity | None
     cloud: CloudImage | None
     stages: StageTimes
+    geometry: StereoGeometry | None = None
+    limits: DepthLimits | None = None
+    cut: CutCounts | None = None
 
 
 @dataclass(frozen=True, slots=True)
