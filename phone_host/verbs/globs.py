@@ -58,5 +58,5 @@ def _without_digits(path: str) -> str:
 
 
 def _grouped(paths: Sequence[str], key: Callable[[str], str]) -> list[tuple[str, ...]]:
-    """Group neighbours that have the same key. (What a shell makes of one glob stands together.)"""
+    """Group neighbours that have the same key; what a shell makes of one glob stands together."""
     return [tuple(group) for _, group in groupby(paths, key)]
