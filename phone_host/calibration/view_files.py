@@ -2,7 +2,6 @@
 
 import glob
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,12 +28,12 @@ class ViewFiles:
     by_number: bool
 
 
-def pair_files(left: str | Sequence[str], right: str | Sequence[str]) -> ViewFiles:
+def pair_files(left: str, right: str) -> ViewFiles:
     """Find the images of both sides and pair them.
 
     Args:
-        left: a folder, a glob or a file, or several of them.
-        right: the same.
+        left: a folder or a glob.
+        right: a folder or a glob.
 
     Returns:
         The pairs.
@@ -43,11 +42,10 @@ def pair_files(left: str | Sequence[str], right: str | Sequence[str]) -> ViewFil
         DataError: one of the two names no image.
         SettingsError: both name the same files.
     """
-    lefts, rights = ((given,) if isinstance(given, str) else given for given in (left, right))
-    left_files, right_files = _images(lefts, "LEFT"), _images(rights, "RIGHT")
+    left_files, right_files = _images(left, "LEFT"), _images(right, "RIGHT")
     both = {path.resolve() for path in left_files} & {path.resolve() for path in right_files}
     if both:
-        folder = lefts[0] if Path(lefts[0]).is_dir() else str(Path(lefts[0]).parent)
+        folder = left if Path(left).is_dir() else str(Path(left).parent)
         raise SettingsError(
             f"LEFT and RIGHT both name {min(both)}",
             f"give two folders, or one quoted glob for each side, such as '{folder}/left*' '{folder}/right*'",
@@ -67,20 +65,16 @@ def pair_files(left: str | Sequence[str], right: str | Sequence[str]) -> ViewFil
     )
 
 
-def _images(given: Sequence[str], side: str) -> list[Path]:
-    """Return the image files of folders and globs, without hidden ones, sorted with numbers in names as numbers."""
-    found: set[Path] = set()
-    for each in given:
-        if Path(each).is_dir():
-            found |= {path for path in Path(each).iterdir() if path.suffix.lower() in _SUFFIXES}
-        elif Path(each).is_file():  # its name may hold brackets
-            found.add(Path(each))
-        else:
-            found |= {Path(name) for name in glob.glob(each)}  # noqa: PTH207 - a pattern may be absolute
+def _images(given: str, side: str) -> list[Path]:
+    """Return the image files of a folder or a glob, without hidden ones, sorted with numbers in names as numbers."""
+    if Path(given).is_dir():
+        found = [path for path in Path(given).iterdir() if path.suffix.lower() in _SUFFIXES]
+    else:
+        found = [Path(name) for name in glob.glob(given)]  # noqa: PTH207 - a pattern may be absolute
     files = [path for path in found if path.is_file() and not path.name.startswith(".")]
     if not files:
         raise DataError(
-            f"{side} {given[0]!r} names no image", "give a folder of images or a quoted glob such as 'left*.png'"
+            f"{side} {given!r} names no image", "give a folder of images or a quoted glob such as 'left*.png'"
         )
     return sorted(files, key=_natural)
 
