@@ -2,6 +2,7 @@
 
 import glob
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -31,11 +32,11 @@ class ViewFiles:
     by_number: bool
 
 
-def pair_files(left: str, right: str) -> ViewFiles:
+def pair_files(left: str | Sequence[str], right: str | Sequence[str]) -> ViewFiles:
     """Find the images of both sides and pair them.
 
     Args:
-        left: an image file, a folder or a glob.
+        left: an image file, a folder or a glob; or several, as a shell makes them of one glob.
         right: the same kind.
 
     Returns:
@@ -45,10 +46,15 @@ def pair_files(left: str, right: str) -> ViewFiles:
         DataError: one of the two names no image.
         SettingsError: both name the same files, or one is a folder and the other a file.
     """
-    _require_one_kind(left, right)
-    left_files, right_files = _images(left, "LEFT"), _images(right, "RIGHT")
-    _require_two_sides(left, left_files, right_files)
-    if Path(left).is_file() and Path(right).is_file():  # whatever their numbers: the user names this pair
+    lefts, rights = ((given,) if isinstance(given, str) else tuple(given) for given in (left, right))
+    both_single = len(lefts) == len(rights) == 1
+    if both_single:
+        _require_one_kind(lefts[0], rights[0])
+    left_files, right_files = _images_of(lefts, "LEFT"), _images_of(rights, "RIGHT")
+    _require_two_sides(lefts[0], left_files, right_files)
+    if (
+        both_single and Path(lefts[0]).is_file() and Path(rights[0]).is_file()
+    ):  # whatever their numbers: the user names this pair
         [first], [second] = left_files, right_files
         return ViewFiles(((first.stem, first, second),), (), (), by_number=False)
     numbered = _numbered(left_files, right_files)
@@ -86,6 +92,14 @@ def _require_two_sides(given: str, left: list[Path], right: list[Path]) -> None:
         folder = given if Path(given).is_dir() else str(Path(given).parent)
         remedy = f"give two folders, or one quoted glob for each side, such as '{folder}/left*' '{folder}/right*'"
     raise SettingsError(f"LEFT and RIGHT both name {min(both)}", remedy)
+
+
+def _images_of(given: Sequence[str], side: str) -> list[Path]:
+    """Return the image files of all arguments of a side, each once, in the order of `_images`."""
+    found = {path for each in given for path in _images(each, side)}
+    if len(given) > 1:  # a shell's glob also catches Thumbs.db
+        found = {path for path in found if path.suffix.lower() in SUFFIXES} or found
+    return sorted(found, key=_natural)
 
 
 def _images(given: str, side: str) -> list[Path]:

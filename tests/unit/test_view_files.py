@@ -121,3 +121,16 @@ def test_a_name_that_leads_nowhere_does_not_exist(tmp_path: Path) -> None:
     right = _touch(tmp_path, "right.png") / "right.png"
     with pytest.raises(DataError, match=r"left\.png' does not exist"):
         pair_files(str(tmp_path / "left.png"), str(right))
+
+
+def test_several_files_of_a_side_are_paired_by_number(tmp_path: Path) -> None:
+    """What a shell made of unquoted globs is paired like the globs: 2 with 2, 10 with 10; 3 stays alone."""
+    left, right = (
+        [tmp_path / f"{side}{number}.png" for number in numbers]
+        for side, numbers in (("l", (10, 2, 3)), ("r", (2, 10)))
+    )
+    for path in (*left, *right):
+        path.touch()
+    files = pair_files([str(path) for path in left], [str(path) for path in right])
+    assert [name for name, _, _ in files.pairs] == ["2", "10"]
+    assert files.left_alone == (tmp_path / "l3.png",)
