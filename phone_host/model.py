@@ -118,16 +118,6 @@ class Epipolar(Enum):
         return self is not Epipolar.LEFT
 
 
-class Axes(Enum):
-    """The axes in which points are written to files. Inside the program they are always the camera's.
-
-    CAMERA: x right, y down, z forward. Y_UP: x right, y up, z backward, as most viewers expect.
-    """
-
-    CAMERA = "camera"
-    Y_UP = "y-up"
-
-
 @dataclass(frozen=True, slots=True)
 class RectifiedPair:
     """Two images of equal size whose epipolar lines are their rows: a point at (x, y) left lies at (x - d, y) right.
