@@ -9,9 +9,9 @@ from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.target import Board, Corners, agree, find_corners
-from phone_host.calibration.view_files import ViewFiles
 from phone_host.model import Image
 from phone_host.stereo.images import read_image
+from phone_host.stereo.view_files import ViewFiles
 
 Size = tuple[int, int]
 

@@ -4,10 +4,13 @@ import glob
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from common.errors import DataError, SettingsError
 
-_SUFFIXES = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp"})
+SUFFIXES: Final = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp"})
+_REMEDY: Final = "give a folder of images or a quoted glob such as 'left*.png'"
+_MOST_KINDS: Final = 4  # enough to recognise a folder by; the line stays short
 _NUMBER = re.compile(r"\d+")
 
 
@@ -32,24 +35,22 @@ def pair_files(left: str, right: str) -> ViewFiles:
     """Find the images of both sides and pair them.
 
     Args:
-        left: a folder or a glob.
-        right: a folder or a glob.
+        left: an image file, a folder or a glob.
+        right: the same kind.
 
     Returns:
         The pairs.
 
     Raises:
         DataError: one of the two names no image.
-        SettingsError: both name the same files.
+        SettingsError: both name the same files, or one is a folder and the other a file.
     """
+    _require_one_kind(left, right)
     left_files, right_files = _images(left, "LEFT"), _images(right, "RIGHT")
-    both = {path.resolve() for path in left_files} & {path.resolve() for path in right_files}
-    if both:
-        folder = left if Path(left).is_dir() else str(Path(left).parent)
-        raise SettingsError(
-            f"LEFT and RIGHT both name {min(both)}",
-            f"give two folders, or one quoted glob for each side, such as '{folder}/left*' '{folder}/right*'",
-        )
+    _require_two_sides(left, left_files, right_files)
+    if Path(left).is_file() and Path(right).is_file():  # whatever their numbers: the user names this pair
+        [first], [second] = left_files, right_files
+        return ViewFiles(((first.stem, first, second),), (), (), by_number=False)
     numbered = _numbered(left_files, right_files)
     if numbered is None:
         count = min(len(left_files), len(right_files))
@@ -65,18 +66,55 @@ def pair_files(left: str, right: str) -> ViewFiles:
     )
 
 
+def _require_one_kind(left: str, right: str) -> None:
+    """Refuse a folder beside a single file: only one pair could come of it, and hardly the one that is meant."""
+    for folder, file, names in ((left, right, ("LEFT", "RIGHT")), (right, left, ("RIGHT", "LEFT"))):
+        if Path(folder).is_dir() and Path(file).is_file():
+            raise SettingsError(
+                f"{names[0]} {folder} is a folder, {names[1]} {file} is a file", "give two files, or two folders"
+            )
+
+
+def _require_two_sides(given: str, left: list[Path], right: list[Path]) -> None:
+    """Refuse files that are on both sides."""
+    both = {path.resolve() for path in left} & {path.resolve() for path in right}
+    if not both:
+        return
+    if Path(given).is_file():
+        remedy = "give the image of the other camera as RIGHT"
+    else:
+        folder = given if Path(given).is_dir() else str(Path(given).parent)
+        remedy = f"give two folders, or one quoted glob for each side, such as '{folder}/left*' '{folder}/right*'"
+    raise SettingsError(f"LEFT and RIGHT both name {min(both)}", remedy)
+
+
 def _images(given: str, side: str) -> list[Path]:
-    """Return the image files of a folder or a glob, without hidden ones, sorted with numbers in names as numbers."""
-    if Path(given).is_dir():
-        found = [path for path in Path(given).iterdir() if path.suffix.lower() in _SUFFIXES]
+    """Return the image files of a file's name, a folder or a glob, without hidden ones, sorted with numbers in names as numbers."""
+    path = Path(given)
+    if path.is_file():
+        return [path]
+    if path.is_dir():
+        inside = [entry for entry in path.iterdir() if entry.is_file() and not entry.name.startswith(".")]
+        files = [entry for entry in inside if entry.suffix.lower() in SUFFIXES]
+        if not files:
+            raise DataError(_without_images(given, side, inside), _REMEDY)
     else:
         found = [Path(name) for name in glob.glob(given)]  # noqa: PTH207 - a pattern may be absolute
-    files = [path for path in found if path.is_file() and not path.name.startswith(".")]
-    if not files:
-        raise DataError(
-            f"{side} {given!r} names no image", "give a folder of images or a quoted glob such as 'left*.png'"
-        )
+        files = [entry for entry in found if entry.is_file() and not entry.name.startswith(".")]
+        if not files:
+            what = "names no image" if glob.has_magic(given) else "does not exist"
+            raise DataError(f"{side} {given!r} {what}", _REMEDY)
+        # A wide pattern also catches Thumbs.db; one of nothing but unusual names is meant as it is.
+        files = [entry for entry in files if entry.suffix.lower() in SUFFIXES] or files
     return sorted(files, key=_natural)
+
+
+def _without_images(given: str, side: str, inside: list[Path]) -> str:
+    """Say what a folder holds instead of images."""
+    if not inside:
+        return f"{side} {given!r} names no image"
+    kinds = sorted({entry.suffix.lower() or "no suffix" for entry in inside})
+    return f"{side} {given!r} names no image, only {len(inside)} other files ({', '.join(kinds[:_MOST_KINDS])})"
 
 
 def _natural(path: Path) -> tuple[list[tuple[int, str]], str]:
