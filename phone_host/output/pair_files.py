@@ -35,6 +35,11 @@ class PairFile(Enum):
 _OF_DISPARITY: Final = frozenset({PairFile.DISPARITY, PairFile.DISPARITY_VIEW})
 _OF_IMAGES: Final = frozenset({PairFile.LEFT, PairFile.RIGHT})
 
+PAIR_NAMES: Final = "|".join(
+    name.replace(".", r"\.") for name in (*(file.value for file in PairFile), "report.json", "index.html")
+)
+"""Pattern of the names that may lie in the folder of a pair, whichever verb wrote it."""
+
 RUN_FILES: Final = (PairFile.LEFT, PairFile.RIGHT, PairFile.DISPARITY, PairFile.CLOUD, PairFile.DEPTH)
 """What a run saves of a pair."""
 
