@@ -11,7 +11,7 @@ from common import now
 from common.errors import SettingsError
 from common.ledger import StageTimes
 from common.versions import REPORT_FORMAT
-from phone_host.model import CloudImage, Disparity, RectifiedPair
+from phone_host.model import CloudImage, Disparity, Processed, RectifiedPair
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.listed import ListedFolder
@@ -21,7 +21,7 @@ from phone_host.output.preview import write_preview
 from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import decode_files, open_image, require_same_size, size_text
-from phone_host.stereo.reproject import disparities_for_near, nearest_depth_m
+from phone_host.stereo.reproject import nearest_depth_m
 from phone_host.verbs.output_folders import require_folder, unwritable
 from phone_host.verbs.stereo_options import build_core
 
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
         "right": {"file": str(options.right), "size": size_text(right)},
         "size": size_text(pair.left),
         "matcher": matcher,
-        **_figures(options, core, disparity),
+        **_figures(core, processed),
         "points": points,
         "times_ms": watch.times_ms(),
         "files": ["disparity.pfm", "disparity.png", *(["cloud.ply"] if cloud is not None else []), "report.json"],
@@ -99,17 +99,20 @@ class _StopWatch:
         return {stage: round(ns / 1e6, 3) for stage, ns in laps}
 
 
-def _figures(options: argparse.Namespace, core: StereoCore, disparity: Disparity) -> dict[str, Any]:
-    """Return geometry, number of disparities, density and warnings about them."""
-    geometry, width_px = core.geometry, disparity.shape[1]
-    count = options.disparities
+def _figures(core: StereoCore, processed: Processed) -> dict[str, Any]:
+    """Return geometry, number of disparities, density, limits, what was cut, and warnings about them."""
+    geometry, disparity, search = processed.geometry, processed.disparity, processed.search
+    limits, cut = processed.limits, processed.cut
+    assert disparity is not None  # `compute` always returns these three
+    assert search is not None
+    assert cut is not None
     warnings = []
-    if count is None and geometry is not None:
-        count = disparities_for_near(geometry, options.near / 1000, width_px)
-        nearest_mm = nearest_depth_m(geometry, count) * 1000
-        if nearest_mm > options.near:
+    wanted_mm = core.wanted.search_from_m * 1000
+    if geometry is not None and wanted_mm > 0:
+        nearest_mm = nearest_depth_m(geometry, search.disparities) * 1000
+        if nearest_mm > wanted_mm:
             warnings.append(
-                f"nothing nearer than {nearest_mm:.0f} mm is found: at {options.near:g} mm the two views of this rig"
+                f"nothing nearer than {nearest_mm:.0f} mm is found: at {wanted_mm:g} mm the two views of this rig"
                 " share less than half of their width"
             )
     density = float(np.isfinite(disparity).mean())
@@ -121,8 +124,11 @@ def _figures(options: argparse.Namespace, core: StereoCore, disparity: Disparity
     if geometry is None:
         warnings.append("no cloud.ply: focal length and baseline are unknown; give --focal PX --baseline MM")
     return {
-        "disparities": count,
+        "disparities": search.disparities,
+        "scale": round(search.scale, 4),
         "geometry": None if geometry is None else asdict(geometry),
+        "limits": None if limits is None else asdict(limits),
+        "cut": asdict(cut),
         "density": round(density, 5),
         "warnings": warnings,
     }
