@@ -27,13 +27,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " are paired by the number in the name, else in name order",
     )
     add_stereo_arguments(parser)
-    parser.add_argument(
-        "--axes",
-        choices=("camera", "y-up"),
-        default="camera",
-        help="axes of cloud.ply and xyz.pfm: camera (x right, y down, z forward; the default), or y-up (x right, y up, z"
-        " backward) as MeshLab and Blender show them upright",
-    )
     parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
     parser.add_argument(
         "--out",

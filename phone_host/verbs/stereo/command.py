@@ -1,13 +1,11 @@
 """phone-host stereo: compute disparity and point clouds of pairs of image files."""
 
 import argparse
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError
-from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
 from phone_host.report.stereo_report import Size, pair_json, pair_lines, set_json, set_lines
 from phone_host.run.stereo_job import StereoJob, run_stereo
@@ -18,7 +16,7 @@ from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.output_folders import require_folder, spare_inputs, unwritable
 from phone_host.verbs.progress import progress
-from phone_host.verbs.stereo_options import build_core
+from phone_host.verbs.stereo_options import build_core, output_options
 
 _DEFAULT_MATCHER: Final = "sgbm"
 _CHECK_FAILED: Final = 4
@@ -38,9 +36,7 @@ def run(options: argparse.Namespace) -> int:
         out=options.out,
         make_core=lambda size_px: _core(options, size_px),
         matcher=options.matcher or _DEFAULT_MATCHER,
-        is_rectified=options.rectified,
-        near_m=math.nan if options.rectified or options.disparities is not None else options.near / 1000,
-        axes=Axes(options.axes),
+        axes=output_options(options).axes,
         most_pixels=most_pixels(None, options.max_megapixels),
     )
     count = len(files.pairs)
