@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final
 
 from phone_host.model import Processed
 from phone_host.output.axes import Axes
@@ -15,8 +15,6 @@ from phone_host.output.depth_png import write_depth
 from phone_host.output.pfm import write_pfm, write_xyz
 from phone_host.output.ply import write_ply
 from phone_host.output.preview import depth_picture, disparity_picture, write_png
-
-T = TypeVar("T")
 
 
 class PairFile(Enum):
@@ -79,17 +77,12 @@ def available(wanted: Sequence[PairFile], *, has_disparity: bool, has_cloud: boo
     )
 
 
-def one_after_another(write: Callable[[PairFile], T], files: Iterable[PairFile]) -> Iterable[T]:
-    """Write in this thread; `ThreadPoolExecutor.map` has the same form."""
-    return map(write, files)
-
-
 def write_pair(
     folder: Path,
     processed: Processed,
     wanted: Sequence[PairFile],
     axes: Axes = Axes.CAMERA,
-    run_all: Callable[[Callable[[PairFile], int], Iterable[PairFile]], Iterable[int]] = one_after_another,
+    run_all: Callable[[Callable[[PairFile], int], Iterable[PairFile]], Iterable[int]] = map,
 ) -> WrittenPair:
     """Write a pair's files, each whole or not at all.
 
@@ -98,7 +91,7 @@ def write_pair(
         processed: the pair.
         wanted: which files. Those for which the pair has no data are left out.
         axes: axes of cloud.ply and xyz.pfm.
-        run_all: calls a function for each file, possibly in several threads.
+        run_all: calls a function for each file, possibly in several threads (`ThreadPoolExecutor.map`).
 
     Returns:
         What was written.

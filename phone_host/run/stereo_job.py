@@ -192,9 +192,12 @@ class _Work:
         planned = available(
             STEREO_FILES, has_disparity=processed.disparity is not None, has_cloud=processed.cloud is not None
         )
-        with self._results.folder_of(folder, [*(file.value for file in planned), "report.json"]) as place:
-            with ThreadPoolExecutor(_WRITERS) as writers:
-                written = write_pair(place, processed, planned, self._job.axes, writers.map)
+        names = [*(file.value for file in planned), "report.json"]
+        with (
+            ThreadPoolExecutor(_WRITERS) as writers,
+            self._results.folder_of(folder, names, writers.map) as place,
+        ):
+            written = write_pair(place, processed, planned, self._job.axes, writers.map)
             watch.lap("write")
             density = 0.0 if processed.disparity is None else float(np.isfinite(processed.disparity).mean())
             remarks = pair_remarks(processed, density, written, core.wanted.search_from_m)
