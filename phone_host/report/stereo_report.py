@@ -22,12 +22,19 @@ class Remark:
     """Something that the user must know about a result.
 
     Attributes:
-        text: one sentence, with the remedy.
+        problem: what it is, with figures.
+        remedy: what to do about it; empty: nothing.
         is_blocking: whether the result must not be taken for right; the command then ends with exit code 4.
     """
 
-    text: str
+    problem: str
+    remedy: str = ""
     is_blocking: bool = False
+
+    @property
+    def text(self) -> str:
+        """Problem and remedy on one line."""
+        return f"{self.problem}: {self.remedy}" if self.remedy else self.problem
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -224,7 +231,9 @@ def set_lines(report: SetReport, out: str) -> list[str]:
             continue
         points = "" if pair.written.points is None else f", {pair.written.points} points"
         lines.append(f"{pair.name}  density {pair.density:.1%}{points}")
-        lines += [f"  warning: {remark.text}" for remark in pair.remarks]
+        lines += [f"  warning: {remark.problem}" for remark in pair.remarks]
+    remedies = dict.fromkeys(remark.remedy for pair in report.computed for remark in pair.remarks if remark.remedy)
+    lines += [f"remedy: {remedy}" for remedy in remedies]
     lines += [f"warning: {remark.text}" for remark in report.remarks]
     told = f"{len(report.computed)} of {len(report.pairs)} pairs computed"
     failed = f", {len(report.failed)} failed" if report.failed else ""
@@ -278,13 +287,13 @@ def alone_remarks(left: Sequence[str], right: Sequence[str], *, by_number: bool,
         if alone:
             named = ", ".join(alone[:_MOST_NAMES]) + (", …" if len(alone) > _MOST_NAMES else "")
             were = "image has" if len(alone) == 1 else "images have"
-            remarks.append(Remark(f"{len(alone)} {side} {were} no partner and were left out: {named}"))
+            remarks.append(Remark(f"{len(alone)} {side} {were} no partner: {named}"))
     if not by_number and pairs > 1:
         unequal = " though the counts differ" if left or right else ""
         remarks.append(
             Remark(
-                f"the images were paired in the order of their names{unequal}, because the names share no numbers: check that each"
-                " pair shows one moment"
+                f"the images were paired in the order of their names{unequal}, because the names share no numbers",
+                "check that each pair shows one moment, or give the two images of a moment the same number",
             )
         )
     return tuple(remarks)
