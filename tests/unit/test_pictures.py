@@ -92,7 +92,7 @@ def test_a_tick_lies_beside_the_colour_of_its_disparity() -> None:
     picture = disparity_picture(disparity, geometry)
     strip = picture[:, 400:]
     bar = strip[:, 5]  # half a letter of 10 px from the picture
-    coloured = np.flatnonzero((bar != 255).any(axis=1))
+    coloured = np.flatnonzero(np.any(bar != 255, axis=1))
     row = round(coloured[-1] - marks["2"] * (coloured[-1] - coloured[0]))
     expected = colour_disparity(np.array([[5]], np.float32), low_px, high_px)[0, 0].astype(int)
     assert np.abs(strip[row, 5].astype(int) - expected).max() <= 4  # one row is half a colour level
@@ -108,7 +108,7 @@ def test_labels_can_be_read_on_a_phone_whatever_the_size_of_the_picture(width: i
     colours = np.zeros((2, 3), np.uint8)
     picture = with_scale(blank, colours, lambda _: (Tick(0.5, "1"),), "m")
     x = width + round(width / 38) * 2  # behind the bar and the tick
-    rows = np.flatnonzero((picture[height // 4 : height * 3 // 4, x:] < 128).all(axis=2).any(axis=1))
+    rows = np.flatnonzero(np.all(picture[height // 4 : height * 3 // 4, x:] < 128, axis=2).any(axis=1))
     digit_px = rows[-1] - rows[0] + 1
     assert digit_px * 390 / picture.shape[1] >= 7
 
