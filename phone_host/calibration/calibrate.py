@@ -36,7 +36,7 @@ from phone_host.calibration.calibrate_alone import (
 )
 from phone_host.calibration.target import Board, Corners
 from phone_host.model import CameraModel, Rectification, Rig, Side
-from phone_host.stereo.rectify import rectify_points, rectify_rig
+from phone_host.stereo.rectify import across_lines_px, rectify_points, rectify_rig
 
 Sizes = tuple[tuple[int, int], tuple[int, int]]
 """Width and height of the left and of the right images, px."""
@@ -311,7 +311,7 @@ def _alone_rms_px(pairs: list[BoardPair], side: Side, points_m: Vector, paramete
 def _vertical_errors_px(pair: BoardPair, rig: Rig, rectification: Rectification) -> Vector:
     left = rectify_points(pair.left_px, rig.left, rectification.R_left, rectification.geometry)
     right = rectify_points(pair.right_px, rig.right, rectification.R_right, rectification.geometry)
-    return np.asarray(left[:, 1] - right[:, 1], dtype=np.float64)
+    return across_lines_px(left, right, rectification.epipolar)
 
 
 def _rms(values: Vector) -> float:

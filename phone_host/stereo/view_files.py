@@ -96,7 +96,10 @@ def _require_two_sides(given: str, left: list[Path], right: list[Path]) -> None:
 
 def _images_of(given: Sequence[str], side: str) -> list[Path]:
     """Return the image files of all arguments of a side, each once, in the order of `_images`."""
-    return sorted({path for each in given for path in _images(each, side)}, key=_natural)
+    found = {path for each in given for path in _images(each, side)}
+    if len(given) > 1:  # a shell's glob also catches Thumbs.db
+        found = {path for path in found if path.suffix.lower() in SUFFIXES} or found
+    return sorted(found, key=_natural)
 
 
 def _images(given: str, side: str) -> list[Path]:
