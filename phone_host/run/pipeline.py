@@ -12,9 +12,8 @@ from common.frame import Frame
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
 from common.protocol.message import FrameMessage
-from phone_host.model import BoardFrame, FramePair, Image, Processed, RectifiedPair, Side
+from phone_host.model import FramePair, Image, Processed, RectifiedPair, Side
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.images import enlarged
 from phone_host.stereo.interpolate import LARGEST_FRACTION, Interpolator
 from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_frames
 
@@ -62,7 +61,6 @@ class Pipeline:
         board, host = _encoded(pair.board.message, "board", pair.board.asked_px), _encoded(pair.host, "host")
         start_ns = self._clock()
         board_image, host_image = decode_frames(board, host, self._most_pixels, self._check_sizes)
-        board_image = _at_asked_size(board_image, pair.board)
         decoded_ns = self._clock()
         board_image = self._at_host_time(pair, board_image)
         interpolated_ns = self._clock()
@@ -94,17 +92,10 @@ class Pipeline:
             return image
         try:
             before = _encoded(pair.before.message, "board", pair.before.asked_px)
-            earlier = _at_asked_size(decode_frame(before, self._most_pixels), pair.before)
+            earlier = decode_frame(before, self._most_pixels)
         except DataError:
             return image
         return self._interpolator.back(earlier, image, fraction) if earlier.shape == image.shape else image
-
-
-def _at_asked_size(image: Image, frame: BoardFrame) -> Image:
-    """Return the image at the size that the board's camera was asked for. Rig, matcher and geometry need that size."""
-    if not any(frame.asked_px):
-        return image
-    return enlarged(image, frame.asked_px, f"board frame {frame.message.sequence}")
 
 
 def _encoded(frame: FrameMessage | Frame, whose: str, asked_px: tuple[int, int] = (0, 0)) -> EncodedImage:
