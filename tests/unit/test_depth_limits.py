@@ -45,7 +45,8 @@ def test_the_relative_error_of_a_measured_depth_is_the_error_over_the_measured_d
 def test_the_far_limit_follows_from_the_rig() -> None:
     """The limit is f b s / delta = 500 x 0.1 x 0.2 / 0.25 = 40 m; there D = 1.25 px, and 0.25 px are 20 % of it."""
     limits = depth_limits(GEOMETRY, 0.25, DepthWanted())
-    assert limits == DepthLimits(near_m=0.0, far_m=pytest.approx(40.0), disparity_error_px=0.25, from_rig=True)
+    assert limits == DepthLimits(near_m=0.0, far_m=limits.far_m, disparity_error_px=0.25, from_rig=True)
+    assert limits.far_m == pytest.approx(40.0)
     assert 0.25 / (50 / limits.far_m) == pytest.approx(0.2)
     assert depth_limits(GEOMETRY, 0.25, DepthWanted(), share=0.05).far_m == pytest.approx(10.0)
 
