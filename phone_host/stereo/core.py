@@ -40,7 +40,7 @@ from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near, reproject
 from phone_host.stereo.scaled_rig import scaled_rig
-from phone_host.stereo.stacked import lying, upright_again
+from phone_host.stereo.stacked import lying_pair, upright_again
 from phone_host.stereo.working import MARGIN_PX, Part, chosen_scale, part_for, reduced, to_full_size
 
 _Sizes = tuple[tuple[int, int], tuple[int, int]]
@@ -204,8 +204,8 @@ def _match(pair: RectifiedPair, ready: _Ready) -> Disparity:
     """Match the part that is wanted, at the working size, turned if need be; the result has the rectified images' size."""
     part, scale, epipolar = ready.part, ready.search.scale, pair.epipolar
     seen = pair if part is None else part.of(pair)
-    left, right = (lying(reduced(image, scale), epipolar) for image in (seen.left, seen.right))
-    found = upright_again(ready.matcher.match(RectifiedPair(left, right)), epipolar)
+    small = RectifiedPair(reduced(seen.left, scale), reduced(seen.right, scale), epipolar)
+    found = upright_again(ready.matcher.match(lying_pair(small)), epipolar)
     height, width = seen.left.shape[:2]
     disparity = to_full_size(found, width, height, epipolar)
     if scale < 1 and ready.search.disparities:

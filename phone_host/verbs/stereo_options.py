@@ -68,7 +68,7 @@ def build_core(
         return _by_calib_txt(options, Path(calibration), chosen, wanted, size_px), None
     if calibration:
         rig = read_rig(Path(calibration))
-        _refuse_rejected(rig, calibration, allowed=options.use_rejected_rig)
+        refuse_rejected(rig, calibration, allowed=options.use_rejected_rig)
         return StereoCore(_matcher(chosen, options.disparities), Rectifier(rig), None, wanted), rig.board_side
     if not options.rectified:
         _refuse_idle_limits(options, ("near", "far", "crop", "scale"), "--calibration or --rectified")
@@ -106,7 +106,17 @@ def _matcher(chosen: AnyMatcher, disparities: int | None) -> MatchSettings:
     return MatchSettings(chosen) if disparities is None else MatchSettings(chosen, disparities)
 
 
-def _refuse_rejected(rig: Rig, calibration: str, *, allowed: bool) -> None:
+def refuse_rejected(rig: Rig, calibration: str, *, allowed: bool) -> None:
+    """Refuse a rig that its own calibration found unfit.
+
+    Args:
+        rig: as read.
+        calibration: its file, for the error.
+        allowed: whether the user wants it all the same.
+
+    Raises:
+        DataError: its verdict is reject, and it is not allowed.
+    """
     if rig.verdict == _REJECTED and not allowed:
         raise DataError(
             f"{calibration} was rejected by its own calibration (verdict {_REJECTED}): its depth would be wrong",
