@@ -137,7 +137,10 @@ class PageData:
         pictures: left, right, disparity.
         delays: of all pairs.
         tables: drops by reason and similar.
-        notes: what to know or try next, one sentence each.
+        notes: what to know, one sentence each.
+        steps: what to do next, one sentence each.
+        depth: HTML of `depth_view`, shown before the pictures; may be empty.
+        files: HTML that leads to the run's files; may be empty.
     """
 
     title: str
@@ -149,6 +152,9 @@ class PageData:
     delays: DelaySeries
     tables: tuple[Table, ...] = ()
     notes: tuple[str, ...] = ()
+    steps: tuple[str, ...] = ()
+    depth: str = ""
+    files: str = ""
 
 
 def delay_series(ledgers: Sequence[PairLedger]) -> DelaySeries:
@@ -200,21 +206,37 @@ def page(data: PageData) -> str:
     Raises:
         DataError: a picture is neither PNG nor JPEG.
     """
-    sign = {Headline.GOOD: "✓", Headline.WARNING: "!", Headline.BAD: "✕"}[data.verdict]
-    subtitle = f'<p class="sub">{escape(data.subtitle)}</p>' if data.subtitle else ""
     parts = [
-        f"<header><h1>{escape(data.title)}</h1>{subtitle}</header>",
-        f'<p class="verdict {data.verdict.value}"><b aria-hidden="true">{sign}</b><span>{escape(data.sentence)}</span></p>',
-        _figures(data.figures),
+        heading(data.title, data.subtitle, data.verdict, data.sentence),
+        figures_row(data.figures),
+        data.depth,
         _pictures(data.pictures),
         *_delays(data.delays),
         *(_table(one) for one in data.tables),
         _notes(data.notes),
     ]
-    return document(data.title, "".join(parts))
+    return document(data.title, "".join(parts), shows_depth=bool(data.depth))
 
 
-def _figures(figures: tuple[Figure, ...]) -> str:
+def heading(title: str, subtitle: str, verdict: Headline, sentence: str) -> str:
+    """Make the head of a page: title, subtitle and verdict.
+
+    Args:
+        title: plain text.
+        subtitle: plain text, may be empty.
+        verdict: gives colour and symbol.
+        sentence: the verdict in words.
+    """
+    sign = {Headline.GOOD: "✓", Headline.WARNING: "!", Headline.BAD: "✕"}[verdict]
+    below = f'<p class="sub">{escape(subtitle)}</p>' if subtitle else ""
+    return (
+        f"<header><h1>{escape(title)}</h1>{below}</header>"
+        f'<p class="verdict {verdict.value}"><b aria-hidden="true">{sign}</b><span>{escape(sentence)}</span></p>'
+    )
+
+
+def figures_row(figures: tuple[Figure, ...]) -> str:
+    """Make the row of key figures; empty if there are none."""
     if not figures:
         return ""
     cards = "".join(
@@ -230,14 +252,19 @@ def _pictures(pictures: tuple[Picture, ...]) -> str:
     if not pictures:
         return ""
     items = "".join(
-        f'<figure><img alt="{escape(picture.label)}" src="{_data_uri(picture)}"><figcaption>{escape(picture.label)}'
+        f'<figure><img alt="{escape(picture.label)}" src="{picture_uri(picture)}"><figcaption>{escape(picture.label)}'
         "</figcaption></figure>"
         for picture in pictures
     )
     return f'<div class="pictures">{items}</div>'
 
 
-def _data_uri(picture: Picture) -> str:
+def picture_uri(picture: Picture) -> str:
+    """Return a picture as the address of an <img>.
+
+    Raises:
+        DataError: it is neither PNG nor JPEG.
+    """
     if picture.data.startswith(b"\x89PNG\r\n\x1a\n"):
         kind = "png"
     elif picture.data.startswith(b"\xff\xd8\xff"):
