@@ -13,6 +13,7 @@ from common.errors import SettingsError, UnavailableError
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.signals import StopSignals
+from common.words import counted
 from phone_host.bench.analysis import Analysis, analyse
 from phone_host.bench.cases import Interface, cases, interfaces, parse_links, parse_qualities, parse_rates, parse_sizes
 from phone_host.bench.changes import parse_changes
@@ -57,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
         raise outcome.failure
     if signals.stop:
         how = "interrupted" if signals.interrupted else "stopped"
-        print(f"delay-bench: {how} after {len(outcome.results)} of {len(planned)} runs", file=sys.stderr)
+        print(f"delay-bench: {how} after {len(outcome.results)} of {counted(len(planned), 'run')}", file=sys.stderr)
         return INTERRUPTED if signals.interrupted else 0
     return 0 if all(result.ledgers for result in outcome.results) else _NOTHING_MEASURED
 

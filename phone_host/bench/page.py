@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Final
 
+from common.words import counted
 from phone_host.bench.analysis import Analysis, InterfaceFit, typical_and_slow
 from phone_host.bench.prediction import Figures, values_of
 from phone_host.bench.report import Conditions, grouped
@@ -121,7 +122,7 @@ def _method(results: Sequence[CaseResult], under: Conditions) -> str:
 def _glance(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> str:
     missing = "".join(f"<li>{escape(str(one))} was not run: {escape(reason)}</li>" for one, reason in under.not_run)
     content = table(FIT_COLUMNS, fit_rows(analysis), tight=True) + (f"<ul>{missing}</ul>" if missing else "")
-    words = f"{len(results)} runs. Propagation = latency + bytes / rate; the clock's uncertainty and its hard bound are those at the end of the run that knew it worst."
+    words = f"{counted(len(results), 'run')}. Propagation = latency + bytes / rate; the clock's uncertainty and its hard bound are those at the end of the run that knew it worst."
     return section("The interfaces", words, content)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+from common.words import counted
 from phone_host.bench.analysis import Analysis, regime_of, statistics_of
 from phone_host.bench.prediction import Figures, Unknown
 from phone_host.bench.report import PERCENTILES, losses, percentiles
@@ -67,7 +68,7 @@ def summary_line(result: CaseResult) -> str:
     lost = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in losses(result).items()) or "nothing"
     if result.ledgers:
         worst_us = statistics_of(result).spread("uncertainty").p95_ns / 1e3
-        pairs = f"{len(result.ledgers)} pairs, {result.pairs_per_second:.1f}/s, clock of the pairs +-{worst_us:.0f} us (p95)"
+        pairs = f"{counted(len(result.ledgers), 'pair')}, {result.pairs_per_second:.1f}/s, clock of the pairs +-{worst_us:.0f} us (p95)"
     else:
         pairs = "no pairs"
     at_end = (
@@ -87,7 +88,7 @@ def regime_lines(result: CaseResult, fifo: FifoSettings) -> tuple[str, ...]:
 def error_lines(analysis: Analysis) -> list[str]:
     """Say how far predictions were from measurements; nothing if nothing was predicted."""
     return [
-        f"{what}, {errors.runs} runs: pairs/s off by {100 * errors.rate:.0f} % (median; {100 * errors.worst_rate:.0f} % at worst), "
+        f"{what}, {counted(errors.runs, 'run')}: pairs/s off by {100 * errors.rate:.0f} % (median; {100 * errors.worst_rate:.0f} % at worst), "
         f"end-to-end p50 by {100 * errors.end_to_end:.0f} % ({100 * errors.worst_end_to_end:.0f} %)"
         for what, errors in (
             ("predicted from the other runs", analysis.held_out),

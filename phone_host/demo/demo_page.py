@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from common import now
 from common.ledger import PairLedger
+from common.words import counted
 from phone_host.demo.demonstration import CheckedPair, DepthErrors
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.report.report_page import Figure, Headline, PageData, delay_series, page
@@ -57,7 +58,7 @@ def _verdict(errors: DepthErrors) -> tuple[Headline, str]:
     if not errors.pairs:
         return Headline.BAD, "No pair was compared with the truth: the run was too short or the programs did not meet."
     if errors.wrong_pairs:
-        return Headline.BAD, f"{errors.wrong_pairs} of {errors.pairs} pairs show two different moments."
+        return Headline.BAD, f"{errors.wrong_pairs} of {counted(errors.pairs, 'pair')} show two different moments."
     text = f"Every checked pair shows one moment, and its depth is right within {errors.depth_mm:.1f} mm ({errors.depth_percent:.2f} %) at the median."
     return (Headline.GOOD if errors.depth_percent <= _GOOD_PERCENT else Headline.WARNING), text
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from common.ledger import PairLedger, StageTimes
+from common.words import counted
 from phone_host.report.page_frame import HALF_PX, document, section, table, two_widths
 from phone_host.svg.plot_parts import legend
 from phone_host.svg.plots import (
@@ -280,7 +281,8 @@ def _delays(series: DelaySeries) -> list[str]:
         return [section("Delays", "No pair was processed, so there are no delays to show.", "")]
     names = [(quantity.label, quantity.colour) for quantity in series.delays]
     mean = Budget(
-        f"mean of {series.pairs} pairs, end to end", tuple(mean_share(quantity) for quantity in series.delays)
+        f"mean of {counted(series.pairs, 'pair')}, end to end",
+        tuple(mean_share(quantity) for quantity in series.delays),
     )
     work = Budget("mean processing delay", tuple(mean_share(quantity) for quantity in series.stages))
     everything = Strips("", (*series.delays, series.end_to_end, series.starvation))

@@ -8,6 +8,7 @@ import numpy as np
 from common import now
 from common.camera.base import CameraHealth
 from common.ledger import PairLedger
+from common.words import counted, times
 from phone_host.measure.accounts import rung_lines
 from phone_host.measure.regime import Judgement, Regime, judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
@@ -69,7 +70,7 @@ def links_tables(run: RunSnapshot) -> tuple[Table, ...]:
         age = tally.age.spread()
         ages = f"{age.p50_ns / 1e6:.1f} ms; {age.p95_ns / 1e6:.1f} ms" if age.count else "-"
         rows.append((tally.name, str(tally.frames), str(tally.carried), str(tally.lost), ages))
-    title = f"Links: the stream changed links {run.link.switches} times"
+    title = f"Links: the stream changed links {times(run.link.switches)}"
     columns = ("link", "frames", "times it took over", "times it was lost", "age of frames on arrival: median; p95")
     return (Table(title, columns, tuple(rows)),)
 
@@ -120,7 +121,7 @@ def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
 
 def rate_figure(run: RunSnapshot) -> Figure:
     """How many pairs per second were processed."""
-    pairs = f"{run.processed} pairs in {run.seconds:.1f} s"
+    pairs = f"{counted(run.processed, 'pair')} in {run.seconds:.1f} s"
     return _measured("pairs per second", run.pairs_per_second, 1, "/s", pairs)
 
 

@@ -4,6 +4,7 @@ import math
 from typing import Final
 
 from common.camera.base import CameraHealth
+from common.words import counted, times
 from phone_host.measure.accounts import LinkAccount, rung_lines
 from phone_host.measure.delays import DELAYS
 from phone_host.measure.regime import judge
@@ -18,7 +19,7 @@ _MS: Final = 1e6
 def summary(run: RunSnapshot) -> str:
     """Summarise the run in a few lines."""
     rate = "" if math.isnan(run.pairs_per_second) else f" in {run.seconds:.1f} s ({run.pairs_per_second:.1f} /s)"
-    lines = [f"{run.processed} pairs{rate}, ended: {run.ended.replace('_', ' ')}"]
+    lines = [f"{counted(run.processed, 'pair')}{rate}, ended: {run.ended.replace('_', ' ')}"]
     if run.processed:
         lines.append(f"{'delay, ms':14} {'p50':>9} {'p95':>9} {'p99':>9} {'max':>9}")
         for name in DELAYS:
@@ -62,14 +63,14 @@ def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
 def camera_troubles(health: CameraHealth) -> list[str]:
     """Say in one line what went wrong with a camera; nothing if nothing did."""
     parts = [
-        *([f"unplugged {health.unplugged} times"] if health.unplugged else []),
-        *([f"stalled {health.stalls} times"] if health.stalls else []),
-        *([f"failed {health.failures} times"] if health.failures else []),
-        *([f"back {health.returned} times"] if health.returned else []),
-        *([f"{health.missed} frames missed by its driver"] if health.missed else []),
-        *(f"{count} frames {fault.value}" for fault, count in health.faults),
-        *([f"{health.distrusted_stamps} stamps not believed"] if health.distrusted_stamps else []),
-        *([f"{health.refused_controls} controls refused"] if health.refused_controls else []),
+        *([f"unplugged {times(health.unplugged)}"] if health.unplugged else []),
+        *([f"stalled {times(health.stalls)}"] if health.stalls else []),
+        *([f"failed {times(health.failures)}"] if health.failures else []),
+        *([f"back {times(health.returned)}"] if health.returned else []),
+        *([f"{counted(health.missed, 'frame')} missed by its driver"] if health.missed else []),
+        *(f"{counted(count, 'frame')} {fault.value}" for fault, count in health.faults),
+        *([f"{counted(health.distrusted_stamps, 'stamp')} not believed"] if health.distrusted_stamps else []),
+        *([f"{counted(health.refused_controls, 'control')} refused"] if health.refused_controls else []),
     ]
     return [f"this machine's camera: {', '.join(parts)}".replace("_", " ")] if parts else []
 
@@ -119,8 +120,10 @@ def _links(link: LinkAccount) -> list[str]:
 
 def _unused_lines(run: RunSnapshot) -> list[str]:
     """Say what was not used, and what was not written."""
-    parts = [f"{item.count} {item.words}" for item in unused(run)]
+    parts = [item.told for item in unused(run)]
     lines = [f"not used: {', '.join(parts) or 'nothing'}"]
     if run.unwritten.lines or run.unwritten.pairs:
-        lines.append(f"not written: {run.unwritten.lines} lines, {run.unwritten.pairs} pairs ({run.unwritten.cause})")
+        lines.append(
+            f"not written: {counted(run.unwritten.lines, 'line')}, {counted(run.unwritten.pairs, 'pair')} ({run.unwritten.cause})"
+        )
     return lines

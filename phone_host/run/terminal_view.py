@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from common import now
+from common.words import counted
 from phone_host.measure.accounts import rung_lines
 from phone_host.measure.delays import DELAYS, STAGES, Spread
 from phone_host.measure.regime import judge
@@ -83,7 +84,7 @@ class LiveTable:
 
 
 def _table(run: RunSnapshot, rate: float) -> Table:
-    table = Table(title=f"{run.processed} pairs, {rate:.1f} /s", title_justify="left")
+    table = Table(title=f"{counted(run.processed, 'pair')}, {rate:.1f} /s", title_justify="left")
     table.add_column("delay, ms")
     for name in ("p50", "p95", "p99", "max"):
         table.add_column(name, justify="right")
@@ -115,7 +116,7 @@ def _state(run: RunSnapshot) -> Text:
         else "clock unknown"
     )
     board = f"board connected over {run.carrier}" if run.carrier else "waiting for the board"
-    lost = ", ".join(f"{item.count} {item.words}" for item in unused(run)) or "nothing"
+    lost = ", ".join(item.told for item in unused(run)) or "nothing"
     phase = "\n".join(phase_lines(run.phase, run.alignment))
     return Text(f"{board} · {clock} · not used: {lost}" + (f"\n{phase}" if phase else ""))
 

@@ -11,6 +11,7 @@ from rich.progress import Progress
 
 from common.errors import DataError, UnavailableError
 from common.versions import REPORT_FORMAT
+from common.words import counted
 from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
 from phone_host.calibration.board_views import BoardViews, look_for_boards
 from phone_host.calibration.calibrate import calibrate
@@ -186,7 +187,7 @@ def _summary(report: dict[str, Any], calibration: Calibration, rejected: tuple[R
         rows.append(_rejections(rejected))
     rms, vertical = report["rms_px"], report["vertical_error_px"]
     rows += [
-        f"{report['pairs']['used']} pairs used, {len(rejected)} rejected",
+        f"{counted(report['pairs']['used'], 'pair')} used, {len(rejected)} rejected",
         f"RMS      left {rms['left']:.3f}, right {rms['right']:.3f}, stereo {rms['stereo']:.3f} px",
     ]
     if vertical["p95"] is not None:

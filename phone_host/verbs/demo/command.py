@@ -14,6 +14,7 @@ from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.settings import with_origins
 from common.program.signals import StopSignals
+from common.words import counted
 from phone_host.children.board_process import socket_folder
 from phone_host.demo.demo_page import demo_page
 from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, truth_json
@@ -117,7 +118,7 @@ def _closing(out: Path, film: Film, errors: DepthErrors) -> str:
     if not errors.pairs:
         return f"no pair was processed in that time, so nothing could be checked: give more --seconds; see {out}/index.html"
     wrong = (
-        f"\nWRONG: {errors.wrong_pairs} of {errors.pairs} checked pairs show two different moments"
+        f"\nWRONG: {errors.wrong_pairs} of {counted(errors.pairs, 'checked pair')} show two different moments"
         if errors.wrong_pairs
         else ""
     )

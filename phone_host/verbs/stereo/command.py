@@ -11,6 +11,7 @@ from common import now
 from common.errors import SettingsError
 from common.ledger import StageTimes
 from common.versions import REPORT_FORMAT
+from common.words import counted
 from phone_host.model import CloudImage, Disparity, RectifiedPair
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
@@ -162,12 +163,12 @@ def _summary(report: dict[str, Any], out: Path) -> str:
     geometry = report["geometry"]
     found = f"{report['density']:.1%} of the pixels have one ({report['times_ms']['total']:.0f} ms)"
     lines = [
-        f"{report['size']} px, {report['matcher']}, {report['disparities']} disparities: {found}",
+        f"{report['size']} px, {report['matcher']}, {counted(report['disparities'], 'disparity', 'disparities')}: {found}",
         *(f"warning: {warning}" for warning in report["warnings"]),
     ]
     if geometry is not None:
         lines.insert(
             1,
-            f"{report['points']} points; f = {geometry['focal_px']:.1f} px, b = {geometry['baseline_m'] * 1e3:.2f} mm",
+            f"{counted(report['points'], 'point')}; f = {geometry['focal_px']:.1f} px, b = {geometry['baseline_m'] * 1e3:.2f} mm",
         )
     return "\n".join([*lines, f"written to {out}: {', '.join(report['files'])}"])
