@@ -38,7 +38,7 @@ class Unused:
             noun = f"{noun} {second}"
         if self.count == 1:
             noun, rest = noun.removesuffix("s"), rest.replace("that were not whole images", "that was no whole image")
-        reason = f" ({self.reason})".replace("_", " ") if self.reason else ""
+        reason = f": {self.reason}".replace("_", " ") if self.reason else ""
         return f"{self.count} {noun} {rest}{reason}"
 
 

@@ -1,7 +1,6 @@
 """A run as one self-contained HTML page: pictures, delays of all pairs as plots, key figures. Pure: data in, text out.
 
-The page refers to nothing outside itself and runs no script. So it opens offline, years later, from any folder, in
-light and dark mode and on a phone. The page says what was not measured. All text that comes from outside is escaped.
+The page says what was not measured. All text that comes from outside is escaped.
 """
 
 import base64
@@ -18,6 +17,7 @@ from common.errors import DataError
 from common.ledger import PairLedger, StageTimes
 from common.words import counted
 from phone_host.report.page_frame import HALF_PX, document, section, table, two_widths
+from phone_host.report.page_links import FileLink, NextCommand, files_section, list_section, next_section
 from phone_host.svg.plot_parts import legend
 from phone_host.svg.plots import (
     Budget,
@@ -140,8 +140,9 @@ class PageData:
         tables: drops by reason and similar.
         notes: what to know, one sentence each.
         steps: what to do next, one sentence each.
-        depth: HTML of `depth_view`, shown before the pictures; may be empty.
-        files: HTML that leads to the run's files; may be empty.
+        commands: what to type next.
+        depth: the last pair's card, HTML with parts of `depth_view`, shown before the pictures; may be empty.
+        files: beside the page.
     """
 
     title: str
@@ -154,8 +155,9 @@ class PageData:
     tables: tuple[Table, ...] = ()
     notes: tuple[str, ...] = ()
     steps: tuple[str, ...] = ()
+    commands: tuple[NextCommand, ...] = ()
     depth: str = ""
-    files: str = ""
+    files: tuple[FileLink, ...] = ()
 
 
 def delay_series(ledgers: Sequence[PairLedger]) -> DelaySeries:
@@ -213,10 +215,12 @@ def page(data: PageData) -> str:
         data.depth,
         _pictures(data.pictures),
         *_delays(data.delays),
-        *(_table(one) for one in data.tables),
-        _notes(data.notes),
+        *(section(one.title, "", table(one.columns, one.rows)) for one in data.tables if one.rows),
+        next_section(data.steps, data.commands),
+        list_section("Remarks", data.notes),
+        files_section(data.files),
     ]
-    return document(data.title, "".join(parts), shows_depth=bool(data.depth))
+    return document(data.title, "".join(parts), shows_depth=bool(data.depth or data.commands))
 
 
 def heading(title: str, subtitle: str, verdict: Headline, sentence: str) -> str:
@@ -284,7 +288,8 @@ def _delays(series: DelaySeries) -> list[str]:
         f"mean of {counted(series.pairs, 'pair')}, end to end",
         tuple(mean_share(quantity) for quantity in series.delays),
     )
-    work = Budget("mean processing delay", tuple(mean_share(quantity) for quantity in series.stages))
+    stages = tuple(stage for stage in series.stages if np.any(stage.values_ns > 0))  # a stage that never ran is none
+    work = Budget("mean processing delay", tuple(mean_share(quantity) for quantity in stages))
     everything = Strips("", (*series.delays, series.end_to_end, series.starvation))
     return [
         section(
@@ -300,12 +305,14 @@ def _delays(series: DelaySeries) -> list[str]:
             "Bar: 5th to 95th percentile. Line across: median. Small tick: 99th percentile. Dot: the longest. Logarithmic axis.",
             two_widths(lambda width: distributions([everything], width)) + _glossary(everything.quantities),
         ),
-        section(
+        ""
+        if not stages
+        else section(
             "Stages of processing",
             "",
-            legend([(quantity.label, quantity.colour) for quantity in series.stages])
+            legend([(quantity.label, quantity.colour) for quantity in stages])
             + two_widths(lambda width: budgets([work], width))
-            + two_widths(lambda width: distributions([Strips("", series.stages)], width)),
+            + two_widths(lambda width: distributions([Strips("", stages)], width)),
         ),
         '<div class="pair">'
         + section(
@@ -329,13 +336,3 @@ def _glossary(quantities: tuple[Quantity, ...]) -> str:
     """Make the list of what each delay means, collapsed; phones have no tooltips."""
     items = "".join(f"<dt>{escape(one.label)}</dt><dd>{escape(one.meaning)}</dd>" for one in quantities)
     return f'<details><summary>What each delay means</summary><dl class="words">{items}</dl></details>'
-
-
-def _table(one: Table) -> str:
-    return section(one.title, "", table(one.columns, one.rows or (("none",),)))
-
-
-def _notes(notes: tuple[str, ...]) -> str:
-    if not notes:
-        return ""
-    return section("What next", "", f"<ul>{''.join(f'<li>{escape(note)}</li>' for note in notes)}</ul>")

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Final
-from urllib.parse import quote
 
 import numpy as np
 
@@ -19,37 +18,12 @@ from phone_host.report import depth_data
 from phone_host.report.cut_words import cut_rows, distance_text, share_text
 from phone_host.report.depth_view import THIN, cloud_view, depth_view, uncertainty_m
 from phone_host.report.page_frame import document, section, table
+from phone_host.report.page_links import FileLink, NextCommand, address, files_section, list_section, next_section
 from phone_host.report.report_page import Figure, Headline, Picture, figures_row, heading, picture_uri
 from phone_host.svg.plot_scale import duration_text
 
 _THUMBNAIL_PX: Final = 320
 _CUT_COLOURS: Final = ("var(--c2)", "var(--c7)", "var(--c6)", "var(--c1)", "var(--c4)", "var(--c3)")
-
-
-@dataclass(frozen=True, slots=True)
-class FileLink:
-    """A file beside the page.
-
-    Attributes:
-        name: its name, relative to the page.
-        words: what it holds, with axes and unit where it has them.
-    """
-
-    name: str
-    words: str
-
-
-@dataclass(frozen=True, slots=True)
-class NextCommand:
-    """A command to copy.
-
-    Attributes:
-        words: what it is for.
-        command: one line, as it is typed into a shell.
-    """
-
-    words: str
-    command: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,7 +114,7 @@ def stereo_page(data: StereoPageData) -> str:
     Returns:
         An HTML document.
     """
-    back = f'<p class="sub"><a href="{escape(quote(data.back))}">all pairs</a></p>' if data.back else ""
+    back = f'<p class="sub"><a href="{address(data.back)}">all pairs</a></p>' if data.back else ""
     cloud = cloud_view(data.processed)
     shown = "" if data.processed.disparity is None else depth_view(data.processed, data.captions, stacked=data.stacked)
     parts = [
@@ -150,9 +124,9 @@ def stereo_page(data: StereoPageData) -> str:
         section("What the cameras saw, and the depth", _uncertainty_words(data.processed), shown) if shown else "",
         section("The cloud", "", cloud) if cloud else "",
         _pixels(data.processed),
-        _list("Remarks", data.notes),
-        _commands(data.commands),
-        _files(data.files),
+        list_section("Remarks", data.notes),
+        next_section((), data.commands),
+        files_section(data.files),
         _settings(data.settings, data.times),
     ]
     return document(data.title, "".join(parts), shows_depth=True)
@@ -171,8 +145,8 @@ def stereo_index(data: StereoIndexData) -> str:
     parts = [
         heading(data.title, data.subtitle, data.verdict, data.sentence),
         section(counted(len(data.pairs), "pair"), "", f'<div class="pictures">{cards}</div>') if cards else "",
-        _commands(data.commands),
-        _files(data.files),
+        next_section((), data.commands),
+        files_section(data.files),
     ]
     return document(data.title, "".join(parts), shows_depth=True)
 
@@ -250,33 +224,6 @@ def _pixels(processed: Processed) -> str:
     )
 
 
-def _list(title: str, lines: Sequence[str]) -> str:
-    if not lines:
-        return ""
-    return section(title, "", f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>")
-
-
-def _commands(commands: Sequence[NextCommand]) -> str:
-    if not commands:
-        return ""
-    lines = "".join(
-        f'<p class="for">{escape(one.words)}</p><div class="command"><code>{escape(one.command)}</code>'
-        '<button type="button" class="copy" hidden>copy</button></div>'
-        for one in commands
-    )
-    return section("What next", "", lines)
-
-
-def _files(files: Sequence[FileLink]) -> str:
-    if not files:
-        return ""
-    rows = "".join(
-        f'<dt><a href="{escape(quote(one.name))}">{escape(one.name)}</a></dt><dd>{escape(one.words)}</dd>'
-        for one in files
-    )
-    return section("Files", "", f'<dl class="words files">{rows}</dl>')
-
-
 def _settings(settings: Sequence[tuple[str, str]], times: Sequence[tuple[str, int]]) -> str:
     cards = []
     if settings:
@@ -295,7 +242,7 @@ def _entry(pair: PairEntry) -> str:
     )
     share = "" if math.isnan(pair.density) else f" · density {100 * pair.density:.0f} %"
     inside = f"{picture}<b>{escape(pair.name)}</b>"
-    link = f'<a href="{escape(quote(pair.folder))}/index.html">{inside}</a>' if pair.folder else inside
+    link = f'<a href="{address(pair.folder)}/index.html">{inside}</a>' if pair.folder else inside
     return (
         f'<figure>{link}<figcaption><span class="{pair.verdict.value}" aria-hidden="true">{sign}</span> '
         f"{escape(pair.sentence)}{share}</figcaption></figure>"

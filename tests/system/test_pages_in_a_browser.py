@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from phone_host.report.stereo_page import NextCommand, stereo_page
+from phone_host.report.page_links import NextCommand
+from phone_host.report.stereo_page import stereo_page
 from tests.support.browser import Browser, browser, needs_chromium
 from tests.support.stereo_pages import page_data
 

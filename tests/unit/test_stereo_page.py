@@ -15,10 +15,9 @@ from phone_host.report import depth_data
 from phone_host.report.cut_words import cut_rows, cut_sentence
 from phone_host.report.depth_script import SCRIPT
 from phone_host.report.page_frame import document
+from phone_host.report.page_links import FileLink, NextCommand
 from phone_host.report.report_page import Headline, Picture
 from phone_host.report.stereo_page import (
-    FileLink,
-    NextCommand,
     PairEntry,
     StereoIndexData,
     stereo_index,

@@ -22,6 +22,7 @@ from phone_host.model import Rig
 from phone_host.output.atomic import write_text
 from phone_host.output.listed import ListedFolder
 from phone_host.output.rig_yaml import write_rig
+from phone_host.report.page_links import NextCommand
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
 from phone_host.run.file_sink import NAMES, PAIR_FILES
@@ -61,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
         report = build(snapshot) | {"truth": truth_json(errors)}
         complete = demo.host.write_report(report)
         demo.write_pictures(out)
-        write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers))
+        write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers, _by_hand(out, film)))
     except _StoppedError:
         return INTERRUPTED if signals.interrupted else 0
     except OSError as error:
@@ -112,9 +113,24 @@ def _render(scene: Scene, rig: Rig, folder: Path, console: Console, signals: Sto
         return render_film(scene, rig, looks, folder, fps=FPS, seconds=DEMO_PERIOD_S, advance=advance)
 
 
+def _by_hand(out: Path, film: Film) -> tuple[NextCommand, ...]:
+    """Return the commands that do the same as the demo, and what comes after it."""
+    return (
+        NextCommand(
+            "The same by hand: the board, in one terminal", f"board-agent run --camera '{film.replay_uri(film.left)}'"
+        ),
+        NextCommand(
+            "and the host, in another one",
+            f"phone-host run --camera '{film.replay_uri(film.right)}' --calibration {out}/rig.yaml --out scan",
+        ),
+        NextCommand(
+            "Your own two cameras: calibrate them from photographs of a chessboard", "phone-host calibrate --help"
+        ),
+    )
+
+
 def _closing(out: Path, film: Film, errors: DepthErrors) -> str:
-    board = f"board-agent run --camera '{film.replay_uri(film.left)}'"
-    host = f"phone-host run --camera '{film.replay_uri(film.right)}' --calibration {out}/rig.yaml --out scan"
+    board, host = (one.command for one in _by_hand(out, film)[:2])
     if not errors.pairs:
         return f"no pair was processed in that time, so nothing could be checked: give more --seconds; see {out}/index.html"
     wrong = (

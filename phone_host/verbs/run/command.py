@@ -21,6 +21,7 @@ from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
+from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.model import Side, TimeOffset
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
@@ -77,13 +78,20 @@ def run(options: argparse.Namespace) -> int:
         remember(keys.path, named[0])
     snapshot = host.snapshot(ended.value)
     report = build(snapshot)
-    page = run_page(snapshot, host.last, board_side, host.sample()) if options.out else ""
+    page = _page(host, snapshot, board_side, options.out) if options.out else ""
     complete = host.write_report(report, page)
     print(json.dumps(report) if options.json else summary(snapshot))
     if signals.interrupted:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     return _CHECK_FAILED if too_few or not complete else 0
+
+
+def _page(host: Host, snapshot: RunSnapshot, board_side: Side, out: Path) -> str:
+    """Make the page of a run, with links to the clouds it saved (maps where it has no geometry)."""
+    saved = sorted(path.relative_to(out).as_posix() for path in out.glob("pair-*/cloud.ply"))
+    saved = saved or sorted(path.relative_to(out).as_posix() for path in out.glob("pair-*/disparity.pfm"))
+    return run_page(snapshot, host.last, board_side, host.sample(), saved)
 
 
 def _core(
