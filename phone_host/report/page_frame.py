@@ -121,7 +121,7 @@ a{color:var(--link)}.files dt{font-weight:600}.share{display:flex;height:1rem;bo
 .command{display:flex;gap:.6rem;align-items:flex-start;margin:.25rem 0 .9rem}.command code{flex:1;min-width:0;padding:.45rem .6rem;background:var(--bg);
 border:1px solid var(--line);border-radius:6px;font:.85rem/1.5 ui-monospace,monospace;white-space:pre-wrap;overflow-wrap:anywhere}
 .command+p,.for{margin:0;font-size:.9rem;color:var(--ink2)}
-section ul{margin:.25rem 0 0;padding-left:1.2rem}
+section ul.small{font-size:.85rem;color:var(--ink2);margin-top:.6rem}section ul{margin:.25rem 0 0;padding-left:1.2rem}
 @media (max-width:700px){main{padding:1.25rem .9rem 2rem}.pair{grid-template-columns:1fr}.wide{display:none}
 .narrow{display:block}.narrow+.wide+.narrow{margin-top:1rem}section{padding:1rem}.figures{grid-template-columns:1fr 1fr}
 .figures dd{font-size:1.25rem}h1{font-size:1.4rem}}

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from common.ledger import PairLedger, StageTimes
 from common.words import counted
+from phone_host.measure.delays import IDLE_STAGE_NS
 from phone_host.report.page_frame import HALF_PX, document, section, table, two_widths
 from phone_host.report.page_links import FileLink, NextCommand, files_section, list_section, next_section
 from phone_host.svg.plot_parts import legend
@@ -288,7 +289,7 @@ def _delays(series: DelaySeries) -> list[str]:
         f"mean of {counted(series.pairs, 'pair')}, end to end",
         tuple(mean_share(quantity) for quantity in series.delays),
     )
-    stages = tuple(stage for stage in series.stages if np.any(stage.values_ns > 0))  # a stage that never ran is none
+    stages = tuple(stage for stage in series.stages if stage.values_ns.max() > IDLE_STAGE_NS)
     work = Budget("mean processing delay", tuple(mean_share(quantity) for quantity in stages))
     everything = Strips("", (*series.delays, series.end_to_end, series.starvation))
     return [

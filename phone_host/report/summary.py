@@ -5,7 +5,7 @@ from typing import Final
 
 from common.camera.base import CameraHealth
 from common.words import counted, times
-from phone_host.measure.accounts import LinkAccount, rung_lines
+from phone_host.measure.accounts import LinkAccount, LinkTally, rung_lines
 from phone_host.measure.delays import DELAYS
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
@@ -14,18 +14,22 @@ from phone_host.model import TimeOffset
 from phone_host.sync.phase import Alignment, Phase
 
 _MS: Final = 1e6
+_DELAY_TABLE: Final = 54
+_LINK_TABLE: Final = 64
+"""Widths of the tables, characters."""
 
 
-def summary(run: RunSnapshot) -> str:
-    """Summarise the run in a few lines."""
+def summary(run: RunSnapshot, width: int = 0) -> str:
+    """Summarise the run in a few lines.
+
+    Args:
+        run: the run.
+        width: of the terminal, in characters: tables leave columns out rather than exceed it; 0: no limit.
+    """
     rate = "" if math.isnan(run.pairs_per_second) else f" in {run.seconds:.1f} s ({run.pairs_per_second:.1f} /s)"
     lines = [f"{counted(run.processed, 'pair')}{rate}, ended: {run.ended.replace('_', ' ')}"]
     if run.processed:
-        lines.append(f"{'delay, ms':14} {'p50':>9} {'p95':>9} {'p99':>9} {'max':>9}")
-        for name in DELAYS:
-            spread = run.delays.spread(name)
-            values = (spread.p50_ns, spread.p95_ns, spread.p99_ns, spread.max_ns)
-            lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value / _MS:9.3f}" for value in values))
+        lines += _delay_table(run, width)
     if run.estimate is not None:
         lines.append(
             f"the board's clock is known to +-{run.estimate.uncertainty_ns / 1000:.0f} us"
@@ -38,8 +42,19 @@ def summary(run: RunSnapshot) -> str:
     lines += [f"  {remedy}" for remedy in judge(figures(run)).remedies]
     lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(run)]
     lines += camera_troubles(run.camera)
-    lines += [*rung_lines(run.link), *_links(run.link), *_unused_lines(run)]
+    lines += [*rung_lines(run.link), *_links(run.link, width), *_unused_lines(run)]
     return "\n".join(lines)
+
+
+def _delay_table(run: RunSnapshot, width: int) -> list[str]:
+    """List the delays; the 99th percentile is left out where it has no room."""
+    columns = ("p50", "p95", "p99", "max") if not 0 < width < _DELAY_TABLE else ("p50", "p95", "max")
+    lines = [f"{'delay, ms':14} " + " ".join(f"{name:>9}" for name in columns)]
+    for name in DELAYS:
+        spread = run.delays.spread(name)
+        values = (getattr(spread, f"{column}_ns") / _MS for column in columns)
+        lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value:9.3f}" for value in values))
+    return lines
 
 
 def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
@@ -106,16 +121,24 @@ def _arrivals(health: CameraHealth, offset: TimeOffset) -> list[str]:
     ]
 
 
-def _links(link: LinkAccount) -> list[str]:
-    """List the links side by side, if there are several."""
+def _links(link: LinkAccount, width: int) -> list[str]:
+    """List the links side by side, if there are several; below each other where a table has no room."""
     if len(link.links) < 2:
         return []
+    if 0 < width < _LINK_TABLE:
+        return [_link_line(tally) for tally in link.links]
     lines = [f"{'link':14} {'frames':>9} {'carried':>9} {'lost':>9} {'age p50':>9} {'p95':>9}"]
     for tally in link.links:
         age = tally.age.spread()
         ages = f"{age.p50_ns / _MS:9.3f} {age.p95_ns / _MS:9.3f}" if age.count else f"{'-':>9} {'-':>9}"
         lines.append(f"{tally.name:14} {tally.frames:9} {tally.carried:9} {tally.lost:9} {ages}")
     return lines
+
+
+def _link_line(tally: LinkTally) -> str:
+    age = tally.age.spread()
+    ages = f", age p50 {age.p50_ns / _MS:.3f} ms, p95 {age.p95_ns / _MS:.3f} ms" if age.count else ""
+    return f"link {tally.name}: {counted(tally.frames, 'frame')}, carried {times(tally.carried)}, lost {times(tally.lost)}{ages}"
 
 
 def _unused_lines(run: RunSnapshot) -> list[str]:

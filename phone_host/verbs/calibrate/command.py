@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from common.errors import DataError, UnavailableError
+from common.program.terminal import fitted
 from common.versions import REPORT_FORMAT
 from common.words import counted
 from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
@@ -67,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
         **_write_rig(options.out, calibration),
     }
     _write_report(options.out, report)
-    print(json_text(report) if options.json else _summary(report, calibration, rejected, options.out))
+    print(json_text(report) if options.json else fitted(_summary(report, calibration, rejected, options.out)))
     return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
 
 

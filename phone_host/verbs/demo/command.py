@@ -7,13 +7,13 @@ from contextlib import nullcontext
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import Progress
 
 from common.errors import SettingsError, UnavailableError
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.settings import with_origins
 from common.program.signals import StopSignals
+from common.program.terminal import columns, fitted
 from common.words import counted
 from phone_host.children.board_process import socket_folder
 from phone_host.demo.demo_page import demo_page
@@ -26,6 +26,7 @@ from phone_host.report.page_links import NextCommand
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
 from phone_host.run.file_sink import NAMES, PAIR_FILES
+from phone_host.run.progress_bar import progress_bar
 from phone_host.run.terminal_view import LiveTable
 from phone_host.scene.film import Film, render_film
 from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
@@ -70,8 +71,8 @@ def run(options: argparse.Namespace) -> int:
             f"{error.filename or out} cannot be written ({error.strerror})",
             "make room on the disk, or give another folder with --out",
         ) from None
-    print(json.dumps(report) if options.json else summary(snapshot))
-    print(_closing(out, film, errors), file=sys.stderr)
+    print(json.dumps(report) if options.json else fitted(summary(snapshot, columns())))
+    print(fitted(_closing(out, film, errors), sys.stderr), file=sys.stderr)
     if signals.stop:
         return INTERRUPTED if signals.interrupted else 0
     return 0 if errors.pairs and not errors.wrong_pairs and complete else _CHECK_FAILED
@@ -101,7 +102,7 @@ def _render(scene: Scene, rig: Rig, folder: Path, console: Console, signals: Sto
         _StoppedError: a stop signal came.
         OSError: the folder cannot be written to.
     """
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+    with progress_bar(console) as progress:
         task = progress.add_task("rendering a moving scene for two cameras", total=2 * FPS * DEMO_PERIOD_S)
 
         def advance() -> None:
@@ -144,4 +145,5 @@ look at   {out}/index.html       the scene, its depth and every delay
           {out}/cloud.ply        the point cloud, in any 3D viewer
           {out}/report.json, {out}/delays.jsonl
 try next  {board}
-          {host}      (in two terminals: the same, by hand)"""
+          {host}
+          (in two terminals: the same, by hand)"""

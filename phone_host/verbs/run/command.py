@@ -15,6 +15,7 @@ from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.settings import Resolved, log_level, with_origins
 from common.program.signals import StopSignals
+from common.program.terminal import columns, fitted
 from common.stamp import HOST_CLOCK
 from phone_host.boards.discovery import find_board_and_say, remember
 from phone_host.camera.examples import EXAMPLE
@@ -80,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
     report = build(snapshot)
     page = _page(host, snapshot, board_side, options.out) if options.out else ""
     complete = host.write_report(report, page)
-    print(json.dumps(report) if options.json else summary(snapshot))
+    print(json.dumps(report) if options.json else fitted(summary(snapshot, columns())))
     if signals.interrupted:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED

@@ -10,6 +10,7 @@ import numpy as np
 from common import now
 from common.errors import SettingsError
 from common.ledger import StageTimes
+from common.program.terminal import fitted
 from common.versions import REPORT_FORMAT
 from common.words import counted
 from phone_host.model import CloudImage, Disparity, RectifiedPair
@@ -74,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
         "files": ["disparity.pfm", "disparity.png", *(["cloud.ply"] if cloud is not None else []), "report.json"],
     }
     _write_report(options.out, report)
-    print(json_text(report) if options.json else _summary(report, options.out))
+    print(json_text(report) if options.json else fitted(_summary(report, options.out)))
     return 0
 
 
