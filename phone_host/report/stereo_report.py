@@ -9,9 +9,11 @@ from typing import Any
 
 from common.imagesize.head import size_text
 from common.versions import REPORT_FORMAT
+from common.words import counted
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
+from phone_host.report.cut_words import distance_text, share_text
 
 Size = tuple[int, int]
 """Width and height, px."""
@@ -202,14 +204,14 @@ def pair_lines(report: PairReport, out: str) -> list[str]:
     search, written, total_ms = report.search, report.written, dict(report.stages_ms)["total"]
     how = [f"{size_text(report.rectified_px)} px", report.matcher]
     if search is not None and search.disparities:
-        how.append(f"{search.disparities} disparities")
+        how.append(counted(search.disparities, "disparity", "disparities"))
     if search is not None and search.scale < 1:
         how.append(f"matched at {search.scale:.0%} of the size")
     lines = [f"{', '.join(how)}: {report.density:.1%} of the pixels have one ({total_ms:.0f} ms)"]
     if report.geometry is not None and written.points is not None:
         share = written.points / (report.rectified_px[0] * report.rectified_px[1])
         lines += [
-            f"{written.points} points, {share:.1%} of the pixels; {report.axes.text}, in metres",
+            f"{counted(written.points, 'point')}, {share:.1%} of the pixels; {report.axes.text}, in metres",
             f"f = {report.geometry.focal_px:.1f} px, b = {report.geometry.baseline_m * 1e3:.2f} mm",
             *cut_lines(report),
         ]
@@ -229,13 +231,13 @@ def set_lines(report: SetReport, out: str) -> list[str]:
         if isinstance(pair, FailedPair):
             lines.append(f"{pair.name}  failed: {pair.problem}: {pair.remedy}")
             continue
-        points = "" if pair.written.points is None else f", {pair.written.points} points"
+        points = "" if pair.written.points is None else f", {counted(pair.written.points, 'point')}"
         lines.append(f"{pair.name}  density {pair.density:.1%}{points}")
         lines += [f"  warning: {remark.problem}" for remark in pair.remarks]
     remedies = dict.fromkeys(remark.remedy for pair in report.computed for remark in pair.remarks if remark.remedy)
     lines += [f"remedy: {remedy}" for remedy in remedies]
     lines += [f"warning: {remark.text}" for remark in report.remarks]
-    told = f"{len(report.computed)} of {len(report.pairs)} pairs computed"
+    told = f"{len(report.computed)} of {counted(len(report.pairs), 'pair')} computed"
     failed = f", {len(report.failed)} failed" if report.failed else ""
     return [*lines, f"{told}{failed}; written to {out}: one folder per pair, and report.json"]
 
@@ -247,30 +249,17 @@ def cut_lines(report: PairReport) -> list[str]:
         return []
     # From z = f b / d: an error of e px makes z wrong by e z / (f b).
     wrong = limits.disparity_error_px * limits.far_m / (geometry.focal_px * geometry.baseline_m)
-    far = f"farther than {distance_text(limits.far_m)}"
-    if limits.from_rig:
-        far += f", where depth is wrong by more than {wrong:.0%}"
+    why = f", where depth is wrong by more than {wrong:.0%}" if limits.from_rig else ""
     parts = (
-        (cut.too_far, far),
+        (cut.too_far, f"farther than {distance_text(limits.far_m)}{why}"),
         (cut.too_near, f"nearer than {distance_text(limits.near_m)}"),
-        (cut.at_zero, "no nearer than infinity within the error of a disparity"),
+        (cut.at_zero, "with a disparity no larger than the noise of zero"),
         (cut.outside, "outside the crop"),
     )
     total = report.rectified_px[0] * report.rectified_px[1]
     said = [f"{share_text(count, total)} {words}" for count, words in parts if count]
     kept = f"the cloud ends at {distance_text(limits.far_m)}"
     return [f"cut: {'; '.join(said)}"] if said else [kept]
-
-
-def share_text(count: int, total: int) -> str:
-    """Write a share in percent; a small one is never called 0 %."""
-    percent = 100 * count / max(1, total)
-    return "under 0.1 %" if 0 < percent < 0.1 else f"{percent:.1f} %" if percent < 10 else f"{percent:.0f} %"
-
-
-def distance_text(metres: float) -> str:
-    """Write a distance with about three digits: 38 m, 1.25 m, 300 mm."""
-    return f"{metres * 1e3:.3g} mm" if metres < 1 else f"{metres:.3g} m" if metres < 1000 else f"{metres:.0f} m"
 
 
 def alone_remarks(left: Sequence[str], right: Sequence[str], *, by_number: bool, pairs: int) -> tuple[Remark, ...]:
@@ -286,8 +275,9 @@ def alone_remarks(left: Sequence[str], right: Sequence[str], *, by_number: bool,
     for side, alone in (("left", left), ("right", right)):
         if alone:
             named = ", ".join(alone[:_MOST_NAMES]) + (", …" if len(alone) > _MOST_NAMES else "")
-            were = "image has" if len(alone) == 1 else "images have"
-            remarks.append(Remark(f"{len(alone)} {side} {were} no partner: {named}"))
+            remarks.append(
+                Remark(f"{counted(len(alone), f'{side} image has', f'{side} images have')} no partner: {named}")
+            )
     if not by_number and pairs > 1:
         unequal = " though the counts differ" if left or right else ""
         remarks.append(

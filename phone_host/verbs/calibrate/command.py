@@ -10,7 +10,9 @@ from rich.console import Console
 from rich.progress import Progress
 
 from common.errors import DataError, UnavailableError
+from common.program.terminal import fitted
 from common.versions import REPORT_FORMAT
+from common.words import counted
 from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
 from phone_host.calibration.board_views import BoardViews, look_for_boards
 from phone_host.calibration.calibrate import calibrate
@@ -66,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
         **_write_rig(options.out, calibration),
     }
     _write_report(options.out, report)
-    print(json_text(report) if options.json else _summary(report, calibration, rejected, options.out))
+    print(json_text(report) if options.json else fitted(_summary(report, calibration, rejected, options.out)))
     return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
 
 
@@ -186,7 +188,7 @@ def _summary(report: dict[str, Any], calibration: Calibration, rejected: tuple[R
         rows.append(_rejections(rejected))
     rms, vertical = report["rms_px"], report["vertical_error_px"]
     rows += [
-        f"{report['pairs']['used']} pairs used, {len(rejected)} rejected",
+        f"{counted(report['pairs']['used'], 'pair')} used, {len(rejected)} rejected",
         f"RMS      left {rms['left']:.3f}, right {rms['right']:.3f}, stereo {rms['stereo']:.3f} px",
     ]
     if vertical["p95"] is not None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError
+from common.program.terminal import fitted
 from phone_host.output.json_text import json_text
 from phone_host.report.stereo_report import Size, pair_json, pair_lines, set_json, set_lines
 from phone_host.run.stereo_job import StereoJob, run_stereo
@@ -47,9 +48,9 @@ def run(options: argparse.Namespace) -> int:
         raise unwritable(options.out, error) from error
     if count == 1:
         [only] = report.computed
-        print(json_text(pair_json(only)) if options.json else "\n".join(pair_lines(only, str(options.out))))
+        print(json_text(pair_json(only)) if options.json else fitted("\n".join(pair_lines(only, str(options.out)))))
     else:
-        print(json_text(set_json(report)) if options.json else "\n".join(set_lines(report, str(options.out))))
+        print(json_text(set_json(report)) if options.json else fitted("\n".join(set_lines(report, str(options.out)))))
     return 0 if report.is_sound else _CHECK_FAILED
 
 
