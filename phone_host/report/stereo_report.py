@@ -15,6 +15,8 @@ from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
 from phone_host.report.cut_words import distance_text, share_text
 
+_ALWAYS = ("report.json", "index.html")
+
 Size = tuple[int, int]
 """Width and height, px."""
 
@@ -27,11 +29,13 @@ class Remark:
         problem: what it is, with figures.
         remedy: what to do about it; empty: nothing.
         is_blocking: whether the result must not be taken for right; the command then ends with exit code 4.
+        is_doubt: whether it speaks against the depth; else it only limits it.
     """
 
     problem: str
     remedy: str = ""
     is_blocking: bool = False
+    is_doubt: bool = False
 
     @property
     def text(self) -> str:
@@ -161,7 +165,7 @@ def pair_json(report: PairReport) -> dict[str, Any]:
         "not_in_depth_png": written.not_in_depth_png,
         "warnings": [remark.text for remark in report.remarks],
         "times_ms": {stage: round(ms, 3) for stage, ms in report.stages_ms},
-        "files": [*written.files, "report.json"],
+        "files": [*written.files, *_ALWAYS],
     }
 
 
@@ -176,7 +180,7 @@ def set_json(report: SetReport) -> dict[str, Any]:
         "failed": len(report.failed),
         "warnings": [remark.text for remark in report.remarks],
         "pairs": [_entry(pair) for pair in report.pairs],
-        "files": [*(pair.name for pair in report.computed), "report.json"],
+        "files": [*(pair.name for pair in report.computed), *_ALWAYS],
     }
 
 
@@ -190,7 +194,7 @@ def _entry(pair: PairReport | FailedPair) -> dict[str, Any]:
         "density": round(pair.density, 5),
         "points": pair.written.points,
         "warnings": [remark.text for remark in pair.remarks],
-        "files": [*pair.written.files, "report.json"],
+        "files": [*pair.written.files, *_ALWAYS],
     }
 
 
@@ -216,7 +220,7 @@ def pair_lines(report: PairReport, out: str) -> list[str]:
             *cut_lines(report),
         ]
     lines += [f"warning: {remark.text}" for remark in report.remarks]
-    return [*lines, f"written to {out}: {', '.join([*written.files, 'report.json'])}"]
+    return [*lines, f"written to {out}: {', '.join([*written.files, *_ALWAYS])}"]
 
 
 def set_lines(report: SetReport, out: str) -> list[str]:
@@ -239,7 +243,7 @@ def set_lines(report: SetReport, out: str) -> list[str]:
     lines += [f"warning: {remark.text}" for remark in report.remarks]
     told = f"{len(report.computed)} of {counted(len(report.pairs), 'pair')} computed"
     failed = f", {len(report.failed)} failed" if report.failed else ""
-    return [*lines, f"{told}{failed}; written to {out}: one folder per pair, and report.json"]
+    return [*lines, f"{told}{failed}; written to {out}: one folder per pair, report.json and index.html"]
 
 
 def cut_lines(report: PairReport) -> list[str]:

@@ -20,6 +20,8 @@ from phone_host.output.atomic import write_text
 from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
 from phone_host.output.pair_files import STEREO_FILES, available, write_pair
+from phone_host.report.page_links import NextCommand
+from phone_host.report.report_page import Picture
 from phone_host.report.stereo_report import (
     FailedPair,
     PairReport,
@@ -30,6 +32,7 @@ from phone_host.report.stereo_report import (
     pair_json,
     set_json,
 )
+from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
 from phone_host.run.stereo_remarks import pair_remarks
 from phone_host.run.stereo_results import StereoResults
 from phone_host.stereo.core import StereoCore
@@ -63,6 +66,7 @@ class StereoJob:
         matcher: its name, for the report.
         axes: of cloud.ply and xyz.pfm.
         most_pixels: an image that claims more is refused.
+        commands: what to do next, for the pages.
     """
 
     files: ViewFiles
@@ -71,6 +75,7 @@ class StereoJob:
     matcher: str
     axes: Axes = Axes.CAMERA
     most_pixels: int = MOST_PIXELS
+    commands: tuple[NextCommand, ...] = ()
 
 
 def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
@@ -104,6 +109,7 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
             first = report.failed[0]
             raise DataError(f"none of the {len(pairs)} pairs can be computed; the first: {first.problem}", first.remedy)
         results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
+        results.write_text("index.html", set_page(report, work.thumbnails, job.commands))
         return report
 
 
@@ -166,6 +172,7 @@ class _Work:
         self._core: StereoCore | None = None
         self._core_px: Size = (0, 0)
         self._has_no_core = False
+        self.thumbnails: dict[str, Picture] = {}
 
     def tried(self, folder: str, left: Path, right: Path) -> PairReport | FailedPair:
         """Compute and write a pair, or say why not."""
@@ -192,7 +199,7 @@ class _Work:
         planned = available(
             STEREO_FILES, has_disparity=processed.disparity is not None, has_cloud=processed.cloud is not None
         )
-        names = [*(file.value for file in planned), "report.json"]
+        names = [*(file.value for file in planned), "report.json", "index.html"]
         with (
             ThreadPoolExecutor(_WRITERS) as writers,
             self._results.folder_of(folder, names, writers.map) as place,
@@ -220,6 +227,9 @@ class _Work:
                 remarks=remarks if folder else (*remarks, *_alone(self._job)),
             )
             write_text(place / "report.json", json_text(pair_json(report), indent=2) + "\n")
+            write_text(place / "index.html", pair_page(report, processed, self._job.commands))
+        if folder and (picture := pair_thumbnail(processed)) is not None:
+            self.thumbnails[folder] = picture
         return report
 
     def _core_for(self, left: EncodedFile, right: EncodedFile) -> StereoCore:

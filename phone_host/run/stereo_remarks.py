@@ -49,7 +49,7 @@ def pair_remarks(processed: Processed, density: float, written: WrittenPair, nea
             )
         )
     if density < _LOW_DENSITY:
-        remarks.append(Remark(f"only {density:.0%} of the pixels have depth", _LOW_DENSITY_REMEDY))
+        remarks.append(Remark(f"only {density:.0%} of the pixels have depth", _LOW_DENSITY_REMEDY, is_doubt=True))
     if geometry is None:
         remarks.append(
             Remark(

@@ -74,7 +74,7 @@ def test_each_pair_gets_a_folder_with_its_number_and_its_own_depth(photos: Path)
     assert watch.done == 3
     out = photos / "out"
     assert {path.name for path in out.iterdir()} == {
-        ".tandemscan", "report.json", "pair-000002", "pair-000007", "pair-000011",
+        ".tandemscan", "report.json", "index.html", "pair-000002", "pair-000007", "pair-000011",
     }  # fmt: skip
     told = json.loads((out / "report.json").read_text())
     assert [pair["name"] for pair in told["pairs"]] == [f"pair-{number:06d}" for number in _SHIFTS]

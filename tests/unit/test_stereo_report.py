@@ -65,7 +65,7 @@ def test_lines_of_a_pair_hold_its_size_search_density_points_and_axes() -> None:
         assert words in lines[0]
     for words in ("700 points", "70.0%", "x right, y down, z forward", "metres"):
         assert words in lines[1]
-    assert lines[-1] == "written to scan: cloud.ply, report.json"
+    assert lines[-1] == "written to scan: cloud.ply, report.json, index.html"
 
 
 def test_the_object_of_a_pair_states_limits_cuts_unit_and_axes() -> None:
