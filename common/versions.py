@@ -24,6 +24,9 @@ LEDGER_FORMAT: Final = 1
 REPORT_FORMAT: Final = 1
 """report.json; a file without `format_version` is of format 1."""
 
+CAMERAS_FORMAT: Final = 1
+"""cameras.json."""
+
 
 def all_versions() -> str:
     """What `--version` prints, without the newline."""

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from common.camera.identity import CameraState
 from common.frame import Frame
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.protocol.message import FrameMessage
@@ -175,6 +176,8 @@ class Rig:
         zero_sigma_px: standard uncertainty of the disparity of infinitely far points, px, at the size of the rig's
             images; NaN = not measured.
         verdict: how the calibration judged itself (good, usable or reject); empty: not stated.
+        left_camera: which camera the left one was, and how it was set; None: not stated.
+        right_camera: the same for the right one.
     """
 
     left: CameraModel
@@ -188,6 +191,8 @@ class Rig:
     time_offset: TimeOffset = TimeOffset()
     zero_sigma_px: float = float("nan")
     verdict: str = ""
+    left_camera: CameraState | None = None
+    right_camera: CameraState | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
