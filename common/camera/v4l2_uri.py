@@ -51,7 +51,8 @@ def v4l2_settings(uri: str, path: str, options: Mapping[str, str], clock: str) -
     """
     if unknown := set(options) - set(_HELP):
         raise SettingsError(
-            f"camera {uri!r} has an unknown option {min(unknown)!r}", f"the options are {', '.join(_HELP)}"
+            f"camera {uri!r} has an unknown option {min(unknown)!r}",
+            f"the options are {', '.join(_HELP)}, rotate, flip",
         )
 
     def read(name: str, parse: Callable[[str], T], default: T) -> T:

@@ -127,7 +127,14 @@ class Host:
         self._camera = OwnCamera(camera, self._queue.add_host, demand)
         self._receiver = Receiver(links, now.random_id(), self._queue)
         interpolator = Interpolator() if settings.interpolate else None
-        pipeline = Pipeline(core, settings.board_side, now.monotonic_ns, interpolator, settings.most_pixels)
+        pipeline = Pipeline(
+            core,
+            settings.board_side,
+            now.monotonic_ns,
+            interpolator,
+            settings.most_pixels,
+            host_orientation=self._own.orientation,
+        )
         self._ledgerer = Ledgerer()
         self._worker = Worker(
             self._queue,

@@ -1,4 +1,4 @@
-"""Converts raw camera images (YUYV, grey, NV12) to grey or BGR, and frames of any encoding to images."""
+"""Converts raw camera images (YUYV, grey, NV12) to grey or BGR, and frames of any encoding to upright images."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,10 +7,12 @@ from typing import Final
 import cv2
 import numpy as np
 
+from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import FrameFault, ImageSizeError, PixelFormat, SpoiledImageError, raw_bytes
 from common.imagesize.head import MOST_PIXELS, ImageKind, require_pixels, size_text
 from phone_host.model import Image
 from phone_host.stereo.images import EncodedFile, decode_file, decode_files, examine, require_same_shape
+from phone_host.stereo.orient import upright
 
 _KINDS: Final = {PixelFormat.MJPEG: ImageKind.JPEG, PixelFormat.PNG: ImageKind.PNG}
 _LOOK: Final = "check the camera that sends it"
@@ -28,6 +30,7 @@ class EncodedImage:
         name: how error messages call it.
         asked_px: (width, height) that its camera was asked for, px; the image may be smaller. Zeros mean the size in
             the header.
+        orientation: how the image becomes upright; all sizes above are those before that.
     """
 
     payload: bytes | memoryview
@@ -36,6 +39,7 @@ class EncodedImage:
     height_px: int
     name: str
     asked_px: tuple[int, int] = (0, 0)
+    orientation: Orientation = UPRIGHT
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -44,8 +48,8 @@ class EncodedImage:
 
     @property
     def whole_px(self) -> tuple[int, int]:
-        """Width and height after enlarging to the size that the camera was asked for, px."""
-        return self.asked_px if any(self.asked_px) else self.size_px
+        """Width and height of the upright image after enlarging to the size that the camera was asked for, px."""
+        return self.orientation.turned_size(self.asked_px if any(self.asked_px) else self.size_px)
 
 
 def decode_frames(
@@ -63,7 +67,7 @@ def decode_frames(
         check: called with the whole sizes of both, px, before either is decoded; raises if they are of no use.
 
     Returns:
-        Both in that order, each (H, W) grey or (H, W, 3) BGR, uint8.
+        Both in that order, upright, each (H, W) grey or (H, W, 3) BGR, uint8.
 
     Raises:
         SpoiledImageError: one of the two is spoiled, or its size cannot be believed.
@@ -72,8 +76,10 @@ def decode_frames(
     if check is not None:
         check(first.whole_px, second.whole_px)
     if isinstance(one, EncodedFile) and isinstance(other, EncodedFile):
-        return decode_files(one, other)
-    return _decoded(one), _decoded(other)
+        images = decode_files(one, other)
+    else:
+        images = _decoded(one), _decoded(other)
+    return upright(images[0], first.orientation), upright(images[1], second.orientation)
 
 
 def decode_frame(image: EncodedImage, most_pixels: int = MOST_PIXELS) -> Image:
@@ -84,12 +90,12 @@ def decode_frame(image: EncodedImage, most_pixels: int = MOST_PIXELS) -> Image:
         most_pixels: the limit for both its camera and the frame.
 
     Returns:
-        (H, W) grey or (H, W, 3) BGR, uint8.
+        Upright (H, W) grey or (H, W, 3) BGR, uint8.
 
     Raises:
         SpoiledImageError: it is spoiled, or its size cannot be believed.
     """
-    return _decoded(_examined(image, most_pixels))
+    return upright(_decoded(_examined(image, most_pixels)), image.orientation)
 
 
 def _decoded(image: EncodedImage | EncodedFile) -> Image:
