@@ -15,6 +15,7 @@ from typing import Final
 
 from common.camera.base import CameraHealth, Grab, Mode, Offers
 from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Step, Unwanted
+from common.camera.v4l2_controls import to_axis, to_locks
 from common.camera.v4l2_device import capture_nodes, lasting_name
 from common.camera.v4l2_formats import Wanted
 from common.camera.v4l2_ring import RING_BUFFERS
@@ -23,7 +24,7 @@ from common.camera.v4l2_tally import Tally
 from common.errors import TandemError, UnavailableError
 from common.frame import Frame
 from common.program.logs import event
-from common.protocol.message import CameraDescription, Pacing, Steering
+from common.protocol.message import CameraDescription, Locks, Pacing, Steering
 
 _LOG = logging.getLogger(__name__)
 
@@ -97,6 +98,8 @@ class V4l2Camera:
                 period_ns=stream.period_ns,
                 pacing=Pacing.CLOCK,
                 steering=Steering.RESTART,
+                identity=stream.identity,
+                controls=to_locks(stream.controls.lockable()),
             )
             self._rates_hz = {stream.period_ns: settings.wanted.fps}
             self._rates_hz |= {int(1_000_000_000 / rate_hz): rate_hz for rate_hz in stream.slower_hz}
@@ -149,6 +152,25 @@ class V4l2Camera:
             held=tuple((axis.value, value) for axis, value in self._wishes.held),
             period_ns=tally.rate.period_ns,
         )
+
+    @property
+    def held_locks(self) -> Locks:
+        """See LockableCamera."""
+        return () if self._stream is None else to_locks(self._stream.controls.held)
+
+    def hold(self, locks: Locks, now_ns: int) -> None:
+        """See LockableCamera. A camera that is away is held when it is back."""
+        held = tuple(to_axis(lock, value) for lock, value in locks)
+        self._wishes = self._wishes.with_held(held)
+        if self._stream is None:
+            return
+        try:
+            self._stream.controls.hold(held)
+        except OSError as error:
+            self._lose(error, now_ns)
+            return
+        asked, told = ({lock.value: value for lock, value in each} for each in (locks, self.held_locks))
+        _LOG.info(event("camera_locked", camera=self._path, asked=asked, held=told))
 
     def due_ns(self, now_ns: int) -> int:
         """When something is to be done that no descriptor reports: a stall, a retry, controls to be held."""
