@@ -51,7 +51,7 @@ from common.protocol.wire_fields import (
 from common.versions import PROTOCOL_VERSION, other_protocol
 
 MAX_HEADER_BYTES: Final = 2048
-"""The longest honest header is a board's hello with all texts at full length. It stays below 1000 bytes."""
+"""The longest honest header is a board's hello with all texts at full length. It stays below 1400 bytes."""
 
 _READS_LONG: Final = "+long"
 """Ends the id of a host that reads long hellos. Boards of 0.2 and before take an id as it comes, but refuse a hello with a field too many."""
