@@ -66,7 +66,7 @@ def require_camera(side: Side, whose: str, rig: CameraState, present: CameraDesc
             f"{remedy}, or calibrate again with these",
         )
     if rig.identity.is_known and rig.orientation != present.orientation:
-        now, then = str(present.orientation) or "no rotate= or flip=", str(rig.orientation) or "none of them"
+        now, then = (str(turn) or "neither rotate= nor flip=" for turn in (present.orientation, rig.orientation))
         raise DataError(
             f"{there} with {now}, but the rig was calibrated with {then}",
             "mount it and give its address as for the calibration, or calibrate again",

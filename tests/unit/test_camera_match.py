@@ -73,7 +73,7 @@ def test_another_orientation_is_refused_with_both() -> None:
     """The same camera on its head has another geometry. Where the camera is unknown, its images may have been turned already."""
     rig = CameraState(C920, 640, 480, Orientation(180))
     check(rig, described(C920, Orientation(180)))
-    with pytest.raises(DataError, match="no rotate= or flip=, but the rig was calibrated with rotate=180"):
+    with pytest.raises(DataError, match="neither rotate= nor flip=, but the rig was calibrated with rotate=180"):
         check(rig, described(C920))
     check(rig, described(UNKNOWN_CAMERA))
 
