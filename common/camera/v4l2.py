@@ -19,6 +19,7 @@ from common.camera.v4l2_controls import to_axis, to_locks
 from common.camera.v4l2_device import capture_nodes, lasting_name
 from common.camera.v4l2_formats import Wanted
 from common.camera.v4l2_ring import RING_BUFFERS
+from common.camera.v4l2_stamps import rate_remedy
 from common.camera.v4l2_stream import Stream, V4l2Settings
 from common.camera.v4l2_tally import Tally
 from common.errors import TandemError, UnavailableError
@@ -169,8 +170,8 @@ class V4l2Camera:
         except OSError as error:
             self._lose(error, now_ns)
             return
-        asked, told = ({lock.value: value for lock, value in each} for each in (locks, self.held_locks))
-        _LOG.info(event("camera_locked", camera=self._path, asked=asked, held=told))
+        told = {lock.value: value for lock, value in self.held_locks}
+        _LOG.info(event("camera_locked", camera=self._path, **told))
 
     def due_ns(self, now_ns: int) -> int:
         """When something is to be done that no descriptor reports: a stall, a retry, controls to be held."""
@@ -336,11 +337,13 @@ class V4l2Camera:
         if self._tally.grabs % 32 or self._tally.rate.differs_from(nominal_ns) is self._rate_is_off:
             return
         self._rate_is_off = not self._rate_is_off
-        measured_ms, nominal_ms = round((self._tally.rate.period_ns or 0) / 1e6, 2), round(nominal_ns / 1e6, 2)
-        say = _LOG.warning if self._rate_is_off else _LOG.info
-        say(
-            event("rate_differs" if self._rate_is_off else "rate_nominal", period_ms=measured_ms, nominal_ms=nominal_ms)
-        )
+        period_ns = self._tally.rate.period_ns or 1
+        figures = {"period_ms": round(period_ns / 1e6, 2), "nominal_ms": round(nominal_ns / 1e6, 2)}
+        if self._rate_is_off and self._stream is not None:
+            remedy = rate_remedy(period_ns, nominal_ns, self._stream.controls.exposure_ns)
+            _LOG.warning(event("rate_differs", **figures, remedy=remedy))
+        else:
+            _LOG.info(event("rate_nominal", **figures))
 
     def _lose(self, error: OSError, now_ns: int) -> None:
         if error.errno in {errno.ENODEV, errno.ENXIO}:
