@@ -16,7 +16,7 @@ from common.stamp import HOST_CLOCK
 from phone_host.children.board_process import board_process
 from phone_host.model import CloudImage, Processed, Result, Rig
 from phone_host.output.ply import write_ply
-from phone_host.output.preview import write_preview
+from phone_host.output.preview import disparity_picture, write_png
 from phone_host.run.host import Host, HostSettings
 from phone_host.run.sinks import FunctionSink
 from phone_host.scene.film import Film
@@ -174,7 +174,7 @@ class DemoRun:
         assert pair.processed.cloud is not None
         cloud: CloudImage = pair.processed.cloud
         write_ply(out / "cloud.ply", cloud, pair.processed.pair.left)
-        write_preview(out / "disparity.png", pair.processed.disparity)
+        write_png(out / "disparity.png", disparity_picture(pair.processed.disparity, pair.processed.geometry))
 
     def _keep(self, result: Result) -> None:
         processed, ledger = result.processed, result.ledger

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from phone_host.model import CloudImage, Image
 from phone_host.output.atomic import write_bytes
+from phone_host.output.axes import Axes
 
 _VERTEX = np.dtype([*((name, "<f4") for name in "xyz"), *((name, "u1") for name in ("red", "green", "blue"))])
 _PROPERTIES = (
@@ -41,12 +42,13 @@ class PointCloud:
     colours: NDArray[np.uint8]
 
 
-def pack_ply(cloud: CloudImage, colours: Image) -> tuple[bytes, NDArray[np.void]]:
+def pack_ply(cloud: CloudImage, colours: Image, axes: Axes = Axes.CAMERA) -> tuple[bytes, NDArray[np.void]]:
     """Pack a cloud image into PLY's header and vertices.
 
     Args:
         cloud: (H, W, 3) float32, m; pixels with a non-finite value are left out.
         colours: (H, W) grey or (H, W, 3) BGR, uint8, same size.
+        axes: axes of the file's points.
 
     Returns:
         The header, and the (N,) vertices to write after it.
@@ -64,23 +66,24 @@ def pack_ply(cloud: CloudImage, colours: Image) -> tuple[bytes, NDArray[np.void]
     points = cloud.reshape(-1, 3)
     bgr = colours.reshape(len(points), -1)
     for channel, name in enumerate("xyz"):
-        vertices[name] = points[:, channel][chosen]
+        np.multiply(points[:, channel][chosen], axes.signs[channel], out=vertices[name])
     for channel, name in enumerate(("blue", "green", "red")):
         vertices[name] = bgr[:, channel if colours.ndim == 3 else 0][chosen]
     header = (
-        "ply\nformat binary_little_endian 1.0\ncomment unit metre; x right, y down, z forward of the left camera\n"
+        f"ply\nformat binary_little_endian 1.0\ncomment unit metre; {axes.text}\n"
         f"element vertex {chosen.size}\n{_PROPERTIES}end_header\n"
     )
     return header.encode(), vertices
 
 
-def write_ply(path: Path, cloud: CloudImage, colours: Image) -> int:
+def write_ply(path: Path, cloud: CloudImage, colours: Image, axes: Axes = Axes.CAMERA) -> int:
     """Write the finite points of a cloud image with their colours.
 
     Args:
         path: the file; it appears whole or not at all.
-        cloud: (H, W, 3) float32, m, NaN = none.
+        cloud: (H, W, 3) float32, m, in the left camera's axes, NaN = none.
         colours: (H, W) grey or (H, W, 3) BGR, uint8: the rectified left image.
+        axes: axes of the file's points.
 
     Returns:
         The number of points written.
@@ -89,7 +92,7 @@ def write_ply(path: Path, cloud: CloudImage, colours: Image) -> int:
         OSError: the file cannot be written.
         ValueError: the two sizes differ.
     """
-    header, vertices = pack_ply(cloud, colours)
+    header, vertices = pack_ply(cloud, colours, axes)
     write_bytes(path, header, vertices.view(np.uint8).data)
     return vertices.size
 

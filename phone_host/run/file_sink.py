@@ -23,12 +23,10 @@ from common.errors import UnavailableError
 from common.ledger import PairLedger
 from common.program.logs import event
 from phone_host.measure.sink_account import SinkAccount
-from phone_host.model import Processed, Result, Unwritten
+from phone_host.model import Result, Unwritten
 from phone_host.output.cameras_json import CAMERAS_NAME
 from phone_host.output.listed import ListedFolder
-from phone_host.output.pfm import write_pfm
-from phone_host.output.ply import write_ply
-from phone_host.output.preview import write_png
+from phone_host.output.pair_files import PAIR_NAMES, RUN_FILES, write_pair
 from phone_host.run.sinks import NotWrittenError, SinkQueue
 
 _LOG = logging.getLogger(__name__)
@@ -44,9 +42,6 @@ _LINES: Final = 16384
 
 NAMES: Final = r"delays\.jsonl|report\.json|settings\.json|cameras\.json|index\.html|pair-[0-9]{6,}"
 """The names that a run writes into its folder."""
-
-PAIR_FILES: Final = r"(left|right)\.png|disparity\.pfm|cloud\.ply"
-"""The names that a run writes into the folder of a saved pair."""
 
 
 class _Trouble:
@@ -156,7 +151,7 @@ class FileSink:
         if folder is None:
             return
         try:
-            self._own = ListedFolder(folder, NAMES, inner=PAIR_FILES)
+            self._own = ListedFolder(folder, NAMES, inner=PAIR_NAMES)
             self._own.add("report.json")
             self._file = self._own.create("delays.jsonl")
             if settings is not None:
@@ -264,18 +259,9 @@ class FileSink:
         assert self._own is not None
         try:
             with self._own.new_folder(f"pair-{result.number:06d}") as folder:
-                _write_pair(folder, result.processed)
+                write_pair(folder, result.processed, RUN_FILES)
         except OSError as error:
             self._unsaved_pairs += 1
             self._of_pairs.begins(error)
             raise NotWrittenError from None
         self._of_pairs.ends()
-
-
-def _write_pair(folder: Path, processed: Processed) -> None:
-    write_png(folder / "left.png", processed.pair.left)
-    write_png(folder / "right.png", processed.pair.right)
-    if processed.disparity is not None:
-        write_pfm(folder / "disparity.pfm", processed.disparity)
-    if processed.cloud is not None:
-        write_ply(folder / "cloud.ply", processed.cloud, processed.pair.left)

@@ -14,7 +14,6 @@ from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
 from phone_host.model import BoardFrame, FramePair, Image, Processed, RectifiedPair, Side
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.images import enlarged
 from phone_host.stereo.interpolate import LARGEST_FRACTION, Interpolator
 from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_frames
 
@@ -66,7 +65,6 @@ class Pipeline:
         board, host = _of_board(pair.board), self._of_host(pair.host)
         start_ns = self._clock()
         board_image, host_image = decode_frames(board, host, self._most_pixels, self._check_sizes)
-        board_image = _at_asked_size(board_image, pair.board)
         decoded_ns = self._clock()
         board_image = self._at_host_time(pair, board_image)
         interpolated_ns = self._clock()
@@ -107,18 +105,10 @@ class Pipeline:
         if abs(fraction) > LARGEST_FRACTION:
             return image
         try:
-            earlier = _at_asked_size(decode_frame(_of_board(pair.before), self._most_pixels), pair.before)
+            earlier = decode_frame(_of_board(pair.before), self._most_pixels)
         except DataError:
             return image
         return self._interpolator.back(earlier, image, fraction) if earlier.shape == image.shape else image
-
-
-def _at_asked_size(image: Image, frame: BoardFrame) -> Image:
-    """Return the upright image at the size that the board's camera was asked for. Rig, matcher and geometry need that size."""
-    if not any(frame.asked_px):
-        return image
-    asked_px = frame.orientation.turned_size(frame.asked_px)
-    return enlarged(image, asked_px, f"board frame {frame.message.sequence}")
 
 
 def _of_board(frame: BoardFrame) -> EncodedImage:

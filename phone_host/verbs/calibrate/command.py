@@ -16,12 +16,12 @@ from phone_host.calibration.board_views import BoardViews, look_for_boards
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.target import Board, parse_board
 from phone_host.calibration.verdict import Verdict, judge
-from phone_host.calibration.view_files import ViewFiles, pair_files
 from phone_host.model import Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_yaml import is_rig, write_rig
 from phone_host.settings import most_pixels
+from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.output_folders import claim_names, require_file, unwritable
 
 _CHECK_FAILED = 4

@@ -20,10 +20,11 @@ from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, truth_json
 from phone_host.model import Rig
 from phone_host.output.atomic import write_text
 from phone_host.output.listed import ListedFolder
+from phone_host.output.pair_files import PAIR_NAMES
 from phone_host.output.rig_yaml import write_rig
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
-from phone_host.run.file_sink import NAMES, PAIR_FILES
+from phone_host.run.file_sink import NAMES
 from phone_host.run.terminal_view import LiveTable
 from phone_host.scene.film import Film, render_film
 from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
@@ -83,7 +84,7 @@ def _clear(out: Path) -> None:
         OSError: the folder cannot be used.
     """
     names = rf"{NAMES}|rig\.yaml|cloud\.ply|disparity\.png"
-    folder = ListedFolder(out, names, kept="film", inner=PAIR_FILES)
+    folder = ListedFolder(out, names, kept="film", inner=PAIR_NAMES)
     folder.add("film", "rig.yaml", "cloud.ply", "disparity.png", "index.html")
     folder.close()
 
