@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Final, NoReturn
 
 from common.errors import TandemError
+from common.program.invocation import as_found
 from common.versions import all_versions
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ _WRITE_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, err
 
 
 class ExamplesFirstParser(argparse.ArgumentParser):
-    """A parser whose help shows its description (the examples) first and unchanged.
+    """A parser whose help shows its description (the examples) first and unchanged, save that programs are named as the shell finds them.
 
     Its sub-parsers are of the same class.
     """
@@ -33,7 +34,7 @@ class ExamplesFirstParser(argparse.ArgumentParser):
         """Return the help text."""
         examples, self.description = self.description or "", None
         try:
-            return f"{examples}\n{super().format_help()}"
+            return f"{as_found(examples)}\n{super().format_help()}"
         finally:
             self.description = examples
 
@@ -93,10 +94,10 @@ class _VersionAction(argparse.Action):
 
 
 def add_version_option(parser: argparse.ArgumentParser) -> None:
-    """Add `--version`, which needs no verb.
+    """Add `--version`.
 
     Args:
-        parser: the command's own parser, not a verb's.
+        parser: the command's own parser, or a verb's.
     """
     parser.add_argument(
         "--version", action=_VersionAction, nargs=0, help="print the versions of package, wire and files"

@@ -7,7 +7,7 @@ from phone_host.camera.examples import EXAMPLE
 
 SUMMARY = "measure the time offset between the two cameras with a screen, a lamp or a moving scene"
 
-EXAMPLES = """  phone-host calibrate-time --pattern pattern.html     (open it full screen in a browser, in view of both cameras)
+EXAMPLES = """  phone-host calibrate-time --pattern pattern.html    # open it full screen in a browser, in view of both cameras
   phone-host calibrate-time --by screen --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
   phone-host calibrate-time --by lamp --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
   phone-host calibrate-time --by scene --frames timing --calibration rig.yaml --out timing

@@ -13,8 +13,8 @@ EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:ri
   phone-host run --link ipc://$XDG_RUNTIME_DIR/board --camera 'replay:right?pace=demand' --rectified --disparities 64 --pairs 20 --out scan
   phone-host run --link tcp://192.168.7.2:5555 --camera 'http://127.0.0.1:8080/video?latency_ms=120' --calibration rig.yaml --out scan
   phone-host run --link serial:/dev/ttyACM0 --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --out scan
-  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --align-phase        (both cameras expose together)
-  phone-host run --camera 'replay:right?loop=1' --pairs 300 --json        (no depth: pairs and delays only)
+  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --align-phase    # both cameras expose together
+  phone-host run --camera 'replay:right?loop=1' --pairs 300 --json    # no depth: pairs and delays only
 """
 
 
