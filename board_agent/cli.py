@@ -11,6 +11,7 @@ from board_agent import examples
 from common.camera.options import EXAMPLE
 from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
 from common.program.invocation import as_found
+from common.program.quantities import frames_per_second, reading, seconds
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -86,7 +87,7 @@ def parser() -> argparse.ArgumentParser:
         )
         verb.add_argument(
             "--least-fps",
-            type=float,
+            type=reading(frames_per_second, "--least-fps"),
             metavar="FPS",
             help="never lower the frame rate below FPS (default: never lower the rate)",
         )
@@ -106,7 +107,11 @@ def _add_keys_options(keys: argparse.ArgumentParser, pair: argparse.ArgumentPars
     )
     what.add_argument("--add", nargs=2, metavar=("NAME", "KEY"), help="let in a host without pairing")
     pair.add_argument(
-        "--seconds", type=float, default=300.0, metavar="S", help="seconds to wait for a host (default 300)"
+        "--seconds",
+        type=reading(seconds, "--seconds"),
+        default=300.0,
+        metavar="S",
+        help="seconds to wait for a host (default 300)",
     )
     for verb in (keys, pair):
         verb.set_defaults(camera=None, link=None, log_level=None, adapt=None, least_fps=None)

@@ -54,10 +54,14 @@ def resolve(kind: type[T], prefix: str, file: Path | None, options: Mapping[str,
     for item in fields(kind):  # type: ignore[arg-type]  # T is always a dataclass
         origin, variable = "default", f"{prefix}_{item.name.upper()}"
         value: Any = item.default
+        read: Any = item.metadata.get("read")
         if item.name in in_file:
-            origin, value = str(file), _checked(in_file[item.name], hints[item.name], f"{item.name} in {file}")
+            origin, value, where = str(file), in_file[item.name], f"{item.name} in {file}"
+            is_text = read is not None and isinstance(value, str)
+            value = read(value, where) if is_text else _checked(value, hints[item.name], where)
         if variable in os.environ:
-            origin, value = variable, _parsed(os.environ[variable], hints[item.name], variable)
+            origin, text = variable, os.environ[variable]
+            value = read(text, variable) if read is not None else _parsed(text, hints[item.name], variable)
         if options.get(item.name) is not None:
             origin, value = f"--{item.name.replace('_', '-')}", options[item.name]
         values[item.name] = value

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from common.program.quantities import reading, seconds
+
 NEXT_STEPS = """delay-bench measures every delay of each link between board and host. It runs both itself and needs no camera.
 
 a first look, in half a minute:
@@ -54,7 +56,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quality", default="80", metavar="PERCENTS", help="JPEG qualities (default 80)")
     parser.add_argument("--fps", default="15,30", metavar="RATES", help="frames per second (default 15,30)")
     parser.add_argument(
-        "--seconds", type=float, default=4.0, metavar="S", help="seconds of each run after its warm-up (default 4)"
+        "--seconds",
+        type=reading(seconds, "--seconds"),
+        default=4.0,
+        metavar="S",
+        help="seconds of each run after its warm-up (default 4)",
     )
     parser.add_argument(
         "--predict",

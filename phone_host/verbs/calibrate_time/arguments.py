@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from common.program.quantities import reading, seconds
 from phone_host.camera.examples import EXAMPLE
 
 SUMMARY = "measure the time offset between the two cameras with a screen, a lamp or a moving scene"
@@ -35,10 +36,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="use the frames that an earlier run kept with --keep, instead of --link and --camera",
     )
-    parser.add_argument("--seconds", type=float, default=20.0, metavar="S", help="seconds to film (default 20)")
+    parser.add_argument(
+        "--seconds", type=reading(seconds, "--seconds"), default=20.0, metavar="S", help="seconds to film (default 20)"
+    )
     parser.add_argument(
         "--wait",
-        type=float,
+        type=reading(seconds, "--wait"),
         metavar="S",
         help="seconds to wait for a board, then exit with code 3 (default: wait for ever)",
     )

@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from common.program.quantities import milliseconds, reading, seconds
 from phone_host.camera.examples import EXAMPLE
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 from phone_host.verbs.stereo_arguments import add_stereo_arguments
@@ -37,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--tolerance",
-        type=float,
+        type=reading(milliseconds, "--tolerance"),
         metavar="MS",
         help="greatest difference of the two exposure times in a pair (default: half of the longer frame period)",
     )
@@ -68,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--wait",
-        type=float,
+        type=reading(seconds, "--wait"),
         metavar="S",
         help="seconds to wait for a board, then exit with code 3 (default: wait for ever)",
     )
