@@ -34,6 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="folder for results; the check looks for free space there (default: the current folder)",
     )
     parser.add_argument(
+        "--keys", metavar="DIR", help="folder of keys, with which the board is asked (default ~/.config/tandemscan)"
+    )
+    parser.add_argument(
         "--wait",
         type=reading(seconds, "--wait"),
         default=5.0,
