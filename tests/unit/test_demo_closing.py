@@ -32,7 +32,7 @@ def test_the_next_commands_can_be_pasted(folder: str) -> None:
     """Whatever the folder's name, a shell takes each command apart as it was meant, and both programs take it."""
     out = Path(folder)
     said = _closing(out, Film(left=out / "film" / "left", right=out / "film" / "right", frames=60, fps=15), ERRORS)
-    lines = said.partition("try next")[2].splitlines()
+    lines = said.partition("try next")[2].splitlines()[1:]
     board, host, bare, *activate = [shlex.split(line) for line in lines if line.startswith("  ")]
     assert Path(board[0]).name == "board-agent"
     assert board_agent.cli.parser().parse_args(board[1:]).camera == f"replay:{out}/film/left?fps=15&loop=1"
