@@ -122,12 +122,16 @@ def check_package(package: Package) -> Finding:
         both = f"{' and '.join(package.wheels)} are installed side by side and overwrite each other's files"
         return fail(package.name, both, f"pip uninstall {remove}, then pip install --force-reinstall --no-deps {keep}")
     if not package.version:
-        return fail(package.name, f"cannot be imported ({package.problem})", "make venv; on Termux pkg install it")
+        return fail(
+            package.name,
+            f"cannot be imported ({package.problem})",
+            "install it: make run-venv in a checkout, or pipx reinstall tandemscan; on Termux pkg install it",
+        )
     text = f"{package.name} {package.version}" + (f" ({package.wheels[0]})" if package.wheels else "")
     found = _numbers(package.version)
     if found < _numbers(package.least) or (package.below and found >= _numbers(package.below)):
         span = f"{package.least} or newer" + (f", below {package.below}" if package.below else "")
-        return warn(package.name, text, f"tested with {span}: make venv installs it")
+        return warn(package.name, text, f"tested with {span}: make run-venv, or pipx reinstall tandemscan, installs it")
     return ok(package.name, text)
 
 
