@@ -45,8 +45,14 @@ class ExamplesFirstParser(argparse.ArgumentParser):
     def parse_known_args(  # type: ignore[override]  # of one type only
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
-        """Parse, and refuse what is left over: the verb's own parser knows best what its options are called."""
-        options, rest = super().parse_known_args(args, namespace)
+        """Parse, and refuse what is left over: the verb's own parser knows best what its options are called.
+
+        `help` and `help VERB` are read as the same with `--help`.
+        """
+        words = list(sys.argv[1:] if args is None else args)
+        if words[:1] == ["help"] and self._subparsers is not None:
+            words = [*words[1:2], "--help"]
+        options, rest = super().parse_known_args(words, namespace)
         if rest:
             self.error(self._unknown(rest))
         return options, rest
@@ -80,6 +86,8 @@ def _plain(message: str) -> str:
         return f"unknown verb {found[1]}{_guess(found[1], verbs) or listed}"
     if found := re.fullmatch(r"argument (\S+): invalid (?:float|int) value: (.*)", message):
         return f"{found[1]} is {found[2]}, which is not a number (leave units out)"
+    if found := re.fullmatch(r"argument (\S+): expected (?:one|at least one|\d+) arguments?", message):
+        return f"{found[1]} needs a value"
     if found := re.fullmatch(r"the following arguments are required: (.*)", message):
         return f"missing: {found[1]}"
     return message

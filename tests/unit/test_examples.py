@@ -112,3 +112,13 @@ def test_a_program_not_on_the_path_is_suggested_by_its_path(
         commands = [shlex.split(line)[0] for line in told.splitlines() if line.startswith("  ")]
         assert len(commands) >= 4
         assert all(Path(command).is_file() for command in commands)
+
+
+@pytest.mark.parametrize("program", ["phone-host", "board-agent"])
+def test_help_is_a_word_too(program: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """`phone-host help` is `phone-host --help`, and `phone-host help run` is `phone-host run --help`."""
+    for words, meant in ((["help"], ["--help"]), (["help", "run"], ["run", "--help"])):
+        assert MAINS[program](words) == 0
+        said = capsys.readouterr().out
+        assert MAINS[program](meant) == 0
+        assert said == capsys.readouterr().out
