@@ -1,10 +1,12 @@
-# `make` lists the targets. On a fresh machine, `make demo` and `make test` need no preparation.
+# `make` lists the targets. On a fresh machine, `make demo` and `make test` need no preparation. `make demo` installs what the commands need
+# at run time; the targets for development add their tools to the same .venv.
 #   PYTHON=/path/to/python3   the interpreter for .venv (default: the first of python3, python3.13, ... that is version 3.11 or newer)
 #   SCAN_DATA=/path           the folder of real images (default: ../shared/data if it exists)
 #   PYTEST_FLAGS="-k clock"   passed on to pytest
 SHELL := /bin/sh
 BIN := .venv/bin
 READY := .venv/.ready
+RUN := .venv/.ready-run
 PARTS := unit contract system hostile
 BENCHES := $(patsubst tests/bench/%.py,%,$(sort $(wildcard tests/bench/bench_*.py)))
 
@@ -15,17 +17,22 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
+.PHONY: help run-venv venv demo docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
-venv: $(READY) ## create or update the virtual environment .venv (the targets below do this themselves)
+run-venv: $(RUN) ## create .venv with what the commands need at run time (make demo does this itself)
+
+$(RUN): requirements/run.txt pyproject.toml common/versions.py
+	@.ci/venv run
+
+venv: $(READY) ## create or update .venv with the development tools, too (the other targets do this themselves)
 
 $(READY): requirements/dev.txt pyproject.toml common/versions.py
-	@.ci/venv
+	@.ci/venv dev
 
-demo: $(READY) ## run both programs on this machine with a rendered scene; writes a full report to out/demo
+demo: $(RUN) ## run both programs on this machine with a rendered scene; writes a full report to out/demo
 	@$(BIN)/phone-host demo --out out/demo
 
 test: $(READY) ## run the unit, contract, system and hostile tests; prints the minutes of each part

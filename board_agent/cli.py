@@ -7,21 +7,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from board_agent import examples
 from common.camera.options import EXAMPLE
 from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
-
-_EXAMPLES = """examples:
-  board-agent run --camera 'v4l2:/dev/video0?size=640x480&fps=30' --link 'tcp://*:5555'
-  board-agent run --camera 'replay:frames?fps=30&loop=1'
-  board-agent run --camera 'replay:frames?pace=demand' --link ipc://$XDG_RUNTIME_DIR/board
-  board-agent run --camera 'v4l2:auto?fps=30' --link 'rfcomm://*' --adapt quality,rate --least-fps 5
-  board-agent run --config /etc/tandemscan/board-agent.toml
-  board-agent cameras
-  sudo board-agent pair
-  sudo board-agent keys --forget phone
-  board-agent doctor
-  board-agent settings --json
-"""
+from common.program.invocation import as_found
+from common.program.quantities import frames_per_second, reading, seconds
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -39,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     """Import the verb and run it. Only here are modules imported by a verb's name."""
     if options.verb is None:
-        parser().print_help()
+        print(as_found(examples.NEXT_STEPS), end="")
         return 0
     gc.disable()  # imported objects stay: looking for garbage among them only costs a board time
     try:
@@ -53,27 +43,28 @@ def _run(options: argparse.Namespace) -> int:
 
 def parser() -> argparse.ArgumentParser:
     """All verbs with their options."""
-    made = ExamplesFirstParser("board-agent", description=_EXAMPLES)
+    made = ExamplesFirstParser("board-agent", description=examples.GENERAL)
     add_version_option(made)
     verbs = made.add_subparsers(dest="verb", metavar="VERB")
-    run = verbs.add_parser("run", help="stream the camera's frames to a host until stopped", description=_EXAMPLES)
+    run = verbs.add_parser("run", help="stream the camera's frames to a host until stopped", description=examples.RUN)
     show = verbs.add_parser(
-        "settings", help="print each setting, its value and where the value comes from", description=_EXAMPLES
+        "settings", help="print each setting, its value and where the value comes from", description=examples.SETTINGS
     )
     cameras = verbs.add_parser(
-        "cameras", help="list the cameras with their formats, rates and controls", description=_EXAMPLES
+        "cameras", help="list the cameras with their formats, rates and controls", description=examples.CAMERAS
     )
     doctor = verbs.add_parser(
-        "doctor", help="check camera, links, clocks, disk and power, and say what to mend", description=_EXAMPLES
+        "doctor", help="check camera, links, clocks, disk and power, and say what to mend", description=examples.DOCTOR
     )
     keys = verbs.add_parser(
         "keys",
         help="list the hosts that this board lets in, or change the list or the board's key",
-        description=_EXAMPLES,
+        description=examples.KEYS,
     )
-    pair = verbs.add_parser("pair", help="show a code that lets a new host in", description=_EXAMPLES)
+    pair = verbs.add_parser("pair", help="show a code that lets a new host in", description=examples.PAIR)
     _add_keys_options(keys, pair)
     for verb in (run, show, cameras, doctor, keys, pair):
+        add_version_option(verb)
         verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
         verb.add_argument("--debug", action="store_true", help="show tracebacks")
     for verb in (run, show, doctor, keys, pair):
@@ -96,7 +87,7 @@ def parser() -> argparse.ArgumentParser:
         )
         verb.add_argument(
             "--least-fps",
-            type=float,
+            type=reading(frames_per_second, "--least-fps"),
             metavar="FPS",
             help="never lower the frame rate below FPS (default: never lower the rate)",
         )
@@ -116,7 +107,11 @@ def _add_keys_options(keys: argparse.ArgumentParser, pair: argparse.ArgumentPars
     )
     what.add_argument("--add", nargs=2, metavar=("NAME", "KEY"), help="let in a host without pairing")
     pair.add_argument(
-        "--seconds", type=float, default=300.0, metavar="S", help="seconds to wait for a host (default 300)"
+        "--seconds",
+        type=reading(seconds, "--seconds"),
+        default=300.0,
+        metavar="S",
+        help="seconds to wait for a host (default 300)",
     )
     for verb in (keys, pair):
         verb.set_defaults(camera=None, link=None, log_level=None, adapt=None, least_fps=None)

@@ -15,7 +15,7 @@ import zmq
 
 from common import now
 from common.errors import ProtocolError, UnavailableError
-from common.keys import KeyFolder
+from common.keys import SERVICE_FOLDER, KeyFolder
 from common.link.enrolment_door import CONTROL_PREFIX, DoorState
 
 _LONGEST_FOLDER_BYTES: Final = 107 - len("/pairing-12345678")
@@ -70,9 +70,15 @@ def absence(keys: KeyFolder) -> UnavailableError:
             f"the path {keys.path} is too long for a socket in it",
             "choose a shorter one with --keys, and use it for the service, too",
         )
+    problem = f"no running board-agent with a secured link uses the keys in {keys.path}"
+    if keys.path == SERVICE_FOLDER:
+        return UnavailableError(
+            problem,
+            "look at `systemctl status board-agent`: it must run, with a camera, and with a link such as tcp://*:5555",
+        )
     return UnavailableError(
-        f"no running board-agent with a secured link uses the keys in {keys.path}",
-        "start it with a link such as tcp://*:5555 and a camera plugged in; for the service use sudo",
+        problem,
+        "start one with `board-agent run --camera v4l2:auto --link 'tcp://*:5555'`; for links on 127.0.0.1 nothing needs pairing",
     )
 
 

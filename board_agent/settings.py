@@ -12,6 +12,7 @@ from common.errors import SettingsError
 from common.keys import SERVICE_FOLDER, KeyFolder, default_folder
 from common.link.factory import parse_link
 from common.program.declaration import setting
+from common.program.quantities import frames_per_second, seconds
 from common.program.settings import Resolved, log_level, resolve
 
 ENVIRONMENT_PREFIX = "BOARD_AGENT"
@@ -35,13 +36,13 @@ class BoardSettings:
         ("tcp://127.0.0.1:5555",), "addresses to listen at; by default only this machine can connect"
     )
     wait_for_camera: bool = setting(default=False, doc="wait for a missing camera; otherwise exit with code 3")
-    idle_after: float = setting(10.0, "switch the camera off after so many seconds without a host; 0: never")
+    idle_after: float = setting(10.0, "switch the camera off after so many seconds without a host; 0: never", seconds)
     adapt: tuple[str, ...] = setting(
         ("quality", "rate"),
         "what may be lowered when the link is too slow, in this order: quality, rate, size; or nothing",
     )
     least_fps: float = setting(
-        0.0, "never lower the frame rate below so many frames per second; 0: never lower the rate"
+        0.0, "never lower the frame rate below so many frames per second; 0: never lower the rate", frames_per_second
     )
     keys: str = setting(
         "",

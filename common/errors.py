@@ -8,6 +8,11 @@ or a check failed, 130 interrupted.
 from typing import ClassVar
 
 
+def printable(text: str) -> str:
+    """Return the text as one line that cannot control the terminal, whatever name or value it quotes."""
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+
+
 class TandemError(Exception):
     """Base of all errors a user may see; never raised itself.
 
@@ -24,9 +29,7 @@ class TandemError(Exception):
         self.remedy = remedy
 
     def __str__(self) -> str:
-        text = f"{self.problem}: {self.remedy}"
-        # One line, whatever name or value it quotes; and foreign text must not control the terminal.
-        return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+        return printable(f"{self.problem}: {self.remedy}")
 
 
 class SettingsError(TandemError):

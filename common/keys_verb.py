@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from common.keys import KeyFolder
-from common.peers import Peer
+from common.peers import Peer, clean_name
 
 
 def change(
     folder: KeyFolder, *, forget: str | None, new: bool, add: Sequence[str] | None, address: str, when: str
-) -> None:
+) -> str:
     """Do what the options of a `keys` verb ask for.
 
     Args:
@@ -20,6 +20,9 @@ def change(
         add: name and public key of a peer to trust; None: nobody.
         address: link on which that peer listens; empty if it does not.
         when: local wall time.
+
+    Returns:
+        What the user should be told about it in one line; usually nothing.
 
     Raises:
         SettingsError: a name or key makes no sense.
@@ -31,7 +34,15 @@ def change(
     if forget is not None:
         folder.forget(forget)
     if add is not None:
-        folder.add(Peer(name=add[0], key=add[1], added=when, address=address))
+        name = folder.add(Peer(name=add[0], key=add[1], added=when, address=address)).name
+        if name != add[0]:
+            why = (
+                "another machine has that name"
+                if clean_name(add[0]) == add[0]
+                else "names are of letters, digits and ._-"
+            )
+            return f"{add[0]!r} is kept as {name}: {why}"
+    return ""
 
 
 def listing(folder: KeyFolder, *, as_json: bool) -> str:

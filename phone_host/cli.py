@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
+from common.program.invocation import as_found
 from phone_host.verbs.calibrate import arguments as calibrate
 from phone_host.verbs.calibrate_time import arguments as calibrate_time
 from phone_host.verbs.demo import arguments as demo
@@ -43,6 +44,28 @@ _VERBS: Final[dict[str, Arguments]] = {
     "settings": settings,
 }
 
+_NEXT_STEPS = """phone-host makes depth out of two cameras: this machine's and a board's, or of two folders of photographs.
+
+try it without hardware, in half a minute:
+  phone-host demo
+
+your own photographs, taken by two cameras side by side (first of a chessboard, then of the scene):
+  phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml
+  phone-host stereo left.png right.png --calibration rig.yaml --out scan
+
+two photographs whose rows already match, without a calibration:
+  phone-host stereo left.png right.png --rectified --disparities 64 --out scan
+
+two cameras, live; the other one hangs on a board or a second computer that runs board-agent:
+  phone-host doctor
+  phone-host pair
+  phone-host run --camera v4l2:auto --calibration rig.yaml --out scan
+
+every verb and its options:
+  phone-host --help
+  phone-host stereo --help
+"""
+
 _EXAMPLES = """examples:
   phone-host demo
   phone-host calibrate 'left*.png' 'right*.png' --board 9x6 --square 25mm --out rig.yaml
@@ -66,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     """Import the command half of the verb, and run it. The only place that imports by a verb's name."""
     if options.verb is None:
-        parser().print_help()
+        print(as_found(_NEXT_STEPS), end="")
         return 0
     command = importlib.import_module(f"phone_host.verbs.{options.verb.replace('-', '_')}.command")
     code: int = command.run(options)
@@ -81,6 +104,7 @@ def parser() -> argparse.ArgumentParser:
     for name, arguments in _VERBS.items():
         verb = verbs.add_parser(name, help=arguments.SUMMARY, description=f"examples:\n{arguments.EXAMPLES}")
         arguments.add_arguments(verb)
+        add_version_option(verb)
         verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
         verb.add_argument("--debug", action="store_true", help="show tracebacks")
     return made

@@ -8,6 +8,7 @@ from typing import Final
 
 from common.imagesize.head import MEGAPIXEL, MOST_PIXELS
 from common.program.declaration import setting
+from common.program.quantities import milliseconds
 
 _USUAL_MEGAPIXELS: Final = MOST_PIXELS // MEGAPIXEL
 MAX_MEGAPIXELS_HELP: Final = f"refuse larger images before decoding them, in megapixels (default {_USUAL_MEGAPIXELS})"
@@ -30,7 +31,9 @@ class PhoneHostSettings:
     calibration: str = setting("", "rig.yaml of the two cameras")
     matcher: str = setting("sgbm", "stereo matcher")
     tolerance: float = setting(
-        0.0, "greatest difference of the two exposure times in a pair, ms; 0: half of the longer frame period"
+        0.0,
+        "greatest difference of the two exposure times in a pair, ms; 0: half of the longer frame period",
+        milliseconds,
     )
     fifo: str = setting(
         "1:drop-oldest", "length of the queue before the matcher and what happens when it is full, DEPTH:POLICY"

@@ -7,10 +7,11 @@ from board_agent.doctor.key_checks import check_keys
 from board_agent.doctor.link_probe import examine_link
 from board_agent.settings import BoardSettings, key_folder
 from common.doctor import machine
+from common.doctor.access import Account
 from common.doctor.camera_probe import examine_camera
-from common.doctor.finding import Finding, fail, ok
+from common.doctor.finding import Finding, fail
 from common.doctor.machine_checks import check_clocks, check_disk, check_power, check_usb_log
-from common.doctor.unit_check import check_unit
+from common.doctor.unit_check import Unit, check_unit
 from common.keys import SERVICE_FOLDER, KeyFolder
 from common.link.factory import needs_keys, parse_link
 
@@ -18,12 +19,11 @@ UNIT: Final = "board-agent"
 _LOG_FOLDERS: Final = (Path("/var/log/journal"), Path("/run/log/journal"))
 
 
-def examine(settings: BoardSettings, file: Path | None) -> list[Finding]:
+def examine(settings: BoardSettings | None) -> list[Finding]:
     """Check this machine for a run with the given settings.
 
     Args:
-        settings: what would be run.
-        file: the settings file they came from; None: no file.
+        settings: what would be run; None: that is not known, so camera, links and keys are left out.
 
     Returns:
         The findings, in the order in which problems would appear.
@@ -34,7 +34,21 @@ def examine(settings: BoardSettings, file: Path | None) -> list[Finding]:
     unit = machine.read_unit(UNIT)
     account = machine.account_of(unit.user) if unit.installed and unit.user else None
     user = account or machine.own_account()
-    findings = [ok("settings", str(file) if file else "no file: defaults, environment and options"), check_unit(unit)]
+    findings = [check_unit(unit)]
+    if settings is not None:
+        findings += _examine_stream(settings, user, unit, is_service=account is not None)
+    log = machine.read_kernel_log()
+    findings += check_clocks(machine.read_clocks(Path(__file__).parent))
+    folders = [Path("/"), *(folder for folder in _LOG_FOLDERS if folder.is_dir())]
+    devices = {folder.stat().st_dev: folder for folder in reversed(folders)}
+    findings += [check_disk(machine.read_disk(folder)) for folder in reversed(devices.values())]
+    findings += [check_power(log, machine.read_supply()), check_usb_log(log)]
+    return findings
+
+
+def _examine_stream(settings: BoardSettings, user: Account, unit: Unit, *, is_service: bool) -> list[Finding]:
+    """Check what the frames come from and where they go."""
+    findings: list[Finding] = []
     if settings.camera:
         findings += examine_camera(settings.camera, user, unit)
     else:
@@ -44,12 +58,6 @@ def examine(settings: BoardSettings, file: Path | None) -> list[Finding]:
     for uri in settings.link:
         findings += examine_link(uri, user, unit, listens_by_default=True)
     if any(needs_keys(parse_link(uri, listens_by_default=True)) for uri in settings.link):
-        is_service = account is not None and not settings.keys
-        findings.append(check_keys(KeyFolder(SERVICE_FOLDER) if is_service else key_folder(settings.keys), user))
-    log = machine.read_kernel_log()
-    findings += check_clocks(machine.read_clocks(Path(__file__).parent))
-    folders = [Path("/"), *(folder for folder in _LOG_FOLDERS if folder.is_dir())]
-    devices = {folder.stat().st_dev: folder for folder in reversed(folders)}
-    findings += [check_disk(machine.read_disk(folder)) for folder in reversed(devices.values())]
-    findings += [check_power(log, machine.read_supply()), check_usb_log(log)]
+        of_service = is_service and not settings.keys
+        findings.append(check_keys(KeyFolder(SERVICE_FOLDER) if of_service else key_folder(settings.keys), user))
     return findings

@@ -98,7 +98,7 @@ _POWER_LINES: Final[Mapping[str, PowerLine | None]] = {
 
 
 def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
+    match = re.fullmatch(r"(\d{1,5})[xX](\d{1,5})", text)
     if match is None or not all(map(int, match.groups())):
         raise ValueError(text)
     return int(match[1]), int(match[2])

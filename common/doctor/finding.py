@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
 
+from common.errors import SettingsError, printable
+
 CHECK_FAILED: Final = 4
 
 
@@ -51,6 +53,18 @@ def fail(what: str, text: str, remedy: str) -> Finding:
     return Finding(what=what, verdict=Grade.FAIL, text=text, remedy=remedy)
 
 
+def settings_finding(file: str, wrong: SettingsError | None) -> Finding:
+    """A finding: the settings, the first thing that a doctor looks at.
+
+    Args:
+        file: the settings file; empty: none is used.
+        wrong: why the settings make no sense; None: they do.
+    """
+    if wrong is not None:
+        return fail("settings", printable(wrong.problem), printable(wrong.remedy))
+    return ok("settings", file or "no file: defaults, environment and options")
+
+
 def table(findings: Sequence[Finding]) -> str:
     """The findings as text, one line each."""
     width = max((len(item.what) for item in findings), default=0)
@@ -72,6 +86,8 @@ def values(findings: Sequence[Finding]) -> dict[str, Any]:
     }
 
 
-def exit_code(findings: Sequence[Finding]) -> int:
-    """The command's exit code: 0 if nothing failed, with or without warnings, otherwise 4."""
+def exit_code(findings: Sequence[Finding], wrong: SettingsError | None = None) -> int:
+    """The command's exit code: 0 if nothing failed, with or without warnings, otherwise 4; with wrong settings theirs, as from every verb."""
+    if wrong is not None:
+        return wrong.exit_code
     return CHECK_FAILED if any(item.verdict is Grade.FAIL for item in findings) else 0

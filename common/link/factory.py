@@ -13,11 +13,11 @@ from typing import Final
 from common.errors import MissingDeviceError, SettingsError, TandemError, UnavailableError
 from common.keys import KeyFolder
 from common.link.base import Link, TakesNewHosts
-from common.link.uri import LINKS, LinkRequest, LinkUri, needs_keys, parse_link
+from common.link.uri import LINKS, LinkRequest, LinkUri, is_this_machine, needs_keys, parse_link
 from common.program.extensions import make_registered, named
 from common.program.logs import event
 
-__all__ = ["LinkUri", "needs_keys", "open_link", "open_links", "parse_link", "tell_insecure"]
+__all__ = ["LinkUri", "is_this_machine", "needs_keys", "open_link", "open_links", "parse_link", "tell_insecure"]
 
 _LOG = logging.getLogger(__name__)
 

@@ -129,11 +129,15 @@ def needs_keys(uri: LinkUri) -> bool:
     """Whether a link is for known keys only: tcp that other machines can reach, unless it is marked insecure."""
     if not uri.address.startswith("tcp://") or uri.insecure:
         return False
-    host = uri.address.removeprefix("tcp://").rpartition(":")[0].strip("[]")
+    return not is_this_machine(uri.address.removeprefix("tcp://").rpartition(":")[0].strip("[]"))
+
+
+def is_this_machine(host: str) -> bool:
+    """Whether a host of an address, without brackets, can only be this machine: localhost, or a loopback address."""
     try:
-        return not (host == "localhost" or ipaddress.ip_address(host).is_loopback)
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
     except ValueError:  # a name, an interface, *
-        return True
+        return False
 
 
 def _extension(uri: str, *, listens_by_default: bool) -> LinkUri | None:

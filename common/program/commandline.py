@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Final, NoReturn
 
 from common.errors import TandemError
+from common.program.invocation import as_found
 from common.program.terminal import fitted
 from common.versions import all_versions
 
@@ -25,7 +26,7 @@ _WRITE_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, err
 
 
 class ExamplesFirstParser(argparse.ArgumentParser):
-    """A parser whose help shows its description (the examples) first and unchanged.
+    """A parser whose help shows its description (the examples) first and unchanged, save that programs are named as the shell finds them.
 
     Its sub-parsers are of the same class.
     """
@@ -34,7 +35,7 @@ class ExamplesFirstParser(argparse.ArgumentParser):
         """Return the help text."""
         examples, self.description = self.description or "", None
         try:
-            return f"{examples}\n{super().format_help()}"
+            return f"{as_found(examples)}\n{super().format_help()}"
         finally:
             self.description = examples
 
@@ -45,8 +46,14 @@ class ExamplesFirstParser(argparse.ArgumentParser):
     def parse_known_args(  # type: ignore[override]  # of one type only
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
-        """Parse, and refuse what is left over: the verb's own parser knows best what its options are called."""
-        options, rest = super().parse_known_args(args, namespace)
+        """Parse, and refuse what is left over: the verb's own parser knows best what its options are called.
+
+        `help` and `help VERB` are read as the same with `--help`.
+        """
+        words = list(sys.argv[1:] if args is None else args)
+        if words[:1] == ["help"] and self._subparsers is not None:
+            words = [*words[1:2], "--help"]
+        options, rest = super().parse_known_args(words, namespace)
         if rest:
             self.error(self._unknown(rest))
         return options, rest
@@ -80,6 +87,8 @@ def _plain(message: str) -> str:
         return f"unknown verb {found[1]}{_guess(found[1], verbs) or listed}"
     if found := re.fullmatch(r"argument (\S+): invalid (?:float|int) value: (.*)", message):
         return f"{found[1]} is {found[2]}, which is not a number (leave units out)"
+    if found := re.fullmatch(r"argument (\S+): expected (?:one|at least one|\d+) arguments?", message):
+        return f"{found[1]} needs a value"
     if found := re.fullmatch(r"the following arguments are required: (.*)", message):
         return f"missing: {found[1]}"
     return message
@@ -94,10 +103,10 @@ class _VersionAction(argparse.Action):
 
 
 def add_version_option(parser: argparse.ArgumentParser) -> None:
-    """Add `--version`, which needs no verb.
+    """Add `--version`.
 
     Args:
-        parser: the command's own parser, not a verb's.
+        parser: the command's own parser, or a verb's.
     """
     parser.add_argument(
         "--version", action=_VersionAction, nargs=0, help="print the versions of package, wire and files"

@@ -7,6 +7,7 @@ A daemon declares its settings as one frozen dataclass whose fields are texts, n
 import json
 import logging
 import os
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -54,10 +55,14 @@ def resolve(kind: type[T], prefix: str, file: Path | None, options: Mapping[str,
     for item in fields(kind):  # type: ignore[arg-type]  # T is always a dataclass
         origin, variable = "default", f"{prefix}_{item.name.upper()}"
         value: Any = item.default
+        read: Any = item.metadata.get("read")
         if item.name in in_file:
-            origin, value = str(file), _checked(in_file[item.name], hints[item.name], f"{item.name} in {file}")
+            origin, value, where = str(file), in_file[item.name], f"{item.name} in {file}"
+            is_text = read is not None and isinstance(value, str)
+            value = read(value, where) if is_text else _checked(value, hints[item.name], where)
         if variable in os.environ:
-            origin, value = variable, _parsed(os.environ[variable], hints[item.name], variable)
+            origin, text = variable, os.environ[variable]
+            value = read(text, variable) if read is not None else _parsed(text, hints[item.name], variable)
         if options.get(item.name) is not None:
             origin, value = f"--{item.name.replace('_', '-')}", options[item.name]
         values[item.name] = value
@@ -127,19 +132,43 @@ def log_level(name: str) -> int:
 _MOST_BYTES = 1 << 20
 """Limit for a settings file, which usually has one page."""
 
+_MOST_SHOWN = 80
+"""Characters of a wrong line that an error shows."""
+
 
 def _read(file: Path, known: set[str]) -> dict[str, Any]:
+    text = ""
     try:
-        content = tomllib.loads(read_whole(file, _MOST_BYTES).decode("utf-8"))
+        text = read_whole(file, _MOST_BYTES).decode("utf-8")
+        content = tomllib.loads(text)
     except OSError as error:
         raise SettingsError(f"settings file {file} cannot be read ({error.strerror})", "check --config") from None
     except DataError as error:
         raise SettingsError(f"settings file {error.problem}", "check --config") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SettingsError(f"settings file {file} is not TOML ({error})", "mend that line") from None
+    except UnicodeDecodeError as error:
+        raise SettingsError(f"settings file {file} is not UTF-8 text ({error.reason})", "save it as UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        where, what = _place(str(error), text)
+        raise SettingsError(
+            f"settings file {file} is not TOML{where}: {what}",
+            'mend that line; texts are in quotes, as in camera = "v4l2:auto"',
+        ) from None
     if unknown := set(content) - known:
         raise SettingsError(f"unknown key {min(unknown)!r} in {file}", f"the keys are {', '.join(sorted(known))}")
     return content
+
+
+def _place(problem: str, text: str) -> tuple[str, str]:
+    """Return where in the text a TOML error lies, with the line itself, and what the error is.
+
+    A password in an address is not shown.
+    """
+    found = re.fullmatch(r"(.*) \(at line (\d+), column \d+\)", problem)
+    if found is None:  # at its end
+        return "", problem
+    line = text.splitlines()[int(found[2]) - 1 : int(found[2])]
+    shown = re.sub(r"//[^/@]*@", "//...@", "".join(line).strip())[:_MOST_SHOWN]
+    return f" in line {found[2]}, {shown!r}", found[1]
 
 
 def _checked(value: object, hint: Any, where: str) -> object:  # noqa: ANN401 - a type hint

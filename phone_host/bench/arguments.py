@@ -3,8 +3,29 @@
 import argparse
 from pathlib import Path
 
+from common.program.quantities import reading, seconds
+
+NEXT_STEPS = """delay-bench measures every delay of each link between board and host. It runs both itself and needs no camera.
+
+a first look, in half a minute:
+  delay-bench --links tcp,ipc --size 320x240 --fps 30 --out bench
+
+every kind of link that works here, two sizes, two rates, in three minutes:
+  delay-bench --out bench
+
+as over USB, Bluetooth or Wi-Fi, without having them:
+  delay-bench --emulate list
+  delay-bench --emulate usb-serial,bluetooth,wifi --size 320x240 --quality 50 --fps 10 --out interfaces
+
+a board on another machine, once `phone-host pair` made it known:
+  delay-bench --links tcp://192.168.7.2:5555 --seconds 30 --out board
+
+all options:
+  delay-bench --help
+"""
+
 EXAMPLES = """examples:
-  delay-bench
+  delay-bench --out bench
   delay-bench --links tcp,ipc,serial --size 320x240,640x480 --quality 50,80 --fps 15,30 --seconds 20 --out bench
   delay-bench --emulate usb-serial,bluetooth,wifi --size 320x240 --quality 50 --fps 10 --out interfaces
   delay-bench --links tcp://192.168.7.2:5555 --seconds 30 --json
@@ -35,7 +56,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quality", default="80", metavar="PERCENTS", help="JPEG qualities (default 80)")
     parser.add_argument("--fps", default="15,30", metavar="RATES", help="frames per second (default 15,30)")
     parser.add_argument(
-        "--seconds", type=float, default=4.0, metavar="S", help="seconds of each run after its warm-up (default 4)"
+        "--seconds",
+        type=reading(seconds, "--seconds"),
+        default=4.0,
+        metavar="S",
+        help="seconds of each run after its warm-up (default 4)",
     )
     parser.add_argument(
         "--predict",

@@ -7,6 +7,7 @@ from typing import Final, TypeVar
 
 from common.errors import SettingsError
 from common.link.factory import parse_link
+from common.program.quantities import frames_per_second, image_size
 from phone_host.bench.emulate import Profile
 
 T = TypeVar("T")
@@ -132,12 +133,12 @@ def parse_sizes(text: str) -> tuple[Size, ...]:
     """
 
     def size(item: str) -> Size:
-        width, _, height = item.partition("x")
-        if not all(_is_number(part, _LEAST_PX, _MOST_PX) for part in (width, height)):
+        width_px, height_px = image_size(item, "--size")
+        if not all(_LEAST_PX <= side_px <= _MOST_PX for side_px in (width_px, height_px)):
             raise SettingsError(
                 f"--size {item!r}", f"give WIDTHxHEIGHT from {_LEAST_PX} to {_MOST_PX} px, for example 640x480"
             )
-        return Size(int(width), int(height))
+        return Size(width_px, height_px)
 
     return _parsed(text, size, "--size names no size", "give WIDTHxHEIGHT, for example 640x480")
 
@@ -150,9 +151,10 @@ def parse_qualities(text: str) -> tuple[int, ...]:
     """
 
     def quality(item: str) -> int:
-        if not _is_number(item, 1, 100):
+        percent = item.removesuffix("%").strip()
+        if not _is_number(percent, 1, 100):
             raise SettingsError(f"--quality {item!r}", "give whole numbers from 1 to 100")
-        return int(item)
+        return int(percent)
 
     return _parsed(text, quality, "--quality names no JPEG quality", "give 1 to 100, for example 80")
 
@@ -165,9 +167,10 @@ def parse_rates(text: str) -> tuple[int, ...]:
     """
 
     def rate(item: str) -> int:
-        if not _is_number(item, 1, _MOST_HZ):
+        rate_hz = frames_per_second(item, "--fps")
+        if not (rate_hz.is_integer() and 1 <= rate_hz <= _MOST_HZ):
             raise SettingsError(f"--fps {item!r}", f"give whole numbers of frames per second from 1 to {_MOST_HZ}")
-        return int(item)
+        return int(rate_hz)
 
     return _parsed(text, rate, "--fps names no rate", "give frames per second, for example 30")
 

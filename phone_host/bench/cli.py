@@ -6,7 +6,8 @@ import sys
 from collections.abc import Sequence
 
 from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
-from phone_host.bench.arguments import EXAMPLES, add_arguments
+from common.program.invocation import as_found
+from phone_host.bench.arguments import EXAMPLES, NEXT_STEPS, add_arguments
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -19,7 +20,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0 done, 2 wrong usage, 3 a link, a process or stdout is not available, 4 nothing was measured,
         130 interrupted.
     """
-    return run_command(parser(), arguments, _run)
+    given = sys.argv[1:] if arguments is None else arguments
+    return run_command(parser(), given, _run if given else _next_steps)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -30,6 +32,12 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     made.add_argument("--debug", action="store_true", help="show tracebacks")
     return made
+
+
+def _next_steps(_: argparse.Namespace) -> int:
+    """Say what can be done: a bare name must not start minutes of work."""
+    print(as_found(NEXT_STEPS), end="")
+    return 0
 
 
 def _run(options: argparse.Namespace) -> int:

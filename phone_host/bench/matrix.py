@@ -15,7 +15,7 @@ from phone_host.bench.cases import Case, Interface, Size
 from phone_host.bench.links import ask_board
 from phone_host.bench.runs import PATIENCE_NS, WARM_UP_S, CaseResult, RunSettings, film_images, render, run_case
 from phone_host.children.board_process import socket_folder
-from phone_host.run.progress_bar import progress_bar
+from phone_host.run.progress_bar import busy_bar, progress_bar
 from phone_host.scene.film import Film
 
 _RENDER_S: Final = 0.06
@@ -57,7 +57,8 @@ def remote_cases(remote: Sequence[Interface], signals: StopSignals) -> list[Case
     """
     found = []
     for interface in remote:
-        case = ask_board(interface.link, PATIENCE_NS, lambda: signals.stop)
+        with busy_bar(f"asking the board at {interface.link}"):
+            case = ask_board(interface.link, PATIENCE_NS, lambda: signals.stop)
         if case is None:
             break
         found.append(case)

@@ -16,6 +16,7 @@ from zmq.utils import z85
 from common import now
 from common.errors import DataError, ProtocolError, SettingsError, TandemError, UnavailableError
 from common.keys import KeyFolder
+from common.link.factory import is_this_machine
 from common.peers import Peer, clean_name
 from common.protocol.enrolment_code import Asking, code_text
 from common.protocol.enrolment_wire import MAX_WORD_BYTES, WordReader, frame_word
@@ -106,10 +107,14 @@ class PairingCall:
         try:
             connected = socket.create_connection(self._door, _ANSWER_S)
         except OSError as error:
-            raise _HungUpError(
-                f"{where} does not take in a new host ({error.strerror or error})",
-                "start board-agent there, and run sudo board-agent pair",
-            ) from None
+            problem = f"{where} does not take in a new host ({error.strerror or error})"
+            if is_this_machine(self._door[0]):
+                raise _HungUpError(
+                    problem,
+                    "for a board-agent that listens on 127.0.0.1 no pairing is needed, `phone-host run` connects;"
+                    " for one with a link such as tcp://*:5555 run `sudo board-agent pair`",
+                ) from None
+            raise _HungUpError(problem, "start board-agent there, and run sudo board-agent pair") from None
         with connected:
             yield _Line(connected, where)
 

@@ -19,6 +19,10 @@ _USABLE_PX: Final = 1.0
 """With a stereo RMS above one pixel, the rows of the two images do not match, and no matcher finds much."""
 
 
+_REJECT: Final = "reject"
+"""The verdict of a calibration whose depth is wrong."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Package:
     """A Python package that the host imports.
@@ -52,6 +56,7 @@ class RigReadings:
         baseline_m: baseline, m.
         host_size_px: image size of the host camera in the rig, px.
         asked_size_px: image size that the host camera is asked for, px; None if the URI does not say.
+        verdict: the calibration's own verdict; empty: the file states none.
     """
 
     path: str
@@ -61,6 +66,7 @@ class RigReadings:
     baseline_m: float = float("nan")
     host_size_px: tuple[int, int] = (0, 0)
     asked_size_px: tuple[int, int] | None = None
+    verdict: str = ""
 
 
 class Answer(Enum):
@@ -116,12 +122,16 @@ def check_package(package: Package) -> Finding:
         both = f"{' and '.join(package.wheels)} are installed side by side and overwrite each other's files"
         return fail(package.name, both, f"pip uninstall {remove}, then pip install --force-reinstall --no-deps {keep}")
     if not package.version:
-        return fail(package.name, f"cannot be imported ({package.problem})", "make venv; on Termux pkg install it")
+        return fail(
+            package.name,
+            f"cannot be imported ({package.problem})",
+            "install it: make run-venv in a checkout, or pipx reinstall tandemscan; on Termux pkg install it",
+        )
     text = f"{package.name} {package.version}" + (f" ({package.wheels[0]})" if package.wheels else "")
     found = _numbers(package.version)
     if found < _numbers(package.least) or (package.below and found >= _numbers(package.below)):
         span = f"{package.least} or newer" + (f", below {package.below}" if package.below else "")
-        return warn(package.name, text, f"tested with {span}: make venv installs it")
+        return warn(package.name, text, f"tested with {span}: make run-venv, or pipx reinstall tandemscan, installs it")
     return ok(package.name, text)
 
 
@@ -138,6 +148,8 @@ def check_rig(rig: RigReadings) -> Finding:
         asked = f"{asked_px[0]}x{asked_px[1]}"
         remedy = f"ask for size={width_px}x{height_px}, or calibrate at {asked}"
         return fail("rig", f"{text}, but the camera is asked for {asked}", remedy)
+    if rig.verdict == _REJECT:
+        return warn("rig", f"{text}, verdict reject", "calibrate again; report.json beside it says what was wrong")
     if rig.rms_px > _USABLE_PX:
         return warn("rig", text, "calibrate again with sharper pictures of a flat board")
     return ok("rig", text)

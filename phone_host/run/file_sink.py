@@ -60,12 +60,12 @@ class _Trouble:
         self._folder, self._what = folder, what
         self.now = self.last = ""
 
-    def begins(self, error: OSError) -> None:
-        """Something could not be written."""
+    def begins(self, error: OSError, what: str = "", remedy: str = "make room; the run goes on") -> None:
+        """Something could not be written; `what` names it if it is only part of what this tracks."""
         cause = error.strerror or str(error)
         if not self.now:
-            remedy = "make room; the run goes on"
-            _LOG.error(event("results_not_written", folder=self._folder, what=self._what, cause=cause, remedy=remedy))
+            missing = what or self._what
+            _LOG.error(event("results_not_written", folder=self._folder, what=missing, cause=cause, remedy=remedy))
         self.now = self.last = cause
 
     def ends(self) -> None:
@@ -231,11 +231,14 @@ class FileSink:
         """
         if self._own is None:
             return
+        writing = "delays.jsonl"
         try:
             self.finish()
             os.fsync(self._file)
+            writing = "report.json"
             self._own.write_text("report.json", json.dumps(report, indent=1) + "\n")
             if page:
+                writing = "index.html"
                 self._own.add("index.html")
                 self._own.write_text("index.html", page)
             if cameras:
@@ -243,7 +246,7 @@ class FileSink:
                 self._own.write_text(CAMERAS_NAME, cameras)
             self._own.sync()
         except OSError as error:
-            self._of_report.begins(error)
+            self._of_report.begins(error, writing, "make room and run again")
         finally:
             self._let_go()
 

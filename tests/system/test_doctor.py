@@ -67,12 +67,23 @@ def test_a_running_board_keeps_its_link(tmp_path: Path) -> None:
         assert agent.stop() == 0
 
 
-def test_settings_that_make_no_sense_are_exit_2(tmp_path: Path) -> None:
-    """A bad URI is a settings error as in `run`: exit 2, one line, no checks."""
-    command = [sys.executable, "-P", "-m", "board_agent.cli", "doctor", "--camera", "v4l2:auto?size=big"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert len(done.stderr.splitlines()) == 1
+def test_settings_that_make_no_sense_are_exit_2_and_the_first_finding(tmp_path: Path) -> None:
+    """A bad URI or file is exit 2 as in `run`; it is one finding with its remedy, and the machine is checked all the same."""
+    code, checks = doctor("board_agent.cli", "--camera", "v4l2:auto?size=big")
+    assert code == 2
+    assert checks["settings"]["verdict"] == "fail"
+    assert "size=big" in checks["settings"]["finding"]
+    assert "640x480" in checks["settings"]["remedy"]
+    assert {"clock", "disk"} <= set(checks)
+    assert "camera" not in checks
+    (tmp_path / "host.toml").write_text("tolerance = 5\ncamera = v4l2:auto\n")
+    code, checks = doctor(
+        "phone_host.cli", "--config", str(tmp_path / "host.toml"), "--keys", str(tmp_path), "--out", str(tmp_path)
+    )
+    assert code == 2
+    assert next(iter(checks)) == "settings"
+    assert "line 2, 'camera = v4l2:auto'" in checks["settings"]["finding"]
+    assert {"python", "numpy", "cv2", "disk"} <= set(checks)
 
 
 def test_the_table_has_a_line_for_each_check(tmp_path: Path) -> None:

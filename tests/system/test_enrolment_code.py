@@ -153,7 +153,7 @@ def test_the_owner_may_come_before_the_agent(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("module", "options", "named"),
     [
-        ("board_agent.cli", ["pair", "--seconds", "nan"], "--seconds is nan"),
+        ("board_agent.cli", ["pair", "--seconds", "nan"], "--seconds is 'nan'"),
         ("board_agent.cli", ["keys", "--forget", "nobody"], "nobody"),
         ("board_agent.cli", ["keys", "--add", "phone", "short"], "short"),
         ("phone_host.cli", ["keys", "--add", "bone", "serial:/dev/ttyACM0", "a" * 40], "serial:/dev/ttyACM0"),

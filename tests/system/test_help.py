@@ -1,5 +1,6 @@
 """The commands' help as a new user sees it."""
 
+import shlex
 from pathlib import Path
 
 import pytest
@@ -30,16 +31,18 @@ def test_help_opens_with_examples(module: str, verb: list[str], tmp_path: Path) 
     name = {"board_agent.cli": "board-agent", "phone_host.cli": "phone-host", "phone_host.bench.cli": "delay-bench"}[
         module
     ]
-    assert second.split("=")[0].strip().removeprefix("sudo ").startswith((name, "PHONE_HOST", "BOARD_AGENT"))
+    words = [word for word in shlex.split(second, comments=True) if word != "sudo" and "=" not in word]
+    assert Path(words[0]).name == name  # with its folder, where the shell does not find it by its name
     # Where a verb is still to be chosen, the help shows none of its options.
     runs_as_it_is = bool(verb) or module == "phone_host.bench.cli"
     assert ("--debug" in running.out.read_text()) is runs_as_it_is
 
 
-@pytest.mark.parametrize("module", ["board_agent.cli", "phone_host.cli"])
+@pytest.mark.parametrize("module", ["board_agent.cli", "phone_host.cli", "phone_host.bench.cli"])
 def test_a_bare_name_says_what_can_be_done(module: str, tmp_path: Path) -> None:
-    """Without a verb a program prints its examples and verbs; this is no error."""
+    """Without arguments a program prints what one can do next, and runs nothing; this is no error."""
     with program(module, [], tmp_path, "bare") as running:
         assert running.wait() == 0
-    assert running.out.read_text().startswith("examples:")
+    assert "try it" in running.out.read_text() or "a first look" in running.out.read_text()
     assert running.stderr == ""
+    assert [path.name for path in tmp_path.iterdir() if not path.name.startswith("bare")] == []

@@ -71,6 +71,12 @@ def test_packages_are_judged_by_version_and_company(package: Package, verdict: G
         (RigReadings("rig.yaml", baseline_m=0.1, host_size_px=(640, 480)), OK, "640x480"),
         (RigReadings("rig.yaml", rms_px=2.5, baseline_m=0.1, host_size_px=(640, 480)), WARN, "2.50 px"),
         (
+            RigReadings("rig.yaml", rms_px=0.2, baseline_m=0.1, host_size_px=(640, 480), verdict="reject"),
+            WARN,
+            "calibrate again",
+        ),
+        (RigReadings("rig.yaml", baseline_m=0.1, host_size_px=(640, 480), verdict="usable"), OK, "640x480"),
+        (
             RigReadings("rig.yaml", baseline_m=0.1, host_size_px=(640, 480), asked_size_px=(1280, 720)),
             FAIL,
             "size=640x480",

@@ -13,6 +13,7 @@ from zmq.utils import z85
 
 from common.errors import DataError, SettingsError, UnavailableError
 from common.keys import KeyFolder, default_folder
+from common.keys_verb import change
 from common.peers import Peer, clean_name, is_key, peer_at
 
 WHEN = "2026-01-01T00:00:00+0000"
@@ -182,3 +183,17 @@ def test_the_codes_typed_last_are_kept(tmp_path: Path) -> None:
     (tmp_path / "k" / "spent-codes").chmod(0o644)
     with pytest.raises(DataError, match="chmod"):
         KeyFolder(tmp_path / "k").spent_codes()
+
+
+def test_a_name_that_is_changed_is_told(tmp_path: Path) -> None:
+    """`keys --add` says under which name the machine is kept if the wanted one is taken or cannot be one; otherwise nothing."""
+    folder = KeyFolder(tmp_path)
+
+    def add(name: str) -> str:
+        return change(folder, forget=None, new=False, add=(name, some_key()), address="", when=WHEN)
+
+    assert add("phone") == ""
+    assert add("phone") == "'phone' is kept as phone-2: another machine has that name"
+    assert add("my phone") == "'my phone' is kept as my-phone: names are of letters, digits and ._-"
+    assert [peer.name for peer in folder.peers()] == ["phone", "phone-2", "my-phone"]
+    assert change(folder, forget="phone", new=False, add=None, address="", when=WHEN) == ""

@@ -75,7 +75,7 @@ def test_packages_are_typed(package: str) -> None:
     assert (ROOT / package / "py.typed").is_file()
 
 
-@pytest.mark.parametrize("name", ["dev.txt", "bench.txt", "docs.txt", "fuzz.txt"])
+@pytest.mark.parametrize("name", ["run.txt", "dev.txt", "bench.txt", "docs.txt", "fuzz.txt"])
 def test_pins_have_hashes_and_no_address(name: str) -> None:
     """Every requirement is one exact version with hashes, and no line names an index or a local path."""
     text = (ROOT / "requirements" / name).read_text(encoding="utf-8")
@@ -86,21 +86,37 @@ def test_pins_have_hashes_and_no_address(name: str) -> None:
 
 
 @pytest.mark.parametrize("markers", MARKERS_OF_LINUX, ids=lambda markers: markers["python_version"])
-def test_pins_satisfy_the_ranges(markers: dict[str, str]) -> None:
+@pytest.mark.parametrize("name", ["run.txt", "dev.txt"])
+def test_pins_satisfy_the_ranges(name: str, markers: dict[str, str]) -> None:
     """For each Python version every dependency, extra and build requirement has exactly one pin, which lies in its range."""
     project = pyproject()["project"]
     extras = project["optional-dependencies"]
-    ranges = [*pyproject()["build-system"]["requires"], *project["dependencies"]]
-    ranges += [*extras["board"], *extras["host"], *extras["dev"]]
+    ranges = [*pyproject()["build-system"]["requires"], *project["dependencies"], *extras["bluetooth"]]
+    ranges += extras["dev"] if name == "dev.txt" else []
     pins: dict[str, str] = {}
-    for pin in map(without_hashes, pinned("dev.txt")):
+    for pin in map(without_hashes, pinned(name)):
         if pin.marker is None or pin.marker.evaluate(markers):
-            name = canonicalize_name(pin.name)
-            assert name not in pins, f"two versions of {name}"
-            pins[name] = next(iter(pin.specifier)).version
+            package = canonicalize_name(pin.name)
+            assert package not in pins, f"two versions of {package}"
+            pins[package] = next(iter(pin.specifier)).version
     for wanted in map(Requirement, ranges):
         version = pins.get(canonicalize_name(wanted.name), "none")
         assert version != "none" and wanted.specifier.contains(version), f"{wanted}: pinned {version}; run make lock"  # noqa: PT018
+
+
+def test_development_only_adds_packages() -> None:
+    """Whoever runs `make demo` first and `make venv` later gets no package replaced: each pin of run.txt is one of dev.txt."""
+    assert set(pinned("run.txt")) < set(pinned("dev.txt"))
+
+
+def test_the_demo_needs_no_development_tools() -> None:
+    """`make demo` installs run.txt alone; it has no test runner, linter or type checker."""
+    names = {without_hashes(line).name for line in pinned("run.txt")}
+    assert names & {Requirement(text).name for text in pyproject()["project"]["optional-dependencies"]["dev"]} == set()
+    done = subprocess.run(
+        ["make", "--dry-run", "--always-make", "demo"], cwd=ROOT, check=True, capture_output=True, text=True
+    )
+    assert [line for line in done.stdout.splitlines() if ".ci/venv" in line] == [".ci/venv run"]
 
 
 @pytest.mark.parametrize("name", ["bench.txt", "docs.txt", "fuzz.txt"])
@@ -115,7 +131,9 @@ def test_other_pins_agree_with_the_rest(name: str) -> None:
 def test_only_one_opencv_is_pinned() -> None:
     """Two OpenCV distributions overwrite each other's files, so exactly one is installed."""
     names = {
-        without_hashes(line).name for name in ("dev.txt", "bench.txt", "docs.txt", "fuzz.txt") for line in pinned(name)
+        without_hashes(line).name
+        for name in ("run.txt", "dev.txt", "bench.txt", "docs.txt", "fuzz.txt")
+        for line in pinned(name)
     }
     assert {name for name in names if "opencv" in name} == {"opencv-python-headless"}
 

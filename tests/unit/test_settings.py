@@ -162,3 +162,18 @@ def test_a_run_is_saved_with_the_origin_of_each_setting(tmp_path: Path) -> None:
         "out": "--out", "save_every": "--save-every", "pairs": "default", "wait": "--wait",
     }  # fmt: skip
     assert json.loads(json.dumps(found))["out"]["value"] == str(tmp_path)
+
+
+def test_a_line_that_is_not_toml_is_shown_without_its_password(tmp_path: Path) -> None:
+    """The error has the line's number and text, as one line of limited length; what stands before an @ in an address is left out."""
+    file = tmp_path / "sample.toml"
+    file.write_text('depth = 2\nname = http://me:secret@phone:8080/video\x07\nlinks = ["a"]\n' + "# end\n" * 3)
+    with pytest.raises(SettingsError) as caught:
+        resolve(Sample, "SAMPLE", file, {})
+    assert "line 2, 'name = http://...@phone:8080/video" in str(caught.value)
+    assert "secret" not in str(caught.value)
+    assert str(caught.value).isprintable()
+    file.write_text("depth = 2\nname = " + "x" * 1000)
+    with pytest.raises(SettingsError) as caught:
+        resolve(Sample, "SAMPLE", file, {})
+    assert len(str(caught.value)) < 300 + len(str(file))

@@ -234,8 +234,25 @@ def test_a_full_disk_is_told_once_and_counted(tmp_path: Path, caplog: pytest.Log
         signal.signal(signal.SIGXFSZ, before)
     assert not sink.complete
     told = [record.getMessage() for record in caplog.records if "results_not_written" in record.getMessage()]
-    assert sorted(text.partition("what=")[2].split()[0] for text in told) == ["lines", "pairs", "report"]
+    assert sorted(text.partition("what=")[2].split()[0] for text in told) == ["lines", "pairs", "report.json"]
     FileSink(tmp_path, 0).close({})  # nobody has it locked any more
+
+
+def test_a_page_that_has_no_room_is_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """If only index.html does not fit, the one line names it, and the run counts as incomplete."""
+    sink = FileSink(tmp_path, 0)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200, hard))
+    try:
+        sink.close({"pairs": 0}, "<p>" * 100)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before)
+    assert not sink.complete
+    assert (tmp_path / "report.json").is_file()
+    (told,) = [record.getMessage() for record in caplog.records if "results_not_written" in record.getMessage()]
+    assert "what=index.html" in told
 
 
 def test_a_folder_that_cannot_be_begun_is_let_go(tmp_path: Path) -> None:

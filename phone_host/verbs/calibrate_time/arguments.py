@@ -3,11 +3,12 @@
 import argparse
 from pathlib import Path
 
+from common.program.quantities import reading, seconds
 from phone_host.camera.examples import EXAMPLE
 
 SUMMARY = "measure the time offset between the two cameras with a screen, a lamp or a moving scene"
 
-EXAMPLES = """  phone-host calibrate-time --pattern pattern.html     (open it full screen in a browser, in view of both cameras)
+EXAMPLES = """  phone-host calibrate-time --pattern pattern.html    # open it full screen in a browser, in view of both cameras
   phone-host calibrate-time --by screen --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
   phone-host calibrate-time --by lamp --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
   phone-host calibrate-time --by scene --frames timing --calibration rig.yaml --out timing
@@ -35,10 +36,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="use the frames that an earlier run kept with --keep, instead of --link and --camera",
     )
-    parser.add_argument("--seconds", type=float, default=20.0, metavar="S", help="seconds to film (default 20)")
+    parser.add_argument(
+        "--seconds", type=reading(seconds, "--seconds"), default=20.0, metavar="S", help="seconds to film (default 20)"
+    )
     parser.add_argument(
         "--wait",
-        type=float,
+        type=reading(seconds, "--wait"),
         metavar="S",
         help="seconds to wait for a board, then exit with code 3 (default: wait for ever)",
     )

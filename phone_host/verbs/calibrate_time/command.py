@@ -8,8 +8,6 @@ from contextlib import suppress
 from typing import Any, TypeVar
 
 import numpy as np
-from rich.console import Console
-from rich.progress import Progress
 
 from common import now
 from common.errors import SettingsError
@@ -35,6 +33,7 @@ from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_yaml import read_rig, write_time_offset
 from phone_host.recording.footage import Footage, film, keep, read
+from phone_host.run.progress_bar import share_bar
 from phone_host.settings import key_folder
 from phone_host.stereo.raw_images import decode_frame
 from phone_host.stereo.rectify import Rectifier
@@ -92,14 +91,6 @@ def _write_pattern(options: argparse.Namespace) -> int:
     return 0
 
 
-def _progress(text: str) -> tuple[Any, Callable[[float], None]]:
-    """Return a progress bar on stderr, shown only in a terminal, and the function that sets its share from 0 to 1."""
-    console = Console(stderr=True)
-    progress = Progress(console=console, transient=True, disable=not console.is_terminal)
-    task = progress.add_task(text, total=1.0)
-    return progress, lambda share: progress.update(task, completed=share)
-
-
 def _footage(options: argparse.Namespace, signals: StopSignals) -> Footage:
     if options.frames is not None:
         return read(options.frames)
@@ -108,9 +99,8 @@ def _footage(options: argparse.Namespace, signals: StopSignals) -> Footage:
     uri = parse_link(options.link or find_board_and_say(keys.path, options.wait), listens_by_default=False)
     tell_insecure(uri)
     links = open_links([uri], keys)
-    progress, advance = _progress("filming")
     wait_ns = None if options.wait is None else round(options.wait * 1e9)
-    with progress:
+    with share_bar("waiting for the board", then="filming") as advance:
         footage = film(links, camera, options.seconds, wait_ns, stop=lambda: signals.stop, advance=advance)
     if options.keep:
         try:
@@ -122,8 +112,9 @@ def _footage(options: argparse.Namespace, signals: StopSignals) -> Footage:
 
 def _measure(by: str, footage: Footage, rig: Rig | None) -> Measured:
     require_shots(len(footage.board), len(footage.host))
-    progress, advance = _progress("measuring")
-    with progress:
+    with share_bar(
+        f"measuring the time offset by the {by}, {len(footage.board) + len(footage.host)} images"
+    ) as advance:
         if by == "scene":
             assert rig is not None
             return measure_shared_motion(

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import shlex
 import sys
 from contextlib import nullcontext
 from pathlib import Path
@@ -11,6 +12,7 @@ from rich.console import Console
 from common.errors import SettingsError, UnavailableError
 from common.program import logs
 from common.program.commandline import INTERRUPTED
+from common.program.invocation import command_line, program_name
 from common.program.settings import with_origins
 from common.program.signals import StopSignals
 from common.program.terminal import columns, fitted
@@ -27,7 +29,7 @@ from phone_host.report.page_links import NextCommand
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
 from phone_host.run.file_sink import NAMES
-from phone_host.run.progress_bar import progress_bar
+from phone_host.run.progress_bar import busy_bar, progress_bar
 from phone_host.run.terminal_view import LiveTable
 from phone_host.scene.film import Film, render_film
 from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
@@ -60,11 +62,12 @@ def run(options: argparse.Namespace) -> int:
                 demo.host.write_report(build(demo.host.snapshot("failed")))
                 raise
         snapshot = demo.host.snapshot("stopped" if signals.stop else "time_over")
-        errors = demo.check(scene)
-        report = build(snapshot) | {"truth": truth_json(errors)}
-        complete = demo.host.write_report(report)
-        demo.write_pictures(out)
-        write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers, _by_hand(out, film)))
+        with busy_bar("comparing the depth with the known scene, writing the page", console):
+            errors = demo.check(scene)
+            report = build(snapshot) | {"truth": truth_json(errors)}
+            complete = demo.host.write_report(report)
+            demo.write_pictures(out)
+            write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers, _by_hand(out, film)))
     except _StoppedError:
         return INTERRUPTED if signals.interrupted else 0
     except OSError as error:
@@ -117,16 +120,15 @@ def _render(scene: Scene, rig: Rig, folder: Path, console: Console, signals: Sto
 
 def _by_hand(out: Path, film: Film) -> tuple[NextCommand, ...]:
     """Return the commands that do the same as the demo, and what comes after it."""
+    board = command_line("board-agent", "run", "--camera", film.replay_uri(film.left))
+    own, rig = film.replay_uri(film.right), out / "rig.yaml"
+    host = command_line("phone-host", "run", "--camera", own, "--calibration", rig, "--out", "scan")
     return (
+        NextCommand("The same by hand: the board, in one terminal", board),
+        NextCommand("and the host, in another one", host),
         NextCommand(
-            "The same by hand: the board, in one terminal", f"board-agent run --camera '{film.replay_uri(film.left)}'"
-        ),
-        NextCommand(
-            "and the host, in another one",
-            f"phone-host run --camera '{film.replay_uri(film.right)}' --calibration {out}/rig.yaml --out scan",
-        ),
-        NextCommand(
-            "Your own two cameras: calibrate them from photographs of a chessboard", "phone-host calibrate --help"
+            "Your own two cameras: calibrate them from photographs of a chessboard",
+            command_line("phone-host", "calibrate", "--help"),
         ),
     )
 
@@ -145,6 +147,19 @@ def _closing(out: Path, film: Film, errors: DepthErrors) -> str:
 look at   {out}/index.html       the scene, its depth and every delay
           {out}/cloud.ply        the point cloud, in any 3D viewer
           {out}/report.json, {out}/delays.jsonl
-try next  {board}
-          {host}
-          (in two terminals: the same, by hand)"""
+try next  the same by hand, in two terminals:
+  {board}
+  {host}
+then what you can do with your own cameras or photographs:
+  {program_name("phone-host")}{_how_found()}"""
+
+
+def _how_found() -> str:
+    """Say how the shell finds the programs by their names, unless it does."""
+    path = program_name("phone-host")
+    activate = Path(shlex.split(path)[0]).parent / "activate"
+    if path == "phone-host" or not activate.is_file():
+        return ""
+    return f"""
+to use phone-host, board-agent and delay-bench by their names, once in each terminal:
+  . {shlex.quote(str(activate))}"""

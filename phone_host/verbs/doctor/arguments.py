@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from common.program.quantities import reading, seconds
+
 SUMMARY = "check this machine, its camera, the board, the calibration and the disk"
 
 EXAMPLES = """  phone-host doctor
@@ -32,5 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="folder for results; the check looks for free space there (default: the current folder)",
     )
     parser.add_argument(
-        "--wait", type=float, default=5.0, metavar="S", help="seconds to wait for the board (default 5)"
+        "--keys", metavar="DIR", help="folder of keys, with which the board is asked (default ~/.config/tandemscan)"
+    )
+    parser.add_argument(
+        "--wait",
+        type=reading(seconds, "--wait"),
+        default=5.0,
+        metavar="S",
+        help="seconds to wait for the board (default 5)",
     )

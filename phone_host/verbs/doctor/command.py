@@ -1,21 +1,28 @@
-"""phone-host doctor: check Python, camera, link, rig and disk."""
+"""phone-host doctor: check settings, Python, camera, link, rig and disk."""
 
 import argparse
 import json
 import math
 
-from common.doctor.finding import exit_code, table, values
+from common.doctor.finding import exit_code, settings_finding, table, values
 from common.errors import SettingsError
 from common.program.terminal import fitted
+from phone_host.declared_settings import PhoneHostSettings
 from phone_host.doctor.host_doctor import Question, examine
-from phone_host.settings import key_folder, resolve_settings
+from phone_host.settings import check, key_folder, resolve_settings
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the checks and print the findings."""
+    """Run the checks and print the findings. If the settings make no sense, that is the first finding, and the machine is checked by itself."""
     if not (math.isfinite(options.wait) and options.wait >= 0):
         raise SettingsError(f"--wait is {options.wait}", "give 0 or more seconds")
-    settings = resolve_settings(options).values
+    settings, wrong = PhoneHostSettings(), None
+    try:
+        resolved = resolve_settings(options).values
+        check(resolved)
+        settings = resolved
+    except SettingsError as error:
+        wrong = error
     question = Question(
         camera=settings.camera,
         links=settings.link,
@@ -24,6 +31,6 @@ def run(options: argparse.Namespace) -> int:
         wait_s=options.wait,
         keys=key_folder(settings.keys),
     )
-    findings = examine(question)
+    findings = [settings_finding(str(options.config or ""), wrong), *examine(question)]
     print(json.dumps(values(findings)) if options.json else fitted(table(findings)))
-    return exit_code(findings)
+    return exit_code(findings, wrong)

@@ -7,8 +7,8 @@ SUMMARY = "list the boards that this host trusts, or change the list or this hos
 
 EXAMPLES = """  phone-host keys
   phone-host keys --forget beaglebone
-  phone-host keys --new                                   (then pair with every board again)
-  phone-host keys --add beaglebone 'tcp://192.168.7.2:5555' 'PUBLIC-KEY'      (as `board-agent keys` shows it)
+  phone-host keys --new    # then pair with every board again
+  phone-host keys --add beaglebone 'tcp://192.168.7.2:5555' 'PUBLIC-KEY'    # as `board-agent keys` shows it
 """
 
 

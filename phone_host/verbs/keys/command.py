@@ -1,6 +1,7 @@
 """phone-host keys: this host's public key and the boards that it knows."""
 
 import argparse
+import sys
 
 from common import now
 from common.errors import SettingsError
@@ -15,6 +16,8 @@ def run(options: argparse.Namespace) -> int:
     if options.add and not address.startswith("tcp://"):
         raise SettingsError(f"{address!r} is not a tcp link", "give tcp://HOST:PORT")
     add = (name, key) if options.add else None
-    change(folder, forget=options.forget, new=options.new, add=add, address=address, when=now.wall_time())
+    told = change(folder, forget=options.forget, new=options.new, add=add, address=address, when=now.wall_time())
     print(listing(folder, as_json=options.json))
+    if told:
+        print(f"phone-host: {told}", file=sys.stderr)
     return 0

@@ -9,8 +9,8 @@ SUMMARY = "make this host and a board known to each other, with the code that th
 
 EXAMPLES = """  phone-host pair
   phone-host pair --link tcp://192.168.7.2:5555
-  phone-host pair --link tcp://raspberrypi.local:5555 --code 123456        (the code that `board-agent pair` shows)
-  sudo phone-host pair --udev                              (names the board on the USB cable: /dev/tandemscan-board)
+  phone-host pair --link tcp://raspberrypi.local:5555 --code 123456    # the code that `board-agent pair` shows
+  sudo phone-host pair --udev    # names the board on the USB cable: /dev/tandemscan-board
 
 `sudo board-agent pair` on the board shows a code of six digits; it stands in no log.
 """

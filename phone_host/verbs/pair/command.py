@@ -12,6 +12,7 @@ from common.keys import KeyFolder
 from common.link.enrolment_door import pairing_address
 from common.link.factory import needs_keys, parse_link
 from common.peers import Peer
+from common.program.invocation import command_line
 from common.protocol.enrolment_code import CODE_DIGITS, read_code
 from phone_host.boards.discovery import find_board_and_say
 from phone_host.boards.enrolment import PairingCall
@@ -34,8 +35,9 @@ def run(options: argparse.Namespace) -> int:
     door = _door(link.address, options.pairing_port)
     board = _paired(keys, door, link.address, options.code)
     known = {"name": board.name, "key": board.key, "link": link.address}
-    run_with = f"phone-host run --link {link.address}" if needs_keys(link) else "phone-host run"
-    print(json.dumps(known) if options.json else f"paired with {board.name}; now: {run_with} --camera ...")
+    to = ("--link", link.address) if needs_keys(link) else ()
+    next_step = command_line("phone-host", "run", *to, "--camera", "v4l2:auto", "--pairs", "100")
+    print(json.dumps(known) if options.json else f"paired with {board.name}; now try\n  {next_step}")
     return 0
 
 
@@ -58,9 +60,8 @@ def _name_device(options: argparse.Namespace) -> int:
             json.dumps({"file": str(RULES), "vendor": board.vendor, "product": board.product, "serial": board.serial})
         )
     else:
-        print(
-            f"written to {RULES}; plug the board in again, then: phone-host run --link serial:/dev/tandemscan-board --camera ..."
-        )
+        next_step = command_line("phone-host", "run", "--link", "serial:/dev/tandemscan-board", "--camera", "v4l2:auto")
+        print(f"written to {RULES}; plug the board in again, then try\n  {next_step}")
     return 0
 
 

@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from common.program.quantities import milliseconds, reading, seconds
 from phone_host.camera.examples import EXAMPLE
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 from phone_host.verbs.stereo_arguments import add_stereo_arguments
@@ -13,8 +14,8 @@ EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:ri
   phone-host run --link ipc://$XDG_RUNTIME_DIR/board --camera 'replay:right?pace=demand' --rectified --disparities 64 --pairs 20 --out scan
   phone-host run --link tcp://192.168.7.2:5555 --camera 'http://127.0.0.1:8080/video?latency_ms=120' --calibration rig.yaml --out scan
   phone-host run --link serial:/dev/ttyACM0 --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --out scan
-  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --align-phase        (both cameras expose together)
-  phone-host run --camera 'replay:right?loop=1' --pairs 300 --json        (no depth: pairs and delays only)
+  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --align-phase    # both cameras expose together
+  phone-host run --camera 'replay:right?loop=1' --pairs 300 --json    # no depth: pairs and delays only
 """
 
 
@@ -37,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--tolerance",
-        type=float,
+        type=reading(milliseconds, "--tolerance"),
         metavar="MS",
         help="greatest difference of the two exposure times in a pair (default: half of the longer frame period)",
     )
@@ -68,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--wait",
-        type=float,
+        type=reading(seconds, "--wait"),
         metavar="S",
         help="seconds to wait for a board, then exit with code 3 (default: wait for ever)",
     )

@@ -9,9 +9,9 @@ from phone_host.verbs.stereo_arguments import add_stereo_arguments
 SUMMARY = "compute disparity and point clouds of pairs of images"
 
 EXAMPLES = """  phone-host stereo left.png right.png --calibration rig.yaml --out scan
-  phone-host stereo left/ right/ --calibration rig.yaml --out scans                  (folders: a folder scans/pair-NNNNNN per pair)
+  phone-host stereo left/ right/ --calibration rig.yaml --out scans    # folders: a folder scans/pair-NNNNNN per pair
   phone-host stereo 'views/left*.jpg' 'views/right*.jpg' --calibration rig.yaml --out scans
-  phone-host stereo im0.png im1.png --rectified --disparities 64 --out scan          (no focal length: no cloud.ply)
+  phone-host stereo im0.png im1.png --rectified --disparities 64 --out scan    # no focal length: no cloud.ply
   phone-host stereo im0.png im1.png --rectified --disparities 80 --focal 994.978 --baseline 193.001 \\
       --doffs 31.086 --center 311.193,254.877 --out scan
 """

@@ -1,0 +1,104 @@
+"""Times, rates and image sizes on the command line, in settings files and in the environment: one way to write each. Pure, light.
+
+A number alone is in the unit that the option's help names, so every script that gives bare numbers stays right. Units are read in upper and
+lower case, with or without a space before them. Lengths: `phone_host/verbs/units.py`.
+"""
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from common.errors import SettingsError
+
+_NUMBER: Final = r"\s*((?:\d{1,12}\.?\d{0,12}|\.\d{1,12})(?:e[+-]?\d{1,2})?)\s*"
+"""Bounded, so that no text takes long to read. No sign: none of these quantities is negative."""
+
+_QUANTITY: Final = re.compile(rf"{_NUMBER}([a-z/]*)\s*", re.ASCII | re.IGNORECASE)
+_SIZE: Final = re.compile(r"\s*(\d{1,5})\s*[x*]\s*(\d{1,5})\s*(?:px)?\s*", re.ASCII | re.IGNORECASE)
+
+_SECONDS: Final = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "sec": 1.0, "min": 60.0, "h": 3600.0}
+_RATES: Final = {"": 1.0, "fps": 1.0, "hz": 1.0, "/s": 1.0}
+
+Reader = Callable[[str], float]
+
+
+def seconds(text: str, option: str) -> float:
+    """Read a time in s: 3, 3s, 500ms or 2min; a number alone means s.
+
+    Args:
+        text: what the user wrote.
+        option: the option, for errors.
+
+    Raises:
+        SettingsError: it is no time.
+    """
+    value_s = _quantity(text, {"": 1.0, **_SECONDS})
+    if math.isnan(value_s):
+        raise SettingsError(f"{option} is {text!r}", "give a time, for example 3, 3s, 500ms or 2min")
+    return value_s
+
+
+def milliseconds(text: str, option: str) -> float:
+    """Read a time in ms: 5, 5ms or 0.005s; a number alone means ms.
+
+    Args:
+        text: what the user wrote.
+        option: the option, for errors.
+
+    Raises:
+        SettingsError: it is no time.
+    """
+    units = {unit: 1000 * value for unit, value in _SECONDS.items()}
+    value_ms = _quantity(text, {"": 1.0, **units})
+    if math.isnan(value_ms):
+        raise SettingsError(f"{option} is {text!r}", "give a time, for example 5, 5ms or 0.005s")
+    return value_ms
+
+
+def frames_per_second(text: str, option: str) -> float:
+    """Read a rate in 1/s: 30, 30fps or 30Hz.
+
+    Args:
+        text: what the user wrote.
+        option: the option, for errors.
+
+    Raises:
+        SettingsError: it is no rate.
+    """
+    rate_hz = _quantity(text, _RATES)
+    if math.isnan(rate_hz):
+        raise SettingsError(f"{option} is {text!r}", "give a rate in frames per second, for example 30 or 30fps")
+    return rate_hz
+
+
+def image_size(text: str, option: str) -> tuple[int, int]:
+    """Read a size: 640x480 or 640X480.
+
+    Args:
+        text: what the user wrote.
+        option: the option, for errors.
+
+    Returns:
+        Width and height, px, both above 0.
+
+    Raises:
+        SettingsError: it is no size.
+    """
+    found = _SIZE.fullmatch(text)
+    size_px = (int(found[1]), int(found[2])) if found else (0, 0)
+    if not all(size_px):
+        raise SettingsError(f"{option} is {text!r}", "give WIDTHxHEIGHT in px, for example 640x480")
+    return size_px
+
+
+def reading(read: Callable[[str, str], float], option: str) -> Reader:
+    """Return a reader for one option: `type=reading(seconds, "--wait")` of argparse."""
+    return lambda text: read(text, option)
+
+
+def _quantity(text: str, units: Mapping[str, float]) -> float:
+    """Return the value in the unit that the factors lead to; NaN if the text is no such quantity."""
+    found = _QUANTITY.fullmatch(text)
+    factor = units.get(found[2].lower(), math.nan) if found else math.nan
+    return float(found[1]) * factor if found else math.nan

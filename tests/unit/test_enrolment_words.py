@@ -1,0 +1,36 @@
+"""What is said when board and host cannot get to know each other leads on."""
+
+import socket
+from pathlib import Path
+
+import pytest
+
+from board_agent.enrolment import absence
+from common.errors import UnavailableError
+from common.keys import SERVICE_FOLDER, KeyFolder
+from phone_host.boards.enrolment import PairingCall
+
+
+def closed_port() -> int:
+    """A port of this machine at which nobody listens."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port: int = server.getsockname()[1]
+        return port
+
+
+def test_on_this_machine_the_host_is_told_that_pairing_may_not_be_needed(tmp_path: Path) -> None:
+    """A board-agent that listens on loopback alone has no door at which to pair: `run` connects as it is."""
+    call = PairingCall(("127.0.0.1", closed_port()), KeyFolder(tmp_path))
+    with pytest.raises(UnavailableError, match="no pairing is needed") as caught, call._line():
+        pass
+    assert "`phone-host run` connects" in caught.value.remedy
+    assert "`sudo board-agent pair`" in caught.value.remedy
+
+
+def test_before_the_set_up_the_board_says_how_to_start(tmp_path: Path) -> None:
+    """With one's own keys, the command that starts an agent; with the service's, where to look. Neither says `sudo` to root."""
+    own, service = absence(KeyFolder(tmp_path)), absence(KeyFolder(SERVICE_FOLDER))
+    assert "board-agent run --camera v4l2:auto --link 'tcp://*:5555'" in own.remedy
+    assert "127.0.0.1" in own.remedy
+    assert "systemctl status board-agent" in service.remedy
+    assert "sudo" not in str(own) + str(service)
