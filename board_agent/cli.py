@@ -9,6 +9,7 @@ from pathlib import Path
 
 from common.camera.options import EXAMPLE
 from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
+from common.program.interrupts import interruptible
 
 _EXAMPLES = """examples:
   board-agent run --camera 'v4l2:/dev/video0?size=640x480&fps=30' --link 'tcp://*:5555'
@@ -47,7 +48,8 @@ def _run(options: argparse.Namespace) -> int:
     finally:
         gc.freeze()
         gc.enable()
-    code: int = verb.run(options)
+    with interruptible():
+        code: int = verb.run(options)
     return code
 
 

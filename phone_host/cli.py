@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
+from common.program.interrupts import interruptible
 from phone_host.verbs.calibrate import arguments as calibrate
 from phone_host.verbs.calibrate_time import arguments as calibrate_time
 from phone_host.verbs.demo import arguments as demo
@@ -43,6 +44,9 @@ _VERBS: Final[dict[str, Arguments]] = {
     "settings": settings,
 }
 
+_NATIVE: Final = frozenset({"calibrate", "stereo"})
+"""Verbs that spend seconds in native code on large images."""
+
 _EXAMPLES = """examples:
   phone-host demo
   phone-host calibrate 'left*.png' 'right*.png' --board 9x6 --square 25mm --out rig.yaml
@@ -69,7 +73,8 @@ def _run(options: argparse.Namespace) -> int:
         parser().print_help()
         return 0
     command = importlib.import_module(f"phone_host.verbs.{options.verb.replace('-', '_')}.command")
-    code: int = command.run(options)
+    with interruptible(native=options.verb in _NATIVE):
+        code: int = command.run(options)
     return code
 
 

@@ -10,12 +10,13 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Final, NoReturn
 
 from common.errors import TandemError
+from common.program import interrupts
 from common.versions import all_versions
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
-INTERRUPTED: Final = 130
+INTERRUPTED: Final = interrupts.INTERRUPTED
 
 _UNAVAILABLE: Final = 3
 

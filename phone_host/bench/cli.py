@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
+from common.program.interrupts import interruptible
 from phone_host.bench.arguments import EXAMPLES, add_arguments
 
 
@@ -37,7 +38,8 @@ def _run(options: argparse.Namespace) -> int:
     command = importlib.import_module(
         "phone_host.bench." + ("profile_list" if options.emulate == "list" else "command")
     )
-    code: int = command.run(options)
+    with interruptible():
+        code: int = command.run(options)
     return code
 
 

@@ -18,6 +18,7 @@ from typing import Final
 
 from common.errors import DataError, UnavailableError
 from common.files import read_file, replacing_in, sync_folder
+from common.unfinished import unfinished
 
 LIST: Final = ".tandemscan"
 
@@ -106,10 +107,11 @@ class ListedFolder:
         os.mkdir(part, dir_fd=self.descriptor)
         folder = os.open(part, _FOLDER, dir_fd=self.descriptor)
         try:
-            yield _way_to(folder, self._path / part)
-            for entry in _entries(folder):
-                _sync_file(entry, folder)
-            os.fsync(folder)
+            with unfinished(lambda: self._remove(part)):
+                yield _way_to(folder, self._path / part)
+                for entry in _entries(folder):
+                    _sync_file(entry, folder)
+                os.fsync(folder)
             os.rename(part, name, src_dir_fd=self.descriptor, dst_dir_fd=self.descriptor)
             sync_folder(self.descriptor)
         except BaseException:
