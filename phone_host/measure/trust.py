@@ -36,6 +36,7 @@ class Doubt(Enum):
     CLOCK_STEPPED = "clock_stepped"
     DISBELIEVED = "disbelieved"
     SPOILED_IMAGES = "spoiled_images"
+    IMAGE_NUMBERS = "image_numbers"
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,8 @@ from typing import Final
 
 from common import now
 from common.camera.base import Camera
+from common.camera.image_numbers import ShowsFiles
+from common.errors import AbsentBoardError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import PairLedger
 from common.link.base import Link
@@ -28,11 +30,13 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
 from phone_host.stream.await_board import BoardPatience
 from phone_host.stream.demand_clock import DemandClock
+from phone_host.stream.one_kind import require_one_kind
 from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.receiver import Receiver
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Alignment, PhaseController, Whose
+from phone_host.sync.stills import Stills
 
 _LOG = logging.getLogger(__name__)
 
@@ -50,6 +54,7 @@ class EndReason(Enum):
 
     PAIRS_REACHED = "pairs_reached"
     STREAM_ENDED = "stream_ended"
+    SECONDS_OVER = "seconds_over"
     STOPPED = "stopped"
 
 
@@ -62,6 +67,7 @@ class HostSettings:
         tolerance_ns: greatest time skew of a pair; None for half of the longer frame period.
         fifo: depth and overflow policy.
         pairs: end after this many processed pairs; 0 for no limit.
+        seconds_ns: end this long after the first pair; 0 for no limit.
         wait_ns: how long to wait for an absent board; None for ever.
         out: folder for results; None to write none.
         save_every: save every Nth pair; 0 for none.
@@ -76,6 +82,7 @@ class HostSettings:
     tolerance_ns: int | None = None
     fifo: FifoSettings = field(default_factory=FifoSettings)
     pairs: int = 0
+    seconds_ns: int = 0
     wait_ns: int | None = None
     out: Path | None = None
     save_every: int = 30
@@ -107,7 +114,8 @@ class Host:
     ) -> None:
         self._settings = settings
         self._own = camera.description
-        demand = DemandClock(self._own.pacing)
+        files = camera if isinstance(camera, ShowsFiles) else None
+        demand = DemandClock(self._own.pacing, None if files is None else Stills(files.images, files.numbers))
         self.started_ns = now.monotonic_ns()
         self._motion = MotionMeter()
         self._files = FileSink(
@@ -123,8 +131,9 @@ class Host:
             self._own.period_ns,
             demand=demand,
             time_offset_ns=settings.time_offset.offset_ns,
+            own_images=None if files is None else files.images,
         )
-        self._camera = OwnCamera(camera, self._queue.add_host, demand)
+        self._camera = OwnCamera(camera, self._queue.add_host, demand, self._queue.own_image_missing)
         self._receiver = Receiver(links, now.random_id(), self._queue)
         interpolator = Interpolator() if settings.interpolate else None
         pipeline = Pipeline(core, settings.board_side, now.monotonic_ns, interpolator, settings.most_pixels)
@@ -308,10 +317,15 @@ class Host:
                 return EndReason.STOPPED
             present = self._receiver.connected or self._receiver.ended
             patience.look(now_ns, self._receiver.refused, present=present)
+            self._check_kinds()
+            if self._is_time_over(now_ns):
+                return self._drain(stop, watch, EndReason.SECONDS_OVER)
             if self._receiver.ended or self._camera.ended:
                 ending_since_ns = now_ns if ending_since_ns is None else ending_since_ns
                 if self._all_paired() or now_ns - ending_since_ns > _LAST_PARTNER_NS:
-                    return self._drain(stop, watch)
+                    if self._receiver.ended:
+                        self._queue.board_ended()
+                    return self._drain(stop, watch, EndReason.STREAM_ENDED)
         self._raise_failures()
         return EndReason.PAIRS_REACHED
 
@@ -335,7 +349,32 @@ class Host:
         if alignment.state is not state or correction is not None:
             _LOG.info(event("phase", state=alignment.state.value, words=alignment.words))
 
-    def _drain(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
+    def _check_kinds(self) -> None:
+        """Refuse a board that shows stills beside a camera with a clock, or the reverse.
+
+        Only the first board is a mistake of the user's. Frames of a later one with another kind of camera are refused
+        by the pair queue, because a board must not be able to end a run.
+
+        Raises:
+            SettingsError: the two kinds are mixed.
+            AbsentBoardError: this machine's camera has shown its last image before a board came.
+        """
+        hello = self._receiver.hello
+        if hello is not None:
+            if len(self._receiver.account.sessions) == 1:
+                require_one_kind(self._own, hello.camera)
+        elif self._camera.ended:
+            raise AbsentBoardError(
+                "no board came before this machine's camera had shown its last image",
+                "start board-agent first, or give loop=1 in --camera",
+            )
+
+    def _is_time_over(self, now_ns: int) -> bool:
+        """Whether the time given for the run has passed since its first pair."""
+        begun_ns, limit_ns = self._ledgerer.first_done_ns, self._settings.seconds_ns
+        return bool(limit_ns and begun_ns) and now_ns - begun_ns >= limit_ns
+
+    def _drain(self, stop: Callable[[], bool], watch: Callable[[], None] | None, ended: EndReason) -> EndReason:
         """Let the worker finish the waiting pairs. No frame will follow."""
         self._queue.finish()
         while not self._worker.has_ended(_STEP_S):
@@ -345,7 +384,7 @@ class Host:
                 return EndReason.STOPPED
         self._raise_failures()
         reached = self._settings.pairs and self._ledgerer.processed >= self._settings.pairs
-        return EndReason.PAIRS_REACHED if reached else EndReason.STREAM_ENDED
+        return EndReason.PAIRS_REACHED if reached else ended
 
     def _all_paired(self) -> bool:
         counts = self._queue.counts

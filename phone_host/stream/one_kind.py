@@ -1,0 +1,31 @@
+"""Stills and films do not mix: one shows an image on demand, the other by its clock. Pure."""
+
+from common.camera.image_numbers import plain_camera
+from common.errors import SettingsError
+from common.protocol.message import CameraDescription, Pacing
+
+_STILLS = "photographs: give both sides a folder, and leave fps=, loop=, phase_ms= and pace=clock out on both"
+_FILM = "a film or a camera: give fps= (or loop=1) on every replay: that side"
+
+
+def require_one_kind(own: CameraDescription, board: CameraDescription) -> None:
+    """Refuse stills on one side beside a camera with a clock on the other: nothing says which images belong together.
+
+    Args:
+        own: this machine's camera.
+        board: the board's camera.
+
+    Raises:
+        SettingsError: one of the two shows images on demand, the other by its clock.
+    """
+    if own.pacing is board.pacing:
+        return
+    names = f"the board's camera ({_address(board)})", f"this machine's ({_address(own)})"
+    stills, film = names if board.pacing is Pacing.DEMAND else names[::-1]
+    raise SettingsError(f"{stills} shows stills, {film} keeps a clock", f"for {_STILLS}; for {_FILM}")
+
+
+def _address(camera: CameraDescription) -> str:
+    """Return what a camera's address begins with, as far as its description tells."""
+    kind, space, rest = plain_camera(camera.name).partition(" ")
+    return f"{kind}:{rest}" if kind == "replay" and space else camera.name
