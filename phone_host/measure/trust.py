@@ -37,6 +37,7 @@ class Doubt(Enum):
     DISBELIEVED = "disbelieved"
     SPOILED_IMAGES = "spoiled_images"
     IMAGE_NUMBERS = "image_numbers"
+    NO_WHOLE_IMAGE = "no_whole_image"
 
 
 @dataclass(frozen=True, slots=True)

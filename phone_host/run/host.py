@@ -17,6 +17,7 @@ from common.ledger import PairLedger
 from common.link.base import Link
 from common.program.logs import event
 from common.protocol.message import Pacing, Steering
+from phone_host.measure.absence import away_of
 from phone_host.measure.image_motion import MotionMeter
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.trust import Doubt
@@ -137,7 +138,7 @@ class Host:
         self._receiver = Receiver(links, now.random_id(), self._queue)
         interpolator = Interpolator() if settings.interpolate else None
         pipeline = Pipeline(core, settings.board_side, now.monotonic_ns, interpolator, settings.most_pixels)
-        self._ledgerer = Ledgerer()
+        self._ledgerer = Ledgerer(self._receiver.account.was_away, lambda: demand.is_timeless)
         self._worker = Worker(
             self._queue,
             pipeline,
@@ -150,6 +151,7 @@ class Host:
         self._trust_due_ns = 0
         self._controller: PhaseController | None = None
         self._steered_session = ""
+        self._ended_ns = 0
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
         """Run until the number of pairs is reached, a stream ends or `stop` returns True.
@@ -183,6 +185,7 @@ class Host:
         Raises:
             Exception: the failure; the last one if there are several.
         """
+        self._ended_ns = now.monotonic_ns()
         self._worker.finished.set()
         with ExitStack() as ending:  # callbacks run in reverse order
             ending.callback(self._raise_failures)
@@ -240,7 +243,7 @@ class Host:
             ended=ended,
             processed=books.processed,
             undecodable=books.undecodable,
-            seconds=(books.last_done_ns - books.first_done_ns) / 1e9,
+            seconds=(books.last_done_ns - books.first_done_ns - books.gap_ns) / 1e9,
             delays=books.delays,
             counts=self._queue.counts,
             link=receiver.account.copy(),
@@ -258,12 +261,17 @@ class Host:
             alignment=self._alignment,
             camera=self._camera.health,
             period_ns=self._period_ns,
-            motion_px_s=self._motion.px_s,
+            motion_px_s=float("nan") if self._queue.is_timeless else self._motion.px_s,
             width_px=self._motion.width_px,
             interpolated=self._settings.interpolate,
             spoiled_images=books.spoiled_images,
             stamps_exact=self._stamps_are_exact,
             judged_pairs=_RECENT if ended == "running" else None,
+            timeless=self._queue.is_timeless,
+            replayed=self._queue.images,
+            away=away_of(receiver.account.absences, self.started_ns, self._ended_ns or now.monotonic_ns()),
+            gaps=books.gaps,
+            gap_s=books.gap_ns / 1e9,
         )
 
     @property
