@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 from common.camera.base import CameraHealth
 from common.frame import NOT_AS_SAID
@@ -107,6 +108,10 @@ class RunSnapshot:
             own=self.spoiled,
             decoded=sum(count for _, count in self.spoiled_images),
         )
+
+
+TIMELESS: Final = "images shown on demand have no moment of exposure: their stamps only count them"
+"""Why a run of stills has no figures that start at an exposure."""
 
 
 def figures(run: RunSnapshot) -> RunFigures:

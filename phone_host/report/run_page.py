@@ -8,9 +8,10 @@ import numpy as np
 from common import now
 from common.camera.base import CameraHealth
 from common.ledger import PairLedger
+from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import rung_lines
 from phone_host.measure.regime import Judgement, Regime, judge
-from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
+from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures
 from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
 from phone_host.model import Image, Processed, Side
@@ -41,7 +42,7 @@ def run_page(run: RunSnapshot, last: Processed | None, board_side: Side, ledgers
             sentence=sentence,
             figures=_figures(run) if run.processed else (),
             pictures=pictures(last, board_side),
-            delays=delay_series(ledgers),
+            delays=delay_series(ledgers, timeless=run.timeless),
             tables=(*links_tables(run), unused_table(run), camera_table(run.camera)),
             notes=notes(run),
         )
@@ -53,6 +54,8 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
     judgement = judge(figures(run))
     return (
         f"Queue: {judgement.sentence}.",
+        *([f"{away[:1].upper()}{away[1:]}."] if (away := away_words(run.away)) else []),
+        *([f"Not measured: when results were exposed: {TIMELESS}."] if run.timeless else []),
         *(f"What would help: {remedy}." for remedy in judgement.remedies),
         *(f"Warning: {item.sentence}. Remedy: {item.remedy}." for item in concerns(run)),
         *phase_lines(run.phase, run.alignment),
@@ -67,7 +70,8 @@ def links_tables(run: RunSnapshot) -> tuple[Table, ...]:
     rows = []
     for tally in run.link.links:
         age = tally.age.spread()
-        ages = f"{age.p50_ns / 1e6:.1f} ms; {age.p95_ns / 1e6:.1f} ms" if age.count else "-"
+        known = age.count and not run.timeless
+        ages = f"{age.p50_ns / 1e6:.1f} ms; {age.p95_ns / 1e6:.1f} ms" if known else "-"
         rows.append((tally.name, str(tally.frames), str(tally.carried), str(tally.lost), ages))
     title = f"Links: the stream changed links {run.link.switches} times"
     columns = ("link", "frames", "times it took over", "times it was lost", "age of frames on arrival: median; p95")
@@ -103,6 +107,8 @@ def _verdict(run: RunSnapshot, judgement: Judgement, found: Sequence[Concern]) -
 
 
 def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
+    if run.timeless:
+        return (rate_figure(run), clock_figure(run))
     skew = run.delays.spread("time_skew")
     return (
         rate_figure(run),
