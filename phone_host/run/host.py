@@ -16,14 +16,16 @@ from common.imagesize.head import MOST_PIXELS
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.program.logs import event
-from common.protocol.message import Pacing, Steering
+from common.protocol.message import Pacing
 from phone_host.measure.absence import away_of
 from phone_host.measure.image_motion import MotionMeter
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
+from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed, Result, Side, TimeOffset
 from phone_host.run.file_sink import FileSink
 from phone_host.run.ledgerer import Ledgerer
+from phone_host.run.phase_steering import PhaseSteering
 from phone_host.run.pipeline import Pipeline
 from phone_host.run.sinks import FunctionSink, Sink
 from phone_host.run.worker import Worker
@@ -36,12 +38,13 @@ from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.receiver import Receiver
 from phone_host.sync.fifo import FifoSettings
-from phone_host.sync.phase import Alignment, PhaseController, Whose
+from phone_host.sync.phase import Whose
 from phone_host.sync.stills import Stills
 
 _LOG = logging.getLogger(__name__)
 
 _STEP_S: Final = 0.05
+_MOTION: Final = "motion"
 _LAST_PARTNER_NS: Final = 1_000_000_000
 """After one stream has ended, the other gets this long to deliver the last partners."""
 
@@ -125,7 +128,7 @@ class Host:
             waits=bool(settings.pairs) or demand.paces_own_camera,
             settings=settings.resolved,
         )
-        self._sinks: tuple[Sink, ...] = (self._files, FunctionSink("motion", self._measure_motion), *sinks)
+        self._sinks: tuple[Sink, ...] = (self._files, FunctionSink(_MOTION, self._measure_motion), *sinks)
         self._queue = PairQueue(
             settings.fifo,
             settings.tolerance_ns,
@@ -149,8 +152,7 @@ class Host:
         )
         self._known_doubts: frozenset[Doubt] = frozenset()
         self._trust_due_ns = 0
-        self._controller: PhaseController | None = None
-        self._steered_session = ""
+        self._steering = PhaseSteering(settings.steered, self._receiver, self._camera, self._queue)
         self._ended_ns = 0
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
@@ -251,14 +253,14 @@ class Host:
             estimate=receiver.estimate,
             tolerance_ns=self._queue.tolerance_ns,
             fifo=self._settings.fifo,
-            sinks=tuple(account for sink in self._sinks for account in sink.accounts),
+            sinks=tuple(account for sink in self._sinks for account in sink.accounts if not self._is_unneeded(account)),
             unwritten=self._files.unwritten,
             spoiled=self._camera.spoiled,
             skipped=self._camera.skipped,
             own_future=self._camera.from_the_future,
             time_offset=self._settings.time_offset,
             phase=self._queue.phase,
-            alignment=self._alignment,
+            alignment=self._steering.alignment,
             camera=self._camera.health,
             period_ns=self._period_ns,
             motion_px_s=float("nan") if self._queue.is_timeless else self._motion.px_s,
@@ -274,10 +276,9 @@ class Host:
             gap_s=books.gap_ns / 1e9,
         )
 
-    @property
-    def _alignment(self) -> Alignment | None:
-        """The state of the phase alignment; None if no camera is being steered."""
-        return None if self._controller is None else self._controller.alignment
+    def _is_unneeded(self, account: SinkAccount) -> bool:
+        """Whether nobody waits for a sink's results: stills do not move, so what was not measured is no loss."""
+        return self._queue.is_timeless and account.name == _MOTION
 
     @property
     def _stamps_are_exact(self) -> bool:
@@ -317,7 +318,8 @@ class Host:
         while not self._worker.finished.wait(_STEP_S):
             now_ns = now.monotonic_ns()
             self._raise_failures()
-            self._align(now_ns)
+            self._check_kinds()
+            self._steering.update(now_ns)
             self._watch_trust(now_ns)
             if watch is not None:
                 watch()
@@ -325,7 +327,6 @@ class Host:
                 return EndReason.STOPPED
             present = self._receiver.connected or self._receiver.ended
             patience.look(now_ns, self._receiver.refused, present=present)
-            self._check_kinds()
             if self._is_time_over(now_ns):
                 return self._drain(stop, watch, EndReason.SECONDS_OVER)
             if self._receiver.ended or self._camera.ended:
@@ -336,26 +337,6 @@ class Host:
                     return self._drain(stop, watch, EndReason.STREAM_ENDED)
         self._raise_failures()
         return EndReason.PAIRS_REACHED
-
-    def _align(self, now_ns: int) -> None:
-        """Steer a camera if that was asked for and is due. A new board session starts the alignment anew."""
-        hello = self._receiver.hello
-        if not self._settings.steered or hello is None or not self._receiver.connected:
-            return
-        if self._controller is None or hello.session != self._steered_session:
-            self._steered_session = hello.session
-            ways = (Whose.BOARD, hello.camera.steering), (Whose.HOST, self._camera.steering)
-            board, own = (way if whose in self._settings.steered else Steering.NONE for whose, way in ways)
-            self._controller = PhaseController(board, own, has_phase=self._queue.has_phase)
-        state = self._controller.alignment.state
-        correction = self._controller.update(now_ns, self._queue.phase)
-        if correction is not None:
-            steer = self._receiver.steer if correction.whose is Whose.BOARD else self._camera.steer
-            steer(correction.later_ns)
-            self._queue.restart_phase()
-        alignment = self._controller.alignment
-        if alignment.state is not state or correction is not None:
-            _LOG.info(event("phase", state=alignment.state.value, words=alignment.words))
 
     def _check_kinds(self) -> None:
         """Refuse a board that shows stills beside a camera with a clock, or the reverse.

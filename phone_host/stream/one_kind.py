@@ -1,11 +1,13 @@
-"""Stills and films do not mix: one shows an image on demand, the other by its clock. Pure."""
+"""Stills and films do not mix: one shows an image on demand, the other by its clock."""
 
 from common.camera.image_numbers import plain_camera
 from common.errors import SettingsError
 from common.protocol.message import CameraDescription, Pacing
 
-_STILLS = "photographs: give both sides a folder, and leave fps=, loop=, phase_ms= and pace=clock out on both"
-_FILM = "a film or a camera: give fps= (or loop=1) on every replay: that side"
+_REMEDY = (
+    "for photographs, leave fps=, loop=, phase_ms= and pace=clock out on both sides; for a film or a live camera, give fps="
+    " or loop=1 on the side that shows stills"
+)
 
 
 def require_one_kind(own: CameraDescription, board: CameraDescription) -> None:
@@ -20,9 +22,9 @@ def require_one_kind(own: CameraDescription, board: CameraDescription) -> None:
     """
     if own.pacing is board.pacing:
         return
-    names = f"the board's camera ({_address(board)})", f"this machine's ({_address(own)})"
+    names = f"the board's camera {_address(board)}", f"this machine's camera {_address(own)}"
     stills, film = names if board.pacing is Pacing.DEMAND else names[::-1]
-    raise SettingsError(f"{stills} shows stills, {film} keeps a clock", f"for {_STILLS}; for {_FILM}")
+    raise SettingsError(f"{stills} shows stills, {film} keeps a clock", _REMEDY)
 
 
 def _address(camera: CameraDescription) -> str:

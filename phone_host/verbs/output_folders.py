@@ -15,7 +15,13 @@ REPORT: Final = "report.json"
 _MOST_REPORT_BYTES: Final = 16 << 20
 """A longer file is no report of ours."""
 
-_OWN_KEYS: Final = (("truth", "demo"), ("ended", "run"), ("verdict", "calibrate"), ("matcher", "stereo"))
+_OWN_KEYS: Final = (
+    ("truth", "demo"),
+    ("ended", "run"),
+    ("verdict", "calibrate"),
+    ("time_offset_ns", "calibrate-time"),
+    ("matcher", "stereo"),
+)
 """A key that only this verb's report has, or only with one of those before it."""
 
 
