@@ -64,8 +64,8 @@ def away_words(away: Sequence[Away]) -> str:
     """Say how often, when and how long the board was away; empty if it was always there."""
     if not away:
         return ""
-    each = [f"{item.seconds:.1f} s at {item.at_s:.0f} s" for item in away[:_MOST_TOLD]]
-    more = f" and {len(away) - _MOST_TOLD} more" if len(away) > _MOST_TOLD else ""
+    each = [f"for {item.seconds:.1f} s from {item.at_s:.0f} s on" for item in away[:_MOST_TOLD]]
+    more = f" and {len(away) - _MOST_TOLD} times more" if len(away) > _MOST_TOLD else ""
     often = "once" if len(away) == 1 else f"{len(away)} times"
     back = "and came back" if away[-1].is_over else "and has not come back"
-    return f"the board went away {often} {back}: for {', '.join(each)}{more} of the run; this time is not counted"
+    return f"the board went away {often} {back} ({', '.join(each)}{more}); rates leave this time out"

@@ -39,7 +39,7 @@ def run_page(run: RunSnapshot, last: Processed | None, board_side: Side, ledgers
             title="tandemscan run",
             subtitle=f"ended: {run.ended.replace('_', ' ')}; {now.wall_time()}",
             verdict=verdict,
-            sentence=sentence,
+            sentence=with_absences(sentence, run),
             figures=_figures(run) if run.processed else (),
             pictures=pictures(last, board_side),
             delays=delay_series(ledgers, timeless=run.timeless),
@@ -49,12 +49,17 @@ def run_page(run: RunSnapshot, last: Processed | None, board_side: Side, ledgers
     )
 
 
+def with_absences(sentence: str, run: RunSnapshot) -> str:
+    """Return a headline that also says when the board was away."""
+    away = away_words(run.away)
+    return f"{sentence} {away[:1].upper()}{away[1:]}." if away else sentence
+
+
 def notes(run: RunSnapshot) -> tuple[str, ...]:
     """Say who waits for whom and what would help, what makes depth wrong, and how the cameras' exposures relate in time."""
     judgement = judge(figures(run))
     return (
         f"Queue: {judgement.sentence}.",
-        *([f"{away[:1].upper()}{away[1:]}."] if (away := away_words(run.away)) else []),
         *([f"Not measured: when results were exposed: {TIMELESS}."] if run.timeless else []),
         *(f"What would help: {remedy}." for remedy in judgement.remedies),
         *(f"Warning: {item.sentence}. Remedy: {item.remedy}." for item in concerns(run)),

@@ -48,6 +48,9 @@ _MOTION: Final = "motion"
 _LAST_PARTNER_NS: Final = 1_000_000_000
 """After one stream has ended, the other gets this long to deliver the last partners."""
 
+_FIRST_PAIR_NS: Final = 10_000_000_000
+"""A limited run allows this much for the first pair: learning the clock takes a second, the first use of OpenCV another."""
+
 _TRUST_NS: Final = 1_000_000_000
 _RECENT: Final = 60
 """Once a second the latest 60 pairs are judged: two seconds at 30 pairs per second."""
@@ -153,7 +156,7 @@ class Host:
         self._known_doubts: frozenset[Doubt] = frozenset()
         self._trust_due_ns = 0
         self._steering = PhaseSteering(settings.steered, self._receiver, self._camera, self._queue)
-        self._ended_ns = 0
+        self._ended_ns = self._met_ns = 0
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
         """Run until the number of pairs is reached, a stream ends or `stop` returns True.
@@ -359,8 +362,12 @@ class Host:
             )
 
     def _is_time_over(self, now_ns: int) -> bool:
-        """Whether the time given for the run has passed since its first pair."""
-        begun_ns, limit_ns = self._ledgerer.first_done_ns, self._settings.seconds_ns
+        """Whether the time given for the run has passed since its first pair, or no pair came for long after the board had."""
+        limit_ns, begun_ns = self._settings.seconds_ns, self._ledgerer.first_done_ns
+        if not self._met_ns and self._receiver.hello is not None:
+            self._met_ns = now_ns
+        if not begun_ns and self._met_ns:
+            begun_ns = self._met_ns + _FIRST_PAIR_NS
         return bool(limit_ns and begun_ns) and now_ns - begun_ns >= limit_ns
 
     def _drain(self, stop: Callable[[], bool], watch: Callable[[], None] | None, ended: EndReason) -> EndReason:

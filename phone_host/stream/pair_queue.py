@@ -22,7 +22,7 @@ from phone_host.sync.fifo import Fifo, FifoSettings, Overflow
 from phone_host.sync.pairing import BoardOrphan, HostOrphan, OrphanReason, Outcome, Paired, Pairing, PairingSettings
 from phone_host.sync.phase import Phase, PhaseMeter
 from phone_host.sync.quarantine import Disbelief
-from phone_host.sync.stills import PairedBy, StillsPairing
+from phone_host.sync.stills import PairedBy, PassedOver, StillsPairing
 
 _SIDE_BYTES: Final = 64 * 1024 * 1024
 """Memory limit of each side's held frames, still encoded: 40 s of 50 KB JPEGs at 30 fps, more than any link's delay."""
@@ -259,13 +259,14 @@ class PairQueue:
             self._board_alone += 1
             self._count(self._board_orphans, OrphanReason.NO_SUCH_NUMBER.value)
 
-    def _pass_over(self, images: int) -> None:
-        """Count images of this machine of whose number the board has none. They are never shown."""
-        if images:
-            with self._changed:
-                self._host_frames += images
-                self._own_alone += images
-                self._count(self._host_orphans, OrphanReason.NO_SUCH_NUMBER.value, images)
+    def _pass_over(self, passed: PassedOver) -> None:
+        """Count images of this machine that are never shown, because no board image of their number came."""
+        with self._changed:
+            self._host_frames += passed.alone + passed.unsent
+            self._own_alone += passed.alone
+            for reason, images in (OrphanReason.NO_SUCH_NUMBER, passed.alone), (OrphanReason.NO_PARTNER, passed.unsent):
+                if images:
+                    self._count(self._host_orphans, reason.value, images)
 
     def own_image_missing(self) -> None:
         """The image that the host camera was asked for is spoiled. Its board frame finds no other partner."""

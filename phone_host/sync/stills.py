@@ -32,16 +32,29 @@ class PairedBy(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class PassedOver:
+    """Own images that stay without a partner, because later ones were asked for, or none.
+
+    Attributes:
+        alone: the board has no image of their number.
+        unsent: the board has one but did not send it, or it was lost on the link.
+    """
+
+    alone: int = 0
+    unsent: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Wanted:
     """The partner of a board image.
 
     Attributes:
         index: index of the own image to show, over all laps; None: there is no image of that number.
-        passed: own images that now stay without a partner, because their numbers were left out.
+        passed: own images that now stay without a partner.
     """
 
     index: int | None
-    passed: int = 0
+    passed: PassedOver = PassedOver()
 
 
 class Stills:
@@ -70,9 +83,9 @@ class Stills:
         return PairedBy.ORDER if by_order else PairedBy.NUMBER
 
     @property
-    def unshown(self) -> int:
-        """Own images that were not asked for yet; 0 if they are shown again and again."""
-        return 0 if self.own.looped else max(0, self.own.count - self._next)
+    def unshown(self) -> PassedOver:
+        """Own images that were not asked for yet; none if they are shown again and again."""
+        return self._passed_before(self.own.count)
 
     def begin(self, board: ImageNumbers | None, period_ns: int) -> None:
         """Begin a board session.
@@ -98,9 +111,25 @@ class Stills:
         index = self._index(sequence, label_ns)
         if index is None:
             return Wanted(None)
-        passed = max(0, min(index, self.own.count) - self._next) if not self.own.looped else 0
+        passed = self._passed_before(min(index, self.own.count))
         self._next = max(self._next, index + 1)
         return Wanted(index, passed)
+
+    def _passed_before(self, index: int) -> PassedOver:
+        """Return what was passed over since the last image that was asked for, up to an index."""
+        if self.own.looped or index <= self._next:
+            return PassedOver()
+        alone = sum(not self._board_has(position) for position in range(self._next, index))
+        return PassedOver(alone, index - self._next - alone)
+
+    def _board_has(self, position: int) -> bool:
+        """Whether the board has told of a partner for an own image. Of numbers with gaps it tells only the ends."""
+        board = self.board
+        if board is None or self.paired_by is PairedBy.ORDER:
+            return board is None or position < board.count
+        assert board.first is not None
+        assert board.last is not None
+        return not board.has_gaps and board.first <= self._numbers[position] <= board.last
 
     def number_of(self, sequence: int, label_ns: int) -> tuple[int, int]:
         """Return the lap and the number of a board frame. Only for images paired by number."""

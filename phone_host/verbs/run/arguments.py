@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="S",
-        help="end S seconds after the first pair (default: no limit)",
+        help="end S seconds after the first pair; exit with code 4 if none comes within 10 seconds more (default: no limit)",
     )
     parser.add_argument(
         "--wait",

@@ -90,6 +90,7 @@ def run(options: argparse.Namespace) -> int:
     if signals.interrupted:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
+    too_few = too_few or (ended is EndReason.SECONDS_OVER and not snapshot.processed)
     nothing_whole = not signals.stop and snapshot.spoiled_counts.nothing_whole
     return _CHECK_FAILED if too_few or nothing_whole or not complete else 0
 
