@@ -14,7 +14,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Final
+from typing import Final, NoReturn
 
 INTERRUPTED: Final = 130
 """128 + SIGINT, as shells report it."""
@@ -53,6 +53,15 @@ def interruptible(*, native: bool = False) -> Iterator[None]:
         signal.signal(signal.SIGINT, signal.SIG_IGN if handler is _leave else handler)
 
 
+def leave() -> NoReturn:
+    """End this process now with 130 and one line. What it had begun to write is removed."""
+    from common.unfinished import remove_unfinished  # noqa: PLC0415 - a start does not pay for it
+
+    remove_unfinished()
+    os.write(2, b"interrupted\n")
+    os._exit(INTERRUPTED)
+
+
 def _leave(number: int, frame: FrameType | None) -> None:
     del number, frame
     os.write(2, b"interrupted\n")
@@ -85,7 +94,4 @@ class _Watcher:
                 break
         if not number or self._stopped.wait(_GRACE_S):
             return
-        from common.unfinished import remove_unfinished  # noqa: PLC0415 - a start does not pay for it
-
-        remove_unfinished()
-        _leave(signal.SIGINT, None)
+        leave()

@@ -48,6 +48,9 @@ _MOTION: Final = "motion"
 _LAST_PARTNER_NS: Final = 1_000_000_000
 """After one stream has ended, the other gets this long to deliver the last partners."""
 
+_STOP_S: Final = 0.4
+"""A stopped run gives its current pair this long: Ctrl-C ends within a second, and the goodbye takes 0.3 s of it."""
+
 _FIRST_PAIR_NS: Final = 10_000_000_000
 """A limited run allows this much for the first pair: learning the clock takes a second, the first use of OpenCV another."""
 
@@ -179,13 +182,21 @@ class Host:
             ended = self._watch(stop, watch)
         except BaseException:
             with suppress(Exception):  # report what ended the run, not its consequences
-                self._end()
+                self._end(_STOP_S)
             raise
-        self._end()
+        self._end(_STOP_S if ended is EndReason.STOPPED else None)
         return ended
 
-    def _end(self) -> None:
+    @property
+    def has_given_up(self) -> bool:
+        """Whether native code still computes a pair that nobody waits for. The process may have to end without it."""
+        return self._worker.has_given_up
+
+    def _end(self, patience_s: float | None) -> None:
         """Finish the current pair but not the waiting ones, and let the sinks finish. No failure skips a later step.
+
+        Args:
+            patience_s: give the current pair up after this time; None: wait for it.
 
         Raises:
             Exception: the failure; the last one if there are several.
@@ -197,7 +208,7 @@ class Host:
             for sink in reversed(self._sinks):
                 ending.callback(sink.finish)
             ending.callback(self._receiver.stop)  # after the worker, because the worker wakes the receiver
-            ending.callback(self._worker.stop)
+            ending.callback(self._worker.stop, patience_s)
             ending.callback(self._queue.finish)
             ending.callback(self._camera.stop)
 

@@ -13,6 +13,7 @@ from common.errors import SettingsError
 from common.link.factory import open_links, parse_link, tell_insecure
 from common.program import logs
 from common.program.commandline import INTERRUPTED
+from common.program.interrupts import leave
 from common.program.settings import Resolved, log_level, with_origins
 from common.program.signals import StopSignals
 from common.stamp import HOST_CLOCK
@@ -86,7 +87,9 @@ def run(options: argparse.Namespace) -> int:
     report = build(snapshot)
     page = run_page(snapshot, host.last, board_side, host.sample()) if options.out else ""
     complete = host.write_report(report, page)
-    print(json.dumps(report) if options.json else summary(snapshot))
+    print(json.dumps(report) if options.json else summary(snapshot), flush=host.has_given_up)
+    if signals.interrupted and host.has_given_up:
+        leave()  # the interpreter's end would wait for native code
     if signals.interrupted:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
