@@ -12,7 +12,7 @@ from board_agent.rate_control import RateControl
 from board_agent.sd_notify import Notifier
 from board_agent.status import StatusLine
 from common import now
-from common.camera.base import Camera, CameraHealth, Ended, Skipped, Spoiled, held_locks, lockable
+from common.camera.base import Camera, CameraHealth, CameraState, Ended, Skipped, Spoiled, held_locks, lockable
 from common.camera.factory import open_camera
 from common.errors import ProtocolError, UnavailableError
 from common.frame import Frame
@@ -115,9 +115,13 @@ class Service:
     notifier: Notifier
     status: StatusLine
 
-    def alive(self, now_ns: int, counts: BoardCounts, session: BoardSession, rung: Rung | None) -> None:
+    def alive(
+        self, now_ns: int, counts: BoardCounts, session: BoardSession, rung: Rung | None, camera: CameraState
+    ) -> None:
         """Report that the loop is running, if a report is due."""
-        text = self.status.text(now_ns, counts, has_host=session.has_host, carrier=session.carrier, rung=rung)
+        text = self.status.text(
+            now_ns, counts, has_host=session.has_host, carrier=session.carrier, rung=rung, camera=camera
+        )
         self.notifier.alive(now_ns, text)
 
 
@@ -202,7 +206,7 @@ class Agent:
             self._watch_host(now_ns)
             if self._service is not None and self._service.notifier.due(now_ns):
                 rung = None if self._control is None else self._control.rung
-                self._service.alive(now_ns, self._outbox.counts, self._session, rung)
+                self._service.alive(now_ns, self._outbox.counts, self._session, rung, self._camera.health.state)
         if self._camera_ended and not self._stopping:
             self._drain()
         self._outbox.discard(DropReason.STOPPED)

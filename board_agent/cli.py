@@ -10,6 +10,7 @@ from pathlib import Path
 from board_agent import examples
 from common.camera.options import EXAMPLE
 from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
+from common.program.interrupts import interruptible
 from common.program.invocation import as_found
 from common.program.quantities import frames_per_second, reading, seconds
 
@@ -37,7 +38,8 @@ def _run(options: argparse.Namespace) -> int:
     finally:
         gc.freeze()
         gc.enable()
-    code: int = verb.run(options)
+    with interruptible():
+        code: int = verb.run(options)
     return code
 
 

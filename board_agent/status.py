@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from common.camera.base import CameraState
 from common.protocol.message import BoardCounts, Pacing, Rung
 
 _SILENT_NS: Final = 3_000_000_000
@@ -33,6 +34,7 @@ class StatusLine:
         has_host: bool,
         carrier: int | None = None,
         rung: Rung | None = None,
+        camera: CameraState = CameraState.RUNNING,
     ) -> str:
         """Return the line. Its rate is the mean since the last call.
 
@@ -42,6 +44,7 @@ class StatusLine:
             has_host: whether a host is served.
             carrier: index of the link that carries frames; None if there is none.
             rung: how far the camera is lowered; None if it cannot be.
+            camera: whether the camera is there.
         """
         fresh = counts.grabbed - self._grabbed
         rate_hz = fresh * 1e9 / max(1, now_ns - self._measured_ns)
@@ -49,6 +52,8 @@ class StatusLine:
             self._moved_ns = now_ns
         self._measured_ns, self._grabbed = now_ns, counts.grabbed
         silent_ns = now_ns - self._moved_ns
+        if not has_host and camera is CameraState.GONE:
+            return f"the camera is gone: {self._camera}; waiting for it, and for a host on {' and '.join(self._links)}"
         if not has_host:
             self._moved_ns = now_ns  # the camera may rest
             return f"waiting for a host on {' and '.join(self._links)}"

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import BinaryIO, Final
 
 from common.errors import DataError, UnavailableError
+from common.unfinished import unfinished
 
 _TURN: Final = threading.RLock()
 
@@ -157,13 +158,14 @@ def replacing_in(folder: int, name: str, *, mode: int = 0o666, durable: bool = T
     temporary = f".{name}.{os.urandom(8).hex()}.part"
     descriptor = os.open(temporary, _NEW, mode, dir_fd=folder)
     try:
-        # Closed before the rename: a full disk may show only when the last buffer is flushed.
-        with os.fdopen(descriptor, "wb") as file:
-            yield file
-            if durable:
-                file.flush()
-                os.fsync(descriptor)
-        os.replace(temporary, name, src_dir_fd=folder, dst_dir_fd=folder)
+        with unfinished(lambda: os.unlink(temporary, dir_fd=folder)):
+            # Closed before the rename: a full disk may show only when the last buffer is flushed.
+            with os.fdopen(descriptor, "wb") as file:
+                yield file
+                if durable:
+                    file.flush()
+                    os.fsync(descriptor)
+            os.replace(temporary, name, src_dir_fd=folder, dst_dir_fd=folder)
         if durable:
             sync_folder(folder)
     except BaseException:

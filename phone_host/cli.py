@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
+from common.program.interrupts import interruptible
 from common.program.invocation import as_found
 from phone_host.verbs.calibrate import arguments as calibrate
 from phone_host.verbs.calibrate_time import arguments as calibrate_time
@@ -43,6 +44,9 @@ _VERBS: Final[dict[str, Arguments]] = {
     "doctor": doctor,
     "settings": settings,
 }
+
+_NATIVE: Final = frozenset({"calibrate", "stereo"})
+"""Verbs that spend seconds in native code on large images."""
 
 _NEXT_STEPS = """phone-host makes depth out of two cameras: this machine's and a board's, or of two folders of photographs.
 
@@ -92,7 +96,8 @@ def _run(options: argparse.Namespace) -> int:
         print(as_found(_NEXT_STEPS), end="")
         return 0
     command = importlib.import_module(f"phone_host.verbs.{options.verb.replace('-', '_')}.command")
-    code: int = command.run(options)
+    with interruptible(native=options.verb in _NATIVE):
+        code: int = command.run(options)
     return code
 
 

@@ -27,6 +27,6 @@ def run(options: argparse.Namespace) -> int:
     except SettingsError as error:
         wrong = error
     logs.set_up(logging.ERROR)  # the findings say it all
-    findings = [settings_finding(str(options.config or ""), wrong), *examine(settings, options.config)]
+    findings = [settings_finding(str(options.config or ""), wrong), *examine(settings)]
     print(json.dumps(values(findings)) if options.json else fitted(table(findings)))
     return exit_code(findings, wrong)

@@ -5,6 +5,7 @@ import json
 import logging
 import os
 import sys
+from collections.abc import Mapping
 from contextlib import ExitStack, closing
 from typing import Final
 
@@ -42,7 +43,10 @@ def run(options: argparse.Namespace) -> int:
     session, counts = summary.session, {"grabbed": summary.counts.grabbed, "sent": summary.counts.sent}
     dropped = {reason.value: count for reason, count in summary.counts.dropped}
     camera = health_values(summary.camera)
-    _LOG.info(logs.event("stopped", session=session, **counts, dropped=dropped, garbage=summary.garbage, camera=camera))
+    drops_told = {f"dropped_{reason}": count for reason, count in dropped.items()}
+    _LOG.info(
+        logs.event("stopped", session=session, **counts, **drops_told, garbage=summary.garbage, **_troubles(camera))
+    )
     if options.json:
         account = {"session": session, **counts, "dropped": dropped, "garbage": summary.garbage}
         print(json.dumps({**account, "ended": summary.ended, "camera": camera}))
@@ -53,6 +57,13 @@ def run(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     return INTERRUPTED if signals.interrupted else 0
+
+
+def _troubles(camera: Mapping[str, object]) -> dict[str, object]:
+    """Return what went wrong with the camera as plain fields, for one line of the log."""
+    plain = {f"camera_{key}": value for key, value in camera.items() if isinstance(value, int | str) and value}
+    faults = camera["faults"]
+    return plain | ({f"spoiled_{key}": count for key, count in faults.items()} if isinstance(faults, dict) else {})
 
 
 def _serve(settings: BoardSettings, signals: StopSignals) -> Summary:

@@ -2,7 +2,8 @@
 
 pace=clock: at any moment the image is number floor(t * fps) of CLOCK_MONOTONIC, exposed exactly at k / fps. So two replays on one machine agree
 whenever they were started; `phase_ms` delays all its exposures by that much. A slower mode shows every n-th of these images at its own time.
-pace=demand: one image per read, nothing dropped; the stamps are first + k / fps.
+pace=demand: one image per read, nothing dropped; the stamps are first + k / fps, where k counts from the first image's number in its name:
+a missing number leaves a gap. The camera's name tells how many images there are and their numbers (`image_numbers.py`).
 """
 
 import re
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Final
 
 from common.camera.base import CameraHealth, Ended, Grab, Mode, Offers, Skipped, Spoiled
+from common.camera.image_numbers import ImageNumbers, numbers_of, with_numbers
 from common.camera.imagefile import SUFFIXES, ImageFile, load
 from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import Frame, FrameFault, find_fault
@@ -47,7 +49,7 @@ class ReplaySettings:
 def name_order(path: Path) -> tuple[list[tuple[int, int | str]], str]:
     """Sort key that treats numbers in names as numbers: frame2 before frame10."""
     parts = [(0, int(part)) if part.isdecimal() else (1, part) for part in re.split(r"(\d+)", path.name) if part]
-    return parts, path.name
+    return parts, str(path)
 
 
 def find_images(pattern: str) -> list[Path]:
@@ -99,8 +101,24 @@ def find_images(pattern: str) -> list[Path]:
     return sorted(found, key=name_order)
 
 
+def _in_order(paths: list[Path], pacing: Pacing) -> tuple[list[Path], tuple[int, ...]]:
+    """Return images in the order in which they are shown, with their numbers; none if their names do not number them.
+
+    A film stays in name order; stills come in the order of their numbers.
+    """
+    numbers = numbers_of([path.stem for path in paths])
+    if not numbers or (pacing is Pacing.CLOCK and list(numbers) != sorted(numbers)):
+        return paths, ()
+    ordered = sorted(zip(numbers, paths, strict=True))
+    return [path for _, path in ordered], tuple(number for number, _ in ordered)
+
+
 class ReplayCamera:
     """A folder of images as a camera.
+
+    Attributes:
+        images: what its description tells of them.
+        numbers: the numbers in their names, in the order of showing; empty if the names do not number them.
 
     Args:
         settings: what to show.
@@ -113,7 +131,13 @@ class ReplayCamera:
 
     def __init__(self, settings: ReplaySettings, now_ns: int) -> None:
         self._settings = settings
-        self._paths = find_images(settings.path)
+        self._paths, self.numbers = _in_order(find_images(settings.path), settings.pacing)
+        self.images = ImageNumbers(
+            count=len(self._paths),
+            first=self.numbers[0] if self.numbers else None,
+            last=self.numbers[-1] if self.numbers else None,
+            looped=settings.loop,
+        )
         self._cache: list[tuple[ImageFile, FrameFault | None] | None] = [None] * len(self._paths)
         self._cached_bytes = 0
         # Image k is exposed k * _step / _rate ns after the start. Integers, because a Fraction costs 0.1 ms a frame where caches are cold.
@@ -123,7 +147,7 @@ class ReplayCamera:
         name = Path(settings.path).name
         steering = Steering.GRID if settings.pacing is Pacing.CLOCK else Steering.NONE
         self.description = CameraDescription(
-            name=f"replay {name}",
+            name=with_numbers(f"replay {name}", self.images),
             width_px=first.width_px,
             height_px=first.height_px,
             pixel_format=first.pixel_format,
@@ -233,6 +257,10 @@ class ReplayCamera:
 
     def _time_of(self, index: int) -> int:
         start = self._phase_ns if self._settings.pacing is Pacing.CLOCK else self._first_ns or 0
+        if self._settings.pacing is Pacing.DEMAND and self.numbers:
+            lap, position = divmod(index, len(self.numbers))
+            span = self.numbers[-1] - self.numbers[0] + 1
+            index = lap * span + self.numbers[position] - self.numbers[0]
         return start + (2 * index * self._step + self._rate) // (2 * self._rate)  # rounded to the nearest ns
 
     def _index_at(self, now_ns: int) -> int:

@@ -7,9 +7,11 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Final, NoReturn
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from common.errors import TandemError
+from common.program import interrupts
 from common.program.invocation import as_found
 from common.program.terminal import fitted
 from common.versions import all_versions
@@ -17,7 +19,7 @@ from common.versions import all_versions
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
-INTERRUPTED: Final = 130
+INTERRUPTED: Final = interrupts.INTERRUPTED
 
 _UNAVAILABLE: Final = 3
 
@@ -30,6 +32,12 @@ class ExamplesFirstParser(argparse.ArgumentParser):
 
     Its sub-parsers are of the same class.
     """
+
+    def add_argument(self, *names: str, **options: Any) -> argparse.Action:  # noqa: ANN401 - argparse's own
+        """Declare an argument. A path must not be empty: to Path, that would be the current folder."""
+        if options.get("type") is Path:
+            options["type"] = _path
+        return super().add_argument(*names, **options)
 
     def format_help(self) -> str:
         """Return the help text."""
@@ -79,6 +87,13 @@ def _guess(word: str, known: Iterable[str]) -> str:
     return f" (did you mean {close[0]}?)" if close else ""
 
 
+def _path(text: str) -> Path:
+    """Read a path."""
+    if not text:
+        raise argparse.ArgumentTypeError("is empty (name a file or folder; . is the current folder)")
+    return Path(text)
+
+
 def _plain(message: str) -> str:
     """Put argparse's own messages into plain words."""
     if found := re.fullmatch(r"argument VERB: invalid choice: '(.*)' \(choose from (.*)\)", message):
@@ -89,6 +104,8 @@ def _plain(message: str) -> str:
         return f"{found[1]} is {found[2]}, which is not a number (leave units out)"
     if found := re.fullmatch(r"argument (\S+): expected (?:one|at least one|\d+) arguments?", message):
         return f"{found[1]} needs a value"
+    if found := re.fullmatch(r"argument (\S+): (is empty .*)", message):
+        return f"{found[1]} {found[2]}"
     if found := re.fullmatch(r"the following arguments are required: (.*)", message):
         return f"missing: {found[1]}"
     return message

@@ -1,8 +1,13 @@
-"""SIGTERM and SIGINT as something a poll loop can wait for. Create it once, in a process's main thread."""
+"""SIGTERM and SIGINT as something a poll loop can wait for. Create it once, in a process's main thread.
+
+A second Ctrl-C ends the process at once: whoever presses it again does not want to wait for the summary.
+"""
 
 import signal
 import socket
 from types import FrameType
+
+from common.program import interrupts
 
 
 class StopSignals:
@@ -28,4 +33,6 @@ class StopSignals:
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         del frame
+        if number == signal.SIGINT and self.interrupted:
+            interrupts.leave()
         self._came.add(number)

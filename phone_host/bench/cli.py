@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
+from common.program.interrupts import interruptible
 from common.program.invocation import as_found
 from phone_host.bench.arguments import EXAMPLES, NEXT_STEPS, add_arguments
 
@@ -45,7 +46,8 @@ def _run(options: argparse.Namespace) -> int:
     command = importlib.import_module(
         "phone_host.bench." + ("profile_list" if options.emulate == "list" else "command")
     )
-    code: int = command.run(options)
+    with interruptible():
+        code: int = command.run(options)
     return code
 
 

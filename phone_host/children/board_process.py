@@ -65,7 +65,7 @@ class BoardProcess:
 def board_process(camera: str, address: str) -> Iterator[BoardProcess]:
     """Run a board-agent process for the length of a block. It always ends with the block."""
     arguments = ["run", "--camera", camera, "--link", address, "--log-level", "warning", "--json"]
-    with child_process("board_agent.cli", arguments, errors=True) as process:
+    with child_process("board_agent.start", arguments, errors=True) as process:
         yield BoardProcess(process)
 
 

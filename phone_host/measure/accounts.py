@@ -8,11 +8,15 @@ from typing import Final, assert_never
 from common.protocol.message import BoardCounts, Rung
 from common.protocol.session import StaleReason
 from common.words import times
+from phone_host.measure.absence import Absence
 from phone_host.measure.delays import Series
 from phone_host.sync.quarantine import Disbelief, Suspects
 
 _MOST_SUSPECTS: Final = 64
 """Number of steps whose suspect frames are remembered. All steps are counted."""
+
+_MOST_ABSENCES: Final = 64
+"""Number of absences that are remembered. All are counted."""
 
 
 @dataclass(slots=True)
@@ -107,6 +111,8 @@ class LinkAccount:
         clock_doubts: how often the knowledge of the clocks was contradicted or void.
         clock_steps: how often one of the clocks had stepped.
         suspects: frames that were believed between a step and the echo that revealed it, newest last.
+        absences: when the board was away after it had been there, the newest last. Replaced, never changed.
+        left: how often the board went away.
     """
 
     sessions: list[SessionAccount] = field(default_factory=list)
@@ -118,6 +124,22 @@ class LinkAccount:
     clock_doubts: int = 0
     clock_steps: int = 0
     suspects: deque[Suspects] = field(default_factory=lambda: deque(maxlen=_MOST_SUSPECTS))
+    absences: tuple[Absence, ...] = ()
+    left: int = 0
+
+    def board_left(self, now_ns: int) -> None:
+        """Take note that the board has gone although it had not shown its last image."""
+        self.left += 1
+        self.absences = (*self.absences[1 - _MOST_ABSENCES :], Absence(now_ns))
+
+    def board_came(self, now_ns: int) -> None:
+        """Take note that the board sends frames, for the first time or again."""
+        if self.absences and self.absences[-1].back_ns is None:
+            self.absences = (*self.absences[:-1], Absence(self.absences[-1].gone_ns, now_ns))
+
+    def was_away(self, since_ns: int, until_ns: int) -> bool:
+        """Whether the board was away at some time between the two, ns. Safe from any thread."""
+        return any(absence.overlaps(since_ns, until_ns) for absence in reversed(self.absences))
 
     def copy(self) -> "LinkAccount":
         """Return a copy of the present state. Safe while the receiver's thread writes."""

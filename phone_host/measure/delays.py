@@ -20,6 +20,9 @@ IDLE_STAGE_NS: Final = 20_000
 STAGES: Final = tuple(stage.name for stage in fields(StageTimes))
 OTHERS: Final = ("time_skew", "uncertainty")
 
+FROM_EXPOSURE: Final = ("capture", "end_to_end", "time_skew")
+"""What is counted from the moment of an exposure. Images shown on demand have none."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
@@ -131,13 +134,22 @@ class DelayStatistics:
         copied.__dict__ |= self.__dict__ | {"_series": series}
         return copied
 
-    def add(self, ledger: PairLedger) -> None:
-        """Take one pair's ledger."""
+    def add(self, ledger: PairLedger, *, after_gap: bool = False, timeless: bool = False) -> None:
+        """Take one pair's ledger.
+
+        Args:
+            ledger: its marks and delays.
+            after_gap: whether the board was away before it, so that the processor's wait says nothing of the link.
+            timeless: whether its stamps are labels, so that nothing may be counted from its exposure.
+        """
+        left_out = {*(FROM_EXPOSURE if timeless else ()), *(("starvation",) if after_gap else ())}
         for name in DELAYS:
-            self._series[name].add(getattr(ledger, f"{name}_ns"))
+            if name not in left_out:
+                self._series[name].add(getattr(ledger, f"{name}_ns"))
         for name in STAGES:
             self._series[name].add(getattr(ledger.stages, name))
-        self._series["time_skew"].add(abs(ledger.time_skew_ns))
+        if not timeless:
+            self._series["time_skew"].add(abs(ledger.time_skew_ns))
         self._series["uncertainty"].add(ledger.uncertainty_ns)
         self._bytes += ledger.bytes
 

@@ -6,7 +6,7 @@ delays themselves: how often pairs arrive, and how long each keeps the processor
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
@@ -30,6 +30,7 @@ class Regime(Enum):
     STARVED_BY_CAMERAS = "starved by the cameras"
     STARVED_BY_LINK = "starved by the link"
     STARVED_BY_PAIRING = "starved by pairing"
+    STARVED_BY_SPOILED = "starved by spoiled images"
     BACKLOG = "backlog"
 
 
@@ -50,6 +51,8 @@ class RunFigures:
         propagation_ns: propagation of a board frame.
         overflow: the FIFO's overflow policy. With `block` the board is held back, so the pairs offered do not show how
             many there could be.
+        spoiled: share of the board camera's frames that the board dropped because they were not whole.
+        gap_s: time without the board, left out of all other figures, s.
     """
 
     pairs: int
@@ -63,6 +66,8 @@ class RunFigures:
     frame_bytes: float
     propagation_ns: float
     overflow: Overflow = Overflow.DROP_OLDEST
+    spoiled: float = 0.0
+    gap_s: float = 0.0
 
     @property
     def busy(self) -> float:
@@ -92,6 +97,14 @@ class Judgement:
 
 def judge(figures: RunFigures) -> Judgement:
     """Determine which regime holds and what would help."""
+    judgement = _judge(figures)
+    if not figures.gap_s:
+        return judgement
+    said = f"{judgement.sentence}; the {figures.gap_s:.1f} s around the board's absence are not counted"
+    return replace(judgement, sentence=said)
+
+
+def _judge(figures: RunFigures) -> Judgement:
     if figures.pairs < _FEW or not math.isfinite(figures.interval_ns) or not figures.processing_ns > 0:
         return Judgement(Regime.UNKNOWN, f"too few pairs ({figures.pairs}) to tell whether the processor starves")
     if figures.busy >= _BUSY:
@@ -101,6 +114,10 @@ def judge(figures: RunFigures) -> Judgement:
         rate = _rate(figures.arrival_ns)
         text = f"{waits}: it keeps up with the cameras; each of the {rate} pairs per second takes it {_ms(figures.processing_ns)} ms"
         return Judgement(Regime.STARVED_BY_CAMERAS, text, _room(figures))
+    if figures.spoiled and figures.arrival_ns <= _SLOWER * figures.period_ns / max(1 - figures.spoiled, 0.01):
+        text = f"{waits}: {100 * figures.spoiled:.0f} % of the frames of the board's camera are not whole and are dropped there"
+        remedy = "check the board camera's cable and its format; board-agent doctor looks at it"
+        return Judgement(Regime.STARVED_BY_SPOILED, text, (remedy,))
     if figures.arrival_ns <= _SLOWER * figures.period_ns * figures.received:
         lost = 100 * (1 - 1 / figures.received)
         text = f"{waits}: frames arrive at the cameras' rate, but {lost:.0f} % of them find no partner"

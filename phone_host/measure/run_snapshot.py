@@ -1,15 +1,20 @@
 """A run at one moment, in one object of copied values. Terminal, page and JSON show this and nothing else. Pure."""
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Final
 
 from common.camera.base import CameraHealth
 from common.frame import NOT_AS_SAID
+from common.protocol.message import DropReason
+from phone_host.measure.absence import Away
 from phone_host.measure.accounts import LinkAccount
 from phone_host.measure.camera_match import LockMiss, settings_concerns
 from phone_host.measure.delays import DelayStatistics
+from phone_host.measure.numbers import ImageEvidence, number_concerns
 from phone_host.measure.regime import RunFigures
 from phone_host.measure.sink_account import SinkAccount
+from phone_host.measure.spoiled import SpoiledCounts, spoiled_concerns
 from phone_host.measure.trust import (
     NO_DOUBT,
     Concern,
@@ -45,6 +50,9 @@ class RunSnapshot:
         interpolated to the moment of the host's. If so, their time skew does not matter.
         spoiled_images: pairs with a spoiled image, by reason; part of `undecodable`.
         stamps_exact: whether both cameras' stamps are the times of exposure by definition.
+        timeless: whether images are shown on demand: nothing is counted from their exposure. replayed: what is known of
+        the images if both sides replay files. away: when the board was away. gaps: how often it was away between two
+        pairs. gap_s: the time between those pairs, s; no part of `seconds`.
         judged_pairs: number of newest pairs over which time and motion are judged; None: all.
         missed_locks: controls of the rig's cameras that could not be restored.
     """
@@ -77,6 +85,11 @@ class RunSnapshot:
     alignment: Alignment | None = None
     judged_pairs: int | None = None
     missed_locks: tuple[LockMiss, ...] = ()
+    timeless: bool = False
+    replayed: ImageEvidence = field(default_factory=ImageEvidence)
+    away: tuple[Away, ...] = ()
+    gaps: int = 0
+    gap_s: float = 0.0
 
     @property
     def stopped(self) -> int:
@@ -85,15 +98,30 @@ class RunSnapshot:
 
     @property
     def pairs_per_second(self) -> float:
-        """Rate of results, 1/s; NaN with fewer than two results."""
-        return (self.processed - 1) / self.seconds if self.processed > 1 and self.seconds > 0 else float("nan")
+        """Rate of results, 1/s, while the board was there; NaN with fewer than two results."""
+        steps = self.processed - 1 - self.gaps
+        return steps / self.seconds if steps > 0 and self.seconds > 0 else float("nan")
+
+    @property
+    def spoiled_counts(self) -> SpoiledCounts:
+        """Images that were not whole, by where that was found."""
+        return SpoiledCounts(
+            pairs=self.processed,
+            on_board=spoiled_on_board(self.link)[0],
+            own=self.spoiled,
+            decoded=sum(count for _, count in self.spoiled_images),
+        )
+
+
+TIMELESS: Final = "images shown on demand have no moment of exposure: their stamps only count them"
+"""Why a run of stills has no figures that start at an exposure."""
 
 
 def figures(run: RunSnapshot) -> RunFigures:
     """Return the figures that determine the regime, over the whole run."""
-    processed = run.processed
-    interval_ns = run.seconds * 1e9 / (processed - 1) if processed > 1 else float("nan")
-    return figures_of(
+    processed, steps = run.processed, run.processed - 1 - run.gaps
+    interval_ns = run.seconds * 1e9 / steps if steps > 0 else float("nan")
+    known = figures_of(
         run.delays,
         run.counts,
         processed,
@@ -101,6 +129,18 @@ def figures(run: RunSnapshot) -> RunFigures:
         period_ns=run.period_ns,
         overflow=run.fifo.overflow,
     )
+    lost, grabbed = spoiled_on_board(run.link)
+    return replace(known, spoiled=lost / grabbed if grabbed else 0.0, gap_s=run.gap_s)
+
+
+def spoiled_on_board(link: LinkAccount) -> tuple[int, int]:
+    """Return how many frames the board's camera gave that were not whole, and how many it gave in all."""
+    lost = grabbed = 0
+    for account in link.sessions:
+        before, after = dict(account.first.dropped), dict(account.latest.dropped)
+        lost += after.get(DropReason.SPOILED, 0) - before.get(DropReason.SPOILED, 0)
+        grabbed += account.latest.grabbed - account.first.grabbed
+    return lost, grabbed
 
 
 def figures_of(
@@ -160,7 +200,9 @@ def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
         received=sum(account.received + account.disbelieved[Disbelief.CREDIT] for account in link.sessions),
         spoiled_images=spoiled(run),
     )
-    return settings_concerns(run.missed_locks) + unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
+    timing = unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
+    told = (*spoiled_concerns(run.spoiled_counts), *number_concerns(run.replayed), *settings_concerns(run.missed_locks))
+    return (*told, *timing)
 
 
 def spoiled(run: RunSnapshot) -> dict[str, int]:

@@ -38,6 +38,8 @@ class Doubt(Enum):
     DISBELIEVED = "disbelieved"
     SPOILED_IMAGES = "spoiled_images"
     CAMERA_SETTINGS = "camera_settings"
+    IMAGE_NUMBERS = "image_numbers"
+    NO_WHOLE_IMAGE = "no_whole_image"
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from typing import Final
 
 from common.errors import DataError, UnavailableError
 from common.files import read_file, replacing_in, sync_folder
+from common.unfinished import unfinished
 
 LIST: Final = ".tandemscan"
 
@@ -110,10 +111,11 @@ class ListedFolder:
         os.mkdir(part, dir_fd=self.descriptor)
         folder = os.open(part, _FOLDER, dir_fd=self.descriptor)
         try:
-            yield _way_to(folder, self._path / part)
-            for _ in run_all(lambda entry: _sync_file(entry, folder), _entries(folder)):
-                pass
-            os.fsync(folder)
+            with unfinished(lambda: self._remove(part)):
+                yield _way_to(folder, self._path / part)
+                for _ in run_all(lambda entry: _sync_file(entry, folder), _entries(folder)):
+                    pass
+                os.fsync(folder)
             os.rename(part, name, src_dir_fd=self.descriptor, dst_dir_fd=self.descriptor)
             sync_folder(self.descriptor)
         except BaseException:

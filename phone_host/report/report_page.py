@@ -42,6 +42,11 @@ MEANINGS: Final = (
 """The delays that add up to end-to-end, in the order in which they occur (DESIGN, section 4)."""
 
 _END_TO_END: Final = "from the middle of the exposure until the results are written: the sum of the delays above"
+_FROM_MIDDLE: Final = (
+    "From the middle of the board camera's exposure to the written result; the delays of a pair add up to its end-to-end"
+    " delay."
+)
+_FROM_DEMAND: Final = "From the moment at which the board had read an image to the written result."
 _STARVATION: Final = "how long the processor had nothing to do before this pair; no part of end-to-end"
 
 
@@ -110,6 +115,8 @@ class DelaySeries:
         stages: the parts of processing.
         time_skew: signed.
         uncertainty: of the clock offset.
+        timeless: whether exposures have no time. Then `delays` has no capture delay, and end-to-end and time skew are
+            not shown.
     """
 
     time_s: NDArray[np.float64]
@@ -119,6 +126,7 @@ class DelaySeries:
     stages: tuple[Quantity, ...]
     time_skew: Quantity
     uncertainty: Quantity
+    timeless: bool = False
 
     @property
     def pairs(self) -> int:
@@ -161,11 +169,12 @@ class PageData:
     files: tuple[FileLink, ...] = ()
 
 
-def delay_series(ledgers: Sequence[PairLedger]) -> DelaySeries:
+def delay_series(ledgers: Sequence[PairLedger], *, timeless: bool = False) -> DelaySeries:
     """Make the series of all delays from ledgers.
 
     Args:
         ledgers: one per pair, in the order in which the pairs were done; may be empty.
+        timeless: whether their exposures are labels, because images were shown on demand.
 
     Returns:
         The series of every delay.
@@ -186,6 +195,7 @@ def delay_series(ledgers: Sequence[PairLedger]) -> DelaySeries:
         delays=tuple(
             Quantity(label=name, values_ns=attribute(f"{name}_ns"), colour=colour, meaning=meaning)
             for colour, (name, meaning) in enumerate(MEANINGS)
+            if not (timeless and name == "capture")
         ),
         end_to_end=Quantity(label="end-to-end", values_ns=attribute("end_to_end_ns"), colour=7, meaning=_END_TO_END),
         starvation=Quantity(label="starvation", values_ns=attribute("starvation_ns"), colour=6, meaning=_STARVATION),
@@ -195,6 +205,7 @@ def delay_series(ledgers: Sequence[PairLedger]) -> DelaySeries:
         ),
         time_skew=Quantity(label="time skew", values_ns=attribute("time_skew_ns"), colour=5),
         uncertainty=Quantity(label="clock uncertainty", values_ns=attribute("uncertainty_ns"), colour=2),
+        timeless=timeless,
     )
 
 
@@ -291,12 +302,11 @@ def _delays(series: DelaySeries) -> list[str]:
     )
     stages = tuple(stage for stage in series.stages if stage.values_ns.max() > IDLE_STAGE_NS)
     work = Budget("mean processing delay", tuple(mean_share(quantity) for quantity in stages))
-    everything = Strips("", (*series.delays, series.end_to_end, series.starvation))
+    everything = Strips("", (*series.delays, *(() if series.timeless else (series.end_to_end,)), series.starvation))
     return [
         section(
             "Where the time goes",
-            "From the middle of the board camera's exposure to the written result; the delays of a pair add up to its "
-            "end-to-end delay. A column is one pair, or the mean of its slice of time where pairs are many.",
+            f"{_FROM_DEMAND if series.timeless else _FROM_MIDDLE} A column is one pair, or the mean of its slice of time where pairs are many.",
             legend(names)
             + two_widths(lambda width: budgets([mean], width))
             + two_widths(lambda width: stacked_over_time(series.time_s, series.delays, width)),
@@ -316,14 +326,7 @@ def _delays(series: DelaySeries) -> list[str]:
             + two_widths(lambda width: distributions([Strips("", stages)], width)),
         ),
         '<div class="pair">'
-        + section(
-            "Time skew of the pairs",
-            "Exposure of the board's frame minus that of the host's; the band is the clocks' uncertainty.",
-            two_widths(
-                lambda width: over_time(series.time_s, series.time_skew, width, band_ns=series.uncertainty.values_ns),
-                HALF_PX,
-            ),
-        )
+        + ("" if series.timeless else _time_skew(series))
         + section(
             "Clock uncertainty",
             "How well the host knows the board's clock, plus or minus.",
@@ -331,6 +334,17 @@ def _delays(series: DelaySeries) -> list[str]:
         )
         + "</div>",
     ]
+
+
+def _time_skew(series: DelaySeries) -> str:
+    return section(
+        "Time skew of the pairs",
+        "Exposure of the board's frame minus that of the host's; the band is the clocks' uncertainty.",
+        two_widths(
+            lambda width: over_time(series.time_s, series.time_skew, width, band_ns=series.uncertainty.values_ns),
+            HALF_PX,
+        ),
+    )
 
 
 def _glossary(quantities: tuple[Quantity, ...]) -> str:

@@ -7,9 +7,9 @@ from typing import Final
 from common.camera.base import CameraHealth, health_values
 from common.versions import REPORT_FORMAT
 from phone_host.measure.accounts import LinkTally, rung_values
-from phone_host.measure.delays import DELAYS, STAGES, Spread
+from phone_host.measure.delays import DELAYS, FROM_EXPOSURE, STAGES, Spread
 from phone_host.measure.regime import Judgement, judge
-from phone_host.measure.run_snapshot import RunSnapshot, concerns, disbelieved, figures
+from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, disbelieved, figures
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.unused import unused
 from phone_host.model import TimeOffset
@@ -29,9 +29,15 @@ def build(run: RunSnapshot) -> dict[str, object]:
         "ended": run.ended,
         "pairs": run.processed,
         "pairs_per_second": _number(run.pairs_per_second),
-        "delays_ms": {name: spread_ms(run.delays.spread(name)) for name in DELAYS},
+        "paired_by": run.replayed.paired_by.value,
+        "not_measured": dict.fromkeys(FROM_EXPOSURE, TIMELESS) if run.timeless else {},
+        "board_away": [
+            {"at_s": round(item.at_s, 3), "seconds": round(item.seconds, 3), "came_back": item.is_over}
+            for item in run.away
+        ],
+        "delays_ms": {name: None if _is_untold(run, name) else spread_ms(run.delays.spread(name)) for name in DELAYS},
         "stages_ms": {name: spread_ms(run.delays.spread(name)) for name in STAGES},
-        "time_skew_ms": spread_ms(run.delays.spread("time_skew")),
+        "time_skew_ms": None if run.timeless else spread_ms(run.delays.spread("time_skew")),
         "clock": _clock(run),
         "phase": _phase(run),
         "time_offset_ms": {
@@ -42,7 +48,7 @@ def build(run: RunSnapshot) -> dict[str, object]:
         "fifo": {"depth": run.fifo.depth, "overflow": run.fifo.overflow.value, "age_bound": age_bound(run)},
         "tolerance_ms": run.tolerance_ns / _MS,
         "sessions": [_session(run, index) for index in range(len(run.link.sessions))],
-        "links": [_link(tally) for tally in run.link.links],
+        "links": [_link(tally, timeless=run.timeless) for tally in run.link.links],
         "switches": run.link.switches,
         "connects": run.link.connects,
         "garbage": run.link.garbage,
@@ -81,6 +87,11 @@ def build(run: RunSnapshot) -> dict[str, object]:
         "sinks": {sink.name: _sink(sink) for sink in run.sinks},
         "unwritten": asdict(run.unwritten),
     }
+
+
+def _is_untold(run: RunSnapshot, name: str) -> bool:
+    """Whether a delay is counted from an exposure that has no time."""
+    return run.timeless and name in FROM_EXPOSURE
 
 
 def _sink(sink: SinkAccount) -> dict[str, object]:
@@ -183,7 +194,7 @@ def _ms(value_ns: int | None) -> float | None:
     return None if value_ns is None else round(value_ns / _MS, 3)
 
 
-def _link(tally: LinkTally) -> dict[str, object]:
+def _link(tally: LinkTally, *, timeless: bool) -> dict[str, object]:
     return {
         "link": tally.name,
         "up": tally.is_up,
@@ -191,7 +202,7 @@ def _link(tally: LinkTally) -> dict[str, object]:
         "bytes": tally.bytes,
         "carried": tally.carried,
         "lost": tally.lost,
-        "age_ms": spread_ms(tally.age.spread()),
+        "age_ms": None if timeless else spread_ms(tally.age.spread()),
     }
 
 
@@ -199,7 +210,9 @@ def _session(run: RunSnapshot, index: int) -> dict[str, object]:
     account = run.link.sessions[index]
     before = dict(account.first.dropped)
     dropped = {reason.value: count - before.get(reason, 0) for reason, count in account.latest.dropped}
-    grabbed, sent = account.latest.grabbed - account.first.grabbed, account.latest.sent - account.first.sent
+    sent = account.latest.sent - account.first.sent
+    # A frame that waited when this host came was grabbed before and sent, or dropped, since. It belongs to this account.
+    grabbed = account.latest.grabbed - account.first.sent - sum(before.values())
     return {
         "session": account.session,
         "grabbed": grabbed,

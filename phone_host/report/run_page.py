@@ -9,9 +9,10 @@ from common import now
 from common.camera.base import CameraHealth
 from common.ledger import PairLedger
 from common.words import counted, times
+from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import rung_lines
 from phone_host.measure.regime import Judgement, Regime, judge
-from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
+from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures
 from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
 from phone_host.model import Processed, Side
@@ -56,13 +57,13 @@ def run_page(
             title="tandemscan run",
             subtitle=f"ended: {run.ended.replace('_', ' ')}; {now.wall_time()}",
             verdict=verdict,
-            sentence=sentence,
+            sentence=with_absences(sentence, run),
             figures=_figures(run) if run.processed else (),
             depth=depth_card(
                 last, board_side, f"The last pair: number {run.processed - 1} of this run, counted from 0"
             ),
             pictures=pictures(last, board_side),
-            delays=delay_series(ledgers),
+            delays=delay_series(ledgers, timeless=run.timeless),
             tables=(*links_tables(run), unused_table(run), camera_table(run.camera)),
             steps=steps(run),
             notes=notes(run),
@@ -71,11 +72,18 @@ def run_page(
     )
 
 
+def with_absences(sentence: str, run: RunSnapshot) -> str:
+    """Return a headline that also says when the board was away."""
+    away = away_words(run.away)
+    return f"{sentence} {away[:1].upper()}{away[1:]}." if away else sentence
+
+
 def notes(run: RunSnapshot) -> tuple[str, ...]:
     """Say who waits for whom, what makes depth wrong, and how the cameras' exposures relate in time."""
     judgement = judge(figures(run))
     return (
         f"Queue: {judgement.sentence}.",
+        *([f"Not measured: when results were exposed: {TIMELESS}."] if run.timeless else []),
         *(_sentence(remark) for remark in judgement.remedies if judgement.regime in _FINE),
         *(f"Warning: {item.sentence}." for item in concerns(run)),
         *phase_lines(run.phase, run.alignment),
@@ -143,7 +151,8 @@ def links_tables(run: RunSnapshot) -> tuple[Table, ...]:
     rows = []
     for tally in run.link.links:
         age = tally.age.spread()
-        ages = f"{age.p50_ns / 1e6:.1f} ms; {age.p95_ns / 1e6:.1f} ms" if age.count else "-"
+        known = age.count and not run.timeless
+        ages = f"{age.p50_ns / 1e6:.1f} ms; {age.p95_ns / 1e6:.1f} ms" if known else "-"
         rows.append((tally.name, str(tally.frames), str(tally.carried), str(tally.lost), ages))
     title = f"Links: the stream changed links {times(run.link.switches)}"
     columns = ("link", "frames", "times it took over", "times it was lost", "age of frames on arrival: median; p95")
@@ -181,6 +190,8 @@ def _verdict(run: RunSnapshot, judgement: Judgement, found: Sequence[Concern]) -
 
 
 def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
+    if run.timeless:
+        return (rate_figure(run), clock_figure(run))
     skew = run.delays.spread("time_skew")
     return (
         rate_figure(run),

@@ -5,6 +5,7 @@ from typing import Final
 
 from common.camera.base import CameraHealth
 from common.words import counted, times
+from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import LinkAccount, LinkTally, rung_lines
 from phone_host.measure.delays import DELAYS
 from phone_host.measure.regime import judge
@@ -12,6 +13,7 @@ from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.unused import unused
 from phone_host.model import TimeOffset
 from phone_host.sync.phase import Alignment, Phase
+from phone_host.sync.stills import PairedBy
 
 _MS: Final = 1e6
 _DELAY_TABLE: Final = 54
@@ -35,6 +37,7 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
             f"the board's clock is known to +-{run.estimate.uncertainty_ns / 1000:.0f} us"
             f" (+-{run.estimate.bound_ns / 1000:.0f} us at worst), skew {run.estimate.skew * 1e6:+.1f} ppm"
         )
+    lines += _pairing_lines(run)
     lines += _agreement(run)
     lines += phase_lines(run.phase, run.alignment)
     lines += _arrivals(run.camera, run.time_offset)
@@ -52,9 +55,23 @@ def _delay_table(run: RunSnapshot, width: int) -> list[str]:
     lines = [f"{'delay, ms':14} " + " ".join(f"{name:>9}" for name in columns)]
     for name in DELAYS:
         spread = run.delays.spread(name)
+        if not spread.count:
+            continue  # stills: nothing is counted from an exposure
         values = (getattr(spread, f"{column}_ns") / _MS for column in columns)
         lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value:9.3f}" for value in values))
     return lines
+
+
+def _pairing_lines(run: RunSnapshot) -> list[str]:
+    """Say what paired the images of two replays, and when the board was away."""
+    by = run.replayed.paired_by
+    how = {
+        PairedBy.NUMBER: "stills, paired by the numbers in their names",
+        PairedBy.ORDER: "stills, paired in their order: the names of one side do not number them, or its numbers are not known",
+    }
+    stills = [how[by]] if by in how and run.replayed.board is not None else []
+    away = away_words(run.away)
+    return [*stills, *([away] if away else [])]
 
 
 def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:

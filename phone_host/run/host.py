@@ -10,17 +10,22 @@ from typing import Final
 
 from common import now
 from common.camera.base import Camera
+from common.camera.image_numbers import ShowsFiles
+from common.errors import AbsentBoardError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.program.logs import event
-from common.protocol.message import Pacing, Steering
+from common.protocol.message import Pacing
+from phone_host.measure.absence import away_of
 from phone_host.measure.image_motion import MotionMeter
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
+from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed, Result, Side, TimeOffset
 from phone_host.run.file_sink import FileSink
 from phone_host.run.ledgerer import Ledgerer
+from phone_host.run.phase_steering import PhaseSteering
 from phone_host.run.pipeline import Pipeline
 from phone_host.run.rig_cameras import RigCameras
 from phone_host.run.sinks import FunctionSink, Sink
@@ -29,17 +34,26 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
 from phone_host.stream.await_board import BoardPatience
 from phone_host.stream.demand_clock import DemandClock
+from phone_host.stream.one_kind import require_one_kind
 from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.receiver import Receiver
 from phone_host.sync.fifo import FifoSettings
-from phone_host.sync.phase import Alignment, PhaseController, Whose
+from phone_host.sync.phase import Whose
+from phone_host.sync.stills import Stills
 
 _LOG = logging.getLogger(__name__)
 
 _STEP_S: Final = 0.05
+_MOTION: Final = "motion"
 _LAST_PARTNER_NS: Final = 1_000_000_000
 """After one stream has ended, the other gets this long to deliver the last partners."""
+
+_STOP_S: Final = 0.4
+"""A stopped run gives its current pair this long: Ctrl-C ends within a second, and the goodbye takes 0.3 s of it."""
+
+_FIRST_PAIR_NS: Final = 10_000_000_000
+"""A limited run allows this much for the first pair: learning the clock takes a second, the first use of OpenCV another."""
 
 _TRUST_NS: Final = 1_000_000_000
 _RECENT: Final = 60
@@ -51,6 +65,7 @@ class EndReason(Enum):
 
     PAIRS_REACHED = "pairs_reached"
     STREAM_ENDED = "stream_ended"
+    SECONDS_OVER = "seconds_over"
     STOPPED = "stopped"
 
 
@@ -63,6 +78,7 @@ class HostSettings:
         tolerance_ns: greatest time skew of a pair; None for half of the longer frame period.
         fifo: depth and overflow policy.
         pairs: end after this many processed pairs; 0 for no limit.
+        seconds_ns: end this long after the first pair; 0 for no limit.
         wait_ns: how long to wait for an absent board; None for ever.
         out: folder for results; None to write none.
         save_every: save every Nth pair; 0 for none.
@@ -77,6 +93,7 @@ class HostSettings:
     tolerance_ns: int | None = None
     fifo: FifoSettings = field(default_factory=FifoSettings)
     pairs: int = 0
+    seconds_ns: int = 0
     wait_ns: int | None = None
     out: Path | None = None
     save_every: int = 30
@@ -108,7 +125,8 @@ class Host:
     ) -> None:
         self._settings = settings
         self._own = camera.description
-        demand = DemandClock(self._own.pacing)
+        files = camera if isinstance(camera, ShowsFiles) else None
+        demand = DemandClock(self._own.pacing, None if files is None else Stills(files.images, files.numbers))
         self.started_ns = now.monotonic_ns()
         self._motion = MotionMeter()
         self._files = FileSink(
@@ -117,15 +135,16 @@ class Host:
             waits=bool(settings.pairs) or demand.paces_own_camera,
             settings=settings.resolved,
         )
-        self._sinks: tuple[Sink, ...] = (self._files, FunctionSink("motion", self._measure_motion), *sinks)
+        self._sinks: tuple[Sink, ...] = (self._files, FunctionSink(_MOTION, self._measure_motion), *sinks)
         self._queue = PairQueue(
             settings.fifo,
             settings.tolerance_ns,
             self._own.period_ns,
             demand=demand,
             time_offset_ns=settings.time_offset.offset_ns,
+            own_images=None if files is None else files.images,
         )
-        self._camera = OwnCamera(camera, self._queue.add_host, demand)
+        self._camera = OwnCamera(camera, self._queue.add_host, demand, self._queue.own_image_missing)
         self._receiver = Receiver(links, now.random_id(), self._queue)
         rig = None if core is None else core.rig
         self._cameras = RigCameras(rig, settings.board_side, self._own, self._camera, self._receiver)
@@ -138,7 +157,7 @@ class Host:
             settings.most_pixels,
             host_orientation=self._own.orientation,
         )
-        self._ledgerer = Ledgerer()
+        self._ledgerer = Ledgerer(self._receiver.account.was_away, lambda: demand.is_timeless)
         self._worker = Worker(
             self._queue,
             pipeline,
@@ -149,8 +168,8 @@ class Host:
         )
         self._known_doubts: frozenset[Doubt] = frozenset()
         self._trust_due_ns = 0
-        self._controller: PhaseController | None = None
-        self._steered_session = ""
+        self._steering = PhaseSteering(settings.steered, self._receiver, self._camera, self._queue)
+        self._ended_ns = self._met_ns = 0
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
         """Run until the number of pairs is reached, a stream ends or `stop` returns True.
@@ -173,24 +192,33 @@ class Host:
             ended = self._watch(stop, watch)
         except BaseException:
             with suppress(Exception):  # report what ended the run, not its consequences
-                self._end()
+                self._end(_STOP_S)
             raise
-        self._end()
+        self._end(_STOP_S if ended is EndReason.STOPPED else None)
         return ended
 
-    def _end(self) -> None:
+    @property
+    def has_given_up(self) -> bool:
+        """Whether native code still computes a pair that nobody waits for. The process may have to end without it."""
+        return self._worker.has_given_up
+
+    def _end(self, patience_s: float | None) -> None:
         """Finish the current pair but not the waiting ones, and let the sinks finish. No failure skips a later step.
+
+        Args:
+            patience_s: give the current pair up after this time; None: wait for it.
 
         Raises:
             Exception: the failure; the last one if there are several.
         """
+        self._ended_ns = now.monotonic_ns()
         self._worker.finished.set()
         with ExitStack() as ending:  # callbacks run in reverse order
             ending.callback(self._raise_failures)
             for sink in reversed(self._sinks):
                 ending.callback(sink.finish)
             ending.callback(self._receiver.stop)  # after the worker, because the worker wakes the receiver
-            ending.callback(self._worker.stop)
+            ending.callback(self._worker.stop, patience_s)
             ending.callback(self._queue.finish)
             ending.callback(self._camera.stop)
 
@@ -241,7 +269,7 @@ class Host:
             ended=ended,
             processed=books.processed,
             undecodable=books.undecodable,
-            seconds=(books.last_done_ns - books.first_done_ns) / 1e9,
+            seconds=(books.last_done_ns - books.first_done_ns - books.gap_ns) / 1e9,
             delays=books.delays,
             counts=self._queue.counts,
             link=receiver.account.copy(),
@@ -249,29 +277,33 @@ class Host:
             estimate=receiver.estimate,
             tolerance_ns=self._queue.tolerance_ns,
             fifo=self._settings.fifo,
-            sinks=tuple(account for sink in self._sinks for account in sink.accounts),
+            sinks=tuple(account for sink in self._sinks for account in sink.accounts if not self._is_unneeded(account)),
             unwritten=self._files.unwritten,
             spoiled=self._camera.spoiled,
             skipped=self._camera.skipped,
             own_future=self._camera.from_the_future,
             time_offset=self._settings.time_offset,
             phase=self._queue.phase,
-            alignment=self._alignment,
+            alignment=self._steering.alignment,
             camera=self._camera.health,
             period_ns=self._period_ns,
-            motion_px_s=self._motion.px_s,
+            motion_px_s=float("nan") if self._queue.is_timeless else self._motion.px_s,
             width_px=self._motion.width_px,
             interpolated=self._settings.interpolate,
             spoiled_images=books.spoiled_images,
             stamps_exact=self._stamps_are_exact,
             judged_pairs=_RECENT if ended == "running" else None,
             missed_locks=self._cameras.missed,
+            timeless=self._queue.is_timeless,
+            replayed=self._queue.images,
+            away=away_of(receiver.account.absences, self.started_ns, self._ended_ns or now.monotonic_ns()),
+            gaps=books.gaps,
+            gap_s=books.gap_ns / 1e9,
         )
 
-    @property
-    def _alignment(self) -> Alignment | None:
-        """The state of the phase alignment; None if no camera is being steered."""
-        return None if self._controller is None else self._controller.alignment
+    def _is_unneeded(self, account: SinkAccount) -> bool:
+        """Whether nobody waits for a sink's results: stills do not move, so what was not measured is no loss."""
+        return self._queue.is_timeless and account.name == _MOTION
 
     @property
     def _stamps_are_exact(self) -> bool:
@@ -311,8 +343,9 @@ class Host:
         while not self._worker.finished.wait(_STEP_S):
             now_ns = now.monotonic_ns()
             self._raise_failures()
+            self._check_kinds()
             self._cameras.look()
-            self._align(now_ns)
+            self._steering.update(now_ns)
             self._watch_trust(now_ns)
             if watch is not None:
                 watch()
@@ -320,34 +353,47 @@ class Host:
                 return EndReason.STOPPED
             present = self._receiver.connected or self._receiver.ended
             patience.look(now_ns, self._receiver.refused, present=present)
+            if self._is_time_over(now_ns):
+                return self._drain(stop, watch, EndReason.SECONDS_OVER)
             if self._receiver.ended or self._camera.ended:
                 ending_since_ns = now_ns if ending_since_ns is None else ending_since_ns
                 if self._all_paired() or now_ns - ending_since_ns > _LAST_PARTNER_NS:
-                    return self._drain(stop, watch)
+                    if self._receiver.ended:
+                        self._queue.board_ended()
+                    return self._drain(stop, watch, EndReason.STREAM_ENDED)
         self._raise_failures()
         return EndReason.PAIRS_REACHED
 
-    def _align(self, now_ns: int) -> None:
-        """Steer a camera if that was asked for and is due. A new board session starts the alignment anew."""
-        hello = self._receiver.hello
-        if not self._settings.steered or hello is None or not self._receiver.connected:
-            return
-        if self._controller is None or hello.session != self._steered_session:
-            self._steered_session = hello.session
-            ways = (Whose.BOARD, hello.camera.steering), (Whose.HOST, self._camera.steering)
-            board, own = (way if whose in self._settings.steered else Steering.NONE for whose, way in ways)
-            self._controller = PhaseController(board, own, has_phase=self._queue.has_phase)
-        state = self._controller.alignment.state
-        correction = self._controller.update(now_ns, self._queue.phase)
-        if correction is not None:
-            steer = self._receiver.steer if correction.whose is Whose.BOARD else self._camera.steer
-            steer(correction.later_ns)
-            self._queue.restart_phase()
-        alignment = self._controller.alignment
-        if alignment.state is not state or correction is not None:
-            _LOG.info(event("phase", state=alignment.state.value, words=alignment.words))
+    def _check_kinds(self) -> None:
+        """Refuse a board that shows stills beside a camera with a clock, or the reverse.
 
-    def _drain(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
+        Only the first board is a mistake of the user's. Frames of a later one with another kind of camera are refused
+        by the pair queue, because a board must not be able to end a run.
+
+        Raises:
+            SettingsError: the two kinds are mixed.
+            AbsentBoardError: this machine's camera has shown its last image before a board came.
+        """
+        hello = self._receiver.hello
+        if hello is not None:
+            if len(self._receiver.account.sessions) == 1:
+                require_one_kind(self._own, hello.camera)
+        elif self._camera.ended:
+            raise AbsentBoardError(
+                "no board came before this machine's camera had shown its last image",
+                "start board-agent first, or give loop=1 in --camera",
+            )
+
+    def _is_time_over(self, now_ns: int) -> bool:
+        """Whether the time given for the run has passed since its first pair, or no pair came for long after the board had."""
+        limit_ns, begun_ns = self._settings.seconds_ns, self._ledgerer.first_done_ns
+        if not self._met_ns and self._receiver.hello is not None:
+            self._met_ns = now_ns
+        if not begun_ns and self._met_ns:
+            begun_ns = self._met_ns + _FIRST_PAIR_NS
+        return bool(limit_ns and begun_ns) and now_ns - begun_ns >= limit_ns
+
+    def _drain(self, stop: Callable[[], bool], watch: Callable[[], None] | None, ended: EndReason) -> EndReason:
         """Let the worker finish the waiting pairs. No frame will follow."""
         self._queue.finish()
         while not self._worker.has_ended(_STEP_S):
@@ -357,7 +403,7 @@ class Host:
                 return EndReason.STOPPED
         self._raise_failures()
         reached = self._settings.pairs and self._ledgerer.processed >= self._settings.pairs
-        return EndReason.PAIRS_REACHED if reached else EndReason.STREAM_ENDED
+        return EndReason.PAIRS_REACHED if reached else ended
 
     def _all_paired(self) -> bool:
         counts = self._queue.counts

@@ -2,6 +2,7 @@
 
 import threading
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from common.frame import FrameFault, SpoiledImageError
@@ -36,6 +37,8 @@ class Books:
         first_done_ns: when the first pair was done; 0: none yet.
         last_done_ns: when the last pair was done; 0: none yet.
         delays: delays of all pairs.
+        gaps: how often the board was away between two pairs.
+        gap_ns: time between those pairs, in all.
     """
 
     processed: int
@@ -44,12 +47,25 @@ class Books:
     first_done_ns: int
     last_done_ns: int
     delays: DelayStatistics
+    gaps: int = 0
+    gap_ns: int = 0
 
 
 class Ledgerer:
-    """Keeps the books. The worker's thread writes; any thread may read."""
+    """Keeps the books. The worker's thread writes; any thread may read.
 
-    def __init__(self) -> None:
+    Args:
+        was_away: whether the board was away at some time between two moments, ns.
+        is_timeless: whether the stamps of this run are no times, so that delays from an exposure mean nothing.
+    """
+
+    def __init__(
+        self,
+        was_away: Callable[[int, int], bool] = lambda _since_ns, _until_ns: False,
+        is_timeless: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._was_away, self._is_timeless = was_away, is_timeless
+        self._gaps = self._gap_ns = 0
         self._lock = threading.Lock()
         self._delays, self._sample = DelayStatistics(), Sample()
         self._spoiled: Counter[FrameFault] = Counter()
@@ -93,8 +109,12 @@ class Ledgerer:
             uncertainty_ns=board.uncertainty_ns,
             host=HostMarks(exposed_ns=pair.host.exposed.ns, grabbed_ns=pair.host.grabbed.ns),
         )
+        idle_ns = max(0, pair.queued_ns - self.last_done_ns) if self.last_done_ns else 0
+        is_gap = idle_ns > 0 and self._was_away(self.last_done_ns, pair.queued_ns)
         with self._lock:
-            self._delays.add(ledger)
+            self._gaps += is_gap
+            self._gap_ns += idle_ns if is_gap else 0
+            self._delays.add(ledger, after_gap=is_gap, timeless=self._is_timeless())
             self._sample.add(ledger)
             self.last = processed
             self.first_done_ns = self.first_done_ns or marks.done_ns
@@ -119,6 +139,8 @@ class Ledgerer:
                 first_done_ns=self.first_done_ns,
                 last_done_ns=self.last_done_ns,
                 delays=self._delays.copy(),
+                gaps=self._gaps,
+                gap_ns=self._gap_ns,
             )
 
     def sample(self) -> tuple[PairLedger, ...]:

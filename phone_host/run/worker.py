@@ -48,15 +48,24 @@ class Worker:
         self._thread = threading.Thread(target=self._work, name="worker", daemon=True)
         self.finished = threading.Event()
         self.failure: Exception | None = None
+        self.has_given_up = False
+        """Whether a pair is still being computed that nobody waits for. Its result is dropped."""
 
     def start(self) -> None:
         """Start the thread."""
         self._thread.start()
 
-    def stop(self) -> None:
-        """Finish the current pair, start none of the waiting ones, and end. The queue must be closed."""
+    def stop(self, patience_s: float | None = None) -> None:
+        """Finish the current pair, start none of the waiting ones, and end. The queue must be closed.
+
+        Args:
+            patience_s: give up a pair that takes longer than this; None: wait for it.
+        """
         self.finished.set()
-        self._thread.join()
+        self._thread.join(patience_s)
+        if self._thread.is_alive():
+            self.has_given_up = True
+            _LOG.warning(event("pair_given_up", why="the run was stopped while native code computed its depth"))
 
     def has_ended(self, wait_s: float) -> bool:
         """Wait up to `wait_s` for the worker to end after a closed queue's last pair. Return whether it has ended."""
@@ -79,6 +88,8 @@ class Worker:
             processed = self._pipeline.process(pair)
         except DataError as error:
             self._note_failed(error)
+            return
+        if self.has_given_up:
             return
         computed_ns = now.monotonic_ns()
         number = self._ledgerer.processed

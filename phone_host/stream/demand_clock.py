@@ -13,7 +13,9 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from common.camera.image_numbers import ImageNumbers
 from common.protocol.message import Pacing
+from phone_host.sync.stills import Stills
 
 
 def has_own_time(pacing: Pacing) -> bool:
@@ -37,9 +39,11 @@ class DemandClock:
 
     Args:
         own: the host camera's pacing.
+        stills: the host camera's images; None if it is no replay. Then its images count from 0.
     """
 
-    def __init__(self, own: Pacing) -> None:
+    def __init__(self, own: Pacing, stills: Stills | None = None) -> None:
+        self._stills = stills
         self.paces_own_camera = not has_own_time(own)
         """Whether the host camera shows an image only when one is wanted."""
         self.is_timeless = self.paces_own_camera
@@ -54,22 +58,31 @@ class DemandClock:
         self._showing = threading.Lock()
 
     @property
+    def stills(self) -> Stills | None:
+        """Says which own image belongs to each board frame; None if the stamps say it."""
+        return self._stills if self.labels_board and self.paces_own_camera else None
+
+    @property
     def is_one_sided(self) -> bool:
         """Whether the board has labels but the host camera has a clock. Then no board frame can be paired."""
         return self.labels_board and not self.paces_own_camera
 
-    def begin(self, board: Pacing) -> None:
+    def begin(self, board: Pacing, images: ImageNumbers | None = None, period_ns: int = 1) -> None:
         """Begin a board session, with new labels. No image that was asked for earlier comes after this call.
 
         Waits for an image that is being shown. Do not call this with a lock held that the image's delivery needs.
 
         Args:
             board: the board camera's pacing.
+            images: what the board tells of its images; None if it tells nothing.
+            period_ns: time between two of its labels.
         """
         with self._showing:
             self._life += 1
             self._expected = None
         self.labels_board = not has_own_time(board)
+        if self._stills is not None:
+            self._stills.begin(images, period_ns)
         self.is_timeless |= self.labels_board
         self._label_offset_ns = None
 
@@ -94,9 +107,9 @@ class DemandClock:
 
         Args:
             stamp_ns: the stamp by which that frame is paired.
-            number: the frame's number in the board session. If both cameras have labels, images of the same number
-                belong together. If the board has a clock, the host camera shows its images in order, with labels that
-                start at the first frame's stamp.
+            number: which image of the host camera, from 0, if both cameras have labels: as `stills` says, else the
+                frame's number in the board session. If the board has a clock, the host camera shows its images in
+                order, with labels that start at the first frame's stamp.
         """
         if self.paces_own_camera:
             self._wants.put(_Want(self._life, stamp_ns, number if self.labels_board else None))

@@ -24,9 +24,17 @@ class OwnCamera:
         camera: the open camera; this class closes it.
         deliver: takes each frame.
         demand: says when a demand-paced camera shows an image. It must have been created for this camera's pacing.
+        missing: called when the image that was asked for is spoiled.
     """
 
-    def __init__(self, camera: Camera, deliver: Callable[[Frame], None], demand: DemandClock) -> None:
+    def __init__(
+        self,
+        camera: Camera,
+        deliver: Callable[[Frame], None],
+        demand: DemandClock,
+        missing: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._missing = missing
         self._camera = camera
         self._deliver = deliver
         self._demand = demand
@@ -123,6 +131,7 @@ class OwnCamera:
                 self._deliver(grab)
             case Spoiled():
                 self.spoiled += 1
+                self._missing()
             case Skipped(_, frames):
                 self.skipped += frames
             case Ended():

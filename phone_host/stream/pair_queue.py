@@ -12,14 +12,17 @@ from collections.abc import Callable, Iterable
 from typing import Final, assert_never
 
 from common import now
+from common.camera.image_numbers import ImageNumbers, numbers_told
 from common.frame import Frame
 from common.protocol.message import CameraDescription, Pacing
+from phone_host.measure.numbers import FilmWatch, ImageEvidence
 from phone_host.model import BoardFrame, FramePair, PairCounts
 from phone_host.stream.demand_clock import DemandClock
 from phone_host.sync.fifo import Fifo, FifoSettings, Overflow
 from phone_host.sync.pairing import BoardOrphan, HostOrphan, OrphanReason, Outcome, Paired, Pairing, PairingSettings
 from phone_host.sync.phase import Phase, PhaseMeter
 from phone_host.sync.quarantine import Disbelief
+from phone_host.sync.stills import PairedBy, PassedOver, StillsPairing
 
 _SIDE_BYTES: Final = 64 * 1024 * 1024
 """Memory limit of each side's held frames, still encoded: 40 s of 50 KB JPEGs at 30 fps, more than any link's delay."""
@@ -49,6 +52,7 @@ class PairQueue:
         host_period_ns: frame period of the host camera.
         demand: says what stamps mean, and is told of each board frame; None: the host camera has a clock.
         time_offset_ns: added to the board's stamps before they are compared with the host's.
+        own_images: the images that the host camera replays; None if it does not.
         clock: monotonic, ns.
     """
 
@@ -60,6 +64,7 @@ class PairQueue:
         *,
         demand: DemandClock | None = None,
         time_offset_ns: int = 0,
+        own_images: ImageNumbers | None = None,
         clock: Callable[[], int] = now.monotonic_ns,
     ) -> None:
         self._clock = clock
@@ -68,11 +73,15 @@ class PairQueue:
         self._tolerance_ns = tolerance_ns
         self._host_period_ns = host_period_ns
         self._board_period_ns = 0
-        self._pairing: Pairing[BoardFrame, Frame] | None = None
+        self._pairing: Pairing[BoardFrame, Frame] | StillsPairing[BoardFrame, Frame] | None = None
         self._changed = threading.Condition()
         self._closed = False
         self._demand = demand or DemandClock(Pacing.CLOCK)
         self._time_offset_ns = time_offset_ns
+        self._own_images = own_images
+        self._board_images: ImageNumbers | None = None
+        self._films = FilmWatch()
+        self._board_alone = self._own_alone = 0
         self._meter: PhaseMeter | None = None
         self._newest: deque[BoardFrame] = deque(maxlen=_NEWEST)
         self._received = self._host_frames = self._paired = self._dropped = self._taken = 0
@@ -102,6 +111,27 @@ class PairQueue:
                 held_host=self._pairing.held_host if self._pairing else 0,
                 board_orphans=tuple(self._board_orphans.items()),
                 host_orphans=tuple(self._host_orphans.items()),
+            )
+
+    @property
+    def is_timeless(self) -> bool:
+        """Whether images are shown on demand, so that their stamps are no times."""
+        return self._demand.is_timeless
+
+    @property
+    def images(self) -> ImageEvidence:
+        """What is known of the images if both sides replay files."""
+        with self._changed:
+            stills = self._demand.stills
+            return ImageEvidence(
+                paired_by=PairedBy.TIME if stills is None else stills.paired_by,
+                board=self._board_images,
+                own=self._own_images,
+                pairs=self._paired,
+                board_alone=self._board_alone,
+                own_alone=self._own_alone,
+                apart=self._films.apart,
+                first_apart=self._films.first_apart,
             )
 
     @property
@@ -140,17 +170,23 @@ class PairQueue:
 
         If the new session's stamps are labels, old host frames find no partner either.
         """
-        self._demand.begin(camera.pacing)  # without the lock: it waits for a host image, whose delivery needs it
+        told = numbers_told(camera.name)
+        self._demand.begin(
+            camera.pacing, told, camera.period_ns
+        )  # without the lock: it waits for a host image, whose delivery needs it
         board_period_ns = camera.period_ns
         with self._changed:
             self._meter = PhaseMeter(board_period_ns, self._host_period_ns)
+            self._board_images = told
+            self._films.begin(told, self._own_images, by_time=not self._demand.is_timeless)
             if self._pairing is not None:
                 self._settle(self._pairing.restart(OrphanReason.STREAM_ENDED))
             if self._pairing is None or board_period_ns != self._board_period_ns or self._demand.labels_board:
                 self._board_period_ns = board_period_ns
                 if self._pairing is not None:
                     self._settle(self._pairing.finish())
-                self._pairing = Pairing(PairingSettings(self.tolerance_ns, board_period_ns, self._host_period_ns))
+                settings = PairingSettings(self.tolerance_ns, board_period_ns, self._host_period_ns)
+                self._pairing = Pairing(settings) if self._demand.stills is None else StillsPairing()
 
     def void(self) -> None:
         """One of the two clocks may have stood still: pair no frame from before with a frame from after this moment."""
@@ -172,6 +208,7 @@ class PairQueue:
             if self._pairing is None or board_period_ns == self._board_period_ns:
                 return
             self._board_period_ns = board_period_ns
+            self._films.lowered()
             self._meter = PhaseMeter(board_period_ns, self._host_period_ns)
             changed = PairingSettings(self.tolerance_ns, board_period_ns, self._host_period_ns)
             if not self._closed:
@@ -203,8 +240,44 @@ class PairQueue:
     def add_board(self, frame: BoardFrame) -> None:
         """Take a frame of the board. If the host camera shows images on demand, ask it for the partner."""
         stamp_ns = self._demand.stamp_ns(frame.marks.exposed_ns + self._time_offset_ns, frame.offset_ns)
+        number = frame.message.sequence
+        if (stills := self._demand.stills) is not None:
+            # On the board's own clock, on which two labels differ by whole periods.
+            wanted = stills.wanted(number, frame.message.marks.exposed_ns)
+            self._pass_over(wanted.passed)
+            if wanted.index is None:
+                self._refuse_number()
+                return
+            number = wanted.index
         self._add_board(frame, stamp_ns)
-        self._demand.frame_came(stamp_ns, frame.message.sequence)
+        self._demand.frame_came(stamp_ns, number)
+
+    def _refuse_number(self) -> None:
+        """Count a board frame of whose number this machine has no image."""
+        with self._changed:
+            self._received += 1
+            self._board_alone += 1
+            self._count(self._board_orphans, OrphanReason.NO_SUCH_NUMBER.value)
+
+    def _pass_over(self, passed: PassedOver) -> None:
+        """Count images of this machine that are never shown, because no board image of their number came."""
+        with self._changed:
+            self._host_frames += passed.alone + passed.unsent
+            self._own_alone += passed.alone
+            for reason, images in (OrphanReason.NO_SUCH_NUMBER, passed.alone), (OrphanReason.NO_PARTNER, passed.unsent):
+                if images:
+                    self._count(self._host_orphans, reason.value, images)
+
+    def own_image_missing(self) -> None:
+        """The image that the host camera was asked for is spoiled. Its board frame finds no other partner."""
+        with self._changed:
+            if isinstance(self._pairing, StillsPairing):
+                self._settle(self._pairing.unanswered())
+
+    def board_ended(self) -> None:
+        """The board has shown its last image. Stills of this machine that nobody asked for stay without a partner."""
+        if (stills := self._demand.stills) is not None and not self._closed:
+            self._pass_over(stills.unshown)
 
     def _add_board(self, frame: BoardFrame, stamp_ns: int) -> None:
         with self._changed:
@@ -266,7 +339,7 @@ class PairQueue:
 
     def _evict(self, now_ns: int) -> None:
         assert self._pairing is not None
-        if self._demand.is_timeless:
+        if self._demand.is_timeless or isinstance(self._pairing, StillsPairing):
             return
         longer_ns = max(self._board_period_ns, self._host_period_ns)
         self._settle(self._pairing.evict_host(now_ns - max(_LEAST_WAIT_NS, self._delay_ns) - 2 * longer_ns))
@@ -281,6 +354,7 @@ class PairQueue:
                     self._board_bytes -= len(board.message.payload)
                     paired_ns = self._clock()
                     self._paired += 1
+                    self._films.pair(board.message.sequence, host.sequence)
                     pair = FramePair(
                         board=board,
                         host=host,
@@ -307,5 +381,5 @@ class PairQueue:
         return max(older, key=lambda f: f.marks.exposed_ns, default=None)
 
     @staticmethod
-    def _count(account: dict[str, int], reason: str) -> None:
-        account[reason] = account.get(reason, 0) + 1
+    def _count(account: dict[str, int], reason: str, frames: int = 1) -> None:
+        account[reason] = account.get(reason, 0) + frames

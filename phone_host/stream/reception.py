@@ -315,6 +315,8 @@ class Reception:
         """Take note that the board has gone from all links."""
         self._border.close()
         self._current.vanished = not orderly
+        if not self._current.ended:
+            self.account.board_left(now_ns)
         for number, tally in enumerate(self.account.links):
             self._choice.down(number, now_ns)
             tally.is_up = False
@@ -364,6 +366,7 @@ class Reception:
         self._flow = Flow()
         self.tail_known = False
         self._choice.carries(link, now_ns)
+        self.account.board_came(now_ns)
         tally, before = self.account.links[link], self._streamed_over
         self._streamed_over = link
         if accepted.resumed:

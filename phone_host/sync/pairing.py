@@ -38,6 +38,7 @@ class OrphanReason(Enum):
     EVICTED = "evicted"
     STREAM_ENDED = "stream_ended"
     CLOCK = "clock_in_doubt"
+    NO_SUCH_NUMBER = "no_image_of_that_number"
 
 
 @dataclass(frozen=True, slots=True)

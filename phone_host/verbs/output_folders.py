@@ -1,11 +1,28 @@
 """Checks where a verb's results go. Impossible targets are refused before the work; write errors carry a remedy."""
 
+import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Final
 
-from common.errors import SettingsError, UnavailableError
+from common.errors import DataError, SettingsError, UnavailableError
+from common.files import read_whole
 from phone_host.output.listed import claim
+
+REPORT: Final = "report.json"
+
+_MOST_REPORT_BYTES: Final = 16 << 20
+"""A longer file is no report of ours."""
+
+_OWN_KEYS: Final = (
+    ("truth", "demo"),
+    ("ended", "run"),
+    ("verdict", "calibrate"),
+    ("time_offset_ns", "calibrate-time"),
+    ("matcher", "stereo"),
+)
+"""A key that only this verb's report has, or only with one of those before it."""
 
 
 def require_folder(out: Path) -> None:
@@ -52,6 +69,34 @@ def spare_inputs(out: Path, names: str, inputs: Mapping[str, Path]) -> None:
             raise SettingsError(
                 f"{what} {path} lies inside --out {out}, which is replaced", "give another folder with --out"
             )
+
+
+def spare_report(folder: Path, command: str) -> None:
+    """Refuse a folder that holds the report of another command, which this one would replace.
+
+    Args:
+        folder: folder for the results.
+        command: the verb whose results go there.
+
+    Raises:
+        UnavailableError: its report.json is another command's.
+    """
+    owner = _owner_of(folder / REPORT)
+    if owner not in {"", command}:
+        raise UnavailableError(
+            f"{folder / REPORT} is the report of {owner}, and {command} would replace it",
+            "give another folder with --out, or move the report away",
+        )
+
+
+def _owner_of(report: Path) -> str:
+    """Return the verb that wrote a report; empty if there is none, or it does not say."""
+    try:
+        content = json.loads(read_whole(report, _MOST_REPORT_BYTES))
+    except (OSError, DataError, ValueError):
+        return ""
+    keys = content.keys() if isinstance(content, dict) else set()
+    return next((command for key, command in _OWN_KEYS if key in keys), "")
 
 
 def require_file(out: Path, option: str = "--out") -> None:

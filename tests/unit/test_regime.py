@@ -150,3 +150,22 @@ def test_the_slower_side_is_always_blamed(period_ms: float, slower: float, proce
     if processing_ms < 0.8 * arrival_ms:
         assert judgement.regime not in {Regime.BACKLOG, Regime.UNKNOWN}
     assert not any(word in text for text in (judgement.sentence, *judgement.remedies) for word in ("nan", "inf"))
+
+
+def test_frames_spoiled_on_the_board_are_not_blamed_on_the_link() -> None:
+    """A third of 30 frames a second is dropped on the board because it is not whole, so 20 a second come: the link carries all there is."""
+    spoiled = replace(figures(period_ms=100 / 3, arrival_ms=50, processing_ms=10), spoiled=1 / 3)
+    judgement = judge(spoiled)
+    assert judgement.regime is Regime.STARVED_BY_SPOILED
+    assert "33 % of the frames of the board's camera are not whole" in judgement.sentence
+    assert "link" not in judgement.sentence
+    slow_too = replace(figures(period_ms=100 / 3, arrival_ms=200, processing_ms=10), spoiled=1 / 3)
+    assert judge(slow_too).regime is Regime.STARVED_BY_LINK
+
+
+def test_time_without_the_board_is_named() -> None:
+    """The judgement stays that of the time with the board, and says what it leaves out."""
+    steady = figures(period_ms=50, arrival_ms=50, processing_ms=10)
+    with_gap = judge(replace(steady, gap_s=6.2))
+    assert with_gap.regime is judge(steady).regime
+    assert with_gap.sentence == f"{judge(steady).sentence}; the 6.2 s around the board's absence are not counted"

@@ -10,12 +10,14 @@ from common.camera.base import CameraHealth, CameraState
 from common.frame import FrameFault
 from common.ledger import BoardMarks, HostMarks
 from common.protocol.message import BoardCounts, DropReason
+from phone_host.measure.absence import Absence, away_of, away_words
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.measure.delays import DelayStatistics, Series
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.unused import Unused, unused
 from phone_host.model import PairCounts, Side, TimeOffset, Unwritten
+from phone_host.report.report_page import delay_series
 from phone_host.report.run_json import age_bound, build
 from phone_host.report.run_page import camera_table, run_page
 from phone_host.report.summary import phase_lines, summary
@@ -311,3 +313,68 @@ def test_a_runs_page_shows_the_last_pair_and_leads_to_the_saved_ones() -> None:
     assert "and 10 more" in page.words
     assert {"report.json", "delays.jsonl"} <= set(links)
     assert len(page.every("canvas")) == 1
+
+
+def test_a_frame_that_waited_when_the_host_came_belongs_to_the_account() -> None:
+    """The board had grabbed 8 and sent 5, dropped 2, so one waited; it was sent since: nothing waits, and never -1."""
+    before = BoardCounts(grabbed=8, sent=5, dropped=((DropReason.NO_HOST, 2),))
+    for latest, waiting in ((BoardCounts(8, 6, before.dropped), 0), (BoardCounts(8, 5, before.dropped), 1)):
+        account = SessionAccount("s", before, latest, received=latest.sent - 5)
+        told: Any = build(replace(run(1), link=LinkAccount([account])))["sessions"]
+        assert told[0]["waiting"] == waiting
+        assert told[0]["grabbed"] == told[0]["sent"] + sum(told[0]["dropped"].values()) + waiting
+
+
+def test_stills_have_no_figures_from_an_exposure() -> None:
+    """Capture, end-to-end, time skew and age are null in the report, which says why, and no row or plot shows them."""
+    delays = DelayStatistics()
+    for _ in range(12):
+        delays.add(LEDGER, timeless=True)
+    link = LinkAccount([], links=(LinkTally("tcp"), LinkTally("serial")))
+    link.links[0].age.add(MS)
+    seen = replace(run(12), delays=delays, timeless=True, link=link, period_ns=0)
+    report: Any = build(seen)
+    assert [name for name, value in report["delays_ms"].items() if value is None] == ["capture", "end_to_end"]
+    assert report["delays_ms"]["processing"]["count"] == 12
+    assert (report["time_skew_ms"], report["links"][0]["age_ms"], report["image_motion_px_per_s"]) == (None, None, None)
+    assert set(report["not_measured"]) == {"capture", "end_to_end", "time_skew"}
+    lines = summary(seen).splitlines()
+    assert not any(line.startswith(("capture", "end-to-end")) for line in lines)
+    assert any(line.startswith("processing") for line in lines)
+    page = run_page(seen, None, Side.LEFT, [LEDGER] * 12)
+    assert "Time skew of the pairs" not in page
+    assert "<dt>capture" not in page
+    assert "<dt>end-to-end" not in page
+    assert next(quantity.label for quantity in delay_series([LEDGER], timeless=True).delays) == "outbox"
+
+
+def test_an_absence_of_the_board_is_told_and_counts_for_nothing() -> None:
+    """Away from second 5 to 11 of a run of 12 pairs at 20 a second: the rate is 20, and summary, page and report name the absence."""
+    start_ns = 1000 * MS
+    absences = (Absence(start_ns + 5000 * MS, start_ns + 11_000 * MS),)
+    seen = replace(run(12), away=away_of(absences, start_ns, 0), gaps=1, gap_s=6.1, seconds=0.5)
+    assert seen.pairs_per_second == pytest.approx(20.0)
+    words = "the board went away once and came back (for 6.0 s from 5 s on); rates leave this time out"
+    assert away_words(seen.away) == words
+    assert words in summary(seen)
+    assert words[1:] in run_page(seen, None, Side.LEFT, ())
+    report: Any = build(seen)
+    assert report["board_away"] == [{"at_s": 5.0, "seconds": 6.0, "came_back": True}]
+    assert "6.1 s around the board's absence are not counted" in report["regime"]["sentence"]
+
+
+def test_a_board_that_is_still_away_is_told() -> None:
+    """Its absence lasts until now."""
+    (away,) = away_of((Absence(4000 * MS),), 1000 * MS, 6500 * MS)
+    assert (away.at_s, away.seconds, away.is_over) == (3.0, 2.5, False)
+    assert "has not come back" in away_words((away,))
+
+
+def test_a_run_without_one_whole_image_says_so() -> None:
+    """Ten spoiled images and no pair are a doubt that names the side; with a pair, or with fewer, they are not."""
+    spoiled = BoardCounts(grabbed=10, sent=0, dropped=((DropReason.SPOILED, 10),))
+    link = LinkAccount([SessionAccount("s", BoardCounts(), spoiled)])
+    assert "because images are not whole (10 from the board's camera)" in summary(replace(run(0), link=link))
+    assert replace(run(0), link=link).spoiled_counts.nothing_whole
+    assert not replace(run(1), link=link).spoiled_counts.nothing_whole
+    assert not replace(run(0), spoiled=9).spoiled_counts.nothing_whole

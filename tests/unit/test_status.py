@@ -1,6 +1,7 @@
 """The line that says how the board is doing."""
 
 from board_agent.status import StatusLine
+from common.camera.base import CameraState
 from common.protocol.message import BoardCounts, DropReason, Pacing, Rung
 
 SECOND_NS = 1_000_000_000
@@ -64,3 +65,15 @@ def test_a_camera_that_rested_without_a_host_is_not_called_silent() -> None:
     status.text(3600 * SECOND_NS, BoardCounts(), has_host=False)
     assert "fps" in status.text(3602 * SECOND_NS, BoardCounts(), has_host=True)
     assert "for 4 s" in status.text(3604 * SECOND_NS, BoardCounts(), has_host=True)
+
+
+def test_a_camera_that_was_pulled_is_told_while_no_host_is_there() -> None:
+    """Its address stands before the links; a camera that rests because nobody listens is no news."""
+    text = line().text(SECOND_NS, BoardCounts(), has_host=False, camera=CameraState.GONE)
+    assert text.startswith("the camera is gone: v4l2:/dev/video0")
+    assert text.endswith("tcp://*:5555 and ipc:///run/x")
+    assert (
+        line()
+        .text(SECOND_NS, BoardCounts(), has_host=False, camera=CameraState.PAUSED)
+        .startswith("waiting for a host")
+    )

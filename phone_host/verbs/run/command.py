@@ -13,6 +13,7 @@ from common.errors import SettingsError
 from common.link.factory import open_links, parse_link, tell_insecure
 from common.program import logs
 from common.program.commandline import INTERRUPTED
+from common.program.interrupts import leave
 from common.program.settings import Resolved, log_level, with_origins
 from common.program.signals import StopSignals
 from common.program.terminal import columns, fitted
@@ -30,14 +31,18 @@ from phone_host.report.summary import summary
 from phone_host.run.file_sink import NAMES
 from phone_host.run.host import EndReason, Host, HostSettings
 from phone_host.run.terminal_view import LiveTable
+from phone_host.run.waiting_note import WaitingNote
 from phone_host.settings import check, key_folder, resolve_settings
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
-from phone_host.verbs.output_folders import spare_inputs
+from phone_host.verbs.output_folders import spare_inputs, spare_report
 from phone_host.verbs.stereo_options import build_core
 
 _CHECK_FAILED = 4
+
+_MOST_SECONDS = 10_000_000
+"""Four months; more than that is a slip of the hand."""
 
 
 def replayed(uri: str) -> str:
@@ -56,6 +61,7 @@ def run(options: argparse.Namespace) -> int:
     _check_numbers(options)
     if options.out is not None:
         inputs = {"--camera": replayed(settings.camera), "--calibration": settings.calibration}
+        spare_report(options.out, "run")
         spare_inputs(options.out, NAMES, {what: Path(path) for what, path in inputs.items() if path})
     fifo = FifoSettings.parse(settings.fifo)
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
@@ -68,10 +74,12 @@ def run(options: argparse.Namespace) -> int:
     links = open_links(uris, keys)
     signals = StopSignals()
     host = Host(_host_settings(options, resolved, fifo, board_side, core), camera, links, core)
-    live = LiveTable(host.snapshot, pairs=options.pairs) if sys.stderr.isatty() else None
+    on_terminal = sys.stderr.isatty()
+    live = LiveTable(host.snapshot, pairs=options.pairs, seconds=options.seconds) if on_terminal else None
+    note = WaitingNote(named, lambda: host.has_met_board, lambda line: print(line, file=sys.stderr, flush=True))
     with live or nullcontext():
         try:
-            ended = host.run(lambda: signals.stop, live.refresh if live else None)
+            ended = host.run(lambda: signals.stop, live.refresh if live else note.refresh)
         except BaseException:
             host.write_report(build(host.snapshot("failed")))
             raise
@@ -81,11 +89,16 @@ def run(options: argparse.Namespace) -> int:
     report = build(snapshot)
     page = _page(host, snapshot, board_side, options.out) if options.out else ""
     complete = host.write_report(report, page)
-    print(json.dumps(report) if options.json else fitted(summary(snapshot, columns())))
+    text = json.dumps(report) if options.json else fitted(summary(snapshot, columns()))
+    print(text, flush=host.has_given_up)
+    if signals.interrupted and host.has_given_up:
+        leave()  # the interpreter's end would wait for native code
     if signals.interrupted:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
-    return _CHECK_FAILED if too_few or not complete else 0
+    too_few = too_few or (ended is EndReason.SECONDS_OVER and not snapshot.processed)
+    nothing_whole = not signals.stop and snapshot.spoiled_counts.nothing_whole
+    return _CHECK_FAILED if too_few or nothing_whole or not complete else 0
 
 
 def _page(host: Host, snapshot: RunSnapshot, board_side: Side, out: Path) -> str:
@@ -129,6 +142,7 @@ def _host_settings(
         tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
         fifo=fifo,
         pairs=options.pairs,
+        seconds_ns=round(options.seconds * 1e9),
         wait_ns=None if options.wait is None else round(options.wait * 1e9),
         out=options.out,
         save_every=options.save_every,
@@ -143,5 +157,7 @@ def _check_numbers(options: argparse.Namespace) -> None:
     for name, value in (("--pairs", options.pairs), ("--save-every", options.save_every)):
         if value < 0:
             raise SettingsError(f"{name} {value}", "give 0 or more")
+    if not 0 <= options.seconds <= _MOST_SECONDS:
+        raise SettingsError(f"--seconds is {options.seconds:g}", f"give 0 (no limit) to {_MOST_SECONDS} seconds")
     if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
         raise SettingsError(f"--wait is {options.wait}", "give 0 or more seconds, or leave it out to wait for ever")

@@ -15,7 +15,7 @@ from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.globs import two_lists
-from phone_host.verbs.output_folders import require_folder, spare_inputs, unwritable
+from phone_host.verbs.output_folders import require_folder, spare_inputs, spare_report, unwritable
 from phone_host.verbs.progress import progress
 from phone_host.verbs.stereo_options import build_core, output_options
 
@@ -64,6 +64,7 @@ def _core(options: argparse.Namespace, size_px: Size) -> StereoCore:
 def _require_place(out: Path, files: ViewFiles) -> None:
     """Refuse a results folder that cannot be written to, holds the photographs or would lose them."""
     require_folder(out)
+    spare_report(out, "stereo")
     try:
         require_writable(out)
     except OSError as error:

@@ -1,0 +1,97 @@
+"""Ctrl-C ends a command within a second, wherever it comes: exit code 130, one line, no traceback, nothing half written.
+
+Three phases. While a command is being imported there is nothing to tidy up: `leave_at_once` ends the process in the
+signal handler. While it runs, Python raises KeyboardInterrupt, but only once native code returns, and OpenCV may
+compute for a minute. So under `interruptible(native=True)` a thread waits for the signal too. It ends the process if
+the main thread has not left within `_GRACE_S`. Once the command is done, its results count and Ctrl-C is ignored.
+
+Commands that end in their own way (StopSignals) replace the handler while they run. Light: a command's first import.
+"""
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Final, NoReturn
+
+INTERRUPTED: Final = 130
+"""128 + SIGINT, as shells report it."""
+
+_GRACE_S: Final = 0.5
+"""Python code ends within milliseconds of a signal; the other half of the second is for a busy machine."""
+
+
+def leave_at_once() -> None:
+    """Let Ctrl-C end this process without any further code, until `interruptible` begins. Call it in the main thread."""
+    signal.signal(signal.SIGINT, _leave)
+
+
+@contextmanager
+def interruptible(*, native: bool = False) -> Iterator[None]:
+    """Raise KeyboardInterrupt on Ctrl-C while the block runs.
+
+    Outside the main thread, and in a process that handles Ctrl-C in another way, this does nothing.
+
+    Args:
+        native: whether to end the process if native code keeps KeyboardInterrupt from being raised. Only for commands
+            whose child processes, if any, need no goodbye.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or handler not in {_leave, signal.default_int_handler}:
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    watcher = _Watcher() if native else None
+    try:
+        yield
+    finally:
+        if watcher is not None:
+            watcher.stop()
+        # A process that began with `leave_at_once` has only its exit left, which a signal must not disturb.
+        signal.signal(signal.SIGINT, signal.SIG_IGN if handler is _leave else handler)
+
+
+def leave() -> NoReturn:
+    """End this process now with 130 and one line. What it had begun to write is removed."""
+    from common.unfinished import remove_unfinished  # noqa: PLC0415 - a start does not pay for it
+
+    remove_unfinished()
+    os.write(2, b"interrupted\n")
+    os._exit(INTERRUPTED)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    del number, frame
+    os.write(2, b"interrupted\n")
+    os._exit(INTERRUPTED)
+
+
+class _Watcher:
+    """Ends the process some time after SIGINT, unless it is stopped before. Create and stop it in the main thread."""
+
+    def __init__(self) -> None:
+        self._reader, self._writer = os.pipe()
+        os.set_blocking(self._writer, False)
+        # The wakeup descriptor is written by the C handler at once, while native code still runs in the main thread.
+        self._before = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="interrupts", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Leave the process alone from now on."""
+        self._stopped.set()
+        signal.set_wakeup_fd(self._before)
+        os.close(self._writer)
+        self._thread.join()
+        os.close(self._reader)
+
+    def _watch(self) -> None:
+        while number := os.read(self._reader, 1):
+            if number[0] == signal.SIGINT:
+                break
+        if not number or self._stopped.wait(_GRACE_S):
+            return
+        leave()

@@ -1,0 +1,82 @@
+"""Two replays whose images cannot belong together are doubted in words; two of one series never are."""
+
+from dataclasses import replace
+
+from common.camera.image_numbers import ImageNumbers
+from phone_host.measure.numbers import FilmWatch, ImageEvidence, number_concerns
+from phone_host.measure.trust import Doubt
+from phone_host.sync.stills import PairedBy
+
+SERIES = ImageNumbers(count=16, first=3, last=18)
+LATER = ImageNumbers(count=16, first=4, last=19)
+SHORT = ImageNumbers(count=10)
+
+
+def said(evidence: ImageEvidence) -> str:
+    """The one doubt's sentence; empty if there is none."""
+    found = number_concerns(evidence)
+    assert all(concern.doubt is Doubt.IMAGE_NUMBERS and concern.remedy for concern in found)
+    return "".join(concern.sentence for concern in found)
+
+
+def test_one_series_is_not_doubted() -> None:
+    """Equal folders are fine however they are paired, and so is everything where one side is a real camera, or no pair has come."""
+    for by in PairedBy:
+        assert not said(ImageEvidence(paired_by=by, board=SERIES, own=SERIES, pairs=5))
+        assert not said(ImageEvidence(paired_by=by, board=SERIES, own=None, pairs=5))
+        assert not said(ImageEvidence(paired_by=by, board=None, own=SHORT, pairs=5))
+        assert not said(ImageEvidence(paired_by=by, board=SERIES, own=SHORT, pairs=0))
+
+
+def test_other_numbers_are_a_doubt_from_the_first_pair_on() -> None:
+    """Folders that begin at different numbers are named with their numbers, before any image lacks its partner."""
+    first = ImageEvidence(paired_by=PairedBy.NUMBER, board=SERIES, own=LATER, pairs=1)
+    assert said(first) == "the board shows 16 images, 3 to 18, this machine 16 images, 4 to 19"
+    assert said(replace(first, board_alone=1, own_alone=2)).endswith(
+        ": 1 of the board's and 2 of this machine's had no partner of the same number so far"
+    )
+
+
+def test_a_number_that_only_one_side_has_is_a_doubt() -> None:
+    """Even if both begin and end alike."""
+    alike = ImageEvidence(paired_by=PairedBy.NUMBER, board=SERIES, own=SERIES, pairs=3, own_alone=1)
+    assert "1 of this machine's had no partner" in said(alike)
+
+
+def test_different_counts_are_a_doubt_where_order_or_time_pairs() -> None:
+    """Paired in their order, a missing image shifts the rest; two looped films of different length drift apart."""
+    for by, words in ((PairedBy.ORDER, "paired in their order"), (PairedBy.TIME, "films of different length")):
+        assert words in said(ImageEvidence(paired_by=by, board=SERIES, own=SHORT, pairs=1))
+
+
+def test_films_that_run_once_and_began_apart_are_a_doubt() -> None:
+    """The host's film was 10 images ahead: all pairs are of different images, and the first one is named."""
+    watch = FilmWatch()
+    watch.begin(SERIES, SERIES, by_time=True)
+    for number in range(5):
+        watch.pair(number, number + 10)
+    assert (watch.pairs, watch.apart, watch.first_apart) == (5, 5, (0, 10))
+    evidence = ImageEvidence(board=SERIES, own=SERIES, pairs=5, apart=watch.apart, first_apart=watch.first_apart)
+    assert "5 of 5 pairs are of different images: first of image 0 of the board and image 10 of this machine" in said(
+        evidence
+    )
+
+
+def test_where_the_place_in_a_film_is_not_known_nothing_is_compared() -> None:
+    """Loops, labels, live cameras, and a board that leaves images out say nothing about the place."""
+    looped = replace(SERIES, looped=True)
+    for board, own, by_time in (
+        (looped, looped, True),
+        (SERIES, SERIES, False),
+        (None, SERIES, True),
+        (SERIES, None, True),
+    ):
+        watch = FilmWatch()
+        watch.begin(board, own, by_time=by_time)
+        watch.pair(0, 10)
+        assert watch.apart == 0
+    watch = FilmWatch()
+    watch.begin(SERIES, SERIES, by_time=True)
+    watch.lowered()
+    watch.pair(0, 10)
+    assert watch.apart == 0
