@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.camera.identity import CameraState
+from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import Frame
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.protocol.message import FrameMessage
@@ -274,6 +275,7 @@ class BoardFrame:
         uncertainty_ns: uncertainty of that offset.
         asked_px: (width, height) that the camera was asked for, px. The frame itself may be smaller. Zeros: use the
             frame's own size.
+        orientation: how its image becomes upright. All sizes are those before that.
     """
 
     message: FrameMessage
@@ -283,6 +285,7 @@ class BoardFrame:
     offset_ns: int
     uncertainty_ns: int
     asked_px: tuple[int, int] = (0, 0)
+    orientation: Orientation = UPRIGHT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,18 +8,19 @@ from common.camera.orientation import UPRIGHT, Orientation
 
 
 class Lock(Enum):
-    """A control that a rig's camera is held at, by the name that it has in files and on the wire.
+    """A control that a rig's camera is held at, by its name in files. The order is the wire's: new ones go to the end.
+
+    Gain is none of them: it changes neither where points lie nor when they were seen, and in other light than that of
+    the calibration it must make up for the held exposure.
 
     Attributes:
         EXPOSURE: exposure time, us. Not ns: the integers of a rig.yaml have 32 bits.
-        GAIN: in the camera's own unit.
         WHITE_BALANCE: colour temperature, K.
         FOCUS: in the camera's own unit.
         ZOOM: in the camera's own unit.
     """
 
     EXPOSURE = "exposure_us"
-    GAIN = "gain"
     WHITE_BALANCE = "white_balance"
     FOCUS = "focus"
     ZOOM = "zoom"
@@ -59,6 +60,20 @@ class CameraIdentity:
 
 
 UNKNOWN_CAMERA: Final = CameraIdentity()
+
+MOST_LETTERS: Final = 48
+"""Texts of an identity are cut here, the same on a board and off it: a driver's name has 15 letters at most, a card's 31 (videodev2.h)."""
+
+
+def identity_of(driver: str, name: str, serial: str) -> CameraIdentity:
+    """Make an identity of what a driver says, which may be any text.
+
+    Args:
+        driver: kernel driver.
+        name: the camera's own name.
+        serial: its serial number.
+    """
+    return CameraIdentity(*(text.encode("utf-8", "replace").decode()[:MOST_LETTERS] for text in (driver, name, serial)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from fractions import Fraction
 from typing import Final
 
 from common.camera.v4l2_formats import FormatOffer, Rates, Wanted, choose, choose_rate, rate_text
-from common.camera.v4l2_stamps import StampClock
+from common.camera.v4l2_stamps import StampClock, rate_remedy
 from common.doctor.access import Holder
 from common.doctor.finding import Finding, fail, ok, warn
 from common.errors import TandemError
@@ -82,6 +82,7 @@ class Sample:
         stamps: clock named by the stamps' flags; None without a frame.
         driver: the kernel driver's name.
         refused: controls that the driver would not set.
+        exposure_ns: exposure time at the end, ns; None if the camera does not report it.
     """
 
     frames: int
@@ -95,6 +96,7 @@ class Sample:
     stamps: StampClock | None
     driver: str
     refused: int = 0
+    exposure_ns: int | None = None
 
 
 def check_absence(nodes: int, cameras: tuple[UsbCamera, ...]) -> Finding:
@@ -124,7 +126,8 @@ def check_format(camera: str, offered: Offered, wanted: Wanted) -> Finding:
     except TandemError as error:
         return fail("format", error.problem, error.remedy)
     width_px, height_px = choice.size_px
-    return ok("format", f"{choice.letters} {width_px}x{height_px} at {rate_text(rate_hz)} frames/s is offered")
+    offer = f"{choice.letters} {width_px}x{height_px} at {rate_text(rate_hz)} frames/s is offered"
+    return ok("format", f"{offer} by the driver; the line `stream` says what the camera gives")
 
 
 def check_bus(bus: UsbBus, frame_bytes: int, rate_hz: float) -> Finding:
@@ -179,9 +182,8 @@ def check_stream(sample: Sample) -> list[Finding]:
     if spoiled:
         finding = warn("stream", f"{text}; spoiled: {faults}", "a better cable or port: frames are cut on the USB bus")
     elif sample.period_ns and sample.nominal_ns < _SLOW * sample.period_ns:
-        finding = warn(
-            "stream", text, "more light or a fixed exposure_ms=; or the bus is full: smaller frames, other port"
-        )
+        slow = f"{text}; the camera is slower than the driver offers"
+        finding = warn("stream", slow, rate_remedy(sample.period_ns, sample.nominal_ns, sample.exposure_ns))
     elif sample.frames >= _FEW and sample.missed > _MANY_MISSED * sample.frames:
         finding = warn(
             "stream", f"{text}; {sample.missed} missed", "the machine is busy, or the bus full: smaller frames"

@@ -13,7 +13,9 @@ from common.imagesize.tiff import TIFF_KINDS, as_stored, tiff_head
 
 _KNOWN: Final = "give a PNG, JPEG, TIFF, BMP, PGM, PPM or WebP image"
 
-_PHONE_KINDS: Final = dict.fromkeys((b"heic", b"heix", b"hevc", b"hevx", b"heim", b"heis", b"mif1", b"msf1"), "HEIC") | {
+_PHONE_KINDS: Final = dict.fromkeys(
+    (b"heic", b"heix", b"hevc", b"hevx", b"heim", b"heis", b"mif1", b"msf1"), "HEIC"
+) | {
     b"avif": "AVIF",
     b"avis": "AVIF",
 }

@@ -133,6 +133,9 @@ _CURES = {
     Reason.NO_PARTNER: "give both images of a pair the same number",
     Reason.UNREADABLE: "copy the images again",
     Reason.OTHER_SIZE: "take all images of one camera at one resolution",
+    Reason.TURNED: (
+        "hold each camera the same way in all images; if only a phone's EXIF tag differs, remove the tag from all of them"
+    ),
     Reason.NOT_FOUND_LEFT: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
     Reason.NOT_FOUND_RIGHT: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
     Reason.NOT_FOUND_BOTH: "show the whole board, sharp and evenly lit, and check --board (inner corners)",

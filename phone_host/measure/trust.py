@@ -37,6 +37,7 @@ class Doubt(Enum):
     CLOCK_STEPPED = "clock_stepped"
     DISBELIEVED = "disbelieved"
     SPOILED_IMAGES = "spoiled_images"
+    CAMERA_SETTINGS = "camera_settings"
 
 
 @dataclass(frozen=True, slots=True)

@@ -112,11 +112,13 @@ class _Reader:
     def __init__(self, path: Path, where: str, values: Any) -> None:  # noqa: ANN401 - whatever JSON holds
         self._path, self._where = path, where
         if not isinstance(values, dict):
-            raise DataError(f"{path}: {where.rstrip('.') or 'the file'} is no object", _REMEDY)
+            name = where.rstrip(".") or "the file"
+            raise DataError(f"{path}: {name} is no object", _REMEDY)
         self._values: dict[str, Any] = values
 
     def problem(self, key: str, what: str) -> DataError:
-        return DataError(f"{self._path}: {self._where}{key} {what}", _REMEDY)
+        name = f"{self._where}{key}"
+        return DataError(f"{self._path}: {name} {what}", _REMEDY)
 
     def inner(self, key: str) -> "_Reader":
         """An object inside."""
@@ -139,5 +141,6 @@ class _Reader:
     def numbers(self) -> tuple[tuple[str, int], ...]:
         """All of its keys, each with a whole number."""
         if len(self._values) > _MOST_LOCKS or any(len(key) > _MOST_TEXT for key in self._values):
-            raise DataError(f"{self._path}: {self._where.rstrip('.')} holds too much", _REMEDY)
+            name = self._where.rstrip(".")
+            raise DataError(f"{self._path}: {name} holds too much", _REMEDY)
         return tuple((key, self.whole(key, -LARGEST_LOCK - 1, LARGEST_LOCK)) for key in self._values)

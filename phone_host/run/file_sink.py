@@ -1,4 +1,4 @@
-"""A run's results on disk: settings.json, delays.jsonl, pair folders, report.json and the page.
+"""A run's results on disk: settings.json, delays.jsonl, pair folders, cameras.json, report.json and the page.
 
 A full disk never stops the run and loses nothing that memory can hold. While writing fails, lines of delays.jsonl wait
 in memory (bounded) and pairs are counted as unsaved. Once there is room again, the waiting lines are written in order.
@@ -25,6 +25,7 @@ from common.ledger import PairLedger
 from common.program.logs import event
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.model import Result, Unwritten
+from phone_host.output.cameras_json import CAMERAS_NAME
 from phone_host.output.listed import ListedFolder
 from phone_host.output.pair_files import PAIR_NAMES, RUN_FILES, write_pair
 from phone_host.run.sinks import NotWrittenError, SinkQueue
@@ -43,7 +44,7 @@ _LINES: Final = 16384
 _WRITERS: Final = 2
 """Threads that write one pair's files. Of 640x480 they take 41 ms with depth.png; one thread took 53 ms without it (decision 0033)."""
 
-NAMES: Final = r"delays\.jsonl|report\.json|settings\.json|index\.html|pair-[0-9]{6,}"
+NAMES: Final = r"delays\.jsonl|report\.json|settings\.json|cameras\.json|index\.html|pair-[0-9]{6,}"
 """The names that a run writes into its folder."""
 
 
@@ -220,12 +221,13 @@ class FileSink:
             lines=lost + self._lines.unwritten, pairs=self._unsaved_pairs, cause=cause or ("it hangs" if lost else "")
         )
 
-    def close(self, report: dict[str, object], page: str = "") -> None:
+    def close(self, report: dict[str, object], page: str = "", cameras: str = "") -> None:
         """Finish the queued work, write report.json and release the folder. May be called again.
 
         Args:
             report: the JSON object to write.
             page: the HTML document to write as index.html beside it; empty: none.
+            cameras: content of cameras.json; empty: none.
         """
         if self._own is None:
             return
@@ -236,6 +238,9 @@ class FileSink:
             if page:
                 self._own.add("index.html")
                 self._own.write_text("index.html", page)
+            if cameras:
+                self._own.add(CAMERAS_NAME)
+                self._own.write_text(CAMERAS_NAME, cameras)
             self._own.sync()
         except OSError as error:
             self._of_report.begins(error)

@@ -1,11 +1,13 @@
-"""What the user of `stereo` must know about a pair's result. Pure."""
+"""What the user of `stereo` must know about a pair's result. Doubts that are found in the images belong here, too."""
 
 import math
 from typing import Final
 
+from common.camera.orientation import UPRIGHT
 from phone_host.model import Processed
 from phone_host.output.pair_files import WrittenPair
 from phone_host.report.stereo_report import Remark
+from phone_host.stereo.images import EncodedFile
 from phone_host.stereo.reproject import nearest_depth_m
 
 _LOW_DENSITY: Final = 0.33
@@ -58,3 +60,16 @@ def pair_remarks(processed: Processed, density: float, written: WrittenPair, nea
             )
         )
     return tuple(remarks)
+
+
+def turned_remarks(*files: EncodedFile) -> tuple[Remark, ...]:
+    """Say which images were turned because of their EXIF headers.
+
+    Args:
+        files: the pair's image files.
+    """
+    return tuple(
+        Remark(f"{file.name} was turned upright, as its EXIF header says")
+        for file in files
+        if file.head.orientation != UPRIGHT
+    )

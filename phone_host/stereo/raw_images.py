@@ -1,16 +1,18 @@
-"""Converts raw camera images (YUYV, grey, NV12) to grey or BGR, and frames of any encoding to images."""
+"""Converts raw camera images (YUYV, grey, NV12) to grey or BGR, and frames of any encoding to upright images."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import cv2
 import numpy as np
 
+from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import FrameFault, ImageSizeError, PixelFormat, SpoiledImageError, raw_bytes
 from common.imagesize.head import MOST_PIXELS, ImageKind, require_pixels, size_text
 from phone_host.model import Image
 from phone_host.stereo.images import EncodedFile, decode_file, decode_files, enlarged, examine, require_same_shape
+from phone_host.stereo.orient import upright
 
 _KINDS: Final = {PixelFormat.MJPEG: ImageKind.JPEG, PixelFormat.PNG: ImageKind.PNG}
 _LOOK: Final = "check the camera that sends it"
@@ -28,6 +30,7 @@ class EncodedImage:
         name: how error messages call it.
         asked_px: (width, height) that its camera was asked for, px; the image may be smaller. Zeros mean the size in
             the header.
+        orientation: how the image becomes upright; all sizes above are those before that.
     """
 
     payload: bytes | memoryview
@@ -36,6 +39,7 @@ class EncodedImage:
     height_px: int
     name: str
     asked_px: tuple[int, int] = (0, 0)
+    orientation: Orientation = UPRIGHT
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -44,7 +48,7 @@ class EncodedImage:
 
     @property
     def whole_px(self) -> tuple[int, int]:
-        """Width and height after enlarging to the size that the camera was asked for, px."""
+        """Width and height after enlarging to the size that the camera was asked for, before it is turned, px."""
         return self.asked_px if any(self.asked_px) else self.size_px
 
 
@@ -64,8 +68,8 @@ def decode_frames(
             no use.
 
     Returns:
-        Both in that order, each (H, W) grey or (H, W, 3) BGR, uint8, upright as its EXIF header says, and as large as
-            its camera was asked for.
+        Both in that order, each (H, W) grey or (H, W, 3) BGR, uint8, upright as its EXIF header and then its camera's
+            orientation say, and as large as its camera was asked for.
 
     Raises:
         SpoiledImageError: one of the two is spoiled, or its size cannot be believed.
@@ -103,12 +107,14 @@ def _whole(decoded: Image, image: EncodedImage, examined: EncodedImage | Encoded
 
 
 def _turned(image: EncodedImage | EncodedFile, size_px: tuple[int, int]) -> tuple[int, int]:
-    """Return the upright width and height of what is stored with this width and height. Raw frames say nothing about it."""
-    return image.head.orientation.turned_size(size_px) if isinstance(image, EncodedFile) else size_px
+    """Return the upright width and height of what is stored with this width and height. Raw frames have no EXIF header."""
+    if isinstance(image, EncodedFile):
+        return image.mounted.turned_size(image.head.orientation.turned_size(size_px))
+    return image.orientation.turned_size(size_px)
 
 
 def _decoded(image: EncodedImage | EncodedFile) -> Image:
-    return decode_raw(image) if isinstance(image, EncodedImage) else decode_file(image)
+    return upright(decode_raw(image), image.orientation) if isinstance(image, EncodedImage) else decode_file(image)
 
 
 def _examined(image: EncodedImage, most_pixels: int) -> EncodedImage | EncodedFile:
@@ -137,7 +143,7 @@ def _examined(image: EncodedImage, most_pixels: int) -> EncodedImage | EncodedFi
             f"{image.name} is {size_text(file.head.size_px)} px, its header says {size_text(image.size_px)}",
             _LOOK,
         )
-    return file
+    return replace(file, mounted=image.orientation)
 
 
 def decode_raw(image: EncodedImage) -> Image:

@@ -10,6 +10,9 @@ from typing import Final
 from common.errors import DataError, SettingsError
 
 SUFFIXES: Final = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp"})
+_UNREAD: Final = frozenset({".heic", ".heif", ".avif"})
+"""Photographs of phones that are not read."""
+
 _REMEDY: Final = "give a folder of images or a quoted glob such as 'left*.png'"
 _MOST_KINDS: Final = 4  # enough to recognise a folder by; the line stays short
 _NUMBER = re.compile(r"\d+")
@@ -110,6 +113,8 @@ def _images(given: str, side: str) -> list[Path]:
     if path.is_dir():
         inside = [entry for entry in path.iterdir() if entry.is_file() and not entry.name.startswith(".")]
         files = [entry for entry in inside if entry.suffix.lower() in SUFFIXES]
+        # A folder of nothing else: whoever opens one says how to convert it.
+        files = files or [entry for entry in inside if entry.suffix.lower() in _UNREAD]
         if not files:
             raise DataError(_without_images(given, side, inside), _REMEDY)
     else:

@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
         spare_inputs(options.out, NAMES, {what: Path(path) for what, path in inputs.items() if path})
     fifo = FifoSettings.parse(settings.fifo)
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
-    core, board_side = _core(options, settings, (camera.description.width_px, camera.description.height_px))
+    core, board_side = _core(options, settings, camera.description.upright_px)
     keys = key_folder(settings.keys)
     named = settings.link or (find_board_and_say(keys.path, options.wait),)
     uris = [parse_link(uri, listens_by_default=False) for uri in named]
