@@ -52,7 +52,7 @@ def set_verdict(report: SetReport) -> tuple[Headline, str]:
     bad = verdicts.count(Headline.BAD) + len(report.failed)
     if good == count:
         return Headline.GOOD, f"Nothing speaks against the depth of any of the {count} pairs."
-    words = [f"{good} of {count} pairs look right"]
+    words = [f"{good} of {count} pairs {'looks' if good == 1 else 'look'} right"]
     if bad:
         words.append(f"{bad} gave no depth or cannot be right")
     if doubtful := count - good - bad:

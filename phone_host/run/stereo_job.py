@@ -23,6 +23,7 @@ from phone_host.output.json_text import json_text
 from phone_host.output.pair_files import STEREO_FILES, available, write_pair
 from phone_host.report.page_links import NextCommand
 from phone_host.report.report_page import Picture
+from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_report import (
     FailedPair,
     PairReport,
@@ -30,8 +31,6 @@ from phone_host.report.stereo_report import (
     SetReport,
     Size,
     alone_remarks,
-    pair_json,
-    set_json,
 )
 from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
 from phone_host.run.stereo_remarks import pair_remarks, turned_remarks

@@ -12,7 +12,9 @@ from common.program.terminal import fitted
 from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
 from phone_host.report.page_links import NextCommand
-from phone_host.report.stereo_report import Size, pair_json, pair_lines, set_json, set_lines
+from phone_host.report.stereo_json import pair_json, set_json
+from phone_host.report.stereo_lines import pair_lines, set_lines
+from phone_host.report.stereo_report import Size
 from phone_host.run.stereo_job import StereoJob, run_stereo
 from phone_host.run.stereo_results import NAMES, require_writable
 from phone_host.settings import most_pixels
