@@ -109,7 +109,10 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
         report = _set(job, tuple(pairs))
         if not report.computed:
             first = report.failed[0]
-            raise DataError(f"none of the {len(pairs)} pairs can be computed; the first: {first.problem}", first.remedy)
+            raise DataError(
+                f"none of the {len(pairs)} pairs can be computed; the first: {first.problem} ({first.remedy})",
+                "mend what this names, then try again",
+            )
         results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
         results.write_text("index.html", set_page(report, work.thumbnails, job.commands))
         return report
