@@ -90,14 +90,14 @@ def _require_place(out: Path, files: ViewFiles) -> None:
         require_writable(out)
     except OSError as error:
         raise unwritable(out, error) from error
-    for left, right in ((left, right) for _, left, right in files.pairs):
-        spare_inputs(out, NAMES, {"LEFT": left, "RIGHT": right})
     folders = {path.resolve().parent for path in _images(files)}
     if out.resolve() in folders:
         raise SettingsError(
             f"--out {out} is the folder of the images, where later runs would take pictures of depth for photographs",
             f"give a folder of its own, such as --out {out / 'scan'}",
         )
+    for left, right in ((left, right) for _, left, right in files.pairs):
+        spare_inputs(out, NAMES, {"LEFT": left, "RIGHT": right})
 
 
 def _images(files: ViewFiles) -> Sequence[Path]:
