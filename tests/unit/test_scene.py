@@ -406,7 +406,7 @@ def test_a_film_is_refused_where_a_foreign_image_would_be_shown_with_it(tmp_path
     def film() -> Film:
         return render_film(scene, small_rig(), looks, tmp_path, fps=2, seconds=1.0, advance=lambda: None)
 
-    with pytest.raises(UnavailableError, match="holiday.JPG is no image of the film"):
+    with pytest.raises(UnavailableError, match=r"holiday\.JPG is no image of the film"):
         film()
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["holiday.JPG", "left"]
     foreign.rename(tmp_path / "left" / "notes.txt")
