@@ -113,7 +113,7 @@ linear-gradient(to left,var(--card) 40%,transparent) right/2.5rem 100% no-repeat
 linear-gradient(to right,var(--edge),transparent) left/1.1rem 100% no-repeat,linear-gradient(to left,var(--edge),transparent) right/1.1rem 100% no-repeat}
 table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums;min-width:50%}
 th,td{text-align:left;padding:.35rem 1.5rem .35rem 0;border-bottom:1px solid var(--line)}th{color:var(--ink2);font-weight:500}
-tr:last-child td{border-bottom:0}.tight{white-space:nowrap;font-size:.75rem}.tight td,.tight th{padding-right:.55rem}.tight td:nth-child(2){white-space:normal}
+tr:last-child td{border-bottom:0}.tight{white-space:nowrap;font-size:.75rem}.tight td,.tight th{padding-right:.55rem}.tight td:nth-child(2){white-space:normal;min-width:8.5rem}
 section>p:last-child{margin-bottom:0}
 details{margin-top:.75rem;font-size:.9rem;color:var(--ink2)}summary{cursor:pointer}
 .words{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1rem;margin:.5rem 0 0}.words dt{color:var(--ink)}.words dd{margin:0}

@@ -78,8 +78,7 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
         f"Queue: {judgement.sentence}.",
         *(_sentence(remark) for remark in judgement.remedies if judgement.regime in _FINE),
         *(f"Warning: {item.sentence}." for item in concerns(run)),
-        *phase_lines(run.phase, run.alignment),
-        *rung_lines(run.link),
+        *(_sentence(line) for line in (*phase_lines(run.phase, run.alignment), *rung_lines(run.link))),
     )
 
 
