@@ -7,11 +7,13 @@ from common.camera.base import CameraHealth
 from common.frame import NOT_AS_SAID
 from phone_host.measure.accounts import LinkAccount
 from phone_host.measure.delays import DelayStatistics
+from phone_host.measure.image_doubts import ImageTrust, gravest_first
 from phone_host.measure.regime import RunFigures
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import (
     NO_DOUBT,
     Concern,
+    Doubt,
     Timing,
     Unbelieved,
     stamp_doubt,
@@ -44,7 +46,8 @@ class RunSnapshot:
         interpolated to the moment of the host's. If so, their time skew does not matter.
         spoiled_images: pairs with a spoiled image, by reason; part of `undecodable`.
         stamps_exact: whether both cameras' stamps are the times of exposure by definition.
-        judged_pairs: number of newest pairs over which time and motion are judged; None: all.
+        judged_pairs: number of newest pairs over which time and motion are judged; None: all. images: what the images
+        say about the depth.
     """
 
     ended: str
@@ -74,6 +77,7 @@ class RunSnapshot:
     phase: Phase | None = None
     alignment: Alignment | None = None
     judged_pairs: int | None = None
+    images: ImageTrust = field(default_factory=ImageTrust)
 
     @property
     def stopped(self) -> int:
@@ -157,7 +161,30 @@ def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
         received=sum(account.received + account.disbelieved[Disbelief.CREDIT] for account in link.sessions),
         spoiled_images=spoiled(run),
     )
-    return unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
+    timing = unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
+    return gravest_first((*image_concerns(run), *timing))
+
+
+def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
+    """Return what the images of a run make doubtful, gravest first. While it runs, pairs without depth may yet get some."""
+    found = run.images.concerns
+    if run.ended == "running" or not lacks_depth(run):
+        return found
+    if any(concern.doubt.blocks for concern in found):
+        return found  # which says why there is none
+    return (
+        Concern(
+            Doubt.NO_DEPTH,
+            "no pair has depth",
+            "check that --calibration or --rectified fits the cameras, and that both see the same scene",
+        ),
+        *found,
+    )
+
+
+def lacks_depth(run: RunSnapshot) -> bool:
+    """Tell whether a rig or rectified images were given, and no pair has depth."""
+    return run.images.wants_depth and not run.images.has_depth
 
 
 def spoiled(run: RunSnapshot) -> dict[str, int]:

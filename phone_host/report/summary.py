@@ -6,6 +6,8 @@ from typing import Final
 from common.camera.base import CameraHealth
 from phone_host.measure.accounts import LinkAccount, rung_lines
 from phone_host.measure.delays import DELAYS
+from phone_host.measure.headline import headline
+from phone_host.measure.image_doubts import ImageTrust
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.unused import unused
@@ -18,7 +20,7 @@ _MS: Final = 1e6
 def summary(run: RunSnapshot) -> str:
     """Summarise the run in a few lines."""
     rate = "" if math.isnan(run.pairs_per_second) else f" in {run.seconds:.1f} s ({run.pairs_per_second:.1f} /s)"
-    lines = [f"{run.processed} pairs{rate}, ended: {run.ended.replace('_', ' ')}"]
+    lines = [headline(run).sentence, f"{run.processed} pairs{rate}, ended: {run.ended.replace('_', ' ')}"]
     if run.processed:
         lines.append(f"{'delay, ms':14} {'p50':>9} {'p95':>9} {'p99':>9} {'max':>9}")
         for name in DELAYS:
@@ -36,6 +38,7 @@ def summary(run: RunSnapshot) -> str:
     lines.append(judge(figures(run)).sentence)
     lines += [f"  {remedy}" for remedy in judge(figures(run)).remedies]
     lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(run)]
+    lines += depth_lines(run.images)
     lines += camera_troubles(run.camera)
     lines += [*rung_lines(run.link), *_links(run.link), *_unused_lines(run)]
     return "\n".join(lines)
@@ -57,6 +60,19 @@ def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
     if alignment is not None:
         lines.append(f"alignment: {alignment.state.value}: {alignment.words}")
     return lines
+
+
+def depth_lines(images: ImageTrust) -> list[str]:
+    """Say how the depth fared from the first judgements to the latest ones; nothing if none was judged."""
+    start, end = images.start, images.now
+    if math.isnan(end.density):
+        return []
+    parts = [f"density {start.density:.0%} at first, {end.density:.0%} now"]
+    if not math.isnan(start.consistency + end.consistency):
+        parts.append(f"left-right consistency {start.consistency:.0%}, {end.consistency:.0%}")
+    if not math.isnan(start.vertical_px + end.vertical_px):
+        parts.append(f"vertical error {start.vertical_px:.2f}, {end.vertical_px:.2f} px")
+    return [f"depth: {'; '.join(parts)}"]
 
 
 def camera_troubles(health: CameraHealth) -> list[str]:

@@ -18,6 +18,7 @@ class StereoCore:
 
     Attributes:
         rig: the cameras; None when the images are already rectified.
+        rectification: of the rig; None when the images are already rectified.
         geometry: converts disparity to metres; None when the images are already rectified and no geometry was given.
 
     Args:
@@ -34,6 +35,7 @@ class StereoCore:
         self._matcher = matcher
         self.rig = None if rectifier is None else rectifier.rig
         self._rectifier = rectifier
+        self.rectification = None if rectifier is None else rectifier.rectification
         self.geometry = geometry if rectifier is None else rectifier.geometry
 
     def compute(self, left: Image, right: Image, clock: Callable[[], int]) -> Processed:
