@@ -235,7 +235,7 @@ _NAMED: Final = {
     Arrangement.SWAPPED: Concern(
         Doubt.SWAPPED,
         "left and right are exchanged: the scene moves the wrong way from the left image to the right one",
-        "swap LEFT and RIGHT or --board-side; if each is where it should be, both cameras are on their heads or both mirror their images",
+        "swap LEFT and RIGHT or --board-side; if each is where it should be, both cameras are on their heads (rotate=180) or both mirror their images (flip=h)",
     ),
     Arrangement.TURNED: Concern(
         Doubt.TURNED,

@@ -11,9 +11,9 @@ from phone_host.measure.image_doubts import ImageTrust, gravest_first
 from phone_host.measure.regime import RunFigures
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import (
+    NO_DEPTH,
     NO_DOUBT,
     Concern,
-    Doubt,
     Timing,
     Unbelieved,
     stamp_doubt,
@@ -172,14 +172,7 @@ def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
         return found
     if any(concern.doubt.blocks for concern in found):
         return found  # which says why there is none
-    return (
-        Concern(
-            Doubt.NO_DEPTH,
-            "no pair has depth",
-            "check that --calibration or --rectified fits the cameras, and that both see the same scene",
-        ),
-        *found,
-    )
+    return (NO_DEPTH, *found)
 
 
 def lacks_depth(run: RunSnapshot) -> bool:

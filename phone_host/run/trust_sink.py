@@ -5,15 +5,13 @@ import threading
 from collections.abc import Callable
 from typing import Final
 
-import numpy as np
-
 from common import now
 from phone_host.measure.image_doubts import ImageJudge, ImageTrust
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.model import DepthLimits, Processed, Result
 from phone_host.run.sinks import SinkQueue
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.evidence import maps_of, measure_evidence
+from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
 
 _PERIOD_NS: Final = 500_000_000
 """A mistake must be named within 2 s. Two of three judgements name it: 1 s, and at most one period until the first."""
@@ -44,7 +42,7 @@ class TrustSink:
     def offer(self, result: Result) -> None:
         """See Sink."""
         processed = result.processed
-        self._has_depth = self._has_depth or _has_depth(processed)
+        self._has_depth = self._has_depth or has_depth(processed)
         self._limits = processed.limits or self._limits
         now_ns = self._clock()
         if now_ns < self._due_ns or self._is_busy:
@@ -87,9 +85,3 @@ class TrustSink:
         with self._lock:
             self._judge.add(evidence)
         self._is_busy = False
-
-
-def _has_depth(processed: Processed) -> bool:
-    if processed.cut is not None:
-        return processed.cut.kept > 0
-    return processed.disparity is not None and bool(np.isfinite(processed.disparity).any())

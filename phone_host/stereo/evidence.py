@@ -16,6 +16,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence_features import Matches, find_features, match, on_common_rows, supports
 from phone_host.stereo.evidence_light import measure_exposure
 from phone_host.stereo.evidence_points import PointMaps, ThroughRig, Unmoved
+from phone_host.stereo.match_align import with_levels_of
 
 _FEATURE_PX: Final = 72_000
 """Pixels of the images in which features are searched, some 310 x 232: twice as many take twice as long and find no more mistakes."""
@@ -27,7 +28,9 @@ _BACK_PX: Final = 1.5
 """A disparity is consistent if the search from right to left returns within this distance at the size of the check."""
 
 _TRACK_WIDTH_PX: Final = 1280
-_TRACKED: Final = 100
+_TRACKED_PX: Final = 4.0
+"""Features found at a quarter of the size are off by less."""
+
 _FEWEST: Final = 8
 
 
@@ -42,6 +45,17 @@ def maps_of(core: StereoCore, processed: Processed) -> PointMaps:
         return ThroughRig(core.rig, core.rectification)
     height_px, width_px = processed.pair.left.shape[:2]
     return Unmoved(width_px, height_px)
+
+
+def has_depth(processed: Processed) -> bool:
+    """Tell whether any pixel of a pair has depth.
+
+    Args:
+        processed: the pair.
+    """
+    if processed.cut is not None:
+        return processed.cut.kept > 0
+    return processed.disparity is not None and bool(np.isfinite(processed.disparity).any())
 
 
 def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
@@ -59,7 +73,8 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
     scale = min(1.0, math.sqrt(_FEATURE_PX / left.size))
     found = [find_features(_stretched(_reduced(image, scale)), scale) for image in (left, right)]
     plain, turned_over = (match(*found, is_mirrored=mirror) for mirror in (False, True))
-    vertical_px, offset_px = _vertical(left, right, plain)
+    upright = _tracked(left, right, plain.turned_by(0))
+    vertical_px, offset_px = _vertical(upright, height_px)
     return Evidence(
         left=measure_exposure(left, len(found[0].points_px)),
         right=measure_exposure(right, len(found[1].points_px)),
@@ -68,7 +83,7 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
         consistency=_consistency(left, right, processed.disparity, 0.0 if math.isnan(offset_px) else offset_px),
         vertical_px=vertical_px,
         vertical_offset_px=offset_px,
-        supports=supports(plain, turned_over, maps, (width_px, height_px)),
+        supports=supports(upright, plain, turned_over, maps, (width_px, height_px)),
     )
 
 
@@ -98,31 +113,32 @@ def _stretched(image: Image) -> Image:
     return np.asarray(cv2.LUT(image, levels), np.uint8)
 
 
-def _vertical(left: Image, right: Image, plain: Matches) -> tuple[float, float]:
-    """Measure the vertical error by tracking matched features to a fraction of a pixel (Lucas and Kanade, IJCAI 1981).
-
-    Returns:
-        Median distance from the rows and median offset, px; NaN with too few features.
-    """
-    upright = plain.turned_by(0)
-    rows = on_common_rows(upright.left_px, upright.right_px, left.shape[0])
-    if rows.sum() < _FEWEST:
-        return math.nan, math.nan
+def _tracked(left: Image, right: Image, matches: Matches) -> Matches:
+    """Follow matched features to a fraction of a pixel (Lucas and Kanade, IJCAI 1981). Those that get lost stay where they are."""
+    if not len(matches.left_px):
+        return matches
     scale = min(1.0, _TRACK_WIDTH_PX / left.shape[1])
-    before, after = _reduced(left, scale), _reduced(right, scale)
-    chosen = np.flatnonzero(rows)[:: max(1, int(rows.sum()) // _TRACKED)]
+    before = _reduced(left, scale)
+    after = with_levels_of(before, _reduced(right, scale))  # tracking takes another exposure for motion
     start, guess = (
-        ((points[chosen] + 0.5) * scale - 0.5).astype(np.float32).reshape(-1, 1, 2)
-        for points in (upright.left_px, upright.right_px)
+        ((points + 0.5) * scale - 0.5).astype(np.float32).reshape(-1, 1, 2)
+        for points in (matches.left_px, matches.right_px)
     )
     ahead, found, _ = cv2.calcOpticalFlowPyrLK(
         before, after, start, guess.copy(), winSize=(15, 15), maxLevel=1, flags=cv2.OPTFLOW_USE_INITIAL_FLOW
     )
-    near = np.linalg.norm((ahead - guess).reshape(-1, 2), axis=1) <= 3.0 / max(scale, 0.2)
+    near = np.linalg.norm((ahead - guess).reshape(-1, 2), axis=1) <= _TRACKED_PX
     kept = (found.ravel() == 1) & near
-    if kept.sum() < _FEWEST:
+    better = (ahead.reshape(-1, 2).astype(np.float64) + 0.5) / scale - 0.5
+    return Matches(matches.left_px, np.where(kept[:, np.newaxis], better, matches.right_px), matches.turns_deg)
+
+
+def _vertical(upright: Matches, height_px: int) -> tuple[float, float]:
+    """Return the median distance from the rows and the median offset, px; NaN with too few features."""
+    rows = on_common_rows(upright.left_px, upright.right_px, height_px)
+    if rows.sum() < _FEWEST:
         return math.nan, math.nan
-    down = (ahead - start).reshape(-1, 2)[kept, 1] / scale
+    down = (upright.right_px - upright.left_px)[rows, 1]
     return float(np.median(np.abs(down))), float(np.median(down))
 
 

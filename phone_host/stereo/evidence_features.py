@@ -38,12 +38,12 @@ _FINE: Final = 0.008
 _OFFSET: Final = 0.15
 """Greatest offset of the rows as a share of the height. Turning about the middle instead of the optical axis moves them."""
 
-_STRICT: Final = 0.004
+_STRICT: Final = 0.002
 _STRICT_OFFSET: Final = 0.015
-"""The same for rows that agree without a fit: 2 px of 480, three times SIFT's error at reduced size, and an offset of 7 px."""
+"""The same for rows that agree without a fit: 1 px of 480, a worn rig's error, and an offset of 7 px."""
 
-_TURNED_OFFSET: Final = 0.05
-"""Greatest offset of strict rows after a turn about the middle of the image: principal points lie that far beside it."""
+_TURNED_OFFSET: Final = 0.025
+"""Greatest offset of strict rows after a turn about the middle of the image: principal points lie that far beside it, 12 px of 480."""
 
 _LOST_ZERO: Final = 0.004
 """Disparities above minus this share of the width count as not negative: 2.5 px of 640, more than a good rig's zero is off."""
@@ -210,17 +210,20 @@ def on_same_rows(
         return np.asarray(usable & (np.abs(down - middle) <= _STRICT) & (abs(middle) <= offset))
 
 
-def supports(plain: Matches, turned_over: Matches, maps: PointMaps, size_px: tuple[int, int]) -> tuple[Support, ...]:
+def supports(
+    upright: Matches, plain: Matches, turned_over: Matches, maps: PointMaps, size_px: tuple[int, int]
+) -> tuple[Support, ...]:
     """Count the features that agree with each arrangement.
 
     Args:
-        plain: matches of the two images as they are.
+        upright: matches of features that have the same direction in both images, as exact as possible.
+        plain: all matches of the two images as they are.
         turned_over: matches of the left image with the mirrored right one.
         maps: the way of a point from a camera's own image to the rectified one.
         size_px: width and height of the rectified images.
     """
     height_px = size_px[1]
-    upright, back = plain.turned_by(0), _Undoing(maps, size_px)
+    back = _Undoing(maps, size_px)
     related = on_common_rows(upright.left_px, upright.right_px, height_px)
     same = on_same_rows(upright.left_px, upright.right_px, height_px)
     in_order = _in_order(upright.left_px, upright.right_px, size_px[0], -_LOST_ZERO)

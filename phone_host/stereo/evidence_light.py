@@ -19,8 +19,11 @@ _REACH_PX: Final = 5
 _EDGES: Final = 40
 """Fewer edges than this say nothing about focus."""
 
-_LEAST_RISE: Final = 24.0
-"""Grey levels over which an edge must rise: far above a webcam's noise of up to 6 levels."""
+_LEAST_RISE: Final = 12.0
+_SURE_RISE: Final = 24.0
+_RISE_SHARE: Final = 0.3
+"""Grey levels over which an edge must rise: far above a webcam's noise, which is 3 levels after averaging along the edge.
+In images of little contrast a share of their range is enough."""
 
 _SHARPEST: Final = 20
 """Percentile of the edges' widths. Edges of shadows and round bodies are wide in the sharpest image."""
@@ -70,6 +73,8 @@ def _widths(image: Image) -> NDArray[np.float32]:
     inner = smooth[:, 1:-1]
     rise = (cv2.dilate(inner, window) - cv2.erode(inner, window)).astype(np.float32)
     steepest = cv2.dilate(slope, window)
-    edges = (slope >= steepest) & (rise >= _LEAST_RISE) & (slope > 0)
+    low, high = (float(level) for level in np.percentile(smooth[::4, ::4], (2, 98)))
+    least = max(_LEAST_RISE, min(_SURE_RISE, _RISE_SHARE * (high - low)))
+    edges = (slope >= steepest) & (rise >= least) & (slope > 0)
     # A step blurred by sigma rises by height / (sigma * sqrt(2 pi)) a pixel at its steepest.
     return np.asarray(rise[edges] / slope[edges] / np.float32(np.sqrt(2 * np.pi)), np.float32)

@@ -182,14 +182,16 @@ def black(image: Image) -> Image:
     return np.asarray(np.clip(noise, 0, 255), np.uint8)
 
 
-def dim(image: Image, share: float = 0.07) -> Image:
-    """The image of a camera with far too little light."""
+def dim(image: Image) -> Image:
+    """The image of a camera with far too little light: between a 25th and a tenth of what it was."""
+    share = float(_random(image).uniform(0.04, 0.1))
     return noisy(np.asarray(image * share + 2, np.uint8), 1.5)
 
 
 def blurred(image: Image, sigma_px: float) -> Image:
-    """An image out of focus; sigma at 640 px of width."""
-    return np.asarray(cv2.GaussianBlur(image, (0, 0), sigma_px * image.shape[1] / 640), np.uint8)
+    """An image out of focus; sigma at 640 px of width, varied by a third."""
+    sigma_px *= float(_random(image).uniform(0.75, 1.35)) * image.shape[1] / 640
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), sigma_px), np.uint8)
 
 
 def turned(image: Image, quarters: int) -> Image:

@@ -23,12 +23,11 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import decode_files, open_image, require_same_size, size_text
 from phone_host.stereo.reproject import disparities_for_near, nearest_depth_m
 from phone_host.verbs.output_folders import require_folder, unwritable
+from phone_host.verbs.stereo.trust import PairTrust, judge_pair, trust_values
 from phone_host.verbs.stereo_options import build_core
 
 _DEFAULT_MATCHER = "sgbm"
-# In a textured scene that both cameras see, more than 90 % of the pixels are matched. Below a third, a wrong pair is
-# far more likely than a scene without texture.
-_LOW_DENSITY = 0.33
+_CHECK_FAILED = 4
 
 
 def run(options: argparse.Namespace) -> int:
@@ -59,6 +58,8 @@ def run(options: argparse.Namespace) -> int:
     pair, disparity, cloud = processed.pair, processed.disparity, processed.cloud
     assert disparity is not None  # `compute` always returns one
     watch.take_over(processed.stages)
+    trust = judge_pair(core, processed)
+    watch.lap("judge")
     points = _write(options.out, pair, disparity, cloud)
     watch.lap("write")
     report: dict[str, Any] = {
@@ -67,14 +68,14 @@ def run(options: argparse.Namespace) -> int:
         "right": {"file": str(options.right), "size": size_text(right)},
         "size": size_text(pair.left),
         "matcher": matcher,
-        **_figures(options, core, disparity),
+        **_figures(options, core, disparity, trust),
         "points": points,
         "times_ms": watch.times_ms(),
         "files": ["disparity.pfm", "disparity.png", *(["cloud.ply"] if cloud is not None else []), "report.json"],
     }
     _write_report(options.out, report)
     print(json_text(report) if options.json else _summary(report, options.out))
-    return 0
+    return _CHECK_FAILED if trust.is_wrong else 0
 
 
 class _StopWatch:
@@ -99,11 +100,11 @@ class _StopWatch:
         return {stage: round(ns / 1e6, 3) for stage, ns in laps}
 
 
-def _figures(options: argparse.Namespace, core: StereoCore, disparity: Disparity) -> dict[str, Any]:
+def _figures(options: argparse.Namespace, core: StereoCore, disparity: Disparity, trust: PairTrust) -> dict[str, Any]:
     """Return geometry, number of disparities, density and warnings about them."""
     geometry, width_px = core.geometry, disparity.shape[1]
     count = options.disparities
-    warnings = []
+    warnings = [f"{concern.sentence}: {concern.remedy}" for concern in trust.concerns]
     if count is None and geometry is not None:
         count = disparities_for_near(geometry, options.near / 1000, width_px)
         nearest_mm = nearest_depth_m(geometry, count) * 1000
@@ -113,17 +114,13 @@ def _figures(options: argparse.Namespace, core: StereoCore, disparity: Disparity
                 " share less than half of their width"
             )
     density = float(np.isfinite(disparity).mean())
-    if density < _LOW_DENSITY:
-        warnings.append(
-            f"only {density:.0%} of the pixels have depth: check that LEFT and RIGHT are not swapped, that both show the same scene,"
-            " that --calibration or --rectified fits them, and that the scene has texture and is not nearer than --near"
-        )
     if geometry is None:
         warnings.append("no cloud.ply: focal length and baseline are unknown; give --focal PX --baseline MM")
     return {
         "disparities": count,
         "geometry": None if geometry is None else asdict(geometry),
         "density": round(density, 5),
+        "trust": trust_values(trust),
         "warnings": warnings,
     }
 
@@ -162,12 +159,13 @@ def _summary(report: dict[str, Any], out: Path) -> str:
     geometry = report["geometry"]
     found = f"{report['density']:.1%} of the pixels have one ({report['times_ms']['total']:.0f} ms)"
     lines = [
+        report["trust"]["headline"],
         f"{report['size']} px, {report['matcher']}, {report['disparities']} disparities: {found}",
         *(f"warning: {warning}" for warning in report["warnings"]),
     ]
     if geometry is not None:
         lines.insert(
-            1,
+            2,
             f"{report['points']} points; f = {geometry['focal_px']:.1f} px, b = {geometry['baseline_m'] * 1e3:.2f} mm",
         )
     return "\n".join([*lines, f"written to {out}: {', '.join(report['files'])}"])
