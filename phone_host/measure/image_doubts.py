@@ -186,8 +186,8 @@ def _covered(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
     ]
     if not blind:
         return ()
-    which = _cameras(blind)
-    return (Concern(Doubt.COVERED, f"{which} no scene at all", "take off the lens cap, the shutter or the finger"),)
+    camera_sees = _cameras(blind)
+    return (Concern(Doubt.COVERED, f"{camera_sees} no scene at all", "take off the lens cap, the shutter or the finger"),)
 
 
 def _cameras(names: list[str]) -> str:
@@ -203,10 +203,11 @@ def _dark(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
     if not dark:
         return ()
     level = min(left.mean_level, right.mean_level)
+    camera_sees = _cameras(dark)
     return (
         Concern(
             Doubt.DARK,
-            f"{_cameras(dark)} almost nothing for want of light (mean level {level:.0f} of 255)",
+            f"{camera_sees} almost nothing for want of light (mean level {level:.0f} of 255)",
             "switch on a light, or give the camera a longer exposure",
         ),
     )
@@ -222,10 +223,11 @@ def _unfocused(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
     if not blurred:
         return ()
     width = max(blur for _, blur in blurred)
+    camera_sees = _cameras([name for name, _ in blurred])
     return (
         Concern(
             Doubt.UNFOCUSED,
-            f"{_cameras([name for name, _ in blurred])} blurred edges ({width:.1f} px)",
+            f"{camera_sees} blurred edges ({width:.1f} px)",
             "clean and focus the lens, and switch its autofocus off before you calibrate",
         ),
     )

@@ -10,11 +10,13 @@ Exit 4 when one is missed, 3 when there is no SCAN_DATA.
 
 import argparse
 import json
+import multiprocessing
 import os
 import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
@@ -37,7 +39,7 @@ from tests.bench.trust_rooms import room
 from tests.bench.trust_scenes import MISTAKES, OTHER_SCENE, GivenPair, given_pairs, other_scene
 
 _ROOMS: Final = 100
-_ROOMS_WITH_MISTAKES: Final = 40
+_ROOMS_WITH_MISTAKES: Final = 20
 _PAIRS_OF_A_RUN: Final = 3
 _TO_REACH: Final = 0.95
 _TUNED_ON: Final = "tuned on"
@@ -138,29 +140,41 @@ def _outcome(found: frozenset[Doubt], right_names: frozenset[Doubt]) -> str:
     return "other" if found else "missed"
 
 
-def given_rows(data: Path, progress: Progress) -> Iterator[Row]:
+def _given_scene_rows(scene: _Scene, foreign: Image) -> list[Row]:
+    cv2.setNumThreads(1)  # the CPU time of a judgement is asked for
+    return [_good(scene, scene.left, scene.right), *(_mistaken(scene, foreign) if scene.has_mistakes else ())]
+
+
+def _room_rows(seed: int) -> list[Row]:
+    """Judge a short good run in a rendered room; in some rooms make the mistakes as well."""
+    cv2.setNumThreads(1)
+    made = room(seed)
+    half = _TUNED_ON if seed < _ROOMS // 2 else _HELD_OUT
+    pairs = made.pairs(_PAIRS_OF_A_RUN)
+    scene = _Scene(f"room {seed}", "room", half, *pairs[0], made.core(), has_mistakes=True)
+    rows = [_good(scene, left, right) for left, right in pairs]
+    if seed % (_ROOMS // _ROOMS_WITH_MISTAKES) == 0:
+        rows += _mistaken(scene, room(seed + _ROOMS).pairs(1)[0][1])
+    return rows
+
+
+def _families(data: Path) -> list[list[Row]]:
     """Judge all given pairs, and the mistakes made on one pair of each series."""
     scenes = list(_given(data))
-    for number, scene in enumerate(progress.track(scenes, description="given pairs")):
-        yield _good(scene, scene.left, scene.right)
-        if scene.has_mistakes:
-            others = [other for other in scenes if other.name.split()[0] != scene.name.split()[0]]
-            yield from _mistaken(scene, others[(7 * number) % len(others)].right)
+    done = []
+    for number, scene in enumerate(scenes):
+        others = [other for other in scenes if other.name.split()[0] != scene.name.split()[0]]
+        done.append(_given_scene_rows(scene, others[(7 * number) % len(others)].right))
+    return done
 
 
-def room_rows(progress: Progress) -> Iterator[Row]:
-    """Judge short good runs in rendered rooms, and the mistakes made in some of them."""
-    before: Image | None = None
-    for seed in progress.track(range(_ROOMS), description="rooms"):
-        made = room(seed)
-        half = _TUNED_ON if seed < _ROOMS // 2 else _HELD_OUT
-        pairs = [made.pair(0.05 * number) for number in range(_PAIRS_OF_A_RUN)]
-        scene = _Scene(f"room {seed}", "room", half, *pairs[0], made.core(), has_mistakes=True)
-        for left, right in pairs:
-            yield _good(scene, left, right)
-        if before is not None and seed % (_ROOMS // _ROOMS_WITH_MISTAKES) == 0:
-            yield from _mistaken(scene, before)
-        before = pairs[0][1]
+def all_rows(data: Path, jobs: int, progress: Progress) -> list[Row]:
+    """Judge everything, in several processes."""
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        given = pool.submit(_families, data)
+        rooms = [pool.submit(_room_rows, seed) for seed in range(_ROOMS)]
+        found = [room.result() for room in progress.track(rooms, description="rooms")]
+        return [row for rows in (*given.result(), *found) for row in rows]
 
 
 def judge(rows: Sequence[Row]) -> list[Verdict]:
@@ -212,15 +226,15 @@ def main() -> int:
     """Run and print; exit code 3 when there are no images, 4 when a figure is missed."""
     parser = argparse.ArgumentParser("python -m tests.bench.bench_trust", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="number of processes")
     options = parser.parse_args()
     if not os.environ.get("SCAN_DATA"):
         print("bench_trust was not run: SCAN_DATA does not name the folder of real images", file=sys.stderr)
         return 3
-    cv2.setNumThreads(1)  # the CPU time of a judgement is asked for
     console = Console(stderr=True)
     try:
         with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
-            rows = [*given_rows(Path(os.environ["SCAN_DATA"]), progress), *room_rows(progress)]
+            rows = all_rows(Path(os.environ["SCAN_DATA"]), options.jobs, progress)
     except FileNotFoundError as error:
         print(f"bench_trust was not run: SCAN_DATA has no {error.args[0]}", file=sys.stderr)
         return 3

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from phone_host.model import CameraModel, Rig
-from phone_host.scene.scene import Body, Box, Look, Plane, Pose, Renderer, Scene, Sphere, Texture, rig_poses, rotation
+from phone_host.scene.scene import Body, Box, Look, Plane, Renderer, Scene, Sphere, Texture, rig_poses, rotation
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
@@ -41,14 +41,15 @@ class Room:
     blur_px: float
     quality: int
 
-    def pair(self, t_s: float = 0.0, *, quarters_right: int = 0) -> tuple[Image, Image]:
-        """Render both images; the right camera may be turned about its axis by quarters."""
+    def pairs(self, count: int) -> list[tuple[Image, Image]]:
+        """Render both images a number of times; each has noise of its own."""
         poses = rig_poses(self.rig)
-        turn = rotation((0.0, 0.0, 1.0), -math.pi / 2 * quarters_right)
-        right = Pose(turn @ poses[1].R_camera_scene, poses[1].centre_m)
-        left_image = Renderer(self.scene, self.rig.left, poses[0], self.looks[0]).frame(t_s)
-        right_image = Renderer(self.scene, self.rig.right, right, self.looks[1]).frame(t_s)
-        return self._sent(left_image, 0.0), self._sent(right_image, self.lower_px)
+        left, right = (
+            Renderer(self.scene, model, pose, look)
+            for model, pose, look in zip((self.rig.left, self.rig.right), poses, self.looks, strict=True)
+        )
+        times_s = [0.05 * number for number in range(count)]
+        return [(self._sent(left.frame(t_s), 0.0), self._sent(right.frame(t_s), self.lower_px)) for t_s in times_s]
 
     def _sent(self, image: Image, lower_px: float) -> Image:
         if lower_px:
