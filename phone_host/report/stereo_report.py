@@ -11,6 +11,7 @@ from common.words import counted
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
+from phone_host.report.stereo_trust import PairTrust
 
 ALWAYS: Final = ("report.json", "index.html")
 """Files that lie in every folder of results."""
@@ -64,6 +65,7 @@ class PairReport:
         written: the files.
         stages_ms: how long each stage took, and `total`.
         remarks: what the user must know.
+        trust: how its images were judged; None: they were not.
     """
 
     name: str
@@ -82,6 +84,7 @@ class PairReport:
     written: WrittenPair
     stages_ms: tuple[tuple[str, float], ...]
     remarks: tuple[Remark, ...] = ()
+    trust: PairTrust | None = None
 
     @property
     def has_depth(self) -> bool:

@@ -14,6 +14,8 @@ def pair_verdict(pair: PairReport) -> tuple[Headline, str]:
     Returns:
         The verdict, and one sentence.
     """
+    if pair.trust is not None and pair.geometry is not None:
+        return Headline(pair.trust.answer.grade.value), pair.trust.answer.sentence
     blocking = next((remark for remark in pair.remarks if remark.is_blocking), None)
     if blocking is not None:
         return Headline.BAD, _sentence(blocking.text)

@@ -24,6 +24,7 @@ from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.pipeline import Pipeline
 from phone_host.run.rig_cameras import RigCameras
 from phone_host.run.sinks import FunctionSink, Sink
+from phone_host.run.trust_sink import TrustSink
 from phone_host.run.worker import Worker
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
@@ -117,7 +118,9 @@ class Host:
             waits=bool(settings.pairs) or demand.paces_own_camera,
             settings=settings.resolved,
         )
-        self._sinks: tuple[Sink, ...] = (self._files, FunctionSink("motion", self._measure_motion), *sinks)
+        self._trust = TrustSink(core)
+        motion = FunctionSink("motion", self._measure_motion)
+        self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *sinks)
         self._queue = PairQueue(
             settings.fifo,
             settings.tolerance_ns,
@@ -266,6 +269,7 @@ class Host:
             stamps_exact=self._stamps_are_exact,
             judged_pairs=_RECENT if ended == "running" else None,
             missed_locks=self._cameras.missed,
+            images=self._trust.trust,
         )
 
     @property
