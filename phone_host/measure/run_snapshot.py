@@ -11,11 +11,13 @@ from phone_host.measure.absence import Away
 from phone_host.measure.accounts import LinkAccount
 from phone_host.measure.camera_match import LockMiss, settings_concerns
 from phone_host.measure.delays import DelayStatistics
+from phone_host.measure.image_doubts import ImageTrust, gravest_first
 from phone_host.measure.numbers import ImageEvidence, number_concerns
 from phone_host.measure.regime import RunFigures
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.spoiled import SpoiledCounts, spoiled_concerns
 from phone_host.measure.trust import (
+    NO_DEPTH,
     NO_DOUBT,
     Concern,
     Timing,
@@ -55,6 +57,7 @@ class RunSnapshot:
         pairs. gap_s: the time between those pairs, s; no part of `seconds`.
         judged_pairs: number of newest pairs over which time and motion are judged; None: all.
         missed_locks: controls of the rig's cameras that could not be restored.
+        images: what the images say about the depth.
     """
 
     ended: str
@@ -90,6 +93,7 @@ class RunSnapshot:
     away: tuple[Away, ...] = ()
     gaps: int = 0
     gap_s: float = 0.0
+    images: ImageTrust = field(default_factory=ImageTrust)
 
     @property
     def stopped(self) -> int:
@@ -200,9 +204,24 @@ def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
         received=sum(account.received + account.disbelieved[Disbelief.CREDIT] for account in link.sessions),
         spoiled_images=spoiled(run),
     )
-    timing = unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
     told = (*spoiled_concerns(run.spoiled_counts), *number_concerns(run.replayed), *settings_concerns(run.missed_locks))
-    return (*told, *timing)
+    timing = unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
+    return gravest_first((*image_concerns(run), *told, *timing))
+
+
+def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
+    """Return what the images of a run make doubtful, gravest first. While it runs, pairs without depth may yet get some."""
+    found = run.images.concerns
+    if run.ended == "running" or not lacks_depth(run):
+        return found
+    if any(concern.doubt.blocks for concern in found):
+        return found  # which says why there is none
+    return (NO_DEPTH, *found)
+
+
+def lacks_depth(run: RunSnapshot) -> bool:
+    """Tell whether a rig or rectified images were given, and no pair has depth."""
+    return run.images.wants_depth and not run.images.has_depth
 
 
 def spoiled(run: RunSnapshot) -> dict[str, int]:

@@ -3,6 +3,7 @@
 docs/files.md describes them.
 """
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -33,11 +34,6 @@ class PairFile(Enum):
 _OF_DISPARITY: Final = frozenset({PairFile.DISPARITY, PairFile.DISPARITY_VIEW})
 _OF_IMAGES: Final = frozenset({PairFile.LEFT, PairFile.RIGHT})
 
-PAIR_NAMES: Final = "|".join(
-    name.replace(".", r"\.") for name in (*(file.value for file in PairFile), "report.json", "index.html")
-)
-"""Pattern of the names that may lie in the folder of a pair, whichever verb wrote it."""
-
 RUN_FILES: Final = (PairFile.LEFT, PairFile.RIGHT, PairFile.DISPARITY, PairFile.CLOUD, PairFile.DEPTH)
 """What a run saves of a pair."""
 
@@ -51,6 +47,20 @@ STEREO_FILES: Final = (
     PairFile.DISPARITY,
 )
 """What `stereo` writes of a pair."""
+
+
+_BESIDE: Final = ("report.json", "index.html")
+
+
+def _pattern(files: Iterable[PairFile]) -> str:
+    return "|".join(re.escape(name) for name in (*(file.value for file in files), *_BESIDE))
+
+
+PAIR_NAMES: Final = _pattern(PairFile)
+"""Pattern of the names that may lie in the folder of a pair, whichever verb wrote it."""
+
+STEREO_NAMES: Final = _pattern(STEREO_FILES)
+"""Pattern of the names that `stereo` writes for a pair."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -302,7 +302,9 @@ def _delays(series: DelaySeries) -> list[str]:
     )
     stages = tuple(stage for stage in series.stages if stage.values_ns.max() > IDLE_STAGE_NS)
     work = Budget("mean processing delay", tuple(mean_share(quantity) for quantity in stages))
-    everything = Strips("", (*series.delays, *(() if series.timeless else (series.end_to_end,)), series.starvation))
+    ends = () if series.timeless else (series.end_to_end,)
+    lasting = tuple(one for one in (*series.delays, *ends, series.starvation) if np.any(one.values_ns > 0))
+    everything = Strips("", lasting)
     return [
         section(
             "Where the time goes",

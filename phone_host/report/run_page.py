@@ -11,9 +11,9 @@ from common.ledger import PairLedger
 from common.words import counted, times
 from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import rung_lines
-from phone_host.measure.regime import Judgement, Regime, judge
+from phone_host.measure.headline import headline
+from phone_host.measure.regime import Regime, judge
 from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures
-from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
 from phone_host.model import Processed, Side
 from phone_host.report.cut_words import cut_sentence
@@ -50,8 +50,7 @@ def run_page(
     Returns:
         One self-contained HTML document.
     """
-    judgement, found = judge(figures(run)), concerns(run)
-    verdict, sentence = _verdict(run, judgement, found)
+    verdict, sentence = _verdict(run)
     return page(
         PageData(
             title="tandemscan run",
@@ -86,8 +85,7 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
         *([f"Not measured: when results were exposed: {TIMELESS}."] if run.timeless else []),
         *(_sentence(remark) for remark in judgement.remedies if judgement.regime in _FINE),
         *(f"Warning: {item.sentence}." for item in concerns(run)),
-        *phase_lines(run.phase, run.alignment),
-        *rung_lines(run.link),
+        *(_sentence(line) for line in (*phase_lines(run.phase, run.alignment), *rung_lines(run.link))),
     )
 
 
@@ -179,14 +177,9 @@ def camera_table(health: CameraHealth) -> Table:
     return Table("This machine's camera", ("what", "value"), tuple(rows))
 
 
-def _verdict(run: RunSnapshot, judgement: Judgement, found: Sequence[Concern]) -> tuple[Headline, str]:
-    if not run.processed and run.spoiled_images:
-        return Headline.BAD, "No pair had two whole images: check the cameras."
-    if not run.processed:
-        return Headline.BAD, "No pair was processed: no frames of the two cameras came together."
-    if found:
-        return Headline.WARNING, f"{found[0].sentence}: {found[0].remedy}."
-    return (Headline.GOOD if judgement.regime in _FINE else Headline.WARNING), f"{judgement.sentence}."
+def _verdict(run: RunSnapshot) -> tuple[Headline, str]:
+    said = headline(run)
+    return Headline(said.grade.value), said.sentence
 
 
 def _figures(run: RunSnapshot) -> tuple[Figure, ...]:

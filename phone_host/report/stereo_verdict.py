@@ -14,6 +14,8 @@ def pair_verdict(pair: PairReport) -> tuple[Headline, str]:
     Returns:
         The verdict, and one sentence.
     """
+    if pair.trust is not None and pair.geometry is not None:
+        return Headline(pair.trust.answer.grade.value), pair.trust.answer.sentence
     blocking = next((remark for remark in pair.remarks if remark.is_blocking), None)
     if blocking is not None:
         return Headline.BAD, _sentence(blocking.text)
@@ -52,7 +54,7 @@ def set_verdict(report: SetReport) -> tuple[Headline, str]:
     bad = verdicts.count(Headline.BAD) + len(report.failed)
     if good == count:
         return Headline.GOOD, f"Nothing speaks against the depth of any of the {count} pairs."
-    words = [f"{good} of {count} pairs look right"]
+    words = [f"{good} of {count} pairs {'looks' if good == 1 else 'look'} right"]
     if bad:
         words.append(f"{bad} gave no depth or cannot be right")
     if doubtful := count - good - bad:

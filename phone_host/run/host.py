@@ -29,6 +29,7 @@ from phone_host.run.phase_steering import PhaseSteering
 from phone_host.run.pipeline import Pipeline
 from phone_host.run.rig_cameras import RigCameras
 from phone_host.run.sinks import FunctionSink, Sink
+from phone_host.run.trust_sink import TrustSink
 from phone_host.run.worker import Worker
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
@@ -135,7 +136,9 @@ class Host:
             waits=bool(settings.pairs) or demand.paces_own_camera,
             settings=settings.resolved,
         )
-        self._sinks: tuple[Sink, ...] = (self._files, FunctionSink(_MOTION, self._measure_motion), *sinks)
+        self._trust = TrustSink(core)
+        motion = FunctionSink(_MOTION, self._measure_motion)
+        self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *sinks)
         self._queue = PairQueue(
             settings.fifo,
             settings.tolerance_ns,
@@ -299,6 +302,7 @@ class Host:
             away=away_of(receiver.account.absences, self.started_ns, self._ended_ns or now.monotonic_ns()),
             gaps=books.gaps,
             gap_s=books.gap_ns / 1e9,
+            images=self._trust.trust,
         )
 
     def _is_unneeded(self, account: SinkAccount) -> bool:

@@ -13,6 +13,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from common import now
+from common.camera.orientation import UPRIGHT, Orientation
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
@@ -22,6 +23,7 @@ from phone_host.output.json_text import json_text
 from phone_host.output.pair_files import STEREO_FILES, available, write_pair
 from phone_host.report.page_links import NextCommand
 from phone_host.report.report_page import Picture
+from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_report import (
     FailedPair,
     PairReport,
@@ -29,12 +31,11 @@ from phone_host.report.stereo_report import (
     SetReport,
     Size,
     alone_remarks,
-    pair_json,
-    set_json,
 )
 from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
-from phone_host.run.stereo_remarks import pair_remarks
+from phone_host.run.stereo_remarks import pair_remarks, turned_remarks
 from phone_host.run.stereo_results import StereoResults
+from phone_host.run.stereo_trust import judge_pair
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import EncodedFile, decode_files, open_image, require_same_size, size_px
 from phone_host.stereo.view_files import ViewFiles
@@ -66,6 +67,7 @@ class StereoJob:
         matcher: its name, for the report.
         axes: of cloud.ply and xyz.pfm.
         most_pixels: an image that claims more is refused.
+        mounted: by which turns the left and the right images become upright, after what their EXIF headers say.
         commands: what to do next, for the pages.
     """
 
@@ -75,6 +77,7 @@ class StereoJob:
     matcher: str
     axes: Axes = Axes.CAMERA
     most_pixels: int = MOST_PIXELS
+    mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
     commands: tuple[NextCommand, ...] = ()
 
 
@@ -107,7 +110,10 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
         report = _set(job, tuple(pairs))
         if not report.computed:
             first = report.failed[0]
-            raise DataError(f"none of the {len(pairs)} pairs can be computed; the first: {first.problem}", first.remedy)
+            raise DataError(
+                f"none of the {len(pairs)} pairs can be computed; the first: {first.problem} ({first.remedy})",
+                "mend what this names, then try again",
+            )
         results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
         results.write_text("index.html", set_page(report, work.thumbnails, job.commands))
         return report
@@ -187,7 +193,8 @@ class _Work:
         """Compute and write a pair. `folder` is empty for the only one."""
         watch, about = _StopWatch(), f" {folder}" if folder else ""
         self._watcher.say(f"reading{about}")
-        opened = open_image(left, self._job.most_pixels), open_image(right, self._job.most_pixels)
+        limit, (of_left, of_right) = self._job.most_pixels, self._job.mounted
+        opened = open_image(left, limit, of_left), open_image(right, limit, of_right)
         core = self._core_for(*opened)
         watch.lap("prepare")
         images = decode_files(*opened)
@@ -195,6 +202,9 @@ class _Work:
         watch.lap("read")
         processed = core.compute(*images, _StageClock(self._watcher, about))
         watch.take_over(processed.stages)
+        self._watcher.say(f"checking{about}")
+        trust = judge_pair(core, processed)
+        watch.lap("judge")
         self._watcher.say(f"writing{about}")
         planned = available(
             STEREO_FILES, has_disparity=processed.disparity is not None, has_cloud=processed.cloud is not None
@@ -207,7 +217,11 @@ class _Work:
             written = write_pair(place, processed, planned, self._job.axes, writers.map)
             watch.lap("write")
             density = 0.0 if processed.disparity is None else float(np.isfinite(processed.disparity).mean())
-            remarks = pair_remarks(processed, density, written, core.wanted.search_from_m)
+            remarks = [
+                *turned_remarks(*opened),
+                *pair_remarks(processed, written, trust, core.wanted.search_from_m),
+                *(() if folder else _alone(self._job)),
+            ]
             report = PairReport(
                 name=folder,
                 left=str(left),
@@ -224,7 +238,8 @@ class _Work:
                 axes=self._job.axes,
                 written=written,
                 stages_ms=watch.times_ms(),
-                remarks=remarks if folder else (*remarks, *_alone(self._job)),
+                remarks=tuple(remarks),
+                trust=trust,
             )
             write_text(place / "report.json", json_text(pair_json(report), indent=2) + "\n")
             write_text(place / "index.html", pair_page(report, processed, self._job.commands))

@@ -1,4 +1,4 @@
-"""Makes the pages of `stereo` from its reports: one for each pair, and one that leads to several. Pure."""
+"""Makes the pages of `stereo` from its reports: one for each pair, and one that leads to several."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath

@@ -14,10 +14,10 @@ from typing import Final, Self
 
 from phone_host.output.atomic import write_text
 from phone_host.output.listed import ListedFolder, RunAll
-from phone_host.output.pair_files import PAIR_NAMES
+from phone_host.output.pair_files import PAIR_NAMES, STEREO_NAMES
 
-NAMES: Final = rf"{PAIR_NAMES}|pair-[0-9]{{6,}}"
-"""The names that `stereo` writes into its folder, alone or as one of several pairs."""
+NAMES: Final = rf"{STEREO_NAMES}|pair-[0-9]{{6,}}"
+"""The names that `stereo` writes into its folder: of the only pair, or a folder for each of several."""
 
 
 class StereoResults:

@@ -17,7 +17,7 @@ from phone_host.measure.delays import DELAYS, IDLE_STAGE_NS, STAGES, Spread
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.unused import unused
-from phone_host.report.summary import camera_troubles, phase_lines
+from phone_host.report.summary import camera_troubles, depth_lines, phase_lines
 
 _REFRESH_S: Final = 0.25
 _WIDE: Final = 64
@@ -117,7 +117,8 @@ def _judgement(run: RunSnapshot) -> list[Text]:
     warnings = [Text(f"warning: {item.sentence}: {item.remedy}", style="bold red") for item in concerns(run)]
     lines = (*camera_troubles(run.camera), *rung_lines(run.link))
     camera = [Text(line, style="yellow") for line in lines]
-    return [Text(judge(figures(run)).sentence, style="dim"), *camera, *warnings]
+    depth = [Text(line) for line in depth_lines(run.images)]
+    return [Text(judge(figures(run)).sentence, style="dim"), *depth, *camera, *warnings]
 
 
 def _state(run: RunSnapshot) -> Text:

@@ -68,6 +68,7 @@ class StereoCore:
 
     Attributes:
         rig: the cameras, at the size of their calibration; None when the images are already rectified.
+        rectification: of the rig, at that size; None when the images are already rectified.
         geometry: converts disparity to metres at that size; None when the images are already rectified and no geometry was
             given. `Processed.geometry` is that of a result.
         wanted: limits, crop and working size as asked for.
@@ -91,6 +92,7 @@ class StereoCore:
         self._matcher = matcher
         self.rig = None if rectifier is None else rectifier.rig
         self._rectifier = rectifier
+        self.rectification = None if rectifier is None else rectifier.rectification
         self.geometry = geometry if rectifier is None else rectifier.geometry
         self.wanted = wanted
         self._kept: dict[_Sizes, _Ready] = {}
@@ -127,27 +129,40 @@ class StereoCore:
         )
 
     def require_sizes(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> None:
-        """Check that images of these sizes can be rectified, before they are decoded.
+        """Check that images of these sizes can be rectified and hold the crop, before they are decoded.
 
         Args:
             left_px: width and height of the left image, px.
             right_px: width and height of the right image, px.
 
         Raises:
-            DataError: a size does not fit the rig, or the sizes differ and there is no rig.
+            DataError: a size does not fit the rig, the sizes differ and there is no rig, or the crop lies outside.
         """
-        if (left_px, right_px) in self._kept:
-            return
+        if self.wanted.crop is None:
+            self._require_fit(left_px, right_px)
+        else:
+            self._ready(left_px, right_px)
+
+    def _require_fit(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> None:
         if self.rig is None:
             require_same_size(left_px, right_px, "the left image", "the right image")
         else:
             scaled_rig(self.rig, left_px, right_px)
 
+    def rectifier_for(self, size_px: tuple[int, int]) -> Rectifier | None:
+        """Return what has rectified images to a size; None if they came rectified.
+
+        Args:
+            size_px: width and height of the rectified images, px.
+        """
+        made = [ready.rectifier for ready in list(self._kept.values()) if (ready.width_px, ready.height_px) == size_px]
+        return made[-1] if made else self._rectifier
+
     def _ready(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> _Ready:
         """Return what these image sizes need; make it if they are new."""
         ready = self._kept.get((left_px, right_px))
         if ready is None:
-            self.require_sizes(left_px, right_px)
+            self._require_fit(left_px, right_px)
             ready = self._made_for(left_px, right_px)
             while len(self._kept) >= _MOST_KEPT:
                 del self._kept[next(iter(self._kept))]

@@ -7,17 +7,17 @@ import pytest
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
+from phone_host.report.report_page import Headline
+from phone_host.report.stereo_json import pair_json
+from phone_host.report.stereo_lines import cut_lines, pair_lines, set_lines
 from phone_host.report.stereo_report import (
     FailedPair,
     PairReport,
     Remark,
     SetReport,
     alone_remarks,
-    cut_lines,
-    pair_json,
-    pair_lines,
-    set_lines,
 )
+from phone_host.report.stereo_verdict import pair_verdict, set_verdict
 
 # 1000 pixels; f b = 50 px m, so an error of 0.25 px makes a depth of 40 m wrong by 0.25 * 40 / 50 = 20 %.
 _PAIR = PairReport(
@@ -59,8 +59,10 @@ def test_a_pair_of_which_nothing_was_cut_says_where_its_cloud_ends() -> None:
 
 
 def test_lines_of_a_pair_hold_its_size_search_density_points_and_axes() -> None:
-    """Everything that a user needs to judge the result stands in the first two lines."""
-    lines = pair_lines(_PAIR, "scan")
+    """The first line says whether the depth is right, the next two have what a user needs to judge it."""
+    answer, *lines = pair_lines(_PAIR, "scan")
+    assert "82% of the pixels" in answer
+    assert "40 m it is wrong by no more than 20%" in answer
     for words in ("40x25 px", "sgbm", "64 disparities", "matched at 50% of the size", "82.0%", "123 ms"):
         assert words in lines[0]
     for words in ("700 points", "70.0%", "x right, y down, z forward", "metres"):
@@ -119,3 +121,39 @@ def test_images_without_partner_are_counted_and_named_and_pairing_by_order_is_to
     assert many.problem == "7 left images have no partner: 0.png, 1.png, 2.png, 3.png, 4.png, …"
     assert "order of their names though the counts differ" in order.problem
     assert alone_remarks([], [], by_number=False, pairs=1) == ()
+
+
+@pytest.mark.parametrize(
+    ("pair", "verdict", "words"),
+    [
+        (_PAIR, Headline.GOOD, "Nothing speaks against"),
+        (replace(_PAIR, remarks=(Remark("nothing nearer than 400 mm is found"),)), Headline.GOOD, "Nothing speaks"),
+        (replace(_PAIR, remarks=(Remark("only 10%", "check", is_doubt=True),)), Headline.WARNING, "Only 10%: check."),
+        (replace(_PAIR, remarks=(Remark("same image", "mend", is_blocking=True),)), Headline.BAD, "Same image: mend."),
+        (replace(_PAIR, written=WrittenPair(files=(), points=0)), Headline.BAD, "No pixel has depth"),
+        (
+            replace(_PAIR, geometry=None, limits=None, written=WrittenPair(files=())),
+            Headline.WARNING,
+            "focal length and baseline are unknown",
+        ),
+    ],
+    ids=["good", "limited", "doubt", "blocking", "no depth", "no metres"],
+)
+def test_the_verdict_of_a_pair_answers_whether_its_depth_is_right(
+    pair: PairReport, verdict: Headline, words: str
+) -> None:
+    """A limit is no doubt; a doubt is no alarm; nothing without depth looks right."""
+    found, sentence = pair_verdict(pair)
+    assert found is verdict
+    assert words in sentence
+
+
+def test_the_verdict_of_several_pairs_counts_them() -> None:
+    """All good is good, all bad is bad, anything else is told in numbers."""
+    bad = replace(_PAIR, written=WrittenPair(files=(), points=0))
+    failed = FailedPair(name="p", left="l", right="r", problem="bad", remedy="mend")
+    assert set_verdict(SetReport(pairs=(_PAIR, _PAIR), by_number=True))[0] is Headline.GOOD
+    assert set_verdict(SetReport(pairs=(bad, failed), by_number=True))[0] is Headline.BAD
+    verdict, sentence = set_verdict(SetReport(pairs=(_PAIR, failed, bad), by_number=True))
+    assert verdict is Headline.WARNING
+    assert sentence == "1 of 3 pairs looks right, 2 gave no depth or cannot be right."

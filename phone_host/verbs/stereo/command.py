@@ -1,20 +1,27 @@
 """phone-host stereo: compute disparity and point clouds of pairs of image files."""
 
 import argparse
+import shlex
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError
 from common.program.terminal import fitted
+from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
-from phone_host.report.stereo_report import Size, pair_json, pair_lines, set_json, set_lines
+from phone_host.report.page_links import NextCommand
+from phone_host.report.stereo_json import pair_json, set_json
+from phone_host.report.stereo_lines import pair_lines, set_lines
+from phone_host.report.stereo_report import Size
 from phone_host.run.stereo_job import StereoJob, run_stereo
 from phone_host.run.stereo_results import NAMES, require_writable
 from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.globs import two_lists
+from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import require_folder, spare_inputs, spare_report, unwritable
 from phone_host.verbs.progress import progress
 from phone_host.verbs.stereo_options import build_core, output_options
@@ -39,6 +46,8 @@ def run(options: argparse.Namespace) -> int:
         matcher=options.matcher or _DEFAULT_MATCHER,
         axes=output_options(options).axes,
         most_pixels=most_pixels(None, options.max_megapixels),
+        mounted=orientations(options),
+        commands=_next(options),
     )
     count = len(files.pairs)
     try:
@@ -61,6 +70,19 @@ def _core(options: argparse.Namespace, size_px: Size) -> StereoCore:
     return core
 
 
+def _next(options: argparse.Namespace) -> tuple[NextCommand, ...]:
+    """Return commands to copy from the page."""
+    commands = []
+    if options.axes == Axes.CAMERA.value and sys.argv[1:2] == ["stereo"]:
+        again = shlex.join(["phone-host", *(word for word in sys.argv[1:] if word != "--json")])
+        commands.append(NextCommand("the same with y up, as most 3D viewers expect", f"{again} --axes y-up"))
+    if options.calibration:
+        rig = shlex.quote(options.calibration)
+        run = f"phone-host run --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration {rig} --out live"
+        commands.append(NextCommand("the same rig live: the board's camera and this machine's", run))
+    return tuple(commands)
+
+
 def _require_place(out: Path, files: ViewFiles) -> None:
     """Refuse a results folder that cannot be written to, holds the photographs or would lose them."""
     require_folder(out)
@@ -69,14 +91,14 @@ def _require_place(out: Path, files: ViewFiles) -> None:
         require_writable(out)
     except OSError as error:
         raise unwritable(out, error) from error
-    for left, right in ((left, right) for _, left, right in files.pairs):
-        spare_inputs(out, NAMES, {"LEFT": left, "RIGHT": right})
     folders = {path.resolve().parent for path in _images(files)}
     if out.resolve() in folders:
         raise SettingsError(
             f"--out {out} is the folder of the images, where later runs would take pictures of depth for photographs",
             f"give a folder of its own, such as --out {out / 'scan'}",
         )
+    for left, right in ((left, right) for _, left, right in files.pairs):
+        spare_inputs(out, NAMES, {"LEFT": left, "RIGHT": right})
 
 
 def _images(files: ViewFiles) -> Sequence[Path]:
