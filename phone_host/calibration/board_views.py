@@ -85,7 +85,9 @@ def look_for_boards(
             seen.append((name, one, other))
         advance()
     if not seen:
-        raise _nothing_read(first_problem)
+        raise first_problem or DataError(
+            "no image has a partner on the other side", "give both images of a pair the same number"
+        )
     usual = _usual([left for _, left, _ in seen]), _usual([right for _, _, right in seen])
     pairs = []
     for name, left_seen, right_seen in seen:
@@ -104,12 +106,6 @@ def _look(path: Path, board: Board, most_pixels: int, mounted: Orientation) -> _
     file = open_image(path, most_pixels, mounted)
     corners = find_corners(decode_file(file), board)
     return _Seen(file=path.name, size_px=file.size_px, turned=file.head.orientation, corners=corners)
-
-
-def _nothing_read(first_problem: DataError | None) -> DataError:
-    if first_problem is None:
-        return DataError("no pair of images could be read", "give both images of a pair the same number")
-    return DataError(f"no pair of images could be read ({first_problem.problem})", first_problem.remedy)
 
 
 def _problem(name: str, pair: tuple[_Seen, _Seen], usual: tuple[_Seen, _Seen]) -> Rejected | None:

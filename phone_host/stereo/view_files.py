@@ -116,7 +116,11 @@ def _images(given: str, side: str) -> list[Path]:
         # A folder of nothing else: whoever opens one says how to convert it.
         files = files or [entry for entry in inside if entry.suffix.lower() in _UNREAD]
         if not files:
-            raise DataError(_without_images(given, side, inside), _REMEDY)
+            if not inside:
+                raise DataError(f"{side} {given!r} names no image", _REMEDY)
+            kinds = sorted({entry.suffix.lower() or "no suffix" for entry in inside})
+            shown = ", ".join(kinds[:_MOST_KINDS])
+            raise DataError(f"{side} {given!r} names no image, only {len(inside)} other files ({shown})", _REMEDY)
     else:
         found = [Path(name) for name in glob.glob(given)]  # noqa: PTH207 - a pattern may be absolute
         files = [entry for entry in found if entry.is_file() and not entry.name.startswith(".")]
@@ -126,14 +130,6 @@ def _images(given: str, side: str) -> list[Path]:
         # A wide pattern also catches Thumbs.db; one of nothing but unusual names is meant as it is.
         files = [entry for entry in files if entry.suffix.lower() in SUFFIXES] or files
     return sorted(files, key=_natural)
-
-
-def _without_images(given: str, side: str, inside: list[Path]) -> str:
-    """Say what a folder holds instead of images."""
-    if not inside:
-        return f"{side} {given!r} names no image"
-    kinds = sorted({entry.suffix.lower() or "no suffix" for entry in inside})
-    return f"{side} {given!r} names no image, only {len(inside)} other files ({', '.join(kinds[:_MOST_KINDS])})"
 
 
 def _natural(path: Path) -> tuple[list[tuple[int, str]], str]:
@@ -146,11 +142,12 @@ def _numbered(left: list[Path], right: list[Path]) -> tuple[dict[int, Path], dic
     """Return the files by the number in their names; None if no number tells each side's files apart and occurs on both sides.
 
     Names may hold more than one number (`cam0_0012`, `0012_cam1`). The one that counts the views is at the place,
-    counted from the end, that pairs most files. Files without a number there stay alone.
+    counted from the end, that pairs most files. Files without a number there stay alone. The folder's name belongs to
+    the name, so what a run has saved is paired by the folders' numbers (`pair-000012/left.png`).
     """
     best: tuple[dict[int, Path], dict[int, Path]] | None = None
     most = 0
-    for place in range(1, 1 + max(len(_NUMBER.findall(path.stem)) for path in (*left, *right))):
+    for place in range(1, 1 + max(len(_numbers(path)) for path in (*left, *right))):
         sides = _by_number(left, place), _by_number(right, place)
         shared = len(sides[0].keys() & sides[1].keys())
         if shared > most:
@@ -160,7 +157,11 @@ def _numbered(left: list[Path], right: list[Path]) -> tuple[dict[int, Path], dic
 
 def _by_number(files: list[Path], place: int) -> dict[int, Path]:
     """Return the files by the number at a place; empty if two files share one there."""
-    numbers = [(path, _NUMBER.findall(path.stem)) for path in files]
+    numbers = [(path, _numbers(path)) for path in files]
     found = [(int(parts[-place]), path) for path, parts in numbers if len(parts) >= place]
     by_number = dict(found)
     return by_number if len(by_number) == len(found) else {}
+
+
+def _numbers(path: Path) -> list[str]:
+    return _NUMBER.findall(f"{path.absolute().parent.name}/{path.stem}")
