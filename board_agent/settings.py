@@ -31,7 +31,10 @@ SERVICE_SETTINGS: Final = Path("/etc/tandemscan/board-agent.toml")
 class BoardSettings:
     """Settings of board-agent, from /etc/tandemscan/board-agent.toml or another file, the environment and options."""
 
-    camera: str = setting("", "the camera, for example v4l2:auto or v4l2:/dev/video0?size=640x480&fps=30")
+    camera: str = setting(
+        "",
+        "the camera, for example v4l2:auto or v4l2:/dev/video0?size=640x480&fps=30; rotate= and flip= if it is mounted turned",
+    )
     link: tuple[str, ...] = setting(
         ("tcp://127.0.0.1:5555",), "addresses to listen at; by default only this machine can connect"
     )

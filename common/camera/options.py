@@ -10,6 +10,9 @@ from typing import Final
 EXAMPLE: Final = "v4l2:/dev/video0[?size=640x480&fps=30&format=mjpeg] or replay:PATH[?fps=30&loop=1&pace=clock|demand]"
 """Example of a camera URI, for help and errors."""
 
+TURNED: Final = "rotate=90|180|270 (clockwise) and flip=h|v for a camera that is mounted turned"
+"""Options of every camera URI, for help."""
+
 _NUMBER: Final = re.compile(
     r"[+-]?\d{1,12}(\.\d{0,12})?(e[+-]?\d{1,2})?|[+-]?\.\d{1,12}|\d{1,12}/\d{1,12}", re.ASCII | re.IGNORECASE
 )

@@ -63,13 +63,13 @@ def require_camera(side: Side, whose: str, rig: CameraState, present: CameraDesc
         remedy = "exchange the two cameras" if exchanged else "plug that one in"
         raise DataError(
             f"{there}, but the rig's {side.value} camera was {rig.identity}",
-            f"{remedy}, or calibrate again with these",
+            f"{remedy}, calibrate again with these, or remove {side.value}_camera from the rig's file",
         )
     if rig.identity.is_known and rig.orientation != present.orientation:
         now, then = (str(turn) or "neither rotate= nor flip=" for turn in (present.orientation, rig.orientation))
         raise DataError(
-            f"{there} with {now}, but the rig was calibrated with {then}",
-            "mount it and give its address as for the calibration, or calibrate again",
+            f"{there}, with {now}, but the rig was calibrated with {then}",
+            f"mount it and give its address as before, calibrate again, or remove {side.value}_camera from the rig's file",
         )
 
 

@@ -3,9 +3,12 @@
 import random
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 
 import msgpack
 
+from common.camera.identity import CameraIdentity, Lock
+from common.camera.orientation import Flip, Orientation
 from common.errors import ProtocolError
 from common.frame import PixelFormat
 from common.ledger import BoardMarks
@@ -41,11 +44,13 @@ from common.protocol.message import (
     HostHello,
     Knock,
     Lane,
+    LockState,
     Message,
     Pacing,
     Ping,
     Pong,
     Rung,
+    SetLocks,
     Status,
 )
 from common.protocol.session import Arrived, Echo, Outgoing
@@ -60,6 +65,12 @@ _CAMERA = CameraDescription(
     pixel_format=PixelFormat.MJPEG,
     period_ns=33_333_333,
     pacing=Pacing.CLOCK,
+)
+_KNOWN = replace(
+    _CAMERA,
+    orientation=Orientation(90, Flip.V),
+    identity=CameraIdentity("uvcvideo", "HD Pro Webcam C920", "A1B2"),
+    controls=((Lock.FOCUS, 20), (Lock.EXPOSURE, 10_000)),
 )
 _RUNG = Rung(index=2, last=5, changes=3, period_ns=66_666_666, quality=50, width_px=320, height_px=240)
 _COUNTS = BoardCounts(9, 5, ((DropReason.REPLACED, 3), (DropReason.NO_HOST, 1)))
@@ -84,6 +95,10 @@ SOUND_MESSAGES: tuple[Message, ...] = (
     Pong(wave=1, t0_ns=10**12, t1_ns=10**12, t2_ns=10**12),
     Status("s", _COUNTS, _RUNG),
     End("s", _COUNTS),
+    HostHello("0123456789abcdef", Lane.CONTROL, reads_long=True),
+    BoardHello(session="s", boot_id="boot", camera=_KNOWN, counts=_COUNTS, rung=_RUNG, is_long=True),
+    SetLocks(_KNOWN.controls),
+    LockState(session="s", asked=_KNOWN.controls, held=((Lock.FOCUS, 25),)),
 )
 
 

@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from common.camera.options import TURNED
 from common.program.quantities import milliseconds, reading, seconds
 from phone_host.camera.examples import EXAMPLE
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
@@ -29,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="address of the board: tcp://HOST:PORT, ipc://PATH[?owner=USER], serial:DEVICE or rfcomm://DEVICE (default: look for a board); repeat the option:"
         " the frames come over the best link that is up",
     )
-    parser.add_argument("--camera", metavar="URI", help=f"camera of this machine: {EXAMPLE}")
+    parser.add_argument("--camera", metavar="URI", help=f"camera of this machine: {EXAMPLE}; {TURNED}")
     add_stereo_arguments(parser)
     parser.add_argument(
         "--board-side",

@@ -97,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     too_few = too_few or (ended is EndReason.SECONDS_OVER and not snapshot.processed)
-    is_wrong = not signals.stop and depth_is_wrong(snapshot)
+    is_wrong = not signals.stop and (depth_is_wrong(snapshot) or snapshot.spoiled_counts.nothing_whole)
     return _CHECK_FAILED if too_few or is_wrong or not complete else 0
 
 

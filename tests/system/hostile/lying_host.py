@@ -12,6 +12,7 @@ import msgpack
 import zmq
 
 from common import now
+from common.camera.identity import Lock
 from common.link.base import SendResult
 from common.link.zeromq import ZeroMqDialer
 from common.protocol.message import (
@@ -24,6 +25,7 @@ from common.protocol.message import (
     Ping,
     Refusal,
     RefusalReason,
+    SetLocks,
     Steer,
 )
 from common.protocol.wire import encode
@@ -124,11 +126,15 @@ def _strange_hellos(number: int) -> Sequence[tuple[Message, Lane]]:
     return [(HostHello(f"{number:016x}", lane), lane) for lane in Lane]
 
 
+def _strange_orders(number: int) -> Sequence[tuple[Message, Lane]]:
+    return [(Steer(_END_NS - number), Lane.CONTROL), (SetLocks(((Lock.FOCUS, -number),)), Lane.CONTROL)]
+
+
 TALKS: Final = (
     Talk("hellos with ever new ids", _strange_hellos),
     Talk("hellos, and answers are not read", _strange_hellos, reads=False),
     Talk("credit of 2^53 frames", lambda _: [(Credit(_MOST), lane) for lane in Lane]),
-    Talk("steering by 146 years", lambda number: [(Steer(_END_NS - number), Lane.CONTROL)]),
+    Talk("steering by 146 years, and ever new locks", _strange_orders),
     Talk("echoes without end", lambda number: [(Ping(number, -_END_NS), lane) for lane in Lane]),
     Talk("echoes, and answers are not read", lambda number: [(Ping(number, number), Lane.CONTROL)], reads=False),
     Talk("goodbyes", lambda _: [(Bye(BoardCounts(_MOST, _MOST)), lane) for lane in Lane]),
