@@ -8,6 +8,7 @@ from board_agent.doctor.board_doctor import examine
 from board_agent.settings import SERVICE_SETTINGS, check, resolve_settings
 from common.doctor.finding import exit_code, table, values
 from common.program import logs
+from common.program.terminal import fitted
 
 
 def run(options: argparse.Namespace) -> int:
@@ -18,5 +19,5 @@ def run(options: argparse.Namespace) -> int:
     check(settings)
     logs.set_up(logging.ERROR)  # the findings say it all
     findings = examine(settings, options.config)
-    print(json.dumps(values(findings)) if options.json else table(findings))
+    print(json.dumps(values(findings)) if options.json else fitted(table(findings)))
     return exit_code(findings)

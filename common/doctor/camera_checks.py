@@ -10,6 +10,7 @@ from common.doctor.access import Holder
 from common.doctor.finding import Finding, fail, ok, warn
 from common.errors import TandemError
 from common.frame import raw_bytes
+from common.words import counted
 
 _MB: Final = 1e6
 
@@ -110,7 +111,9 @@ def check_absence(nodes: int, cameras: tuple[UsbCamera, ...]) -> Finding:
         return fail("camera", f"USB camera {without[0]!r} has no driver", "modprobe uvcvideo; then look at dmesg")
     if nodes:
         return fail(
-            "camera", f"none of {nodes} video nodes gives images", "see the next lines; unplug and plug it again"
+            "camera",
+            f"none of {counted(nodes, 'video node')} gives images",
+            "see the next lines; unplug and plug it again",
         )
     return fail("camera", "none is plugged in", "plug one in; lsusb lists what the USB bus sees")
 
@@ -136,7 +139,7 @@ def check_bus(bus: UsbBus, frame_bytes: int, rate_hz: float) -> Finding:
         rate_hz: frames a second.
     """
     needed = frame_bytes * rate_hz
-    shares = f", shared with {bus.cameras - 1} more cameras" if bus.cameras > 1 else ""
+    shares = f", shared with {counted(bus.cameras - 1, 'more camera')}" if bus.cameras > 1 else ""
     room = next((room for megabits, room in _BUS_BYTES if bus.megabits <= megabits), 0)
     if not room:
         return ok("usb", f"port {bus.port}, {bus.megabits:g} Mbit/s{shares}: {needed / _MB:.1f} MB/s is no burden")
@@ -173,7 +176,7 @@ def check_stream(sample: Sample) -> list[Finding]:
     nominal_hz = 1e9 / sample.nominal_ns
     rate = f"{1e9 / sample.period_ns:.1f}" if sample.period_ns else "too few to tell"
     text = (
-        f"{sample.frames} sound frames, {rate} of {nominal_hz:.3g} a second, {sample.frame_bytes / 1000:.0f} KB each, "
+        f"{counted(sample.frames, 'sound frame')}, {rate} of {nominal_hz:.3g} a second, {sample.frame_bytes / 1000:.0f} KB each, "
         f"the first after {sample.first_ns / 1e9:.2f} s"
     )
     if spoiled:
@@ -224,7 +227,7 @@ def _check_stamps(sample: Sample) -> Finding:
     if sample.distrusted:
         return warn(
             "stamps",
-            f"{sample.distrusted} of {sample.frames} stamps of driver {sample.driver} ({named}) cannot be true",
+            f"{sample.distrusted} of {counted(sample.frames, 'stamp')} of driver {sample.driver} ({named}) cannot be true",
             "the moment of dequeuing stands for them, some ms late and less even; a UVC webcam has better ones",
         )
     return ok("stamps", f"driver {sample.driver} stamps {named}, {meaning}; all plausible")

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Final, NoReturn
 
 from common.errors import TandemError
+from common.program.terminal import fitted
 from common.versions import all_versions
 
 if TYPE_CHECKING:
@@ -158,7 +159,7 @@ def _ran(
 
 def _say(line: str) -> None:
     with contextlib.suppress(OSError):  # if stderr is gone too, the exit code must suffice
-        print(line, file=sys.stderr)
+        print(fitted(line, sys.stderr), file=sys.stderr)
 
 
 def _forget_stdout() -> None:

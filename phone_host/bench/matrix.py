@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Final, Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from common import now
 from common.errors import TandemError, UnavailableError
@@ -16,6 +15,7 @@ from phone_host.bench.cases import Case, Interface, Size
 from phone_host.bench.links import ask_board
 from phone_host.bench.runs import PATIENCE_NS, WARM_UP_S, CaseResult, RunSettings, film_images, render, run_case
 from phone_host.children.board_process import socket_folder
+from phone_host.run.progress_bar import progress_bar
 from phone_host.scene.film import Film
 
 _RENDER_S: Final = 0.06
@@ -117,9 +117,7 @@ class _Bar:
     """
 
     def __init__(self, total_s: float, signals: StopSignals) -> None:
-        console = Console(stderr=True)
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("left"), TimeRemainingColumn())
-        self._progress = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+        self._progress = progress_bar(Console(stderr=True))
         self._task = self._progress.add_task("", total=total_s)
         self._signals = signals
         self._done_s = self._length_s = 0.0

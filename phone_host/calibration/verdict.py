@@ -10,6 +10,7 @@ from enum import Enum
 
 import numpy as np
 
+from common.words import counted
 from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
 
 GOOD_PX, USABLE_PX = 0.25, 0.5
@@ -122,7 +123,9 @@ def _hints(calibration: Calibration, rejected: tuple[Rejected, ...]) -> list[str
         )
     if len(rejected) > _MANY_REJECTED * (len(rejected) + len(calibration.used)):
         reason, count = Counter(each.reason for each in rejected).most_common(1)[0]
-        hints.append(f"{len(rejected)} pairs were rejected, {count} of them: {reason.value}: {_CURES[reason]}")
+        hints.append(
+            f"{counted(len(rejected), 'pair was', 'pairs were')} rejected, {count} of them: {reason.value}: {_CURES[reason]}"
+        )
     return hints
 
 

@@ -22,7 +22,7 @@ from phone_host.run.sinks import FunctionSink
 from phone_host.scene.film import Film
 from phone_host.scene.scene import RectifiedView, Scene, rig_poses, truth
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
 
@@ -106,7 +106,7 @@ class DemoRun:
         self.ledgers: list[PairLedger] = []
         self.address = f"ipc://{sockets}/board"
         near = disparities_for_near(self._rectifier.geometry, NEAR_M, self._rectifier.rectification.width_px)
-        core = StereoCore(create_matcher(MatchSettings(disparities=near)), self._rectifier)
+        core = StereoCore(MatchSettings(disparities=near), self._rectifier)
         camera = open_camera(film.replay_uri(film.right), HOST_CLOCK, now.monotonic_ns())
         link = open_link(parse_link(self.address, listens_by_default=False))
         settings = HostSettings(wait_ns=_BOARD_PATIENCE_NS, out=out, save_every=0, resolved=resolved)

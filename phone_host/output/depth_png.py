@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from phone_host.model import CloudImage
 from phone_host.output.atomic import write_bytes
 from phone_host.output.png_text import with_text
+from phone_host.output.strips import strips
 
 MOST_MM: Final = 65535
 """The greatest depth of a 16-bit picture in mm."""
@@ -29,11 +30,16 @@ def depth_mm(cloud: CloudImage) -> tuple[NDArray[np.uint16], int]:
     Returns:
         (H, W) uint16, mm, 0 = none; and how many depths became 0 because they do not round to 1 to 65535 mm.
     """
-    millimetres = np.rint(cloud[..., 2] * np.float32(1000))
-    fits = (millimetres >= 1) & (millimetres <= MOST_MM)
-    known = np.count_nonzero(millimetres == millimetres)  # noqa: PLR0124 - false for NaN only; `isfinite` needs a second pass
-    millimetres[~fits] = 0
-    return millimetres.astype(np.uint16), int(known - np.count_nonzero(fits))
+    depth = np.empty(cloud.shape[:2], dtype=np.uint16)
+    known = kept = 0
+    for rows in strips(cloud.shape[0], cloud.shape[1]):
+        millimetres = np.rint(cloud[rows, :, 2] * np.float32(1000))
+        fits = (millimetres >= 1) & (millimetres <= MOST_MM)
+        known += int(np.count_nonzero(~np.isnan(millimetres)))
+        kept += int(np.count_nonzero(fits))
+        millimetres[~fits] = 0
+        depth[rows] = millimetres
+    return depth, known - kept
 
 
 def write_depth(path: Path, cloud: CloudImage) -> int:

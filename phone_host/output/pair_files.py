@@ -3,11 +3,12 @@
 docs/files.md describes them.
 """
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final
 
 from phone_host.model import Processed
 from phone_host.output.axes import Axes
@@ -15,8 +16,6 @@ from phone_host.output.depth_png import write_depth
 from phone_host.output.pfm import write_pfm, write_xyz
 from phone_host.output.ply import write_ply
 from phone_host.output.preview import depth_picture, disparity_picture, write_png
-
-T = TypeVar("T")
 
 
 class PairFile(Enum):
@@ -35,11 +34,6 @@ class PairFile(Enum):
 _OF_DISPARITY: Final = frozenset({PairFile.DISPARITY, PairFile.DISPARITY_VIEW})
 _OF_IMAGES: Final = frozenset({PairFile.LEFT, PairFile.RIGHT})
 
-PAIR_NAMES: Final = "|".join(
-    name.replace(".", r"\.") for name in (*(file.value for file in PairFile), "report.json", "index.html")
-)
-"""Pattern of the names that may lie in the folder of a pair, whichever verb wrote it."""
-
 RUN_FILES: Final = (PairFile.LEFT, PairFile.RIGHT, PairFile.DISPARITY, PairFile.CLOUD, PairFile.DEPTH)
 """What a run saves of a pair."""
 
@@ -53,6 +47,20 @@ STEREO_FILES: Final = (
     PairFile.DISPARITY,
 )
 """What `stereo` writes of a pair."""
+
+
+_BESIDE: Final = ("report.json", "index.html")
+
+
+def _pattern(files: Iterable[PairFile]) -> str:
+    return "|".join(re.escape(name) for name in (*(file.value for file in files), *_BESIDE))
+
+
+PAIR_NAMES: Final = _pattern(PairFile)
+"""Pattern of the names that may lie in the folder of a pair, whichever verb wrote it."""
+
+STEREO_NAMES: Final = _pattern(STEREO_FILES)
+"""Pattern of the names that `stereo` writes for a pair."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,17 +87,12 @@ def available(wanted: Sequence[PairFile], *, has_disparity: bool, has_cloud: boo
     )
 
 
-def one_after_another(write: Callable[[PairFile], T], files: Iterable[PairFile]) -> Iterable[T]:
-    """Write in this thread; `ThreadPoolExecutor.map` has the same form."""
-    return map(write, files)
-
-
 def write_pair(
     folder: Path,
     processed: Processed,
     wanted: Sequence[PairFile],
     axes: Axes = Axes.CAMERA,
-    run_all: Callable[[Callable[[PairFile], int], Iterable[PairFile]], Iterable[int]] = one_after_another,
+    run_all: Callable[[Callable[[PairFile], int], Iterable[PairFile]], Iterable[int]] = map,
 ) -> WrittenPair:
     """Write a pair's files, each whole or not at all.
 
@@ -98,7 +101,7 @@ def write_pair(
         processed: the pair.
         wanted: which files. Those for which the pair has no data are left out.
         axes: axes of cloud.ply and xyz.pfm.
-        run_all: calls a function for each file, possibly in several threads.
+        run_all: calls a function for each file, possibly in several threads (`ThreadPoolExecutor.map`).
 
     Returns:
         What was written.

@@ -6,6 +6,8 @@ infinity. The header has no place for comments that all readers would skip, so u
 """
 
 import re
+from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +15,9 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.model import CloudImage, Disparity
-from phone_host.output.atomic import write_bytes
+from phone_host.output.atomic import write_parts
 from phone_host.output.axes import Axes
+from phone_host.output.strips import strips
 
 # Magic, width, height, scale; one white space character ends the header (the data may begin with any byte). A header of
 # more than 256 bytes is not PFM: three numbers never need that much.
@@ -32,10 +35,14 @@ def write_pfm(path: Path, disparity: Disparity) -> None:
     Raises:
         OSError: the file cannot be written.
     """
+
+    def row_strips() -> Iterator[memoryview]:
+        for rows in _bottom_first(disparity):
+            data = np.where(np.isfinite(rows), rows, np.float32(np.inf))
+            yield np.ascontiguousarray(data, dtype="<f4").data.cast("B")
+
     height, width = disparity.shape
-    rows = np.where(np.isfinite(disparity), disparity, np.float32(np.inf))[::-1]
-    data = np.ascontiguousarray(rows, dtype="<f4")
-    write_bytes(path, f"Pf\n{width} {height}\n-1\n".encode(), data.data.cast("B"))
+    write_parts(path, chain([f"Pf\n{width} {height}\n-1\n".encode()], row_strips()))
 
 
 def write_xyz(path: Path, cloud: CloudImage, axes: Axes = Axes.CAMERA) -> None:
@@ -51,9 +58,20 @@ def write_xyz(path: Path, cloud: CloudImage, axes: Axes = Axes.CAMERA) -> None:
     """
     height, width, _ = cloud.shape
     # Whole rows: numpy multiplies a last axis of length 3 at a tenth of this speed.
-    rows = np.ascontiguousarray(cloud, dtype="<f4").reshape(height, 3 * width)[::-1]
-    data = np.multiply(rows, np.tile(axes.signs, width), dtype="<f4")
-    write_bytes(path, f"PF\n{width} {height}\n-1\n".encode(), data.data.cast("B"))
+    signs = np.tile(axes.signs, width)
+
+    def row_strips() -> Iterator[memoryview]:
+        for rows in _bottom_first(np.ascontiguousarray(cloud).reshape(height, 3 * width)):
+            yield np.multiply(rows, signs, dtype="<f4").data.cast("B")
+
+    write_parts(path, chain([f"PF\n{width} {height}\n-1\n".encode()], row_strips()))
+
+
+def _bottom_first(values: NDArray[np.float32]) -> Iterator[NDArray[np.float32]]:
+    """Yield the rows in the file's order, some at a time."""
+    upside_down = values[::-1]
+    for rows in strips(*values.shape):
+        yield np.ascontiguousarray(upside_down[rows])
 
 
 def read_pfm(path: Path) -> Disparity:

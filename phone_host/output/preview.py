@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from phone_host.model import CloudImage, Disparity, Image, StereoGeometry
 from phone_host.output.atomic import write_bytes
 from phone_host.output.scale_bar import Tick, ticks, with_scale
+from phone_host.output.strips import strips
 
 # Viridis: lightness rises evenly, it works in grey prints and for colour-blind readers, and its dark end (68, 1, 84)
 # differs from the black that means "none" (Smith and van der Walt, 2015).
@@ -156,12 +157,16 @@ def _sample(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def _coloured(values: NDArray[np.float32], dark: float, bright: float) -> Image:
     """Colour values from `dark` to `bright`, whichever is greater; NaN becomes black."""
-    levels = values - np.float32(dark)
-    levels *= np.float32((_LEVELS - 1) / (bright - dark))
-    levels += np.float32(1.5)  # to the nearest level, from 1
-    np.clip(levels, 1, _LEVELS, out=levels)
-    levels[~np.isfinite(levels)] = 0
-    return np.asarray(cv2.applyColorMap(levels.astype(np.uint8), _table()), dtype=np.uint8)
+    image = np.empty((*values.shape, 3), dtype=np.uint8)
+    table, scale = _table(), np.float32((_LEVELS - 1) / (bright - dark))
+    for rows in strips(*values.shape):
+        levels = values[rows] - np.float32(dark)
+        levels *= scale
+        levels += np.float32(1.5)  # to the nearest level, from 1
+        np.clip(levels, 1, _LEVELS, out=levels)
+        levels[~np.isfinite(values[rows])] = 0
+        image[rows] = cv2.applyColorMap(levels.astype(np.uint8), table)
+    return image
 
 
 def _table() -> Image:

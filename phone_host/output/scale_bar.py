@@ -25,6 +25,7 @@ _PITCH: Final = 2.0  # least distance of two ticks, in heights of a letter
 _ENOUGH_TICKS: Final = 4
 _WIDEST_GAP: Final = 0.35  # of the scale: none of its thirds stays without a tick
 _MOST_TICKS: Final = 9
+_MOST_RATIO: Final = 1e6  # of the greatest label to the least: a micrometre to a metre, a millimetre to a kilometre
 _PAPER: Final = 255
 _INK: Final = 0
 
@@ -84,10 +85,9 @@ def _widest_gap(found: list[Tick]) -> float:
 
 def _round_numbers(low: float, high: float) -> Iterator[Iterable[float]]:
     """Yield the numbers of each roundness between two limits, those of greater steps first."""
-    least = max(low, 1e-3 * high if math.isfinite(high) else 1e-3)
+    least = low if low > 0 else high / _MOST_RATIO
     first = math.floor(math.log10(least)) - 1
-    # Beyond a thousand times the least there is no room for more ticks on any scale.
-    last = math.floor(math.log10(min(high, least * 1e3)))
+    last = math.floor(math.log10(min(high, least * _MOST_RATIO)))
     for digits in _STEPS:
         decades = range(first, last + 1)
         numbers = [float(f"{digit}e{decade}") for decade in decades for digit in digits]

@@ -8,19 +8,22 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
 from common import now
+from common.camera.orientation import UPRIGHT, Orientation
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
-from phone_host.model import Image, Processed
 from phone_host.output.atomic import write_text
 from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
 from phone_host.output.pair_files import STEREO_FILES, available, write_pair
+from phone_host.report.page_links import NextCommand
+from phone_host.report.report_page import Picture
+from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_report import (
     FailedPair,
     PairReport,
@@ -28,10 +31,9 @@ from phone_host.report.stereo_report import (
     SetReport,
     Size,
     alone_remarks,
-    pair_json,
-    set_json,
 )
-from phone_host.run.stereo_remarks import pair_remarks
+from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
+from phone_host.run.stereo_remarks import pair_remarks, turned_remarks
 from phone_host.run.stereo_results import StereoResults
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import EncodedFile, decode_files, open_image, require_same_size, size_px
@@ -62,20 +64,20 @@ class StereoJob:
         out: the results folder.
         make_core: makes the stereo core for images of this size (width and height of the left one, px).
         matcher: its name, for the report.
-        is_rectified: whether the images arrive rectified.
-        near_m: nearest depth that is looked for, m; NaN: the search was given in px.
         axes: of cloud.ply and xyz.pfm.
         most_pixels: an image that claims more is refused.
+        mounted: by which turns the left and the right images become upright, after what their EXIF headers say.
+        commands: what to do next, for the pages.
     """
 
     files: ViewFiles
     out: Path
     make_core: Callable[[Size], StereoCore]
     matcher: str
-    is_rectified: bool
-    near_m: float
     axes: Axes = Axes.CAMERA
     most_pixels: int = MOST_PIXELS
+    mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
+    commands: tuple[NextCommand, ...] = ()
 
 
 def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
@@ -107,8 +109,12 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
         report = _set(job, tuple(pairs))
         if not report.computed:
             first = report.failed[0]
-            raise DataError(f"none of the {len(pairs)} pairs can be computed; the first: {first.problem}", first.remedy)
+            raise DataError(
+                f"none of the {len(pairs)} pairs can be computed; the first: {first.problem} ({first.remedy})",
+                "mend what this names, then try again",
+            )
         results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
+        results.write_text("index.html", set_page(report, work.thumbnails, job.commands))
         return report
 
 
@@ -170,19 +176,24 @@ class _Work:
         self._job, self._results, self._watcher = job, results, watcher
         self._core: StereoCore | None = None
         self._core_px: Size = (0, 0)
+        self._has_no_core = False
+        self.thumbnails: dict[str, Picture] = {}
 
     def tried(self, folder: str, left: Path, right: Path) -> PairReport | FailedPair:
         """Compute and write a pair, or say why not."""
         try:
             return self.computed(folder, left, right)
         except DataError as error:
+            if self._has_no_core:  # no pair can be computed without one
+                raise
             return FailedPair(name=folder, left=str(left), right=str(right), problem=error.problem, remedy=error.remedy)
 
     def computed(self, folder: str, left: Path, right: Path) -> PairReport:
         """Compute and write a pair. `folder` is empty for the only one."""
         watch, about = _StopWatch(), f" {folder}" if folder else ""
         self._watcher.say(f"reading{about}")
-        opened = open_image(left, self._job.most_pixels), open_image(right, self._job.most_pixels)
+        limit, (of_left, of_right) = self._job.most_pixels, self._job.mounted
+        opened = open_image(left, limit, of_left), open_image(right, limit, of_right)
         core = self._core_for(*opened)
         watch.lap("prepare")
         images = decode_files(*opened)
@@ -191,55 +202,57 @@ class _Work:
         processed = core.compute(*images, _StageClock(self._watcher, about))
         watch.take_over(processed.stages)
         self._watcher.say(f"writing{about}")
-        return self._written(folder, (left, right), images, processed, watch)
-
-    def _core_for(self, left: EncodedFile, right: EncodedFile) -> StereoCore:
-        """Return the core for these images; refuse images that it cannot take, before they are decoded."""
-        if self._job.is_rectified:
-            require_same_size(left.size_px, right.size_px, left.name, right.name)
-        if self._core is None or (self._job.is_rectified and left.size_px != self._core_px):
-            self._core, self._core_px = self._job.make_core(left.size_px), left.size_px
-        self._core.require_sizes(left.size_px, right.size_px)
-        return self._core
-
-    def _written(
-        self,
-        folder: str,
-        files: tuple[Path, Path],
-        images: tuple[Image, Image],
-        processed: Processed,
-        watch: _StopWatch,
-    ) -> PairReport:
-        job, disparity = self._job, processed.disparity
-        assert disparity is not None  # `compute` always returns one
-        planned = available(STEREO_FILES, has_disparity=True, has_cloud=processed.cloud is not None)
-        with self._results.folder_of(folder, [*(file.value for file in planned), "report.json"]) as place:
-            with ThreadPoolExecutor(_WRITERS) as writers:
-                written = write_pair(place, processed, planned, job.axes, writers.map)
+        planned = available(
+            STEREO_FILES, has_disparity=processed.disparity is not None, has_cloud=processed.cloud is not None
+        )
+        names = [*(file.value for file in planned), "report.json", "index.html"]
+        with (
+            ThreadPoolExecutor(_WRITERS) as writers,
+            self._results.folder_of(folder, names, writers.map) as place,
+        ):
+            written = write_pair(place, processed, planned, self._job.axes, writers.map)
             watch.lap("write")
-            density = float(np.isfinite(disparity).mean())
-            remarks = pair_remarks(processed, density, written, job.near_m)
+            density = 0.0 if processed.disparity is None else float(np.isfinite(processed.disparity).mean())
+            remarks = [
+                *turned_remarks(*opened),
+                *pair_remarks(processed, density, written, core.wanted.search_from_m),
+                *(() if folder else _alone(self._job)),
+            ]
             report = PairReport(
                 name=folder,
-                left=str(files[0]),
-                right=str(files[1]),
+                left=str(left),
+                right=str(right),
                 left_px=size_px(images[0]),
                 right_px=size_px(images[1]),
                 rectified_px=size_px(processed.pair.left),
-                matcher=job.matcher,
+                matcher=self._job.matcher,
                 search=processed.search,
                 geometry=processed.geometry,
                 limits=processed.limits,
                 cut=processed.cut,
                 density=density,
-                axes=job.axes,
+                axes=self._job.axes,
                 written=written,
                 stages_ms=watch.times_ms(),
-                remarks=remarks if folder else (*remarks, *_alone(job)),
+                remarks=tuple(remarks),
             )
-            _write_report(place, pair_json(report))
+            write_text(place / "report.json", json_text(pair_json(report), indent=2) + "\n")
+            write_text(place / "index.html", pair_page(report, processed, self._job.commands))
+        if folder and (picture := pair_thumbnail(processed)) is not None:
+            self.thumbnails[folder] = picture
         return report
 
-
-def _write_report(folder: Path, report: dict[str, Any]) -> None:
-    write_text(folder / "report.json", json_text(report, indent=2) + "\n")
+    def _core_for(self, left: EncodedFile, right: EncodedFile) -> StereoCore:
+        """Return the core for these images; refuse images that it cannot take, before they are decoded."""
+        is_rectified = self._core is not None and self._core.rig is None
+        if self._core is None or (is_rectified and left.size_px != self._core_px):
+            try:
+                made = self._job.make_core(left.size_px)
+            except DataError:
+                self._has_no_core = self._core is None
+                raise
+            self._core, self._core_px = made, left.size_px
+        if self._core.rig is None:
+            require_same_size(left.size_px, right.size_px, left.name, right.name)
+        self._core.require_sizes(left.size_px, right.size_px)
+        return self._core

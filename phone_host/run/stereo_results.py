@@ -13,11 +13,11 @@ from types import TracebackType
 from typing import Final, Self
 
 from phone_host.output.atomic import write_text
-from phone_host.output.listed import ListedFolder
-from phone_host.output.pair_files import PAIR_NAMES
+from phone_host.output.listed import ListedFolder, RunAll
+from phone_host.output.pair_files import PAIR_NAMES, STEREO_NAMES
 
-NAMES: Final = rf"{PAIR_NAMES}|pair-[0-9]{{6,}}"
-"""The names that `stereo` writes into its folder, alone or as one of several pairs."""
+NAMES: Final = rf"{STEREO_NAMES}|pair-[0-9]{{6,}}"
+"""The names that `stereo` writes into its folder: of the only pair, or a folder for each of several."""
 
 
 class StereoResults:
@@ -51,12 +51,13 @@ class StereoResults:
             self._own = ListedFolder(self._path, NAMES, inner=PAIR_NAMES)
 
     @contextmanager
-    def folder_of(self, name: str, files: Sequence[str]) -> Iterator[Path]:
+    def folder_of(self, name: str, files: Sequence[str], run_all: RunAll) -> Iterator[Path]:
         """Give a pair a place for its files. The folder is open.
 
         Args:
             name: of its own folder, which appears when the block ends; empty: its files go into the results folder.
             files: names of its files.
+            run_all: see `ListedFolder.new_folder`.
 
         Yields:
             Where to write them.
@@ -66,7 +67,7 @@ class StereoResults:
         """
         assert self._own is not None
         if name:
-            with self._own.new_folder(name) as folder:
+            with self._own.new_folder(name, run_all) as folder:
                 yield folder
         else:
             self._own.add(*files)

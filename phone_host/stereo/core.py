@@ -40,7 +40,7 @@ from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near, reproject
 from phone_host.stereo.scaled_rig import scaled_rig
-from phone_host.stereo.stacked import lying, upright_again
+from phone_host.stereo.stacked import lying_pair, upright_again
 from phone_host.stereo.working import MARGIN_PX, Part, chosen_scale, part_for, reduced, to_full_size
 
 _Sizes = tuple[tuple[int, int], tuple[int, int]]
@@ -70,6 +70,7 @@ class StereoCore:
         rig: the cameras, at the size of their calibration; None when the images are already rectified.
         geometry: converts disparity to metres at that size; None when the images are already rectified and no geometry was
             given. `Processed.geometry` is that of a result.
+        wanted: limits, crop and working size as asked for.
 
     Args:
         matcher: finds the disparity: a matcher as it is, or the settings from which one is made for each image size.
@@ -91,7 +92,7 @@ class StereoCore:
         self.rig = None if rectifier is None else rectifier.rig
         self._rectifier = rectifier
         self.geometry = geometry if rectifier is None else rectifier.geometry
-        self._wanted = wanted
+        self.wanted = wanted
         self._kept: dict[_Sizes, _Ready] = {}
         if isinstance(matcher, MatchSettings):
             create_matcher(matcher)  # a name or a number that is wrong is told before the first pair comes
@@ -154,7 +155,7 @@ class StereoCore:
         return ready
 
     def _made_for(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> _Ready:
-        rectifier, geometry, wanted = self._rectifier, self.geometry, self._wanted
+        rectifier, geometry, wanted = self._rectifier, self.geometry, self.wanted
         size, epipolar, zero_sigma_px = left_px, Epipolar.LEFT, math.nan
         if rectifier is not None:
             rig = scaled_rig(rectifier.rig, left_px, right_px)
@@ -189,9 +190,9 @@ class StereoCore:
         """Return N, px of the rectified images; 0 if the matcher has its own."""
         if not isinstance(self._matcher, MatchSettings):
             return 0
-        if geometry is None or math.isnan(self._wanted.search_from_m):
+        if geometry is None or math.isnan(self.wanted.search_from_m):
             return self._matcher.disparities
-        return disparities_for_near(geometry, self._wanted.search_from_m, along_px)
+        return disparities_for_near(geometry, self.wanted.search_from_m, along_px)
 
     def _matcher_for(self, disparities: int) -> Matcher:
         if isinstance(self._matcher, MatchSettings):
@@ -203,8 +204,8 @@ def _match(pair: RectifiedPair, ready: _Ready) -> Disparity:
     """Match the part that is wanted, at the working size, turned if need be; the result has the rectified images' size."""
     part, scale, epipolar = ready.part, ready.search.scale, pair.epipolar
     seen = pair if part is None else part.of(pair)
-    left, right = (lying(reduced(image, scale), epipolar) for image in (seen.left, seen.right))
-    found = upright_again(ready.matcher.match(RectifiedPair(left, right)), epipolar)
+    small = RectifiedPair(reduced(seen.left, scale), reduced(seen.right, scale), epipolar)
+    found = upright_again(ready.matcher.match(lying_pair(small)), epipolar)
     height, width = seen.left.shape[:2]
     disparity = to_full_size(found, width, height, epipolar)
     if scale < 1 and ready.search.disparities:

@@ -116,7 +116,7 @@ def above_zero(disparity: Disparity, doffs_px: float, error_px: float) -> tuple[
 
 
 def cut_cloud(cloud: CloudImage, geometry: StereoGeometry, limits: DepthLimits) -> CutCounts:
-    """Cut a cloud to its limits, in place: no coordinate of what remains is beyond the far one.
+    """Cut a cloud to its limits, in place: every coordinate of what remains lies below the far one.
 
     Args:
         cloud: (H, W, 3) float32, m, NaN = none; changed.
@@ -128,10 +128,11 @@ def cut_cloud(cloud: CloudImage, geometry: StereoGeometry, limits: DepthLimits) 
     """
     depth = cloud[..., 2]
     before = int(np.count_nonzero(np.isfinite(depth)))
-    too_far = depth > _float32_below(limits.far_m)
+    far_m = _float32_below(limits.far_m)
+    too_far = depth >= far_m
     if _is_wide(geometry, cloud.shape[1], cloud.shape[0]):
         for axis in (0, 1):
-            too_far |= np.abs(cloud[..., axis]) > _float32_below(limits.far_m)
+            too_far |= np.abs(cloud[..., axis]) >= far_m
     too_near = (depth < limits.near_m) & ~too_far if limits.near_m > 0 else np.zeros(0, np.bool_)
     counts = CutCounts(too_far=int(np.count_nonzero(too_far)), too_near=int(np.count_nonzero(too_near)))
     if counts.too_far:

@@ -41,6 +41,7 @@ _SAMPLES_PER_EDGE = 65  # the outline bends slowly: between two of 65 samples it
 # that.
 _FIELD_SHARES = (1.0, 0.97, 0.94, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5)
 _LEAST_SIZE_PX = 32
+_WHOLE_PX = 1e-6  # rounding of ideal cameras' windows, which are whole pixels wide, must not cost a row
 _MOST_KEPT_PIXELS = 4_000_000  # twice 1920 x 1080: what a live camera sends. The maps take 6 bytes per pixel and side.
 _STRIP_ROWS = 256
 _TO_RIGHT = {
@@ -72,8 +73,8 @@ def rectify_rig(rig: Rig) -> Rectification:
     )
     x0, y0 = np.max([window[:2] for window in windows], axis=0)
     x1, y1 = np.min([window[2:] for window in windows], axis=0)
-    width_px = math.floor(focal_px * (x1 - x0)) + 1
-    height_px = math.floor(focal_px * (y1 - y0)) + 1
+    width_px = math.floor(focal_px * (x1 - x0) + _WHOLE_PX) + 1
+    height_px = math.floor(focal_px * (y1 - y0) + _WHOLE_PX) + 1
     if width_px < _LEAST_SIZE_PX or height_px < _LEAST_SIZE_PX:
         raise DataError(
             f"the two cameras' fields of view overlap by {max(width_px, 0)}x{max(height_px, 0)} px only",

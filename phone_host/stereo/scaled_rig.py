@@ -9,7 +9,7 @@ import numpy as np
 
 from common.errors import DataError
 from common.imagesize.head import size_text
-from phone_host.model import CameraModel, Rig, Side
+from phone_host.model import CameraModel, Rig, Side, StereoGeometry
 
 _ROUNDING_PX = 1.0
 """A scaled size is whole pixels. Cameras round either way, so the smaller of two sizes may be off by less than this."""
@@ -35,6 +35,35 @@ def scaled_rig(rig: Rig, left_px: tuple[int, int], right_px: tuple[int, int]) ->
     # Disparities are in px of the rectified images, whose focal length is that of the coarser camera (`rectify`).
     finer = coarser_focal_px(left, right) / coarser_focal_px(rig.left, rig.right)
     return replace(rig, left=left, right=right, zero_sigma_px=rig.zero_sigma_px * finer)
+
+
+def scaled_geometry(
+    geometry: StereoGeometry, from_px: tuple[int, int], to_px: tuple[int, int], name: str
+) -> StereoGeometry:
+    """Scale the geometry of rectified images to a copy of another size.
+
+    Args:
+        geometry: for images of the first size.
+        from_px: width and height for which it holds, px.
+        to_px: width and height of the copies, px.
+        name: of its file, for errors.
+
+    Raises:
+        DataError: the second size is no scaling of the first.
+    """
+    if not _is_scaling(from_px, to_px):
+        raise DataError(
+            f"the images are {size_text(to_px)} px, no scaling of the {size_text(from_px)} px that {name} is for",
+            "give the calibration of these images",
+        )
+    scale_x, scale_y = (new / old for new, old in zip(to_px, from_px, strict=True))
+    return replace(
+        geometry,
+        focal_px=geometry.focal_px * scale_x,
+        cx_px=(geometry.cx_px + 0.5) * scale_x - 0.5,
+        cy_px=(geometry.cy_px + 0.5) * scale_y - 0.5,
+        doffs_px=geometry.doffs_px * scale_x,
+    )
 
 
 def coarser_focal_px(left: CameraModel, right: CameraModel) -> float:

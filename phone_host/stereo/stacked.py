@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import Epipolar
+from phone_host.model import Epipolar, RectifiedPair
 
 Values = TypeVar("Values", np.uint8, np.float32)
 
@@ -29,6 +29,20 @@ def lying(image: NDArray[Values], epipolar: Epipolar) -> NDArray[Values]:
         (W, H) or (W, H, 3); the image itself if its lines are rows.
     """
     return np.asarray(cv2.rotate(image, _LYING[epipolar]), image.dtype) if epipolar.is_vertical else image
+
+
+def lying_pair(pair: RectifiedPair) -> RectifiedPair:
+    """Turn both images of a pair as `lying` does; its epipolar lines become rows.
+
+    Args:
+        pair: upright.
+
+    Returns:
+        The pair with points that move to the left; the pair itself if they do already.
+    """
+    if not pair.epipolar.is_vertical:
+        return pair
+    return RectifiedPair(lying(pair.left, pair.epipolar), lying(pair.right, pair.epipolar))
 
 
 def upright_again(values: NDArray[Values], epipolar: Epipolar) -> NDArray[Values]:

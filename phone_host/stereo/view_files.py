@@ -116,7 +116,11 @@ def _images(given: str, side: str) -> list[Path]:
         # A folder of nothing else: whoever opens one says how to convert it.
         files = files or [entry for entry in inside if entry.suffix.lower() in _UNREAD]
         if not files:
-            raise DataError(_without_images(given, side, inside), _REMEDY)
+            if not inside:
+                raise DataError(f"{side} {given!r} names no image", _REMEDY)
+            kinds = sorted({entry.suffix.lower() or "no suffix" for entry in inside})
+            shown = ", ".join(kinds[:_MOST_KINDS])
+            raise DataError(f"{side} {given!r} names no image, only {len(inside)} other files ({shown})", _REMEDY)
     else:
         found = [Path(name) for name in glob.glob(given)]  # noqa: PTH207 - a pattern may be absolute
         files = [entry for entry in found if entry.is_file() and not entry.name.startswith(".")]
@@ -126,14 +130,6 @@ def _images(given: str, side: str) -> list[Path]:
         # A wide pattern also catches Thumbs.db; one of nothing but unusual names is meant as it is.
         files = [entry for entry in files if entry.suffix.lower() in SUFFIXES] or files
     return sorted(files, key=_natural)
-
-
-def _without_images(given: str, side: str, inside: list[Path]) -> str:
-    """Say what a folder holds instead of images."""
-    if not inside:
-        return f"{side} {given!r} names no image"
-    kinds = sorted({entry.suffix.lower() or "no suffix" for entry in inside})
-    return f"{side} {given!r} names no image, only {len(inside)} other files ({', '.join(kinds[:_MOST_KINDS])})"
 
 
 def _natural(path: Path) -> tuple[list[tuple[int, str]], str]:

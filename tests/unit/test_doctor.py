@@ -275,7 +275,7 @@ def test_a_full_or_read_only_disk_warns(disk: Disk, verdict: Grade) -> None:
             log("Under-voltage detected! (0x00050005)", "Undervoltage detected!"),
             Supply(),
             WARN,
-            "2 times, the last 30 s",
+            "twice, the last 30 s",
         ),
         (log("usb usb1-port1: over-current change #3"), Supply(), WARN, "over-current"),
         (log(), throttled(0x50005, "get_throttled"), FAIL, "too low now"),

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import DataError, UnavailableError
+from common.program.terminal import fitted
 from phone_host.calibration.board_pairs import Calibration, Reason
 from phone_host.calibration.board_views import BoardViews, Mounted, look_for_boards
 from phone_host.calibration.calibrate import calibrate
@@ -62,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     report = report_of(files, views, rejected, found, judgement)
     report |= _write_rig(options.out, replace(found, rig=rig))
     _write_report(options.out, report)
-    print(json_text(report) if options.json else summary(report, views, found, rejected, options.out))
+    print(json_text(report) if options.json else fitted(summary(report, views, found, rejected, options.out)))
     return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
 
 

@@ -7,13 +7,14 @@ from contextlib import nullcontext
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import Progress
 
 from common.errors import SettingsError, UnavailableError
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.settings import with_origins
 from common.program.signals import StopSignals
+from common.program.terminal import columns, fitted
+from common.words import counted
 from phone_host.children.board_process import socket_folder
 from phone_host.demo.demo_page import demo_page
 from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, truth_json
@@ -22,9 +23,11 @@ from phone_host.output.atomic import write_text
 from phone_host.output.listed import ListedFolder
 from phone_host.output.pair_files import PAIR_NAMES
 from phone_host.output.rig_yaml import write_rig
+from phone_host.report.page_links import NextCommand
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
 from phone_host.run.file_sink import NAMES
+from phone_host.run.progress_bar import progress_bar
 from phone_host.run.terminal_view import LiveTable
 from phone_host.scene.film import Film, render_film
 from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
@@ -61,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
         report = build(snapshot) | {"truth": truth_json(errors)}
         complete = demo.host.write_report(report)
         demo.write_pictures(out)
-        write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers))
+        write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers, _by_hand(out, film)))
     except _StoppedError:
         return INTERRUPTED if signals.interrupted else 0
     except OSError as error:
@@ -69,8 +72,8 @@ def run(options: argparse.Namespace) -> int:
             f"{error.filename or out} cannot be written ({error.strerror})",
             "make room on the disk, or give another folder with --out",
         ) from None
-    print(json.dumps(report) if options.json else summary(snapshot))
-    print(_closing(out, film, errors), file=sys.stderr)
+    print(json.dumps(report) if options.json else fitted(summary(snapshot, columns())))
+    print(fitted(_closing(out, film, errors), sys.stderr), file=sys.stderr)
     if signals.stop:
         return INTERRUPTED if signals.interrupted else 0
     return 0 if errors.pairs and not errors.wrong_pairs and complete else _CHECK_FAILED
@@ -100,7 +103,7 @@ def _render(scene: Scene, rig: Rig, folder: Path, console: Console, signals: Sto
         _StoppedError: a stop signal came.
         OSError: the folder cannot be written to.
     """
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+    with progress_bar(console) as progress:
         task = progress.add_task("rendering a moving scene for two cameras", total=2 * FPS * DEMO_PERIOD_S)
 
         def advance() -> None:
@@ -112,13 +115,28 @@ def _render(scene: Scene, rig: Rig, folder: Path, console: Console, signals: Sto
         return render_film(scene, rig, looks, folder, fps=FPS, seconds=DEMO_PERIOD_S, advance=advance)
 
 
+def _by_hand(out: Path, film: Film) -> tuple[NextCommand, ...]:
+    """Return the commands that do the same as the demo, and what comes after it."""
+    return (
+        NextCommand(
+            "The same by hand: the board, in one terminal", f"board-agent run --camera '{film.replay_uri(film.left)}'"
+        ),
+        NextCommand(
+            "and the host, in another one",
+            f"phone-host run --camera '{film.replay_uri(film.right)}' --calibration {out}/rig.yaml --out scan",
+        ),
+        NextCommand(
+            "Your own two cameras: calibrate them from photographs of a chessboard", "phone-host calibrate --help"
+        ),
+    )
+
+
 def _closing(out: Path, film: Film, errors: DepthErrors) -> str:
-    board = f"board-agent run --camera '{film.replay_uri(film.left)}'"
-    host = f"phone-host run --camera '{film.replay_uri(film.right)}' --calibration {out}/rig.yaml --out scan"
+    board, host = (one.command for one in _by_hand(out, film)[:2])
     if not errors.pairs:
         return f"no pair was processed in that time, so nothing could be checked: give more --seconds; see {out}/index.html"
     wrong = (
-        f"\nWRONG: {errors.wrong_pairs} of {errors.pairs} checked pairs show two different moments"
+        f"\nWRONG: {errors.wrong_pairs} of {counted(errors.pairs, 'checked pair')} show two different moments"
         if errors.wrong_pairs
         else ""
     )
@@ -128,4 +146,5 @@ look at   {out}/index.html       the scene, its depth and every delay
           {out}/cloud.ply        the point cloud, in any 3D viewer
           {out}/report.json, {out}/delays.jsonl
 try next  {board}
-          {host}      (in two terminals: the same, by hand)"""
+          {host}
+          (in two terminals: the same, by hand)"""

@@ -6,6 +6,7 @@ import math
 
 from common.doctor.finding import exit_code, table, values
 from common.errors import SettingsError
+from common.program.terminal import fitted
 from phone_host.doctor.host_doctor import Question, examine
 from phone_host.settings import key_folder, resolve_settings
 
@@ -24,5 +25,5 @@ def run(options: argparse.Namespace) -> int:
         keys=key_folder(settings.keys),
     )
     findings = examine(question)
-    print(json.dumps(values(findings)) if options.json else table(findings))
+    print(json.dumps(values(findings)) if options.json else fitted(table(findings)))
     return exit_code(findings)

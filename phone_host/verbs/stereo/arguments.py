@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
+from phone_host.verbs.orientation_arguments import add_orientation_arguments
 from phone_host.verbs.stereo_arguments import add_stereo_arguments
 
 SUMMARY = "compute disparity and point clouds of pairs of images"
@@ -27,13 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " are paired by the number in the name, else in name order",
     )
     add_stereo_arguments(parser)
-    parser.add_argument(
-        "--axes",
-        choices=("camera", "y-up"),
-        default="camera",
-        help="axes of cloud.ply and xyz.pfm: camera (x right, y down, z forward; the default), or y-up (x right, y up, z"
-        " backward) as MeshLab and Blender show them upright",
-    )
+    add_orientation_arguments(parser)
     parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
     parser.add_argument(
         "--out",

@@ -1,24 +1,30 @@
 """phone-host stereo: compute disparity and point clouds of pairs of image files."""
 
 import argparse
-import math
+import shlex
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError
+from common.program.terminal import fitted
 from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
-from phone_host.report.stereo_report import Size, pair_json, pair_lines, set_json, set_lines
+from phone_host.report.page_links import NextCommand
+from phone_host.report.stereo_json import pair_json, set_json
+from phone_host.report.stereo_lines import pair_lines, set_lines
+from phone_host.report.stereo_report import Size
 from phone_host.run.stereo_job import StereoJob, run_stereo
 from phone_host.run.stereo_results import NAMES, require_writable
 from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.globs import two_lists
+from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import require_folder, spare_inputs, unwritable
 from phone_host.verbs.progress import progress
-from phone_host.verbs.stereo_options import build_core
+from phone_host.verbs.stereo_options import build_core, output_options
 
 _DEFAULT_MATCHER: Final = "sgbm"
 _CHECK_FAILED: Final = 4
@@ -38,10 +44,10 @@ def run(options: argparse.Namespace) -> int:
         out=options.out,
         make_core=lambda size_px: _core(options, size_px),
         matcher=options.matcher or _DEFAULT_MATCHER,
-        is_rectified=options.rectified,
-        near_m=math.nan if options.rectified or options.disparities is not None else options.near / 1000,
-        axes=Axes(options.axes),
+        axes=output_options(options).axes,
         most_pixels=most_pixels(None, options.max_megapixels),
+        mounted=orientations(options),
+        commands=_next(options),
     )
     count = len(files.pairs)
     try:
@@ -51,9 +57,9 @@ def run(options: argparse.Namespace) -> int:
         raise unwritable(options.out, error) from error
     if count == 1:
         [only] = report.computed
-        print(json_text(pair_json(only)) if options.json else "\n".join(pair_lines(only, str(options.out))))
+        print(json_text(pair_json(only)) if options.json else fitted("\n".join(pair_lines(only, str(options.out)))))
     else:
-        print(json_text(set_json(report)) if options.json else "\n".join(set_lines(report, str(options.out))))
+        print(json_text(set_json(report)) if options.json else fitted("\n".join(set_lines(report, str(options.out)))))
     return 0 if report.is_sound else _CHECK_FAILED
 
 
@@ -64,6 +70,19 @@ def _core(options: argparse.Namespace, size_px: Size) -> StereoCore:
     return core
 
 
+def _next(options: argparse.Namespace) -> tuple[NextCommand, ...]:
+    """Return commands to copy from the page."""
+    commands = []
+    if options.axes == Axes.CAMERA.value and sys.argv[1:2] == ["stereo"]:
+        again = shlex.join(["phone-host", *(word for word in sys.argv[1:] if word != "--json")])
+        commands.append(NextCommand("the same with y up, as most 3D viewers expect", f"{again} --axes y-up"))
+    if options.calibration:
+        rig = shlex.quote(options.calibration)
+        run = f"phone-host run --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration {rig} --out live"
+        commands.append(NextCommand("the same rig live: the board's camera and this machine's", run))
+    return tuple(commands)
+
+
 def _require_place(out: Path, files: ViewFiles) -> None:
     """Refuse a results folder that cannot be written to, holds the photographs or would lose them."""
     require_folder(out)
@@ -71,14 +90,14 @@ def _require_place(out: Path, files: ViewFiles) -> None:
         require_writable(out)
     except OSError as error:
         raise unwritable(out, error) from error
-    for left, right in ((left, right) for _, left, right in files.pairs):
-        spare_inputs(out, NAMES, {"LEFT": left, "RIGHT": right})
     folders = {path.resolve().parent for path in _images(files)}
     if out.resolve() in folders:
         raise SettingsError(
             f"--out {out} is the folder of the images, where later runs would take pictures of depth for photographs",
             f"give a folder of its own, such as --out {out / 'scan'}",
         )
+    for left, right in ((left, right) for _, left, right in files.pairs):
+        spare_inputs(out, NAMES, {"LEFT": left, "RIGHT": right})
 
 
 def _images(files: ViewFiles) -> Sequence[Path]:
