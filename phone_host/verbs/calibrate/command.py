@@ -22,7 +22,7 @@ from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_yaml import is_rig, write_rig
 from phone_host.settings import most_pixels
-from phone_host.verbs.output_folders import claim_names, require_file, spare_report, unwritable
+from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, unwritable
 
 _CHECK_FAILED = 4
 
@@ -37,10 +37,10 @@ def run(options: argparse.Namespace) -> int:
     """Find the chessboard in all pairs, calibrate, judge and write."""
     board = parse_board(options.board, options.square)
     require_file(options.out)
-    spare_report(options.out.parent, "calibrate")
     if options.out.exists() and not is_rig(options.out):
         raise UnavailableError(f"{options.out} is not a calibration, and would be replaced", "name another --out")
     files = pair_files(options.left, options.right)
+    keep_other_report(options.out.parent, "calibrate")
     claim_names(options.out.parent, options.out, "report.json")
     views = _look(files, board, most_pixels(None, options.max_megapixels))
     try:

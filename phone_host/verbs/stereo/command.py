@@ -22,7 +22,7 @@ from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import decode_files, open_image, require_same_size, size_text
 from phone_host.stereo.reproject import disparities_for_near, nearest_depth_m
-from phone_host.verbs.output_folders import require_folder, spare_report, unwritable
+from phone_host.verbs.output_folders import keep_other_report, require_folder, unwritable
 from phone_host.verbs.stereo_options import build_core
 
 _DEFAULT_MATCHER = "sgbm"
@@ -39,7 +39,6 @@ def run(options: argparse.Namespace) -> int:
             "give the rig.yaml of `phone-host calibrate`, or --rectified --disparities N",
         )
     require_folder(options.out)
-    spare_report(options.out, "stereo")
     watch = _StopWatch()
     limit = most_pixels(None, options.max_megapixels)
     files = open_image(options.left, limit), open_image(options.right, limit)
@@ -52,6 +51,7 @@ def run(options: argparse.Namespace) -> int:
     core.require_sizes(files[0].size_px, files[1].size_px)
     watch.lap("prepare")
     left, right = decode_files(*files)
+    keep_other_report(options.out, "stereo")
     _clear(
         options.out, has_cloud=core.geometry is not None
     )  # only once the images are known to be sound, or an earlier result would be lost for nothing
