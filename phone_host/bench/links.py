@@ -140,7 +140,7 @@ def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | No
     camera = hello.camera
     if camera.pacing is Pacing.DEMAND:
         raise UnavailableError(
-            f"the board at {uri} shows images on demand", "start it with a camera, or a replay with pace=clock"
+            f"the board at {uri} shows images on demand", "start it with a camera, or a replay with fps="
         )
     rate_hz = max(1, round(1e9 / camera.period_ns))
     return Case(

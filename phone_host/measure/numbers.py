@@ -5,7 +5,7 @@ or one side began earlier; then pairs may be of different moments, and their dep
 """
 
 from dataclasses import dataclass
-from typing import Final, assert_never
+from typing import assert_never
 
 from common.camera.image_numbers import ImageNumbers
 from phone_host.measure.trust import Concern, Doubt
@@ -62,51 +62,66 @@ class FilmWatch:
             self.apart += 1
 
 
-_STILLS: Final = (
-    "leave fps=, loop=, phase_ms= and pace= out on both sides to pair photographs by number, or give loop=1 on both"
-)
-_SERIES: Final = (
-    "check that both folders are of one series: the numbers in the file names say which two images belong together"
-)
-
-
 def number_concerns(evidence: ImageEvidence) -> tuple[Concern, ...]:
     """Say why pairs of two replays may show different moments; empty before the first pair, and if there is no reason."""
     board, own = evidence.board, evidence.own
     if board is None or own is None or not evidence.pairs + evidence.board_alone + evidence.own_alone:
         return ()
-    both = f"the board shows {board.words}, this machine {own.words}"
     match evidence.paired_by:
         case PairedBy.NUMBER:
-            sentence, remedy = _by_number(evidence, both, alike=_range(board) == _range(own)), _SERIES
+            return _by_number(evidence, board, own)
         case PairedBy.ORDER:
-            sentence = f"{both}, and they are paired in their order: a missing one shifts all that follow"
-            sentence = sentence if board.count != own.count else ""
-            remedy = "number the files of both sides alike, such as 0012.jpg"
-        case PairedBy.TIME if evidence.apart:
-            sentence, remedy = _apart(evidence), _STILLS
+            return _by_order(board, own)
         case PairedBy.TIME:
-            sentence, remedy = f"{both}: two films of different length do not belong together", _SERIES
-            sentence = sentence if board.count != own.count else ""
+            return _by_time(evidence, board, own)
         case _:
             assert_never(evidence.paired_by)
-    return (Concern(Doubt.IMAGE_NUMBERS, sentence, remedy),) if sentence else ()
 
 
-def _range(images: ImageNumbers) -> tuple[int, int | None, int | None]:
-    return images.count, images.first, images.last
-
-
-def _by_number(evidence: ImageEvidence, both: str, *, alike: bool) -> str:
+def _by_number(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
     there, here = evidence.board_alone, evidence.own_alone
-    if not there and not here:
-        return "" if alike else both
-    return f"{both}: {there} of the board's and {here} of this machine's had no partner of the same number so far"
-
-
-def _apart(evidence: ImageEvidence) -> str:
-    there, here = evidence.first_apart
+    alike = (board.count, board.first, board.last) == (own.count, own.first, own.last)
+    if alike and not there and not here:
+        return ()
+    alone = f": {there} of the board's and {here} of this machine's had no partner of the same number so far"
     return (
-        f"{evidence.apart} of {evidence.pairs} pairs are of different images: first of image {there} of the board and"
-        f" image {here} of this machine, counted from 0"
+        Concern(
+            Doubt.IMAGE_NUMBERS,
+            f"the board shows {board.words}, this machine {own.words}{alone if there or here else ''}",
+            "check that both folders are of one series: the number in the file name says which two images belong together",
+        ),
+    )
+
+
+def _by_order(board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
+    if board.count == own.count:
+        return ()
+    return (
+        Concern(
+            Doubt.IMAGE_NUMBERS,
+            f"the board shows {board.words}, this machine {own.words}, paired in their order: a missing one shifts all that follow",
+            "number the files of both sides alike, such as 0012.jpg",
+        ),
+    )
+
+
+def _by_time(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
+    there, here = evidence.first_apart
+    if evidence.apart:
+        return (
+            Concern(
+                Doubt.IMAGE_NUMBERS,
+                f"{evidence.apart} of {evidence.pairs} pairs are of different images: first of image {there} of the board"
+                f" and image {here} of this machine, counted from 0",
+                "give both films loop=1; or, for photographs, leave fps=, loop=, phase_ms= and pace= out on both sides",
+            ),
+        )
+    if board.count == own.count:
+        return ()
+    return (
+        Concern(
+            Doubt.IMAGE_NUMBERS,
+            f"the board shows {board.words}, this machine {own.words}: films of different length drift apart",
+            "give two films of one recording, with as many images",
+        ),
     )

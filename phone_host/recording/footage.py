@@ -141,7 +141,7 @@ def film(
         camera.close()
         for link in links:
             link.close()
-        raise DataError("a camera with pace=demand has no clock", "give it pace=clock")
+        raise DataError("a camera with pace=demand has no clock", "give it fps= or pace=clock")
     keeper = _Keeper(camera.description.orientation)
     own = OwnCamera(camera, keeper.add_host, DemandClock(pacing))
     receiver = Receiver(links, now.random_id(), keeper)
@@ -175,7 +175,7 @@ def _check(receiver: Receiver, own: OwnCamera) -> None:
             raise failure
     hello = receiver.hello
     if hello is not None and not has_own_time(hello.camera.pacing):
-        raise DataError("the board's camera has pace=demand and so has no clock", "give it pace=clock")
+        raise DataError("the board's camera has pace=demand and so has no clock", "give it fps= or pace=clock")
 
 
 def keep(footage: Footage, folder: Path) -> None:

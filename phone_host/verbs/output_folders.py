@@ -1,16 +1,20 @@
 """Checks where a verb's results go. Impossible targets are refused before the work; write errors carry a remedy."""
 
 import json
+import os
 import re
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
 from common.errors import DataError, SettingsError, UnavailableError
 from common.files import read_whole
-from phone_host.output.listed import claim
+from phone_host.output.listed import ListedFolder, claim
 
 REPORT: Final = "report.json"
+_REPLACED: Final = (REPORT, "index.html")
+"""What every command calls alike; the other results of two commands have different names or are computed from the same input."""
 
 _MOST_REPORT_BYTES: Final = 16 << 20
 """A longer file is no report of ours."""
@@ -71,22 +75,32 @@ def spare_inputs(out: Path, names: str, inputs: Mapping[str, Path]) -> None:
             )
 
 
-def spare_report(folder: Path, command: str) -> None:
-    """Refuse a folder that holds the report of another command, which this one would replace.
+def keep_other_report(folder: Path, command: str) -> None:
+    """Move another command's report and page aside, which this one would replace, and say where they are.
 
     Args:
         folder: folder for the results.
         command: the verb whose results go there.
 
     Raises:
-        UnavailableError: its report.json is another command's.
+        UnavailableError: they are not ours to move, or the folder cannot be written to.
     """
     owner = _owner_of(folder / REPORT)
-    if owner not in {"", command}:
-        raise UnavailableError(
-            f"{folder / REPORT} is the report of {owner}, and {command} would replace it",
-            "give another folder with --out, or move the report away",
-        )
+    if owner in {"", command}:
+        return
+    moves = {name: f"{Path(name).stem}-{owner}{Path(name).suffix}" for name in _REPLACED if (folder / name).exists()}
+    try:
+        listed = ListedFolder(folder, "(?!)", kept="|".join(map(re.escape, (*moves, *moves.values()))))
+        try:
+            listed.add(*moves.values())
+            for name, kept in moves.items():
+                os.replace(name, kept, src_dir_fd=listed.descriptor, dst_dir_fd=listed.descriptor)
+        finally:
+            listed.close()
+    except OSError as error:
+        raise unwritable(folder, error) from error
+    names = " and ".join(moves.values())
+    print(f"phone-host: kept what {owner} had written in {folder} as {names}", file=sys.stderr)
 
 
 def _owner_of(report: Path) -> str:

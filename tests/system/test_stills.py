@@ -1,5 +1,6 @@
 """Folders of photographs through both programs: paired by the number in the name, never with another one, never without a word."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -67,8 +68,8 @@ def test_without_a_board_a_run_waits_says_so_and_ends_with_3(tmp_path: Path) -> 
     assert "no board within 1.5 s" in waiting.stderr
 
 
-def test_seconds_end_a_run_and_another_commands_report_is_spared(tmp_path: Path) -> None:
-    """A second after the first pair the run is done, with 0; `calibrate` then refuses to replace its report."""
+def test_seconds_end_a_run_and_another_commands_report_is_kept(tmp_path: Path) -> None:
+    """A second after the first pair the run is done, with 0; `calibrate` then puts its report beside that of the run."""
     film, link, out = write_film(tmp_path / "film", 3), f"ipc://{tmp_path}/link", tmp_path / "out"
     camera = f"replay:{film}?fps=20&loop=1"
     limited = ["run", "--camera", camera, "--link", link, "--seconds", "1", "--json", "--out", str(out)]
@@ -77,17 +78,13 @@ def test_seconds_end_a_run_and_another_commands_report_is_spared(tmp_path: Path)
     report = receiver.json()
     assert report["ended"] == "seconds_over"
     assert report["pairs"] > 1
-    arguments = [
-        "calibrate",
-        str(film),
-        str(film),
-        "--board",
-        "9x6",
-        "--square",
-        "25mm",
-        "--out",
-        str(out / "rig.yaml"),
-    ]
-    with host(arguments, tmp_path, "calibrate") as refused:
-        assert refused.wait() == 3
-    assert "is the report of run" in refused.stderr
+    boards = tmp_path / "boards"
+    boards.mkdir()
+    (boards / "0.jpg").write_bytes((film / "1.jpg").read_bytes())
+    size = ["--board", "9x6", "--square", "25mm", "--out", str(out / "rig.yaml")]
+    with host(["calibrate", str(film), str(boards), *size], tmp_path, "calibrate") as calibrating:
+        assert calibrating.wait() == 4  # there is no chessboard
+    assert "kept what run had written" in calibrating.stderr
+    assert json.loads((out / "report-run.json").read_text())["pairs"] == report["pairs"]
+    assert (out / "index-run.html").exists()
+    assert json.loads((out / "report.json").read_text())["verdict"] == "reject"

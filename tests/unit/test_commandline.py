@@ -3,6 +3,7 @@
 import errno
 from argparse import Namespace
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -111,3 +112,14 @@ def test_a_mistake_of_typing_is_named(arguments: list[str], told: str, capsys: p
     with pytest.raises(SystemExit):
         sample().parse_args(arguments)
     assert told in capsys.readouterr().err
+
+
+def test_an_empty_path_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    """To a shell variable that is not set, `--out "$OUT"` must not mean the current folder."""
+    parser = ExamplesFirstParser("sample", description="")
+    parser.add_argument("--out", type=Path)
+    with pytest.raises(SystemExit) as leaving:
+        parser.parse_args(["--out", ""])
+    assert leaving.value.code == 2
+    assert "--out is empty" in capsys.readouterr().err
+    assert parser.parse_args(["--out", "."]).out == Path()

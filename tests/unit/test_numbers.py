@@ -45,7 +45,7 @@ def test_a_number_that_only_one_side_has_is_a_doubt() -> None:
 
 def test_different_counts_are_a_doubt_where_order_or_time_pairs() -> None:
     """Paired in their order, a missing image shifts the rest; two looped films of different length drift apart."""
-    for by, words in ((PairedBy.ORDER, "paired in their order"), (PairedBy.TIME, "films of different length")):
+    for by, words in ((PairedBy.ORDER, "paired in their order"), (PairedBy.TIME, "drift apart")):
         assert words in said(ImageEvidence(paired_by=by, board=SERIES, own=SHORT, pairs=1))
 
 

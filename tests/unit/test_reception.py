@@ -352,3 +352,24 @@ def test_a_board_that_vanished_leaves_an_open_end() -> None:
     assert talk.reception.account.sessions[-1].vanished
     assert not talk.reception.ended
     talk.reception.close()
+
+
+def test_a_board_that_went_away_and_came_back_was_absent_in_between() -> None:
+    """From its goodbye to its next frames; a board that had shown its last image is done and not absent."""
+    talk = Talk()
+    talk.run()
+    gone_ns = talk.now_ns
+    talk.reception.receive(NAMES[Lane.FRAMES], Bye(BoardCounts(talk.sent, talk.sent)), gone_ns)
+    account = talk.reception.account
+    assert (account.left, account.absences[0].back_ns) == (1, None)
+    assert account.was_away(gone_ns + 1, gone_ns + 2)
+    talk.begin("second")
+    talk.run(60)
+    (absence,) = account.absences
+    assert absence.gone_ns == gone_ns
+    assert absence.back_ns is not None
+    assert not account.was_away(absence.back_ns, absence.back_ns + MS)
+    assert not account.was_away(0, gone_ns)
+    account.sessions[-1].ended = True
+    talk.reception.receive(NAMES[Lane.FRAMES], Bye(BoardCounts(talk.sent, talk.sent)), talk.now_ns)
+    assert account.left == 1

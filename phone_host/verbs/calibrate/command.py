@@ -23,7 +23,7 @@ from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.calibrate.figures import rejections, report_of, report_of_failure, summary, unwritten
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import claim_names, require_file, spare_report, unwritable
+from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, unwritable
 from phone_host.verbs.progress import progress
 from phone_host.verbs.units import square_mm
 
@@ -43,10 +43,10 @@ def run(options: argparse.Namespace) -> int:
     board = parse_board(options.board, square_mm(options.square))
     mounted = orientations(options)
     require_file(options.out)
-    spare_report(options.out.parent, "calibrate")
     if options.out.exists() and not is_rig(options.out):
         raise UnavailableError(f"{options.out} is not a calibration, and would be replaced", "name another --out")
     files = pair_files(*two_lists(options.images))
+    keep_other_report(options.out.parent, "calibrate")
     claim_names(options.out.parent, options.out, "report.json")
     beside = cameras_beside(files, mounted)
     views, found = _calibrated(files, board, options, mounted)

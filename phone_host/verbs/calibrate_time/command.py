@@ -37,7 +37,7 @@ from phone_host.run.progress_bar import share_bar
 from phone_host.settings import key_folder
 from phone_host.stereo.raw_images import decode_frame
 from phone_host.stereo.rectify import Rectifier
-from phone_host.verbs.output_folders import claim_names, require_file, require_folder, spare_report, unwritable
+from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, require_folder, unwritable
 
 _Reading = TypeVar("_Reading")
 
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     rig = None if options.calibration is None else read_rig(options.calibration)
     if options.out is not None:
         require_folder(options.out)
-        spare_report(options.out, "calibrate-time")
+        keep_other_report(options.out, "calibrate-time")
         claim_names(options.out, options.out, "report.json", "time-offset.svg")
     signals = StopSignals()
     footage = _footage(options, signals)

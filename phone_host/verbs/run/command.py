@@ -36,7 +36,7 @@ from phone_host.settings import check, key_folder, resolve_settings
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
-from phone_host.verbs.output_folders import spare_inputs, spare_report
+from phone_host.verbs.output_folders import keep_other_report, spare_inputs
 from phone_host.verbs.stereo_options import build_core
 
 _CHECK_FAILED = 4
@@ -61,7 +61,6 @@ def run(options: argparse.Namespace) -> int:
     _check_numbers(options)
     if options.out is not None:
         inputs = {"--camera": replayed(settings.camera), "--calibration": settings.calibration}
-        spare_report(options.out, "run")
         spare_inputs(options.out, NAMES, {what: Path(path) for what, path in inputs.items() if path})
     fifo = FifoSettings.parse(settings.fifo)
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
@@ -73,6 +72,8 @@ def run(options: argparse.Namespace) -> int:
         tell_insecure(uri)
     links = open_links(uris, keys)
     signals = StopSignals()
+    if options.out is not None:
+        keep_other_report(options.out, "run")
     host = Host(_host_settings(options, resolved, fifo, board_side, core), camera, links, core)
     on_terminal = sys.stderr.isatty()
     live = LiveTable(host.snapshot, pairs=options.pairs, seconds=options.seconds) if on_terminal else None

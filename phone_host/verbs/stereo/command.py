@@ -22,7 +22,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import require_folder, spare_inputs, spare_report, unwritable
+from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
 from phone_host.verbs.progress import progress
 from phone_host.verbs.stereo_options import build_core, output_options
 
@@ -86,7 +86,6 @@ def _next(options: argparse.Namespace) -> tuple[NextCommand, ...]:
 def _require_place(out: Path, files: ViewFiles) -> None:
     """Refuse a results folder that cannot be written to, holds the photographs or would lose them."""
     require_folder(out)
-    spare_report(out, "stereo")
     try:
         require_writable(out)
     except OSError as error:
@@ -99,6 +98,7 @@ def _require_place(out: Path, files: ViewFiles) -> None:
         )
     for left, right in ((left, right) for _, left, right in files.pairs):
         spare_inputs(out, NAMES, {"LEFT": left, "RIGHT": right})
+    keep_other_report(out, "stereo")
 
 
 def _images(files: ViewFiles) -> Sequence[Path]:
