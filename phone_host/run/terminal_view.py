@@ -11,8 +11,9 @@ from rich.table import Table
 from rich.text import Text
 
 from common import now
+from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import rung_lines
-from phone_host.measure.delays import DELAYS, STAGES, Spread
+from phone_host.measure.delays import DELAYS, FROM_EXPOSURE, STAGES, Spread
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.unused import unused
@@ -88,6 +89,8 @@ def _table(run: RunSnapshot, rate: float) -> Table:
     for name in ("p50", "p95", "p99", "max"):
         table.add_column(name, justify="right")
     for name in (*DELAYS, "time_skew"):
+        if run.timeless and name in FROM_EXPOSURE:
+            continue
         table.add_row(name.replace("_", "-"), *_values_ms(run.delays.spread(name, _RECENT)))
     return table
 
@@ -103,7 +106,8 @@ def _judgement(run: RunSnapshot) -> list[Text]:
     """Return the regime, the two cameras' troubles and the concerns about the depth."""
     warnings = [Text(f"warning: {item.sentence}: {item.remedy}", style="bold red") for item in concerns(run)]
     lines = (*camera_troubles(run.camera), *rung_lines(run.link))
-    camera = [Text(line, style="yellow") for line in lines]
+    away = away_words(run.away)
+    camera = [Text(line, style="yellow") for line in (*lines, *([away] if away else []))]
     return [Text(judge(figures(run)).sentence, style="dim"), *camera, *warnings]
 
 
