@@ -380,7 +380,7 @@ class Host:
         """
         hello = self._receiver.hello
         if hello is not None:
-            if len(self._receiver.account.sessions) == 1:
+            if sum(bool(account.session) for account in tuple(self._receiver.account.sessions)) == 1:
                 require_one_kind(self._own, hello.camera)
         elif self._camera.ended:
             raise AbsentBoardError(

@@ -12,8 +12,9 @@ from rich.text import Text
 
 from common import now
 from common.words import counted
+from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import rung_lines
-from phone_host.measure.delays import DELAYS, IDLE_STAGE_NS, STAGES, Spread
+from phone_host.measure.delays import DELAYS, FROM_EXPOSURE, IDLE_STAGE_NS, STAGES, Spread
 from phone_host.measure.headline import headline
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
@@ -99,6 +100,8 @@ def _table(run: RunSnapshot, rate: float, width: int) -> Table:
     for name in names:
         table.add_column(name, justify="right", no_wrap=True)
     for name in (*DELAYS, "time_skew"):
+        if run.timeless and name in FROM_EXPOSURE:
+            continue
         spread = run.delays.spread(name, _RECENT)
         table.add_row(name.replace("_", "-"), *(_cell_ms(spread, column) for column in names))
     return table
@@ -117,7 +120,8 @@ def _judgement(run: RunSnapshot) -> list[Text]:
     """Return the regime, how the depth fares, the two cameras' troubles and the concerns."""
     warnings = [Text(f"warning: {item.sentence}: {item.remedy}", style="bold red") for item in concerns(run)]
     lines = (*camera_troubles(run.camera), *rung_lines(run.link))
-    camera = [Text(line, style="yellow") for line in lines]
+    away = away_words(run.away)
+    camera = [Text(line, style="yellow") for line in (*lines, *([away] if away else []))]
     depth = [Text(line) for line in depth_lines(run.images)]
     if run.images.wants_depth and run.images.judged and not warnings:
         depth.insert(0, Text(headline(run).sentence, style="bold"))
