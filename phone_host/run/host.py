@@ -19,6 +19,7 @@ from phone_host.measure.image_motion import MotionMeter
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed, Result, Side, TimeOffset
+from phone_host.output.axes import Axes
 from phone_host.run.file_sink import FileSink
 from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.pipeline import Pipeline
@@ -72,6 +73,7 @@ class HostSettings:
         steered: the cameras that may be steered until both expose together; empty: the phase stays as it is.
         most_pixels: largest accepted image size of either camera, pixels.
         resolved: the settings of the run with their origins, for settings.json; None: not saved.
+        axes: of the points in saved clouds.
     """
 
     board_side: Side = Side.LEFT
@@ -86,6 +88,7 @@ class HostSettings:
     steered: frozenset[Whose] = frozenset()
     most_pixels: int = MOST_PIXELS
     resolved: Mapping[str, object] | None = None
+    axes: Axes = Axes.CAMERA
 
 
 class Host:
@@ -117,6 +120,7 @@ class Host:
             settings.save_every,
             waits=bool(settings.pairs) or demand.paces_own_camera,
             settings=settings.resolved,
+            axes=settings.axes,
         )
         self._trust = TrustSink(core)
         motion = FunctionSink("motion", self._measure_motion)
