@@ -213,7 +213,8 @@ def test_a_saved_pair_with_points_has_its_cloud_in_the_axes_asked_for_and_its_de
     expected = np.array([0.1, -0.2, -1.5], np.float32)
     np.testing.assert_array_equal(np.unique(read_ply(folder / "cloud.ply").points_m, axis=0), [expected])
     depth = np.asarray(cv2.imread(str(folder / "depth.png"), cv2.IMREAD_UNCHANGED))
-    assert (depth.dtype, np.unique(depth).tolist()) == (np.uint16, [1500])
+    assert depth.dtype == np.uint16
+    assert np.unique(depth).tolist() == [1500]
 
 
 def test_a_disk_slower_than_the_pairs_costs_pairs_and_no_line(tmp_path: Path) -> None:
