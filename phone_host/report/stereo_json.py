@@ -35,7 +35,7 @@ def pair_json(report: PairReport) -> dict[str, Any]:
         "unit": "metre" if written.points is not None else None,
         "axes": report.axes.text if written.points is not None else None,
         "not_in_depth_png": written.not_in_depth_png,
-        "trust": None if report.trust is None else trust_values(report.trust),
+        "trust": trust_values(report.trust),
         "warnings": [remark.text for remark in report.remarks],
         "times_ms": {stage: round(ms, 3) for stage, ms in report.stages_ms},
         "files": [*written.files, *ALWAYS],

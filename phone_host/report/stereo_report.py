@@ -30,13 +30,11 @@ class Remark:
         problem: what it is, with figures.
         remedy: what to do about it; empty: nothing.
         is_blocking: whether the result must not be taken for right; the command then ends with exit code 4.
-        is_doubt: whether it speaks against the depth; else it only limits it.
     """
 
     problem: str
     remedy: str = ""
     is_blocking: bool = False
-    is_doubt: bool = False
 
     @property
     def text(self) -> str:
@@ -65,7 +63,7 @@ class PairReport:
         written: the files.
         stages_ms: how long each stage took, and `total`.
         remarks: what the user must know.
-        trust: how its images were judged; None: they were not.
+        trust: how its images were judged.
     """
 
     name: str
@@ -83,8 +81,8 @@ class PairReport:
     axes: Axes
     written: WrittenPair
     stages_ms: tuple[tuple[str, float], ...]
+    trust: PairTrust
     remarks: tuple[Remark, ...] = ()
-    trust: PairTrust | None = None
 
     @property
     def has_depth(self) -> bool:

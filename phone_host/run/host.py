@@ -23,6 +23,7 @@ from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed, Result, Side, TimeOffset
+from phone_host.output.axes import Axes
 from phone_host.run.file_sink import FileSink
 from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.phase_steering import PhaseSteering
@@ -88,6 +89,7 @@ class HostSettings:
         steered: the cameras that may be steered until both expose together; empty: the phase stays as it is.
         most_pixels: largest accepted image size of either camera, pixels.
         resolved: the settings of the run with their origins, for settings.json; None: not saved.
+        axes: of the points in saved clouds.
     """
 
     board_side: Side = Side.LEFT
@@ -103,6 +105,7 @@ class HostSettings:
     steered: frozenset[Whose] = frozenset()
     most_pixels: int = MOST_PIXELS
     resolved: Mapping[str, object] | None = None
+    axes: Axes = Axes.CAMERA
 
 
 class Host:
@@ -135,6 +138,7 @@ class Host:
             settings.save_every,
             waits=bool(settings.pairs) or demand.paces_own_camera,
             settings=settings.resolved,
+            axes=settings.axes,
         )
         self._trust = TrustSink(core)
         motion = FunctionSink(_MOTION, self._measure_motion)

@@ -30,7 +30,6 @@ def pair_remarks(processed: Processed, written: WrittenPair, trust: PairTrust, n
             concern.sentence,
             concern.remedy,
             is_blocking=concern.doubt.blocks and concern.doubt is not Doubt.NO_DEPTH,
-            is_doubt=True,
         )
         for concern in trust.concerns
     ]

@@ -36,8 +36,13 @@ from phone_host.settings import check, key_folder, resolve_settings
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
+<<<<<<< HEAD
 from phone_host.verbs.output_folders import keep_other_report, spare_inputs
 from phone_host.verbs.stereo_options import build_core
+=======
+from phone_host.verbs.output_folders import spare_inputs
+from phone_host.verbs.stereo_options import build_core, output_options
+>>>>>>> stereo
 
 _CHECK_FAILED = 4
 
@@ -147,6 +152,7 @@ def _host_settings(
         wait_ns=None if options.wait is None else round(options.wait * 1e9),
         out=options.out,
         save_every=options.save_every,
+        axes=output_options(options).axes,
         time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
         interpolate=settings.interpolate,
         most_pixels=settings.most_pixels,
