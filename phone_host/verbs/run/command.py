@@ -36,13 +36,8 @@ from phone_host.settings import check, key_folder, resolve_settings
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
-<<<<<<< HEAD
 from phone_host.verbs.output_folders import keep_other_report, spare_inputs
-from phone_host.verbs.stereo_options import build_core
-=======
-from phone_host.verbs.output_folders import spare_inputs
 from phone_host.verbs.stereo_options import build_core, output_options
->>>>>>> stereo
 
 _CHECK_FAILED = 4
 
