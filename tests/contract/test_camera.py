@@ -93,6 +93,7 @@ CAMERAS: dict[str, Callable[[Path], Set]] = {
     "replay clock": replay("fps=30"),
     "replay demand loop": replay("fps=30&loop=1&pace=demand"),
     "replay demand": replay("fps=24&pace=demand"),
+    "replay of a turned camera": replay("fps=30&loop=1&rotate=90&flip=h"),
     "mjpeg over http": served,
 }
 
