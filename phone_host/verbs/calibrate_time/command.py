@@ -8,10 +8,6 @@ from contextlib import suppress
 from typing import Any, TypeVar
 
 import numpy as np
-<<<<<<< HEAD
-=======
-from rich.console import Console
->>>>>>> pages
 
 from common import now
 from common.errors import SettingsError
@@ -38,11 +34,7 @@ from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_yaml import read_rig, write_time_offset
 from phone_host.recording.footage import Footage, film, keep, read
-<<<<<<< HEAD
 from phone_host.run.progress_bar import share_bar
-=======
-from phone_host.run.progress_bar import progress_bar
->>>>>>> pages
 from phone_host.settings import key_folder
 from phone_host.stereo.raw_images import decode_frame
 from phone_host.stereo.rectify import Rectifier
@@ -101,17 +93,6 @@ def _write_pattern(options: argparse.Namespace) -> int:
     return 0
 
 
-<<<<<<< HEAD
-=======
-def _progress(text: str) -> tuple[Any, Callable[[float], None]]:
-    """Return a progress bar on stderr, shown only in a terminal, and the function that sets its share from 0 to 1."""
-    console = Console(stderr=True)
-    progress = progress_bar(console)
-    task = progress.add_task(text, total=1.0)
-    return progress, lambda share: progress.update(task, completed=share)
-
-
->>>>>>> pages
 def _footage(options: argparse.Namespace, signals: StopSignals) -> Footage:
     if options.frames is not None:
         return read(options.frames)
