@@ -127,17 +127,21 @@ class StereoCore:
         )
 
     def require_sizes(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> None:
-        """Check that images of these sizes can be rectified, before they are decoded.
+        """Check that images of these sizes can be rectified and hold the crop, before they are decoded.
 
         Args:
             left_px: width and height of the left image, px.
             right_px: width and height of the right image, px.
 
         Raises:
-            DataError: a size does not fit the rig, or the sizes differ and there is no rig.
+            DataError: a size does not fit the rig, the sizes differ and there is no rig, or the crop lies outside.
         """
-        if (left_px, right_px) in self._kept:
-            return
+        if self.wanted.crop is None:
+            self._require_fit(left_px, right_px)
+        else:
+            self._ready(left_px, right_px)
+
+    def _require_fit(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> None:
         if self.rig is None:
             require_same_size(left_px, right_px, "the left image", "the right image")
         else:
@@ -147,7 +151,7 @@ class StereoCore:
         """Return what these image sizes need; make it if they are new."""
         ready = self._kept.get((left_px, right_px))
         if ready is None:
-            self.require_sizes(left_px, right_px)
+            self._require_fit(left_px, right_px)
             ready = self._made_for(left_px, right_px)
             while len(self._kept) >= _MOST_KEPT:
                 del self._kept[next(iter(self._kept))]

@@ -34,7 +34,7 @@ def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--near",
         metavar="MM",
-        help=f"cut what is nearer, and look for nothing nearer (default: look from {DEFAULT_NEAR_MM:g} mm on, cut nothing)",
+        help=f"cut what is nearer, and look for nothing nearer; 20cm and 0.2m work, too (default: look from {DEFAULT_NEAR_MM:g} mm on, cut nothing)",
     )
     parser.add_argument(
         "--far",

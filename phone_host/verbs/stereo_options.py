@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -10,7 +11,7 @@ from common.errors import DataError, SettingsError
 from phone_host.declared_settings import NEAR_M
 from phone_host.model import Rig, Side, StereoGeometry
 from phone_host.output.axes import Axes
-from phone_host.output.calib_txt import is_calib_txt, read_calib_txt
+from phone_host.output.calib_txt import KittiCameras, is_calib_txt, read_calib_txt
 from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
@@ -22,6 +23,8 @@ from phone_host.verbs.stereo_numbers import crop_of, length_m, pixels, point_px,
 
 _REJECTED: Final = "reject"
 """`Rig.verdict` of a rig that should not be used (`calibration.verdict`)."""
+
+_KITTI_COLOUR: Final = re.compile(r"\bimage_0?2\b")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +131,9 @@ def _by_calib_txt(
     options: argparse.Namespace, path: Path, chosen: AnyMatcher, wanted: DepthWanted, size_px: tuple[int, int]
 ) -> StereoCore:
     """Build the core for rectified images from the file that their publisher gave; N is ndisp unless the user says otherwise."""
-    found = read_calib_txt(path)
+    # KITTI's two pairs of cameras have other baselines. Its folders image_2 and image_02 hold the left colour images.
+    colour = _KITTI_COLOUR.search(str(getattr(options, "left", "")))
+    found = read_calib_txt(path, KittiCameras.COLOUR if colour else KittiCameras.GREY)
     geometry, disparities = found.geometry, options.disparities
     if found.size_px is not None and found.size_px != size_px:
         geometry = scaled_geometry(geometry, found.size_px, size_px, str(path))

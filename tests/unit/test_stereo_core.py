@@ -126,6 +126,14 @@ def test_only_the_crop_has_depth_and_it_is_right() -> None:
     assert processed.pair.left is left
 
 
+def test_a_crop_outside_is_told_before_images_are_decoded() -> None:
+    """The sizes alone show that nothing of the crop lies in the rectified image of about 560 x 330 px."""
+    crop = Crop(x_px=700, y_px=0, width_px=10, height_px=10)
+    core = StereoCore(MatchSettings(), Rectifier(unlike_rig()), wanted=DepthWanted(search_from_m=0.5, crop=crop))
+    with pytest.raises(DataError, match="--crop 700,0,10,10"):
+        core.require_sizes((640, 480), (1280, 720))
+
+
 def test_half_the_working_size_gives_the_same_metres() -> None:
     """At scale 0.5 the map has the input's size and its pixels: 10 px stay 10 px, 5 m stay 5 m, and the error doubles."""
     left = np.asarray(cv2.resize(noise(200, 100), (400, 200), interpolation=cv2.INTER_CUBIC), np.uint8)
@@ -156,6 +164,16 @@ def test_a_rig_follows_the_images_size() -> None:
     # f b / near = 526 x 0.10026 / 0.5 = 105.5 -> 112, and half of it -> 64
     assert [each.search.disparities for each in found if each.search] == [112, 64, 112]
     assert found[0].pair.left.shape == found[2].pair.left.shape
+
+
+def test_any_number_of_sizes_may_come() -> None:
+    """Six sizes in turn, more than are kept ready: each image gets the geometry of its own size, also when it comes back."""
+    core = StereoCore(MatchSettings(disparities=16), Rectifier(matched_rig()))
+    for width in (160, 200, 240, 280, 320, 360, 160):
+        image = np.zeros((width * 3 // 4, width), np.uint8)
+        geometry = core.compute(image, image, lambda: 0).geometry
+        assert geometry is not None
+        assert geometry.focal_px == pytest.approx(525 * width / 640)
 
 
 @pytest.mark.parametrize("y_m", [0.1, -0.1])

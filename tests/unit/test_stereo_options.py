@@ -134,6 +134,22 @@ def test_calib_txt_scales_to_a_smaller_copy_of_its_images(tmp_path: Path) -> Non
         core_of("--calibration", str(path), size_px=(640, 480))
 
 
+def test_kittis_colour_images_get_the_colour_cameras(tmp_path: Path) -> None:
+    """Its cameras 0 and 1 are 540 mm apart, 2 and 3 only 530: the folder of the left image tells which are meant."""
+    rows = [
+        f"P{camera}: 700 0 600 {-700 * x_m} 0 700 180 0 0 0 1 0" for camera, x_m in enumerate((0, 0.54, -0.06, 0.47))
+    ]
+    path = tmp_path / "calib.txt"
+    path.write_text("\n".join(rows) + "\n")
+    for folder, expected_m in (("image_0", 0.54), ("image_2", 0.53), ("image_02/data", 0.53), ("image_20", 0.54)):
+        options = parsed("--calibration", str(path))
+        options.left = tmp_path / folder / "000000.png"
+        core, _ = build_core(options, str(path), "sgbm", (1226, 370))
+        assert core is not None
+        assert core.geometry is not None
+        assert core.geometry.baseline_m == pytest.approx(expected_m)
+
+
 def test_with_metres_the_range_follows_from_near() -> None:
     """Rectified images with focal length and baseline need no --disparities: 500 x 0.06 / 0.3 = 100, so 112."""
     core = core_of("--rectified", "--focal", "500", "--baseline", "60", size_px=(320, 240))
