@@ -20,6 +20,9 @@ from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.view_files import ViewFiles
 from phone_host.stereo.working import chosen_scale
 
+_WHOLE_METRES = 10.0
+"""From here on a limit in tenths of a metre says nothing."""
+
 
 def report_of(
     files: ViewFiles, views: BoardViews, rejected: tuple[Rejected, ...], calibration: Calibration, judgement: Assessment
@@ -155,9 +158,9 @@ def summary(
         rows.append(f"vertical mean {vertical['mean']:.3f}, 95 % {vertical['p95']:.3f}, max {vertical['max']:.3f} px")
     rows.append(f"baseline {report['baseline_mm']:.2f} +- {calibration.baseline_sigma_m * 1e3:.2f} mm")
     if report["zero_sigma_px"] is not None:
-        rows.append(
-            f"zero     disparity +- {report['zero_sigma_px']:.2f} px; depth beyond {report['depth_limit_m']:.2g} m is a guess"
-        )
+        far_m = report["depth_limit_m"]
+        far = f"{far_m:.0f}" if far_m >= _WHOLE_METRES else f"{far_m:.1f}"
+        rows.append(f"zero     disparity +- {report['zero_sigma_px']:.2f} px; depth beyond {far} m is a guess")
     rows.append(f"verdict  {report['verdict']}")
     rows += [f"remedy   {remedy}" for remedy in report["remedy"].split("; ") if remedy]
     return "\n".join([*rows, *_written(report, calibration, out)])
