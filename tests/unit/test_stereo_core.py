@@ -166,6 +166,16 @@ def test_a_rig_follows_the_images_size() -> None:
     assert found[0].pair.left.shape == found[2].pair.left.shape
 
 
+def test_any_number_of_sizes_may_come() -> None:
+    """Six sizes in turn, more than are kept ready: each image gets the geometry of its own size, also when it comes back."""
+    core = StereoCore(MatchSettings(disparities=16), Rectifier(matched_rig()))
+    for width in (160, 200, 240, 280, 320, 360, 160):
+        image = np.zeros((width * 3 // 4, width), np.uint8)
+        geometry = core.compute(image, image, lambda: 0).geometry
+        assert geometry is not None
+        assert geometry.focal_px == pytest.approx(525 * width / 640)
+
+
 @pytest.mark.parametrize("y_m", [0.1, -0.1])
 def test_stacked_cameras_give_an_upright_cloud(y_m: float) -> None:
     """A textured wall 1.5 m before two cameras one above the other, in either order, is found at 1.5 m, upright."""
