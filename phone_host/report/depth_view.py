@@ -22,7 +22,7 @@ from phone_host.svg.plot_scale import ticks
 
 STYLE: Final = """
 .views{display:grid;grid-template-columns:1fr 1fr;gap:.75rem}.views figure{margin:0;min-width:0}
-.views.rows{gap:2px}.views.stack{grid-template-columns:1fr}
+.views.rows{gap:2px}.views.stack{grid-template-columns:1fr;max-width:640px;gap:2px}
 .view{position:relative;line-height:0;background:#000;touch-action:pan-y;cursor:crosshair}.view.still{cursor:default}
 .view img{width:100%;height:auto;display:block}
 .view i{position:absolute;width:17px;height:17px;margin:-9px 0 0 -9px;border:2px solid #fff;border-radius:50%;

@@ -98,7 +98,7 @@ def files(saved: Sequence[str]) -> tuple[FileLink, ...]:
     Args:
         saved: of saved pairs, relative to the page, in order.
     """
-    links = [FileLink(name, _saved_words(name)) for name in saved[:_MOST_LINKS]]
+    links = [FileLink(name, "" if number else _saved_words(name)) for number, name in enumerate(saved[:_MOST_LINKS])]
     if len(saved) > _MOST_LINKS:
         first = saved[_MOST_LINKS].partition("/")[0]
         links.append(FileLink(f"{first}/", f"and {len(saved) - _MOST_LINKS} more, from this folder on"))
@@ -110,7 +110,7 @@ def files(saved: Sequence[str]) -> tuple[FileLink, ...]:
 
 
 def _saved_words(name: str) -> str:
-    """Say what a saved file holds."""
+    """Say what a saved file holds; the others hold the same."""
     kind = name.rpartition("/")[2]
     return {
         "cloud.ply": "point cloud, metres: X right, Y down, Z forward from the left camera",
@@ -185,8 +185,13 @@ def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
             note=f"median; 95 % below {skew.p95_ns / 1e6:.1f} ms",
         ),
         clock_figure(run),
-        _measured("image motion", run.motion_px_s, 0, "px/s", "the fastest tenth of the host camera's image"),
+        *(() if np.isnan(run.motion_px_s) else (_motion_figure(run),)),
     )
+
+
+def _motion_figure(run: RunSnapshot) -> Figure:
+    words = "the fastest tenth of the host camera's image"
+    return _measured("image motion", run.motion_px_s, 0, "px/s", words)
 
 
 def rate_figure(run: RunSnapshot) -> Figure:
