@@ -104,6 +104,6 @@ def headline(run: RunSnapshot) -> Answer:
     if run.images.wants_depth:
         return answer(run.images.now, found, run.images.geometry, run.images.disparity_error_px)
     if found:
-        grade = Grade.BAD if found[0].doubt.blocks else Grade.WARNING
-        return Answer(grade, f"{found[0].sentence[:1].upper()}{found[0].sentence[1:]}. Remedy: {found[0].remedy}.")
+        sentence = f"{found[0].sentence[:1].upper()}{found[0].sentence[1:]}. Remedy: {found[0].remedy}."
+        return Answer(Grade.WARNING, sentence)
     return Answer(Grade.GOOD, "This run measured pairs and delays only, no depth: no calibration was given.")

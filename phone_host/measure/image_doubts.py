@@ -162,16 +162,17 @@ def image_doubts(evidence: Evidence) -> tuple[Concern, ...]:
     """Say what the images of one pair make doubtful, gravest first; empty if nothing.
 
     Args:
-        evidence: of the pair; without supports (an unrectified pair) only brightness and focus are judged.
+        evidence: of the pair; without supports (an unrectified pair) only brightness is judged.
     """
     support = {item.arrangement: item.features for item in evidence.supports}
     sees = max(support.values(), default=0) >= _LEAST_SUPPORT
     covered = () if sees else _covered(evidence.left, evidence.right)
     if covered:
         return covered
-    light = (*_dark(evidence.left, evidence.right), *_unfocused(evidence.left, evidence.right))
+    dark = _dark(evidence.left, evidence.right)
     if not support:
-        return light
+        return dark
+    light = (*dark, *_unfocused(evidence.left, evidence.right))
     mistake = _arrangement(support)
     if not mistake and not light and _are_strangers(evidence, support):
         mistake = (_OTHER_SCENE,)

@@ -180,6 +180,11 @@ def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
     return (NO_DEPTH, *found)
 
 
+def depth_is_wrong(run: RunSnapshot) -> bool:
+    """Tell whether depth was wanted and cannot be right: a blocking doubt stands, or no pair has depth."""
+    return run.images.wants_depth and any(concern.doubt.blocks for concern in image_concerns(run))
+
+
 def lacks_depth(run: RunSnapshot) -> bool:
     """Tell whether a rig or rectified images were given, and no pair has depth."""
     return run.images.wants_depth and not run.images.has_depth

@@ -21,7 +21,7 @@ class TrustSink:
     """Judges the newest pair whenever one is due; the other pairs pass. It never delays a pair.
 
     Args:
-        core: the run's stereo core; None: only brightness and focus are judged.
+        core: the run's stereo core; None: only brightness is judged.
         clock: monotonic, ns.
     """
 

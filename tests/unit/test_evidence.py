@@ -211,7 +211,7 @@ def test_a_turn_goes_about_the_middle_of_the_image() -> None:
         assert turned_back(np.array([[x, y]], np.float64), (30, 30), quarters).tolist() == [[27.0, 2.0]]
 
 
-def test_without_a_rig_only_brightness_and_focus_are_judged(good: Pair) -> None:
+def test_without_a_rig_only_brightness_is_judged(good: Pair) -> None:
     """Pairs of a run without calibration are not accused of any arrangement, but a covered camera is named."""
     swapped = Processed(RectifiedPair(good[1], good[0]), None, None, StageTimes())
     assert image_doubts(measure_evidence(swapped, None)) == ()

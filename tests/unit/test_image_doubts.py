@@ -8,7 +8,7 @@ import pytest
 
 from phone_host.measure.headline import Grade, answer, depth_error_m, headline
 from phone_host.measure.image_doubts import ImageFigures, ImageJudge, ImageTrust, image_doubts, median_figures
-from phone_host.measure.run_snapshot import RunSnapshot, concerns
+from phone_host.measure.run_snapshot import RunSnapshot, concerns, depth_is_wrong
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement, Evidence, Exposure, StereoGeometry, Support
 from phone_host.report.run_json import build
@@ -87,7 +87,7 @@ def test_both_cameras_are_named_together() -> None:
 def test_a_doubt_stands_while_most_of_the_latest_three_judgements_have_it() -> None:
     """One judgement of three is not enough, two are; it goes when two of three are free of it."""
     judge = ImageJudge()
-    stands = []
+    stands: list[list[Doubt]] = []
     for found in (GOOD, SWAPPED, GOOD, SWAPPED, SWAPPED, GOOD, GOOD):
         judge.add(found)
         stands.append([concern.doubt for concern in judge.concerns])
@@ -98,7 +98,7 @@ def test_a_doubt_stands_while_most_of_the_latest_three_judgements_have_it() -> N
 def test_a_run_of_one_pair_is_judged_by_it() -> None:
     """The only judgement is most of them."""
     judge = ImageJudge()
-    assert judge.concerns == ()
+    assert judge.judged == 0
     judge.add(SWAPPED)
     assert [concern.doubt for concern in judge.concerns] == [Doubt.SWAPPED]
     assert judge.judged == 1
@@ -157,6 +157,8 @@ def test_a_run_that_wanted_depth_and_found_none_has_a_doubt() -> None:
     """At the end only, and only if no graver doubt says why; without a rig nothing is wanted."""
     none = with_images(has_depth=False)
     assert [concern.doubt for concern in concerns(none)] == [Doubt.NO_DEPTH]
+    assert depth_is_wrong(none)
+    assert not depth_is_wrong(with_images())
     assert concerns(replace(none, ended="running")) == ()
     assert [concern.doubt for concern in concerns(with_images(has_depth=False, concerns=image_doubts(SWAPPED)))] == [
         Doubt.SWAPPED
@@ -169,7 +171,8 @@ def test_a_run_without_a_rig_is_answered_about_delays() -> None:
     plain = run(30)
     assert headline(plain).sentence.startswith("This run measured pairs and delays only")
     covered = replace(plain, images=ImageTrust(concerns=image_doubts(replace(BLIND, supports=()))))
-    assert headline(covered).grade is Grade.BAD
+    assert headline(covered).grade is Grade.WARNING
+    assert not depth_is_wrong(covered)
     assert headline(covered).sentence.startswith("The right camera sees no scene")
     fast = replace(plain, motion_px_s=1e6, width_px=640)
     assert headline(fast).grade is Grade.WARNING

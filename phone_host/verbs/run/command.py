@@ -22,7 +22,7 @@ from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
-from phone_host.measure.run_snapshot import RunSnapshot, concerns
+from phone_host.measure.run_snapshot import RunSnapshot, depth_is_wrong
 from phone_host.model import Side, TimeOffset
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
     if signals.interrupted:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
-    is_wrong = not signals.stop and any(concern.doubt.blocks for concern in concerns(snapshot))
+    is_wrong = not signals.stop and depth_is_wrong(snapshot)
     return _CHECK_FAILED if too_few or is_wrong or not complete else 0
 
 
