@@ -152,7 +152,8 @@ def _print(results: Sequence[CaseResult], under: Conditions, analysis: Analysis)
             table.add_column(name, justify="right")
         for row in rows(group):
             table.add_row(*row)
-        if console.is_terminal and console.measure(table).maximum > console.width:
+        whole = console.measure(table, options=console.options.update(width=1000)).maximum
+        if console.is_terminal and whole > console.width:
             _print_narrow(console, group)
         else:
             console.print(table)

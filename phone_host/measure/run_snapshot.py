@@ -8,9 +8,11 @@ from common.frame import NOT_AS_SAID
 from phone_host.measure.accounts import LinkAccount
 from phone_host.measure.camera_match import LockMiss, settings_concerns
 from phone_host.measure.delays import DelayStatistics
+from phone_host.measure.image_doubts import ImageTrust, gravest_first
 from phone_host.measure.regime import RunFigures
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import (
+    NO_DEPTH,
     NO_DOUBT,
     Concern,
     Timing,
@@ -47,6 +49,7 @@ class RunSnapshot:
         stamps_exact: whether both cameras' stamps are the times of exposure by definition.
         judged_pairs: number of newest pairs over which time and motion are judged; None: all.
         missed_locks: controls of the rig's cameras that could not be restored.
+        images: what the images say about the depth.
     """
 
     ended: str
@@ -77,6 +80,7 @@ class RunSnapshot:
     alignment: Alignment | None = None
     judged_pairs: int | None = None
     missed_locks: tuple[LockMiss, ...] = ()
+    images: ImageTrust = field(default_factory=ImageTrust)
 
     @property
     def stopped(self) -> int:
@@ -160,7 +164,30 @@ def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
         received=sum(account.received + account.disbelieved[Disbelief.CREDIT] for account in link.sessions),
         spoiled_images=spoiled(run),
     )
-    return settings_concerns(run.missed_locks) + unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
+    timing = (
+        settings_concerns(run.missed_locks) + unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
+    )
+    return gravest_first((*image_concerns(run), *timing))
+
+
+def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
+    """Return what the images of a run make doubtful, gravest first. While it runs, pairs without depth may yet get some."""
+    found = run.images.concerns
+    if run.ended == "running" or not lacks_depth(run):
+        return found
+    if any(concern.doubt.blocks for concern in found):
+        return found  # which says why there is none
+    return (NO_DEPTH, *found)
+
+
+def depth_is_wrong(run: RunSnapshot) -> bool:
+    """Tell whether depth was wanted and cannot be right: a blocking doubt stands, or no pair has depth."""
+    return run.images.wants_depth and any(concern.doubt.blocks for concern in image_concerns(run))
+
+
+def lacks_depth(run: RunSnapshot) -> bool:
+    """Tell whether a rig or rectified images were given, and no pair has depth."""
+    return run.images.wants_depth and not run.images.has_depth
 
 
 def spoiled(run: RunSnapshot) -> dict[str, int]:

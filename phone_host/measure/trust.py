@@ -38,6 +38,38 @@ class Doubt(Enum):
     DISBELIEVED = "disbelieved"
     SPOILED_IMAGES = "spoiled_images"
     CAMERA_SETTINGS = "camera_settings"
+    SWAPPED = "swapped"
+    TURNED = "turned"
+    TURNED_BY_QUARTER = "turned_by_quarter"
+    MIRRORED = "mirrored"
+    SAME_IMAGE = "same_image"
+    OTHER_SCENE = "other_scene"
+    COVERED = "covered"
+    DARK = "dark"
+    UNFOCUSED = "unfocused"
+    LOW_DENSITY = "low_density"
+    LOW_CONSISTENCY = "low_consistency"
+    VERTICAL_ERROR = "vertical_error"
+    NO_DEPTH = "no_depth"
+
+    @property
+    def blocks(self) -> bool:
+        """Whether the depth cannot be right as long as this doubt stands: a run that ends with it fails."""
+        return self in _BLOCKING
+
+
+_BLOCKING: Final = frozenset(
+    {
+        Doubt.SWAPPED,
+        Doubt.TURNED,
+        Doubt.TURNED_BY_QUARTER,
+        Doubt.MIRRORED,
+        Doubt.SAME_IMAGE,
+        Doubt.OTHER_SCENE,
+        Doubt.COVERED,
+        Doubt.NO_DEPTH,
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +160,13 @@ class Concern:
     doubt: Doubt
     sentence: str
     remedy: str
+
+
+NO_DEPTH: Final = Concern(
+    Doubt.NO_DEPTH,
+    "no pair has depth",
+    "check that --calibration or --rectified fits the cameras, and that both see the same scene",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -74,7 +74,7 @@ function turnCloud(root) {
   }
   const views = {front: [0, 0], turned: [.45, .22], side: [1.2, .1], above: [0, 1.2]};
   let yaw, pitch, away, pivot, asked = 0, frame = null, depth = null, pixels = null;
-  function reset(name) { [yaw, pitch] = views[name]; away = m.pivot[2]; pivot = [...m.pivot]; draw(); }
+  function reset(name) { [yaw, pitch] = views[name]; away = m.pivot[2] * (name === 'front' ? 1 : 1.25); pivot = [...m.pivot]; draw(); }
   function draw() { if (!asked) asked = requestAnimationFrame(paint); }
   const axes = () => {
     const cy = Math.cos(yaw), sy = Math.sin(yaw), cp = Math.cos(pitch), sp = Math.sin(pitch);
@@ -108,23 +108,23 @@ function turnCloud(root) {
   }
   function legend(w, h, f, turn, scale) {
     const style = getComputedStyle(canvas), ink = style.color;
-    const write = (text, x, y) => {  // readable over points, too
-      pen.strokeStyle = style.backgroundColor; pen.lineWidth = 4 * scale; pen.strokeText(text, x, y); pen.fillText(text, x, y);
-      pen.lineWidth = 2 * scale;
-    };
-    pen.font = 12 * scale + 'px system-ui, sans-serif'; pen.lineWidth = 2 * scale; pen.textBaseline = 'middle';
+    // Lines and letters have an edge in the colour of the ground, so that they can be read over points, too.
+    const edge = () => { pen.strokeStyle = style.backgroundColor; pen.lineWidth = 5 * scale; };
+    const line = hue => { edge(); pen.stroke(); pen.strokeStyle = hue; pen.lineWidth = 2 * scale; pen.stroke(); };
+    const write = (text, x, y) => { edge(); pen.strokeText(text, x, y); pen.fillText(text, x, y); };
+    pen.font = 12 * scale + 'px system-ui, sans-serif'; pen.lineJoin = pen.lineCap = 'round'; pen.textBaseline = 'middle';
     let length = Math.pow(10, Math.floor(Math.log10(140 * scale * away / f)));
     for (const more of [5, 2]) if (f * length * more / away <= 140 * scale) { length *= more; break; }
     const x = 14 * scale, y = h - 14 * scale, long = f * length / away;
-    pen.strokeStyle = pen.fillStyle = ink; pen.textAlign = 'left';
-    pen.beginPath(); pen.moveTo(x, y - 4 * scale); pen.lineTo(x, y); pen.lineTo(x + long, y); pen.lineTo(x + long, y - 4 * scale); pen.stroke();
+    pen.beginPath(); pen.moveTo(x, y - 4 * scale); pen.lineTo(x, y); pen.lineTo(x + long, y); pen.lineTo(x + long, y - 4 * scale);
+    line(ink); pen.fillStyle = ink; pen.textAlign = 'left';
     write(length >= 1 ? length + ' m' : length >= .01 ? Math.round(length * 100) + ' cm' : Math.round(length * 1e4) / 10 + ' mm', x + long + 6 * scale, y - 1);
     const at = [w - 48 * scale, h - 44 * scale], names = ['X', 'Y', 'Z'], hues = ['#e0452f', '#2f9e44', '#3b82f6'];
     pen.textAlign = 'center';
     for (let k = 0; k < 3; k++) {
       const dx = turn[0][k] * 26 * scale, dy = turn[1][k] * 26 * scale;
-      pen.strokeStyle = pen.fillStyle = hues[k];
-      pen.beginPath(); pen.moveTo(at[0], at[1]); pen.lineTo(at[0] + dx, at[1] + dy); pen.stroke();
+      pen.beginPath(); pen.moveTo(at[0], at[1]); pen.lineTo(at[0] + dx, at[1] + dy);
+      line(hues[k]); pen.fillStyle = hues[k];
       write(names[k], at[0] + dx * 1.4, at[1] + dy * 1.4);
     }
   }

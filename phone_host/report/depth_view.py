@@ -22,7 +22,7 @@ from phone_host.svg.plot_scale import ticks
 
 STYLE: Final = """
 .views{display:grid;grid-template-columns:1fr 1fr;gap:.75rem}.views figure{margin:0;min-width:0}
-.views.rows{gap:2px}.views.stack{grid-template-columns:1fr}
+.views.rows{gap:2px}.views.stack{grid-template-columns:1fr;max-width:640px;gap:2px}
 .view{position:relative;line-height:0;background:#000;touch-action:pan-y;cursor:crosshair}.view.still{cursor:default}
 .view img{width:100%;height:auto;display:block}
 .view i{position:absolute;width:17px;height:17px;margin:-9px 0 0 -9px;border:2px solid #fff;border-radius:50%;
@@ -39,7 +39,7 @@ font-variant-numeric:tabular-nums;font-weight:600}
 .ticks{position:relative;height:1.5rem;font-size:.75rem;color:var(--ink2);font-variant-numeric:tabular-nums;line-height:1}
 .ticks span{position:absolute;transform:translateX(-50%);white-space:nowrap;padding-top:6px}
 .ticks span::before{content:"";position:absolute;left:50%;top:0;height:4px;border-left:1px solid var(--ink2)}
-.clouds figure{margin:0}.clouds canvas{display:block;width:100%;height:min(62vh,560px);touch-action:none;cursor:grab;background:var(--bg);
+.views+.clouds,.depthview+.clouds{margin-top:1.25rem}.clouds figure{margin:0}.clouds canvas{display:block;width:100%;height:min(62vh,560px);touch-action:none;cursor:grab;background:var(--bg);
 color:var(--ink2);border-radius:8px;border:1px solid var(--line)}
 .clouds canvas:active{cursor:grabbing}.clouds canvas:focus-visible,.view:focus-visible{outline:2px solid var(--c5);outline-offset:2px}
 button{font:inherit;font-size:.85rem;color:var(--ink);background:var(--bg);border:1px solid var(--line);border-radius:6px;padding:.35rem .8rem;cursor:pointer}

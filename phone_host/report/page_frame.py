@@ -95,10 +95,10 @@ h1{font-size:1.7rem;line-height:1.2;letter-spacing:-.01em;margin:0}h2{font-size:
 .sub,section>p{color:var(--ink2);margin:.25rem 0 0}section>p{font-size:.9rem;margin:0 0 .75rem;max-width:95ch}
 .verdict{display:flex;gap:.75rem;align-items:baseline;padding:.8rem 1rem;border-radius:10px;background:var(--card);
 border:1px solid var(--line);border-left:4px solid currentColor}
-.verdict span{color:var(--ink)}.verdict.good{color:var(--good)}.verdict.warning{color:var(--warning)}.verdict.bad{color:var(--bad)}
-.figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:1px;background:var(--line);
+.verdict span{color:var(--ink)}.good{color:var(--good)}.warning{color:var(--warning)}.bad{color:var(--bad)}
+.figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:1px;background:var(--card);
 border:1px solid var(--line);border-radius:10px;overflow:hidden}
-.figures div{background:var(--card);padding:.8rem 1rem}.figures dt{color:var(--ink2);font-size:.85rem}
+.figures div{box-shadow:0 0 0 1px var(--line);padding:.8rem 1rem}.figures dt{color:var(--ink2);font-size:.85rem}
 .figures dd{margin:0;font-size:1.5rem;font-weight:600;letter-spacing:-.01em;font-variant-numeric:tabular-nums;line-height:1.3}
 .figures small{font-size:.9rem;font-weight:400;color:var(--ink2)}
 .figures dd.note{font-size:.8rem;font-weight:400;color:var(--ink2);letter-spacing:0}
@@ -113,7 +113,7 @@ linear-gradient(to left,var(--card) 40%,transparent) right/2.5rem 100% no-repeat
 linear-gradient(to right,var(--edge),transparent) left/1.1rem 100% no-repeat,linear-gradient(to left,var(--edge),transparent) right/1.1rem 100% no-repeat}
 table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums;min-width:50%}
 th,td{text-align:left;padding:.35rem 1.5rem .35rem 0;border-bottom:1px solid var(--line)}th{color:var(--ink2);font-weight:500}
-tr:last-child td{border-bottom:0}.tight{white-space:nowrap;font-size:.75rem}.tight td,.tight th{padding-right:.55rem}.tight td:nth-child(2){white-space:normal}
+tr:last-child td{border-bottom:0}.tight{white-space:nowrap;font-size:.75rem}.tight td,.tight th{padding-right:.55rem}.tight td:nth-child(2){white-space:normal;min-width:8.5rem}
 section>p:last-child{margin-bottom:0}
 details{margin-top:.75rem;font-size:.9rem;color:var(--ink2)}summary{cursor:pointer}
 .words{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1rem;margin:.5rem 0 0}.words dt{color:var(--ink)}.words dd{margin:0}
@@ -124,5 +124,5 @@ border:1px solid var(--line);border-radius:6px;font:.85rem/1.5 ui-monospace,mono
 section ul.small{font-size:.85rem;color:var(--ink2);margin-top:.6rem}section ul{margin:.25rem 0 0;padding-left:1.2rem}
 @media (max-width:700px){main{padding:1.25rem .9rem 2rem}.pair{grid-template-columns:1fr}.wide{display:none}
 .narrow{display:block}.narrow+.wide+.narrow{margin-top:1rem}section{padding:1rem}.figures{grid-template-columns:1fr 1fr}
-.figures dd{font-size:1.25rem}h1{font-size:1.4rem}}
+.figures dd{font-size:1.25rem}.words.files{grid-template-columns:1fr}.files dd{margin-bottom:.4rem}h1{font-size:1.4rem}}
 """

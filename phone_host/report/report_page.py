@@ -291,7 +291,8 @@ def _delays(series: DelaySeries) -> list[str]:
     )
     stages = tuple(stage for stage in series.stages if stage.values_ns.max() > IDLE_STAGE_NS)
     work = Budget("mean processing delay", tuple(mean_share(quantity) for quantity in stages))
-    everything = Strips("", (*series.delays, series.end_to_end, series.starvation))
+    lasting = tuple(one for one in (*series.delays, series.end_to_end, series.starvation) if np.any(one.values_ns > 0))
+    everything = Strips("", lasting)
     return [
         section(
             "Where the time goes",

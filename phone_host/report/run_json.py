@@ -8,9 +8,12 @@ from common.camera.base import CameraHealth, health_values
 from common.versions import REPORT_FORMAT
 from phone_host.measure.accounts import LinkTally, rung_values
 from phone_host.measure.delays import DELAYS, STAGES, Spread
+from phone_host.measure.headline import headline
+from phone_host.measure.image_doubts import ImageFigures
 from phone_host.measure.regime import Judgement, judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, disbelieved, figures
 from phone_host.measure.sink_account import SinkAccount
+from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
 from phone_host.model import TimeOffset
 from phone_host.sync.fifo import Overflow
@@ -66,6 +69,7 @@ def build(run: RunSnapshot) -> dict[str, object]:
         },
         "regime": _regime(judge(figures(run))),
         "image_motion_px_per_s": _number(run.motion_px_s),
+        "trust": _trust(run),
         "warnings": [
             {"doubt": item.doubt.value, "sentence": item.sentence, "remedy": item.remedy} for item in concerns(run)
         ],
@@ -80,6 +84,41 @@ def build(run: RunSnapshot) -> dict[str, object]:
         "unused": [{"place": item.place, "reason": item.reason, "count": item.count} for item in unused(run)],
         "sinks": {sink.name: _sink(sink) for sink in run.sinks},
         "unwritten": asdict(run.unwritten),
+    }
+
+
+def _trust(run: RunSnapshot) -> dict[str, object]:
+    """Return the answer, every doubt, and how density, consistency and vertical error moved."""
+    said, images = headline(run), run.images
+    return {
+        "grade": said.grade.value,
+        "headline": said.sentence,
+        "doubts": [concern_values(item) for item in concerns(run)],
+        "wants_depth": images.wants_depth,
+        "has_depth": images.has_depth,
+        "judged_pairs": images.judged,
+        "at_first": figure_values(images.start),
+        "now": figure_values(images.now),
+    }
+
+
+def concern_values(concern: Concern) -> dict[str, object]:
+    """Return a doubt with its sentence, its remedy, and whether it blocks."""
+    return {
+        "doubt": concern.doubt.value,
+        "sentence": concern.sentence,
+        "remedy": concern.remedy,
+        "blocking": concern.doubt.blocks,
+    }
+
+
+def figure_values(figures: ImageFigures) -> dict[str, float | None]:
+    """Return what the images say: shares, px; None where nothing was measured."""
+    return {
+        "density": _number(figures.density),
+        "consistency": _number(figures.consistency),
+        "vertical_error_px": _number(figures.vertical_px),
+        "vertical_offset_px": _number(figures.vertical_offset_px),
     }
 
 

@@ -10,9 +10,9 @@ from common.camera.base import CameraHealth
 from common.ledger import PairLedger
 from common.words import counted, times
 from phone_host.measure.accounts import rung_lines
-from phone_host.measure.regime import Judgement, Regime, judge
+from phone_host.measure.headline import headline
+from phone_host.measure.regime import Regime, judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
-from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
 from phone_host.model import Processed, Side
 from phone_host.report.cut_words import cut_sentence
@@ -49,8 +49,7 @@ def run_page(
     Returns:
         One self-contained HTML document.
     """
-    judgement, found = judge(figures(run)), concerns(run)
-    verdict, sentence = _verdict(run, judgement, found)
+    verdict, sentence = _verdict(run)
     return page(
         PageData(
             title="tandemscan run",
@@ -78,8 +77,7 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
         f"Queue: {judgement.sentence}.",
         *(_sentence(remark) for remark in judgement.remedies if judgement.regime in _FINE),
         *(f"Warning: {item.sentence}." for item in concerns(run)),
-        *phase_lines(run.phase, run.alignment),
-        *rung_lines(run.link),
+        *(_sentence(line) for line in (*phase_lines(run.phase, run.alignment), *rung_lines(run.link))),
     )
 
 
@@ -100,7 +98,7 @@ def files(saved: Sequence[str]) -> tuple[FileLink, ...]:
     Args:
         saved: of saved pairs, relative to the page, in order.
     """
-    links = [FileLink(name, _saved_words(name)) for name in saved[:_MOST_LINKS]]
+    links = [FileLink(name, "" if number else _saved_words(name)) for number, name in enumerate(saved[:_MOST_LINKS])]
     if len(saved) > _MOST_LINKS:
         first = saved[_MOST_LINKS].partition("/")[0]
         links.append(FileLink(f"{first}/", f"and {len(saved) - _MOST_LINKS} more, from this folder on"))
@@ -112,7 +110,7 @@ def files(saved: Sequence[str]) -> tuple[FileLink, ...]:
 
 
 def _saved_words(name: str) -> str:
-    """Say what a saved file holds."""
+    """Say what a saved file holds; the others hold the same."""
     kind = name.rpartition("/")[2]
     return {
         "cloud.ply": "point cloud, metres: X right, Y down, Z forward from the left camera",
@@ -170,14 +168,9 @@ def camera_table(health: CameraHealth) -> Table:
     return Table("This machine's camera", ("what", "value"), tuple(rows))
 
 
-def _verdict(run: RunSnapshot, judgement: Judgement, found: Sequence[Concern]) -> tuple[Headline, str]:
-    if not run.processed and run.spoiled_images:
-        return Headline.BAD, "No pair had two whole images: check the cameras."
-    if not run.processed:
-        return Headline.BAD, "No pair was processed: no frames of the two cameras came together."
-    if found:
-        return Headline.WARNING, f"{found[0].sentence}: {found[0].remedy}."
-    return (Headline.GOOD if judgement.regime in _FINE else Headline.WARNING), f"{judgement.sentence}."
+def _verdict(run: RunSnapshot) -> tuple[Headline, str]:
+    said = headline(run)
+    return Headline(said.grade.value), said.sentence
 
 
 def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
@@ -192,8 +185,13 @@ def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
             note=f"median; 95 % below {skew.p95_ns / 1e6:.1f} ms",
         ),
         clock_figure(run),
-        _measured("image motion", run.motion_px_s, 0, "px/s", "the fastest tenth of the host camera's image"),
+        *(() if np.isnan(run.motion_px_s) else (_motion_figure(run),)),
     )
+
+
+def _motion_figure(run: RunSnapshot) -> Figure:
+    words = "the fastest tenth of the host camera's image"
+    return _measured("image motion", run.motion_px_s, 0, "px/s", words)
 
 
 def rate_figure(run: RunSnapshot) -> Figure:

@@ -9,6 +9,7 @@ from typing import Any
 from common.imagesize.head import size_text
 from common.versions import REPORT_FORMAT
 from phone_host.report.stereo_report import ALWAYS, FailedPair, PairReport, SetReport
+from phone_host.report.stereo_trust import trust_values
 from phone_host.report.stereo_verdict import pair_verdict, set_verdict
 
 
@@ -34,6 +35,7 @@ def pair_json(report: PairReport) -> dict[str, Any]:
         "unit": "metre" if written.points is not None else None,
         "axes": report.axes.text if written.points is not None else None,
         "not_in_depth_png": written.not_in_depth_png,
+        "trust": trust_values(report.trust),
         "warnings": [remark.text for remark in report.remarks],
         "times_ms": {stage: round(ms, 3) for stage, ms in report.stages_ms},
         "files": [*written.files, *ALWAYS],

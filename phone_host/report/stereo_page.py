@@ -240,7 +240,7 @@ def _entry(pair: PairEntry) -> str:
     picture = (
         f'<img alt="{escape(pair.thumbnail.label)}" src="{picture_uri(pair.thumbnail)}">' if pair.thumbnail else ""
     )
-    share = "" if math.isnan(pair.density) else f" · density {100 * pair.density:.0f} %"
+    share = "" if math.isnan(pair.density) else f" · density {100 * pair.density:.0f}\u00a0%"
     inside = f"{picture}<b>{escape(pair.name)}</b>"
     link = f'<a href="{address(pair.folder)}/index.html">{inside}</a>' if pair.folder else inside
     return (

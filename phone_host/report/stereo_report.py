@@ -11,6 +11,7 @@ from common.words import counted
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
+from phone_host.report.stereo_trust import PairTrust
 
 ALWAYS: Final = ("report.json", "index.html")
 """Files that lie in every folder of results."""
@@ -29,13 +30,11 @@ class Remark:
         problem: what it is, with figures.
         remedy: what to do about it; empty: nothing.
         is_blocking: whether the result must not be taken for right; the command then ends with exit code 4.
-        is_doubt: whether it speaks against the depth; else it only limits it.
     """
 
     problem: str
     remedy: str = ""
     is_blocking: bool = False
-    is_doubt: bool = False
 
     @property
     def text(self) -> str:
@@ -64,6 +63,7 @@ class PairReport:
         written: the files.
         stages_ms: how long each stage took, and `total`.
         remarks: what the user must know.
+        trust: how its images were judged.
     """
 
     name: str
@@ -81,6 +81,7 @@ class PairReport:
     axes: Axes
     written: WrittenPair
     stages_ms: tuple[tuple[str, float], ...]
+    trust: PairTrust
     remarks: tuple[Remark, ...] = ()
 
     @property

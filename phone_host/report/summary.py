@@ -7,6 +7,8 @@ from common.camera.base import CameraHealth
 from common.words import counted, times
 from phone_host.measure.accounts import LinkAccount, LinkTally, rung_lines
 from phone_host.measure.delays import DELAYS
+from phone_host.measure.headline import headline
+from phone_host.measure.image_doubts import ImageTrust
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.unused import unused
@@ -27,7 +29,7 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
         width: of the terminal, in characters: tables leave columns out rather than exceed it; 0: no limit.
     """
     rate = "" if math.isnan(run.pairs_per_second) else f" in {run.seconds:.1f} s ({run.pairs_per_second:.1f} /s)"
-    lines = [f"{counted(run.processed, 'pair')}{rate}, ended: {run.ended.replace('_', ' ')}"]
+    lines = [headline(run).sentence, f"{counted(run.processed, 'pair')}{rate}, ended: {run.ended.replace('_', ' ')}"]
     if run.processed:
         lines += _delay_table(run, width)
     if run.estimate is not None:
@@ -41,6 +43,7 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
     lines.append(judge(figures(run)).sentence)
     lines += [f"  {remedy}" for remedy in judge(figures(run)).remedies]
     lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(run)]
+    lines += depth_lines(run.images)
     lines += camera_troubles(run.camera)
     lines += [*rung_lines(run.link), *_links(run.link, width), *_unused_lines(run)]
     return "\n".join(lines)
@@ -73,6 +76,19 @@ def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
     if alignment is not None:
         lines.append(f"alignment: {alignment.state.value}: {alignment.words}")
     return lines
+
+
+def depth_lines(images: ImageTrust) -> list[str]:
+    """Say how the depth fared from the first judgements to the latest ones; nothing if none was judged."""
+    start, end = images.start, images.now
+    if math.isnan(end.density):
+        return []
+    parts = [f"density {start.density:.0%} at first, {end.density:.0%} now"]
+    if not math.isnan(start.consistency + end.consistency):
+        parts.append(f"left-right consistency {start.consistency:.0%}, {end.consistency:.0%}")
+    if not math.isnan(start.vertical_px + end.vertical_px):
+        parts.append(f"vertical error {start.vertical_px:.2f}, {end.vertical_px:.2f} px")
+    return [f"depth: {'; '.join(parts)}"]
 
 
 def camera_troubles(health: CameraHealth) -> list[str]:

@@ -25,6 +25,7 @@ from common.ledger import PairLedger
 from common.program.logs import event
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.model import Result, Unwritten
+from phone_host.output.axes import Axes
 from phone_host.output.cameras_json import CAMERAS_NAME
 from phone_host.output.listed import ListedFolder
 from phone_host.output.pair_files import PAIR_NAMES, RUN_FILES, write_pair
@@ -135,6 +136,7 @@ class FileSink:
         save_every: save every Nth pair, starting with the first; 0 for none.
         waits: whether the worker waits for room for a pair that is due to be saved, so that none is missing.
         settings: settings of the run, each with its value and origin; None: not saved.
+        axes: of the points in saved clouds.
 
     Raises:
         UnavailableError: the folder cannot be created or written to, or something that is not ours is in the way.
@@ -147,8 +149,9 @@ class FileSink:
         *,
         waits: bool = False,
         settings: Mapping[str, object] | None = None,
+        axes: Axes = Axes.CAMERA,
     ) -> None:
-        self._save_every = save_every
+        self._save_every, self._axes = save_every, axes
         self._unsaved_pairs = self._lost_lines = 0
         self._own: ListedFolder | None = None
         self._file = -1
@@ -266,7 +269,7 @@ class FileSink:
                 ThreadPoolExecutor(_WRITERS) as writers,
                 self._own.new_folder(f"pair-{result.number:06d}", writers.map) as folder,
             ):
-                write_pair(folder, result.processed, RUN_FILES, run_all=writers.map)
+                write_pair(folder, result.processed, RUN_FILES, self._axes, writers.map)
         except OSError as error:
             self._unsaved_pairs += 1
             self._of_pairs.begins(error)

@@ -19,11 +19,13 @@ from phone_host.measure.image_motion import MotionMeter
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed, Result, Side, TimeOffset
+from phone_host.output.axes import Axes
 from phone_host.run.file_sink import FileSink
 from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.pipeline import Pipeline
 from phone_host.run.rig_cameras import RigCameras
 from phone_host.run.sinks import FunctionSink, Sink
+from phone_host.run.trust_sink import TrustSink
 from phone_host.run.worker import Worker
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
@@ -71,6 +73,7 @@ class HostSettings:
         steered: the cameras that may be steered until both expose together; empty: the phase stays as it is.
         most_pixels: largest accepted image size of either camera, pixels.
         resolved: the settings of the run with their origins, for settings.json; None: not saved.
+        axes: of the points in saved clouds.
     """
 
     board_side: Side = Side.LEFT
@@ -85,6 +88,7 @@ class HostSettings:
     steered: frozenset[Whose] = frozenset()
     most_pixels: int = MOST_PIXELS
     resolved: Mapping[str, object] | None = None
+    axes: Axes = Axes.CAMERA
 
 
 class Host:
@@ -116,8 +120,11 @@ class Host:
             settings.save_every,
             waits=bool(settings.pairs) or demand.paces_own_camera,
             settings=settings.resolved,
+            axes=settings.axes,
         )
-        self._sinks: tuple[Sink, ...] = (self._files, FunctionSink("motion", self._measure_motion), *sinks)
+        self._trust = TrustSink(core)
+        motion = FunctionSink("motion", self._measure_motion)
+        self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *sinks)
         self._queue = PairQueue(
             settings.fifo,
             settings.tolerance_ns,
@@ -266,6 +273,7 @@ class Host:
             stamps_exact=self._stamps_are_exact,
             judged_pairs=_RECENT if ended == "running" else None,
             missed_locks=self._cameras.missed,
+            images=self._trust.trust,
         )
 
     @property

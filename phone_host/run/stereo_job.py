@@ -35,6 +35,7 @@ from phone_host.report.stereo_report import (
 from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
 from phone_host.run.stereo_remarks import pair_remarks, turned_remarks
 from phone_host.run.stereo_results import StereoResults
+from phone_host.run.stereo_trust import judge_pair
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import EncodedFile, decode_files, open_image, require_same_size, size_px
 from phone_host.stereo.view_files import ViewFiles
@@ -201,6 +202,9 @@ class _Work:
         watch.lap("read")
         processed = core.compute(*images, _StageClock(self._watcher, about))
         watch.take_over(processed.stages)
+        self._watcher.say(f"checking{about}")
+        trust = judge_pair(core, processed)
+        watch.lap("judge")
         self._watcher.say(f"writing{about}")
         planned = available(
             STEREO_FILES, has_disparity=processed.disparity is not None, has_cloud=processed.cloud is not None
@@ -215,7 +219,7 @@ class _Work:
             density = 0.0 if processed.disparity is None else float(np.isfinite(processed.disparity).mean())
             remarks = [
                 *turned_remarks(*opened),
-                *pair_remarks(processed, density, written, core.wanted.search_from_m),
+                *pair_remarks(processed, written, trust, core.wanted.search_from_m),
                 *(() if folder else _alone(self._job)),
             ]
             report = PairReport(
@@ -235,6 +239,7 @@ class _Work:
                 written=written,
                 stages_ms=watch.times_ms(),
                 remarks=tuple(remarks),
+                trust=trust,
             )
             write_text(place / "report.json", json_text(pair_json(report), indent=2) + "\n")
             write_text(place / "index.html", pair_page(report, processed, self._job.commands))

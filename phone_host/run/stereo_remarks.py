@@ -1,38 +1,38 @@
 """What the user of `stereo` must know about a pair's result. Doubts that are found in the images belong here, too."""
 
 import math
-from typing import Final
 
 from common.camera.orientation import UPRIGHT
+from phone_host.measure.trust import Doubt
 from phone_host.model import Processed
 from phone_host.output.pair_files import WrittenPair
 from phone_host.report.stereo_report import Remark
+from phone_host.report.stereo_trust import PairTrust
 from phone_host.stereo.images import EncodedFile
 from phone_host.stereo.reproject import nearest_depth_m
 
-_LOW_DENSITY: Final = 0.33
-"""In a textured scene that both cameras see, more than 90 % of the pixels are matched. Below a third, a wrong pair is far
-more likely than a scene without texture."""
 
-_LOW_DENSITY_REMEDY: Final = (
-    "check that LEFT and RIGHT are not swapped, that both show the same scene, that --calibration or --rectified fits them, and"
-    " that the scene has texture and is not nearer than --near"
-)
-
-
-def pair_remarks(processed: Processed, density: float, written: WrittenPair, near_m: float) -> tuple[Remark, ...]:
+def pair_remarks(processed: Processed, written: WrittenPair, trust: PairTrust, near_m: float) -> tuple[Remark, ...]:
     """Find what must be said about a pair.
 
     Args:
         processed: the pair.
-        density: share of its pixels that have a disparity.
         written: its files.
+        trust: how its images were judged.
         near_m: nearest depth that was looked for, m; NaN: the search was given in px.
 
     Returns:
-        The remarks, the gravest last.
+        The remarks; doubts come first, gravest first.
     """
-    remarks = []
+    # That one pair of several has no depth is told; only if none has any, the command fails.
+    remarks = [
+        Remark(
+            concern.sentence,
+            concern.remedy,
+            is_blocking=concern.doubt.blocks and concern.doubt is not Doubt.NO_DEPTH,
+        )
+        for concern in trust.concerns
+    ]
     geometry, search = processed.geometry, processed.search
     if geometry is not None and search is not None and search.disparities and not math.isnan(near_m):
         nearest_m = nearest_depth_m(geometry, search.disparities)
@@ -50,8 +50,6 @@ def pair_remarks(processed: Processed, density: float, written: WrittenPair, nea
                 "take them from xyz.pfm",
             )
         )
-    if density < _LOW_DENSITY:
-        remarks.append(Remark(f"only {density:.0%} of the pixels have depth", _LOW_DENSITY_REMEDY, is_doubt=True))
     if geometry is None:
         remarks.append(
             Remark(

@@ -14,10 +14,11 @@ from common import now
 from common.words import counted
 from phone_host.measure.accounts import rung_lines
 from phone_host.measure.delays import DELAYS, IDLE_STAGE_NS, STAGES, Spread
+from phone_host.measure.headline import headline
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.unused import unused
-from phone_host.report.summary import camera_troubles, phase_lines
+from phone_host.report.summary import camera_troubles, depth_lines, phase_lines
 
 _REFRESH_S: Final = 0.25
 _WIDE: Final = 64
@@ -113,11 +114,14 @@ def _stages(run: RunSnapshot) -> Text:
 
 
 def _judgement(run: RunSnapshot) -> list[Text]:
-    """Return the regime, the two cameras' troubles and the concerns about the depth."""
+    """Return the regime, how the depth fares, the two cameras' troubles and the concerns."""
     warnings = [Text(f"warning: {item.sentence}: {item.remedy}", style="bold red") for item in concerns(run)]
     lines = (*camera_troubles(run.camera), *rung_lines(run.link))
     camera = [Text(line, style="yellow") for line in lines]
-    return [Text(judge(figures(run)).sentence, style="dim"), *camera, *warnings]
+    depth = [Text(line) for line in depth_lines(run.images)]
+    if run.images.wants_depth and run.images.judged and not warnings:
+        depth.insert(0, Text(headline(run).sentence, style="bold"))
+    return [Text(judge(figures(run)).sentence, style="dim"), *depth, *camera, *warnings]
 
 
 def _state(run: RunSnapshot) -> Text:

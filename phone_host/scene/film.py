@@ -134,8 +134,9 @@ def _refuse_foreign(folder: Path, frames: int) -> None:
     images = [path for path in folder.glob("*") if path.suffix.lower() in SUFFIXES]
     foreign = sorted(path.name for path in images if path.name not in ours)
     if foreign:
+        image = folder / foreign[0]
         raise UnavailableError(
-            f"{folder / foreign[0]} is no image of the film, but would be shown with it",
+            f"{image} is no image of the film, but would be shown with it",
             "move it away, or give another folder with --out",
         )
 

@@ -68,6 +68,7 @@ class StereoCore:
 
     Attributes:
         rig: the cameras, at the size of their calibration; None when the images are already rectified.
+        rectification: of the rig, at that size; None when the images are already rectified.
         geometry: converts disparity to metres at that size; None when the images are already rectified and no geometry was
             given. `Processed.geometry` is that of a result.
         wanted: limits, crop and working size as asked for.
@@ -91,6 +92,7 @@ class StereoCore:
         self._matcher = matcher
         self.rig = None if rectifier is None else rectifier.rig
         self._rectifier = rectifier
+        self.rectification = None if rectifier is None else rectifier.rectification
         self.geometry = geometry if rectifier is None else rectifier.geometry
         self.wanted = wanted
         self._kept: dict[_Sizes, _Ready] = {}
@@ -146,6 +148,15 @@ class StereoCore:
             require_same_size(left_px, right_px, "the left image", "the right image")
         else:
             scaled_rig(self.rig, left_px, right_px)
+
+    def rectifier_for(self, size_px: tuple[int, int]) -> Rectifier | None:
+        """Return what has rectified images to a size; None if they came rectified.
+
+        Args:
+            size_px: width and height of the rectified images, px.
+        """
+        made = [ready.rectifier for ready in list(self._kept.values()) if (ready.width_px, ready.height_px) == size_px]
+        return made[-1] if made else self._rectifier
 
     def _ready(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> _Ready:
         """Return what these image sizes need; make it if they are new."""

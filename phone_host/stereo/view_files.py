@@ -142,11 +142,12 @@ def _numbered(left: list[Path], right: list[Path]) -> tuple[dict[int, Path], dic
     """Return the files by the number in their names; None if no number tells each side's files apart and occurs on both sides.
 
     Names may hold more than one number (`cam0_0012`, `0012_cam1`). The one that counts the views is at the place,
-    counted from the end, that pairs most files. Files without a number there stay alone.
+    counted from the end, that pairs most files. Files without a number there stay alone. The folder's name belongs to
+    the name, so what a run has saved is paired by the folders' numbers (`pair-000012/left.png`).
     """
     best: tuple[dict[int, Path], dict[int, Path]] | None = None
     most = 0
-    for place in range(1, 1 + max(len(_NUMBER.findall(path.stem)) for path in (*left, *right))):
+    for place in range(1, 1 + max(len(_numbers(path)) for path in (*left, *right))):
         sides = _by_number(left, place), _by_number(right, place)
         shared = len(sides[0].keys() & sides[1].keys())
         if shared > most:
@@ -156,7 +157,11 @@ def _numbered(left: list[Path], right: list[Path]) -> tuple[dict[int, Path], dic
 
 def _by_number(files: list[Path], place: int) -> dict[int, Path]:
     """Return the files by the number at a place; empty if two files share one there."""
-    numbers = [(path, _NUMBER.findall(path.stem)) for path in files]
+    numbers = [(path, _numbers(path)) for path in files]
     found = [(int(parts[-place]), path) for path, parts in numbers if len(parts) >= place]
     by_number = dict(found)
     return by_number if len(by_number) == len(found) else {}
+
+
+def _numbers(path: Path) -> list[str]:
+    return _NUMBER.findall(f"{path.absolute().parent.name}/{path.stem}")

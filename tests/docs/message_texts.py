@@ -114,6 +114,8 @@ class Code:
     def _quoted(self, place: Place, value: ast.expr, depth: int) -> str:
         """A quoted value: the text of a constant, otherwise a word."""
         inner = value.value if isinstance(value, ast.FormattedValue) else value
+        if told := _counted(inner):
+            return told[0]
         if isinstance(inner, ast.Name) and (constant := self._constants[place.path].get(inner.id)) is not None:
             if isinstance(constant, ast.Constant):
                 return str(constant.value)
@@ -183,6 +185,21 @@ class Code:
             given += caller.call.args[offset : offset + 1] if offset >= 0 else []
             found += [text for value in given for text in self.texts(caller, value, depth)]
         return found
+
+
+def _counted(value: ast.expr) -> list[str]:
+    """A number with its noun, or one of two words, in the plural; none if it is something else."""
+    match value:
+        case ast.Call(func=ast.Name(id="counted"), args=[number, ast.Constant(value=str() as noun)]):
+            return [f"{word(number)} {noun}s"]
+        case ast.Call(func=ast.Name(id="counted"), args=[number, _, ast.Constant(value=str() as plural)]):
+            return [f"{word(number)} {plural}"]
+        case ast.Call(func=ast.Name(id="times"), args=[number]):
+            return [f"{word(number)} times"]
+        case ast.IfExp(body=ast.Constant(value=str()), orelse=ast.Constant(value=str() as plural)):
+            return [plural]
+        case _:
+            return []
 
 
 def word(expression: ast.expr) -> str:

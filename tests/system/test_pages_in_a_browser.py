@@ -50,17 +50,17 @@ def test_mouse_and_fingers_turn_and_zoom_the_cloud(shown: tuple[Browser, str]) -
     page.ask("document.querySelector('canvas').scrollIntoView()")
     left, top, width, height = box(page, "canvas")
     x, y = left + width / 2, top + height / 2
-    assert drawn(page) == [0.45, 0.22, 2.0]
+    assert drawn(page) == [0.45, 0.22, 2.5]
     page.move(x, y, kind="mousePressed", held=True)
     page.move(x + 50, y + 10, held=True)
     page.move(x + 50, y + 10, kind="mouseReleased")
     page.wait("!document.querySelector('.cloudview').dataset.drawn.startsWith('0.450')")
-    assert drawn(page) == [pytest.approx(0.45 - 50 * 0.008), pytest.approx(0.22 + 10 * 0.008), 2.0]
+    assert drawn(page) == [pytest.approx(0.45 - 50 * 0.008), pytest.approx(0.22 + 10 * 0.008), 2.5]
     page.touch("touchStart", (x - 40, y), (x + 40, y))
     page.touch("touchMove", (x - 80, y), (x + 80, y))
     page.touch("touchEnd")
-    page.wait("!document.querySelector('.cloudview').dataset.drawn.endsWith('2.000')")
-    assert drawn(page)[2] == pytest.approx(1.0, abs=0.05)
+    page.wait("!document.querySelector('.cloudview').dataset.drawn.endsWith('2.500')")
+    assert drawn(page)[2] == pytest.approx(1.25, abs=0.05)
     painted = "[...document.querySelector('canvas').getContext('2d').getImageData(0, 0, 900, 400).data].filter((v, i) => i % 4 === 3 && v).length"
     assert page.ask(painted) > 10_000
     assert page.complaints == []

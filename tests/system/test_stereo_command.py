@@ -60,7 +60,7 @@ def test_a_rectified_pair_with_geometry_gives_all_files(shifted: Path, matcher: 
     assert report["disparities"] == 32
     assert report["density"] == pytest.approx(np.isfinite(disparity).mean(), abs=1e-4)
     assert report["points"] == np.isfinite(disparity).sum()
-    assert set(report["times_ms"]) == {"read", "prepare", "rectify", "match", "reproject", "write", "total"}
+    assert set(report["times_ms"]) == {"read", "prepare", "rectify", "match", "reproject", "judge", "write", "total"}
     assert sorted(path.name for path in (shifted / "o").iterdir()) == sorted([".tandemscan", *report["files"]])
 
 
@@ -139,8 +139,9 @@ def test_an_unrectified_pair_of_two_sizes_goes_through_the_rig(tmp_path: Path) -
         "stereo", tmp_path / "l.png", tmp_path / "r.png", "--calibration", tmp_path / "rig.yaml",
         "--near", 600, "--out", tmp_path / "o", "--json",
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 4, done.stderr  # the two textures have nothing in common
     report = json.loads(done.stdout)
+    assert report["trust"]["doubts"][0]["doubt"] == "other_scene"
     assert report["size"] == f"{rectification.width_px}x{rectification.height_px}"
     # f b / near = 526 * 0.10026 / 0.6 = 87.9 -> 96
     assert report["disparities"] == 96

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path as FilePath
 
 import cv2
 import numpy as np
@@ -10,7 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from common.errors import UnavailableError
 from phone_host.model import RectifiedPair, StereoGeometry
+from phone_host.scene.film import Film, render_film
 from phone_host.scene.scene import (
     DEMO_PERIOD_S,
     PHONE_LOOK,
@@ -391,3 +394,22 @@ def test_a_poster_that_moves_close_by_is_drawn_as_if_it_stood_there() -> None:
         difference = np.abs(film.frame(t_s).astype(int) - render(scene.at(t_s), camera, pose).astype(int))
         assert difference.max() <= 1
     assert (film.frame(0.5) != film.frame(0.2)).any()
+
+
+def test_a_film_is_refused_where_a_foreign_image_would_be_shown_with_it(tmp_path: FilePath) -> None:
+    """An image that the film will not replace ends the rendering before it begins; the film's own images and other files do not."""
+    foreign = tmp_path / "left" / "holiday.JPG"
+    foreign.parent.mkdir()
+    foreign.write_bytes(b"mine")
+    scene, looks = plane_scene(1.0, 0.0), (WEBCAM_LOOK, PHONE_LOOK)
+
+    def film() -> Film:
+        return render_film(scene, small_rig(), looks, tmp_path, fps=2, seconds=1.0, advance=lambda: None)
+
+    with pytest.raises(UnavailableError, match=r"holiday\.JPG is no image of the film"):
+        film()
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["holiday.JPG", "left"]
+    foreign.rename(tmp_path / "left" / "notes.txt")
+    film()
+    film()
+    assert sorted(path.name for path in (tmp_path / "left").iterdir()) == ["0.jpg", "1.jpg", "notes.txt"]

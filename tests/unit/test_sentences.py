@@ -11,8 +11,10 @@ from typing import Final
 from common.camera.base import CameraHealth
 from common.protocol.message import RefusalReason
 from common.versions import PROTOCOL_VERSION
+from phone_host.measure.image_doubts import image_doubts
 from phone_host.measure.regime import RunFigures, judge
 from phone_host.measure.trust import (
+    NO_DEPTH,
     Concern,
     Timing,
     Unbelieved,
@@ -20,7 +22,7 @@ from phone_host.measure.trust import (
     timing_concerns,
     unbelieved_concerns,
 )
-from phone_host.model import TimeOffset
+from phone_host.model import Arrangement, Evidence, Exposure, Support, TimeOffset
 from phone_host.stream.refusals import BoardRefusal, refusal_text
 from phone_host.sync.fifo import Overflow
 
@@ -93,12 +95,36 @@ def sentences() -> Iterator[str]:
                 )
             ),
         )
+    yield from map(told, image_examples())
     for refused in RefusalReason:
         problem, remedy = refusal_text(BoardRefusal(refused))
         yield f"refused, {refused.name.lower()}: {problem}\n    {remedy}"
     for protocol in (PROTOCOL_VERSION - 1, PROTOCOL_VERSION + 1):
         problem, remedy = refusal_text(BoardRefusal(RefusalReason.VERSION, protocol))
         yield f"refused, version {protocol}: {problem}\n    {remedy}"
+
+
+def image_examples() -> Iterator[Concern]:
+    """One example of each doubt that the images raise."""
+    sharp = Exposure(mean_level=110, bright_level=200, structure=30, blur_px=1.0, features=400)
+    blind = replace(sharp, mean_level=3, bright_level=5, structure=0.3)
+
+    def support(arrangement: Arrangement, features: int) -> tuple[Support, ...]:
+        return tuple(Support(kind, features if kind is arrangement else 0) for kind in Arrangement)
+
+    good = Evidence(
+        left=sharp, right=sharp, density=0.9, consistency=0.9, vertical_px=0.2, supports=support(Arrangement.RIGHT, 90)
+    )
+    for arrangement in Arrangement:
+        yield from image_doubts(replace(good, supports=support(arrangement, 90)))
+    yield from image_doubts(replace(good, density=0.05, supports=support(Arrangement.RIGHT, 0)))
+    yield from image_doubts(replace(good, right=blind, supports=()))
+    yield from image_doubts(replace(good, left=replace(sharp, mean_level=9, bright_level=20)))
+    yield from image_doubts(replace(good, right=replace(sharp, blur_px=2.5)))
+    yield from image_doubts(replace(good, density=0.1))
+    yield from image_doubts(replace(good, consistency=0.1))
+    yield from image_doubts(replace(good, vertical_px=3.1))
+    yield NO_DEPTH
 
 
 def told(concern: Concern) -> str:

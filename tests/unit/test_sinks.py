@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,7 +19,9 @@ from common.frame import Frame, PixelFormat
 from common.ledger import BoardMarks, HostMarks, StageTimes
 from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, Processed, RectifiedPair, Result
+from phone_host.output.axes import Axes
 from phone_host.output.listed import LIST
+from phone_host.output.ply import read_ply
 from phone_host.run.file_sink import FileSink
 from phone_host.run.sinks import FunctionSink, SinkQueue
 from tests.support.samples import FRAME, LEDGER
@@ -195,6 +198,23 @@ def test_a_pair_whose_name_somebody_has_taken_is_counted_and_the_run_goes_on(tmp
     assert (tmp_path / "pair-000001" / "mine").read_text() == "mine"
     assert not list(tmp_path.glob("*.part"))
     assert (tmp_path / "pair-000002" / "left.png").exists()
+
+
+def test_a_saved_pair_with_points_has_its_cloud_in_the_axes_asked_for_and_its_depth(tmp_path: Path) -> None:
+    """The point 0.2 m below the optical axis and 1.5 m ahead is written as y = -0.2, z = -1.5 with y up; depth.png holds 1500 mm."""
+    sink = FileSink(tmp_path, 1, waits=True, axes=Axes.Y_UP)
+    small = result(0)
+    height, width = small.processed.pair.left.shape[:2]
+    cloud = np.full((height, width, 3), (0.1, 0.2, 1.5), np.float32)
+    sink.await_place(0)
+    sink.offer(replace(small, processed=replace(small.processed, cloud=cloud)))
+    sink.close({})
+    folder = tmp_path / "pair-000000"
+    expected = np.array([0.1, -0.2, -1.5], np.float32)
+    np.testing.assert_array_equal(np.unique(read_ply(folder / "cloud.ply").points_m, axis=0), [expected])
+    depth = np.asarray(cv2.imread(str(folder / "depth.png"), cv2.IMREAD_UNCHANGED))
+    assert depth.dtype == np.uint16
+    assert np.unique(depth).tolist() == [1500]
 
 
 def test_a_disk_slower_than_the_pairs_costs_pairs_and_no_line(tmp_path: Path) -> None:

@@ -167,7 +167,7 @@ def test_progress_names_each_stage_and_pair(photos: Path) -> None:
     """On a terminal one reads what is being done; on large images each stage takes seconds."""
     watch = _Watch()
     run_stereo(_job(photos), watch)
-    stages = ("reading", "rectifying", "matching", "computing points", "writing")
+    stages = ("reading", "rectifying", "matching", "computing points", "checking", "writing")
     assert watch.said == [f"{stage} pair-{number:06d}" for number in _SHIFTS for stage in stages]
 
 

@@ -217,7 +217,7 @@ def test_the_page_of_several_pairs_leads_to_each() -> None:
     parsed = Page(stereo_index(data))
     assert [one["href"] for one in parsed.every("a")] == ["pair-000000/index.html"]
     assert len(parsed.every("img")) == 1
-    for words in ("2 pairs", "a.png and b.png", "density 50 %", "Not read."):
+    for words in ("2 pairs", "a.png and b.png", "density 50\u00a0%", "Not read."):
         assert words in parsed.words
     assert "1 pair" in Page(stereo_index(replace(data, pairs=entries[:1]))).words
     assert isinstance(thumbnail(processed(1600, 1200)), Picture)

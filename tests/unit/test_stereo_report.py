@@ -4,6 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from phone_host.measure.headline import Answer, Grade
+from phone_host.measure.image_doubts import ImageFigures
+from phone_host.measure.trust import NO_DEPTH
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
@@ -17,9 +20,13 @@ from phone_host.report.stereo_report import (
     SetReport,
     alone_remarks,
 )
-from phone_host.report.stereo_verdict import pair_verdict, set_verdict
+from phone_host.report.stereo_trust import PairTrust
+from phone_host.report.stereo_verdict import set_verdict
 
 # 1000 pixels; f b = 50 px m, so an error of 0.25 px makes a depth of 40 m wrong by 0.25 * 40 / 50 = 20 %.
+_GOOD = PairTrust(ImageFigures(), (), Answer(Grade.GOOD, "Depth looks right."))
+_BAD = PairTrust(ImageFigures(), (NO_DEPTH,), Answer(Grade.BAD, "Depth is wrong."))
+
 _PAIR = PairReport(
     name="",
     left="l.png",
@@ -36,6 +43,7 @@ _PAIR = PairReport(
     axes=Axes.CAMERA,
     written=WrittenPair(files=("cloud.ply",), points=700),
     stages_ms=(("total", 123.4),),
+    trust=_GOOD,
 )
 
 
@@ -61,8 +69,7 @@ def test_a_pair_of_which_nothing_was_cut_says_where_its_cloud_ends() -> None:
 def test_lines_of_a_pair_hold_its_size_search_density_points_and_axes() -> None:
     """The first line says whether the depth is right, the next two have what a user needs to judge it."""
     answer, *lines = pair_lines(_PAIR, "scan")
-    assert "82% of the pixels" in answer
-    assert "40 m it is wrong by no more than 20%" in answer
+    assert answer == "Depth looks right."
     for words in ("40x25 px", "sgbm", "64 disparities", "matched at 50% of the size", "82.0%", "123 ms"):
         assert words in lines[0]
     for words in ("700 points", "70.0%", "x right, y down, z forward", "metres"):
@@ -75,6 +82,7 @@ def test_the_object_of_a_pair_states_limits_cuts_unit_and_axes() -> None:
     told = pair_json(_PAIR)
     assert told["limits"] == {"near_m": 0.0, "far_m": 40.0, "disparity_error_px": 0.25, "from_rig": True}
     assert (told["cut"]["too_far"], told["cut"]["kept"]) == (120, 700)
+    assert (told["verdict"], told["headline"], told["trust"]["doubts"]) == ("good", "Depth looks right.", [])
     assert (told["unit"], told["scale"], told["disparities"], told["points"]) == ("metre", 0.5, 64, 700)
     flat = pair_json(replace(_PAIR, geometry=None, limits=None, written=WrittenPair(files=())))
     assert (flat["unit"], flat["axes"], flat["limits"]) == (None, None, None)
@@ -123,34 +131,9 @@ def test_images_without_partner_are_counted_and_named_and_pairing_by_order_is_to
     assert alone_remarks([], [], by_number=False, pairs=1) == ()
 
 
-@pytest.mark.parametrize(
-    ("pair", "verdict", "words"),
-    [
-        (_PAIR, Headline.GOOD, "Nothing speaks against"),
-        (replace(_PAIR, remarks=(Remark("nothing nearer than 400 mm is found"),)), Headline.GOOD, "Nothing speaks"),
-        (replace(_PAIR, remarks=(Remark("only 10%", "check", is_doubt=True),)), Headline.WARNING, "Only 10%: check."),
-        (replace(_PAIR, remarks=(Remark("same image", "mend", is_blocking=True),)), Headline.BAD, "Same image: mend."),
-        (replace(_PAIR, written=WrittenPair(files=(), points=0)), Headline.BAD, "No pixel has depth"),
-        (
-            replace(_PAIR, geometry=None, limits=None, written=WrittenPair(files=())),
-            Headline.WARNING,
-            "focal length and baseline are unknown",
-        ),
-    ],
-    ids=["good", "limited", "doubt", "blocking", "no depth", "no metres"],
-)
-def test_the_verdict_of_a_pair_answers_whether_its_depth_is_right(
-    pair: PairReport, verdict: Headline, words: str
-) -> None:
-    """A limit is no doubt; a doubt is no alarm; nothing without depth looks right."""
-    found, sentence = pair_verdict(pair)
-    assert found is verdict
-    assert words in sentence
-
-
 def test_the_verdict_of_several_pairs_counts_them() -> None:
     """All good is good, all bad is bad, anything else is told in numbers."""
-    bad = replace(_PAIR, written=WrittenPair(files=(), points=0))
+    bad = replace(_PAIR, trust=_BAD)
     failed = FailedPair(name="p", left="l", right="r", problem="bad", remedy="mend")
     assert set_verdict(SetReport(pairs=(_PAIR, _PAIR), by_number=True))[0] is Headline.GOOD
     assert set_verdict(SetReport(pairs=(bad, failed), by_number=True))[0] is Headline.BAD

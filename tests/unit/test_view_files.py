@@ -134,3 +134,13 @@ def test_several_files_of_a_side_are_paired_by_number(tmp_path: Path) -> None:
     files = pair_files([str(path) for path in left], [str(path) for path in right])
     assert [name for name, _, _ in files.pairs] == ["2", "10"]
     assert files.left_alone == (tmp_path / "l3.png",)
+
+
+def test_saved_pairs_are_paired_by_the_numbers_of_their_folders(tmp_path: Path) -> None:
+    """In what a run has saved, each pair has a folder and all images are called left.png and right.png; 4 has no left one."""
+    for number in (0, 4, 15):
+        _touch(tmp_path / f"pair-{number:06d}", "right.png", *([] if number == 4 else ["left.png"]))
+    files = pair_files(str(tmp_path / "pair-*" / "left.png"), str(tmp_path / "pair-*" / "right.png"))
+    assert files.by_number
+    assert [name for name, _, _ in files.pairs] == ["0", "15"]
+    assert [path.parent.name for path in files.right_alone] == ["pair-000004"]

@@ -9,7 +9,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 from rich.console import Console
-from rich.progress import Progress
 
 from common import now
 from common.errors import SettingsError
@@ -19,6 +18,7 @@ from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level
 from common.program.signals import StopSignals
+from common.program.terminal import fitted
 from common.stamp import HOST_CLOCK
 from common.versions import REPORT_FORMAT
 from phone_host.boards.discovery import find_board_and_say
@@ -35,6 +35,7 @@ from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_yaml import read_rig, write_time_offset
 from phone_host.recording.footage import Footage, film, keep, read
+from phone_host.run.progress_bar import progress_bar
 from phone_host.settings import key_folder
 from phone_host.stereo.raw_images import decode_frame
 from phone_host.stereo.rectify import Rectifier
@@ -60,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     measured = _measure(options.by, footage, rig)
     report = _report(options, measured, footage)
     _store(options, measured, report)
-    print(json_text(report) if options.json else _summary(report))
+    print(json_text(report) if options.json else fitted(_summary(report)))
     return 0
 
 
@@ -95,7 +96,7 @@ def _write_pattern(options: argparse.Namespace) -> int:
 def _progress(text: str) -> tuple[Any, Callable[[float], None]]:
     """Return a progress bar on stderr, shown only in a terminal, and the function that sets its share from 0 to 1."""
     console = Console(stderr=True)
-    progress = Progress(console=console, transient=True, disable=not console.is_terminal)
+    progress = progress_bar(console)
     task = progress.add_task(text, total=1.0)
     return progress, lambda share: progress.update(task, completed=share)
 

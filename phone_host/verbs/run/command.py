@@ -22,7 +22,7 @@ from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
-from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.run_snapshot import RunSnapshot, depth_is_wrong
 from phone_host.model import Side, TimeOffset
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
@@ -35,7 +35,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
 from phone_host.verbs.output_folders import spare_inputs
-from phone_host.verbs.stereo_options import build_core
+from phone_host.verbs.stereo_options import build_core, output_options
 
 _CHECK_FAILED = 4
 
@@ -85,7 +85,8 @@ def run(options: argparse.Namespace) -> int:
     if signals.interrupted:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
-    return _CHECK_FAILED if too_few or not complete else 0
+    is_wrong = not signals.stop and depth_is_wrong(snapshot)
+    return _CHECK_FAILED if too_few or is_wrong or not complete else 0
 
 
 def _page(host: Host, snapshot: RunSnapshot, board_side: Side, out: Path) -> str:
@@ -132,6 +133,7 @@ def _host_settings(
         wait_ns=None if options.wait is None else round(options.wait * 1e9),
         out=options.out,
         save_every=options.save_every,
+        axes=output_options(options).axes,
         time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
         interpolate=settings.interpolate,
         most_pixels=settings.most_pixels,

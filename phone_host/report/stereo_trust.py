@@ -1,0 +1,37 @@
+"""How far the depth of one pair of image files can be trusted. Pure."""
+
+from dataclasses import dataclass
+
+from phone_host.measure.headline import Answer
+from phone_host.measure.image_doubts import ImageFigures
+from phone_host.measure.trust import Concern
+from phone_host.report.run_json import concern_values, figure_values
+
+
+@dataclass(frozen=True, slots=True)
+class PairTrust:
+    """How far the depth of one pair can be trusted.
+
+    Attributes:
+        figures: density, left-right consistency and vertical error.
+        concerns: the doubts, gravest first.
+        answer: the headline.
+    """
+
+    figures: ImageFigures
+    concerns: tuple[Concern, ...]
+    answer: Answer
+
+
+def trust_values(trust: PairTrust) -> dict[str, object]:
+    """Return the `trust` block of report.json.
+
+    Args:
+        trust: of the pair.
+    """
+    return {
+        "grade": trust.answer.grade.value,
+        "headline": trust.answer.sentence,
+        "doubts": [concern_values(concern) for concern in trust.concerns],
+        **figure_values(trust.figures),
+    }

@@ -1,0 +1,26 @@
+"""Judges one processed pair of images from files: its doubts, and the answer to whether its depth is right."""
+
+from phone_host.measure.headline import answer
+from phone_host.measure.image_doubts import gravest_first, image_doubts, median_figures
+from phone_host.measure.trust import NO_DEPTH
+from phone_host.model import Processed
+from phone_host.report.stereo_trust import PairTrust
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
+
+
+def judge_pair(core: StereoCore, processed: Processed) -> PairTrust:
+    """Judge one pair.
+
+    Args:
+        core: the core that processed it.
+        processed: its result.
+    """
+    evidence = measure_evidence(processed, maps_of(core, processed))
+    # What the images tell of swapped, turned or shifted views assumes that the epipolar lines are rows.
+    found = () if processed.pair.epipolar.is_vertical else image_doubts(evidence)
+    if not has_depth(processed) and not any(concern.doubt.blocks for concern in found):
+        found = gravest_first((NO_DEPTH, *found))
+    figures = median_figures((evidence,))
+    error_px = float("nan") if processed.limits is None else processed.limits.disparity_error_px
+    return PairTrust(figures, found, answer(figures, found, processed.geometry, error_px))

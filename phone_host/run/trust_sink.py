@@ -1,0 +1,87 @@
+"""A sink that judges a run's images twice a second: whether cameras are swapped, turned, covered, and how depth fares."""
+
+import math
+import threading
+from collections.abc import Callable
+from typing import Final
+
+from common import now
+from phone_host.measure.image_doubts import ImageJudge, ImageTrust
+from phone_host.measure.sink_account import SinkAccount
+from phone_host.model import DepthLimits, Processed, Result
+from phone_host.run.sinks import SinkQueue
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
+
+_PERIOD_NS: Final = 500_000_000
+"""A mistake must be named within 2 s. Two of three judgements name it: 1 s, and at most one period until the first."""
+
+
+class TrustSink:
+    """Judges the newest pair whenever one is due; the other pairs pass. It never delays a pair.
+
+    Args:
+        core: the run's stereo core; None: only brightness is judged.
+        clock: monotonic, ns.
+    """
+
+    def __init__(self, core: StereoCore | None, clock: Callable[[], int] = now.monotonic_ns) -> None:
+        self._core, self._clock = core, clock
+        self._judge = ImageJudge()
+        self._lock = threading.Lock()
+        self._queue: SinkQueue[Processed] = SinkQueue("trust", self._take, depth=1)
+        self._due_ns = 0
+        self._is_busy = False
+        self._has_depth = False
+        self._limits: DepthLimits | None = None
+
+    def await_place(self, number: int) -> None:
+        """See Sink."""
+        del number  # it does not wait
+
+    def offer(self, result: Result) -> None:
+        """See Sink."""
+        processed = result.processed
+        self._has_depth = self._has_depth or has_depth(processed)
+        self._limits = processed.limits or self._limits
+        now_ns = self._clock()
+        if now_ns < self._due_ns or self._is_busy:
+            return
+        self._due_ns = now_ns + _PERIOD_NS
+        self._is_busy = self._queue.offer(processed)
+
+    def finish(self) -> None:
+        """See Sink."""
+        self._queue.finish()
+
+    @property
+    def failure(self) -> Exception | None:
+        """See Sink."""
+        return self._queue.failure
+
+    @property
+    def accounts(self) -> tuple[SinkAccount, ...]:
+        """See Sink."""
+        return (self._queue.account,)
+
+    @property
+    def trust(self) -> ImageTrust:
+        """What the images have said so far, as a copy."""
+        with self._lock:
+            return ImageTrust(
+                judged=self._judge.judged,
+                wants_depth=self._core is not None,
+                has_depth=self._has_depth,
+                start=self._judge.start,
+                now=self._judge.now,
+                concerns=self._judge.concerns,
+                geometry=None if self._core is None else self._core.geometry,
+                disparity_error_px=math.nan if self._limits is None else self._limits.disparity_error_px,
+            )
+
+    def _take(self, processed: Processed) -> None:
+        maps = None if self._core is None else maps_of(self._core, processed)
+        evidence = measure_evidence(processed, maps)
+        with self._lock:
+            self._judge.add(evidence)
+        self._is_busy = False

@@ -1,0 +1,182 @@
+"""Measures what a pair's images say about its depth: density, consistency, vertical error, brightness, arrangement. Pure.
+
+`phone_host.measure.image_doubts` judges it. All is measured at reduced size, so that a judgement of 640x480 costs about
+50 ms of one core.
+"""
+
+import math
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.model import Disparity, Evidence, Image, Processed
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.evidence_features import Matches, find_features, match, on_common_rows, supports
+from phone_host.stereo.evidence_light import measure_exposure
+from phone_host.stereo.evidence_points import PointMaps, ThroughRig, Unmoved
+from phone_host.stereo.match_align import with_levels_of
+
+_FEATURE_PX: Final = 72_000
+"""Pixels of the images in which features are searched, some 310 x 232: twice as many take twice as long and find no more mistakes."""
+
+_CHECK_WIDTH_PX: Final = 480
+_CHECKS: Final = 240
+_PATCH_PX: Final = 9
+_BACK_PX: Final = 1.5
+"""A disparity is consistent if the search from right to left returns within this distance at the size of the check."""
+
+_TRACK_WIDTH_PX: Final = 1280
+_TRACKED_PX: Final = 4.0
+"""Features found at a quarter of the size are off by less."""
+
+_FEWEST: Final = 8
+
+
+def maps_of(core: StereoCore, processed: Processed) -> PointMaps:
+    """Return the way of a point from the cameras' own images to a pair that this core has rectified.
+
+    Args:
+        core: the core.
+        processed: one of its results.
+    """
+    height_px, width_px = processed.pair.left.shape[:2]
+    rectifier = core.rectifier_for((width_px, height_px))
+    if rectifier is not None:
+        return ThroughRig(rectifier.rig, rectifier.rectification)
+    return Unmoved(width_px, height_px)
+
+
+def has_depth(processed: Processed) -> bool:
+    """Tell whether any pixel of a pair has depth.
+
+    Args:
+        processed: the pair.
+    """
+    if processed.cut is not None:
+        return processed.cut.kept > 0
+    return processed.disparity is not None and bool(np.isfinite(processed.disparity).any())
+
+
+def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
+    """Measure the evidence in one pair.
+
+    Args:
+        processed: the pair; rectified if `maps` is given.
+        maps: the way of a point from the cameras' own images; None if the pair is not rectified. Then only brightness
+            and sharpness are measured.
+    """
+    left, right = _grey(processed.pair.left), _grey(processed.pair.right)
+    if maps is None or processed.disparity is None:
+        return Evidence(left=measure_exposure(left, 0), right=measure_exposure(right, 0))
+    height_px, width_px = left.shape
+    scale = min(1.0, math.sqrt(_FEATURE_PX / left.size))
+    found = [find_features(_stretched(_reduced(image, scale)), scale) for image in (left, right)]
+    plain, turned_over = (match(*found, is_mirrored=mirror) for mirror in (False, True))
+    upright = _tracked(left, right, plain.turned_by(0))
+    vertical_px, offset_px = _vertical(upright, height_px)
+    return Evidence(
+        left=measure_exposure(left, len(found[0].points_px)),
+        right=measure_exposure(right, len(found[1].points_px)),
+        density=float(np.isfinite(processed.disparity).mean()),
+        disparity_px=_middle(processed.disparity),
+        consistency=_consistency(left, right, processed.disparity, 0.0 if math.isnan(offset_px) else offset_px),
+        vertical_px=vertical_px,
+        vertical_offset_px=offset_px,
+        supports=supports(upright, plain, turned_over, maps, (width_px, height_px)),
+    )
+
+
+def _middle(disparity: Disparity) -> float:
+    """Return the median of every 64th disparity, px; NaN without any."""
+    some = disparity[::8, ::8]
+    known = some[np.isfinite(some)]
+    return float(np.median(known)) if known.size else math.nan
+
+
+def _grey(image: Image) -> Image:
+    return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
+
+
+def _reduced(image: Image, scale: float) -> Image:
+    if scale >= 1.0:
+        return image
+    size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _stretched(image: Image) -> Image:
+    """Stretch the levels to the full range, or SIFT finds nothing in a dim image."""
+    low, high = (float(level) for level in np.percentile(image, (1, 99)))
+    gain = min(255.0 / max(high - low, 1.0), 8.0)
+    levels = np.clip((np.arange(256) - low) * gain, 0, 255).astype(np.uint8)
+    return np.asarray(cv2.LUT(image, levels), np.uint8)
+
+
+def _tracked(left: Image, right: Image, matches: Matches) -> Matches:
+    """Follow matched features to a fraction of a pixel (Lucas and Kanade, IJCAI 1981). Those that get lost stay where they are."""
+    if not len(matches.left_px):
+        return matches
+    scale = min(1.0, _TRACK_WIDTH_PX / left.shape[1])
+    before = _reduced(left, scale)
+    after = with_levels_of(before, _reduced(right, scale))  # tracking takes another exposure for motion
+    start, guess = (
+        ((points + 0.5) * scale - 0.5).astype(np.float32).reshape(-1, 1, 2)
+        for points in (matches.left_px, matches.right_px)
+    )
+    ahead, found, _ = cv2.calcOpticalFlowPyrLK(
+        before, after, start, guess.copy(), winSize=(15, 15), maxLevel=1, flags=cv2.OPTFLOW_USE_INITIAL_FLOW
+    )
+    near = np.linalg.norm((ahead - guess).reshape(-1, 2), axis=1) <= _TRACKED_PX
+    kept = (found.ravel() == 1) & near
+    better = (ahead.reshape(-1, 2).astype(np.float64) + 0.5) / scale - 0.5
+    return Matches(matches.left_px, np.where(kept[:, np.newaxis], better, matches.right_px), matches.turns_deg)
+
+
+def _vertical(upright: Matches, height_px: int) -> tuple[float, float]:
+    """Return the median distance from the rows and the median offset, px; NaN with too few features."""
+    rows = on_common_rows(upright.left_px, upright.right_px, height_px)
+    if rows.sum() < _FEWEST:
+        return math.nan, math.nan
+    down = (upright.right_px - upright.left_px)[rows, 1]
+    return float(np.median(np.abs(down))), float(np.median(down))
+
+
+def _consistency(left: Image, right: Image, disparity: Disparity, offset_px: float) -> float:
+    """Search sampled points of the right image in the left one and count those that lead back.
+
+    Args:
+        left: (H, W) uint8.
+        right: the same size.
+        disparity: (H, W), px.
+        offset_px: how far too low the right image lies: matchers correct that.
+
+    Returns:
+        Share of the samples; NaN with too few disparities.
+    """
+    width = left.shape[1]
+    scale = min(1.0, _CHECK_WIDTH_PX / width)
+    small = _reduced(left, scale), _reduced(right, scale)
+    half = _PATCH_PX // 2
+    known = np.argwhere(np.isfinite(disparity))
+    if len(known) < _CHECKS:
+        return math.nan
+    sample = known[np.linspace(0, len(known) - 1, _CHECKS).astype(np.intp)]
+    values = disparity[sample[:, 0], sample[:, 1]] * scale
+    reach = math.ceil(float(np.nanmax(disparity)) * scale) + 2
+    found = tried = 0
+    for (row, column), shift in zip(((sample + 0.5) * scale - 0.5).tolist(), values.tolist(), strict=True):
+        y, x = round(row), round(column - shift)
+        expected = column - shift - x  # the rest that rounding took
+        lower = y + round(offset_px * scale)
+        if min(y, lower, x) < half:
+            continue
+        patch = small[1][lower - half : lower + half + 1, x - half : x + half + 1]
+        strip = small[0][y - half : y + half + 1, x - half : x + reach + half + 1]
+        if patch.shape != (_PATCH_PX, _PATCH_PX) or strip.shape[0] < _PATCH_PX or strip.shape[1] < _PATCH_PX + shift:
+            continue
+        tried += 1
+        likeness: NDArray[np.float32] = np.asarray(cv2.matchTemplate(strip, patch, cv2.TM_CCOEFF_NORMED), np.float32)
+        found += abs(int(likeness.argmax()) - shift - expected) <= _BACK_PX
+    return found / tried if tried >= _CHECKS // 4 else math.nan

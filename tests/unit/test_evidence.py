@@ -1,0 +1,250 @@
+"""Mistakes made on a rendered pair are named rightly; good pairs, also behind a rig, raise no doubt."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
+
+import cv2
+import numpy as np
+import pytest
+
+from common import now
+from common.ledger import StageTimes
+from phone_host.measure.image_doubts import image_doubts
+from phone_host.measure.trust import Doubt
+from phone_host.model import Arrangement, CameraModel, CutCounts, Evidence, Image, Processed, RectifiedPair, Rig, Side
+from phone_host.scene.scene import Look, demo_scene, render, rig_poses
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
+from phone_host.stereo.evidence_points import ThroughRig, turned_back
+from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.rectify import Rectifier
+from tests.support.rigs import points_seen_by_both, unlike_rig
+
+Pair = tuple[Image, Image]
+
+SGBM: Final = create_matcher(MatchSettings(MatcherName.SGBM, 48))
+FLAT: Final = StereoCore(SGBM)
+
+
+def _rig(turn: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Rig:
+    """Two cameras of 320x240, f = 260 px, 100 mm apart, the right one turned by a rotation vector, rad."""
+    models = [
+        CameraModel(
+            width_px=320,
+            height_px=240,
+            matrix=np.array([[260.0, 0, 159.5 + off], [0, 260.0, 119.5 - off], [0, 0, 1]]),
+            distortion=np.array([lens, 0.02, 0, 0, 0]) * any(turn),
+        )
+        for off, lens in ((0.0, -0.1), (4.0 * any(turn), -0.18))
+    ]
+    rotation = np.asarray(cv2.Rodrigues(np.array(turn))[0], np.float64)
+    centre = rotation @ np.array([0.1, 0.0, 0.0])
+    return Rig(left=models[0], right=models[1], R_right_left=rotation, t_right_left_m=-centre)
+
+
+def _render(rig: Rig) -> Pair:
+    poses, looks = (
+        rig_poses(rig),
+        (Look(noise_sigma=1.0, seed=1), Look(noise_sigma=1.5, gain_bgr=(0.9, 0.9, 0.9), seed=2)),
+    )
+    left, right = (
+        render(demo_scene(), model, pose, look)
+        for model, pose, look in zip((rig.left, rig.right), poses, looks, strict=True)
+    )
+    return left, right
+
+
+@pytest.fixture(scope="module")
+def good() -> Pair:
+    """A rectified pair of the demo's scene."""
+    return _render(_rig())
+
+
+@pytest.fixture(scope="module")
+def turned_rig() -> Rig:
+    """Unlike lenses, and a right camera that looks 1.2 degrees aside, down and rolled."""
+    return _rig((0.02, -0.02, 0.02))
+
+
+@pytest.fixture(scope="module")
+def raw(turned_rig: Rig) -> Pair:
+    """What that rig sees."""
+    return _render(turned_rig)
+
+
+def _evidence(core: StereoCore, left: Image, right: Image) -> Evidence:
+    processed = core.compute(left, right, now.monotonic_ns)
+    return measure_evidence(processed, maps_of(core, processed))
+
+
+def _doubts(core: StereoCore, left: Image, right: Image) -> list[Doubt]:
+    return [concern.doubt for concern in image_doubts(_evidence(core, left, right))]
+
+
+def _turn(image: Image, code: int) -> Image:
+    return np.asarray(cv2.rotate(image, code), np.uint8)
+
+
+def _flip(image: Image, axis: int) -> Image:
+    return np.asarray(cv2.flip(image, axis), np.uint8)
+
+
+def _square(image: Image) -> Image:
+    return image[:, 40:280].copy()
+
+
+def _blur(image: Image) -> Image:
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), 3.0), np.uint8)
+
+
+def _noise(image: Image, level: float, seed: int) -> Image:
+    return np.clip(np.random.default_rng(seed).normal(level, 2.0, image.shape), 0, 255).astype(np.uint8)
+
+
+def _dark(image: Image) -> Image:
+    return np.asarray(image * 0.08, np.uint8)
+
+
+def _both(change: Callable[[Image], Image]) -> Callable[[Image, Image], Pair]:
+    return lambda left, right: (change(left), change(right))
+
+
+HALF, QUARTER = cv2.ROTATE_180, cv2.ROTATE_90_CLOCKWISE
+MISTAKES: Final[dict[str, tuple[Doubt, Callable[[Image, Image], Pair]]]] = {
+    "swapped": (Doubt.SWAPPED, lambda left, right: (right, left)),
+    "right on its head": (Doubt.TURNED, lambda left, right: (left, _turn(right, HALF))),
+    "left on its head": (Doubt.TURNED, lambda left, right: (_turn(left, HALF), right)),
+    "right turned by a quarter": (Doubt.TURNED_BY_QUARTER, lambda a, b: (_square(a), _turn(_square(b), QUARTER))),
+    "left turned by a quarter": (Doubt.TURNED_BY_QUARTER, lambda a, b: (_turn(_square(a), QUARTER), _square(b))),
+    "both turned by a quarter": (Doubt.TURNED_BY_QUARTER, _both(lambda image: _turn(_square(image), QUARTER))),
+    "right mirrored": (Doubt.MIRRORED, lambda left, right: (left, _flip(right, 1))),
+    "left mirrored top to bottom": (Doubt.MIRRORED, lambda left, right: (_flip(left, 0), right)),
+    "same image": (Doubt.SAME_IMAGE, lambda left, _: (left, left)),
+    "same image, darker and blurred": (
+        Doubt.SAME_IMAGE,
+        lambda left, _: (left, np.asarray(cv2.GaussianBlur(left * 0.8, (0, 0), 0.6), np.uint8)),
+    ),
+    "right covered": (Doubt.COVERED, lambda left, right: (left, _noise(right, 3, 1))),
+    "left covered by a finger": (Doubt.COVERED, lambda left, right: (_noise(left, 80, 1), right)),
+    "both covered": (Doubt.COVERED, lambda left, right: (_noise(left, 3, 1), _noise(right, 3, 2))),
+    "right dark": (Doubt.DARK, lambda left, right: (left, _dark(right))),
+    "both dark": (Doubt.DARK, _both(_dark)),
+    "left unfocused": (Doubt.UNFOCUSED, lambda left, right: (_blur(left), right)),
+    "both unfocused": (Doubt.UNFOCUSED, _both(_blur)),
+    "another scene": (Doubt.OTHER_SCENE, lambda left, right: (left, _texture(right.shape))),
+}
+
+
+def _texture(shape: tuple[int, ...]) -> Image:
+    noise = cv2.GaussianBlur(np.random.default_rng(4).normal(size=shape), (0, 0), 2.0)
+    return np.asarray(np.clip(128 + noise / noise.std() * 40, 0, 255), np.uint8)
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_named_and_no_other_one(good: Pair, mistake: str) -> None:
+    """The first doubt is the mistake's own; no blocking doubt stands beside it."""
+    doubt, change = MISTAKES[mistake]
+    found = _doubts(FLAT, *change(*good))
+    assert found[:1] == [doubt]
+    assert not [other for other in found[1:] if other.blocks]
+
+
+def test_a_good_pair_raises_no_doubt(good: Pair) -> None:
+    """Figures are those of geometry: rows agree, and the median disparity is that of the scene, 0.7 to 2.5 m away at f b = 26 m px."""
+    evidence = _evidence(FLAT, *good)
+    assert image_doubts(evidence) == ()
+    assert evidence.density > 0.7
+    assert evidence.consistency > 0.6
+    assert evidence.vertical_px < 0.3
+    assert 26 / 2.5 <= evidence.disparity_px <= 26 / 0.7
+
+
+@pytest.mark.parametrize("lower_px", [-1.5, 1.5, 4.0])
+def test_the_vertical_error_is_measured(good: Pair, lower_px: float) -> None:
+    """A right image that lies too low is told with its sign and size; 4 px are a doubt, 1.5 px are not."""
+    move = np.array([[1, 0, 0], [0, 1, lower_px]])
+    lower = np.asarray(cv2.warpAffine(good[1], move, (320, 240), borderMode=cv2.BORDER_REPLICATE), np.uint8)
+    evidence = _evidence(FLAT, good[0], lower)
+    assert evidence.vertical_offset_px == pytest.approx(lower_px, abs=0.15)
+    assert evidence.vertical_px == pytest.approx(abs(lower_px), abs=0.15)
+    doubts = [concern.doubt for concern in image_doubts(evidence)]
+    assert (Doubt.VERTICAL_ERROR in doubts) == (abs(lower_px) > 2)
+    assert not any(doubt.blocks for doubt in doubts)
+
+
+def test_behind_a_rig_mistakes_are_made_in_the_cameras_own_images(turned_rig: Rig, raw: Pair) -> None:
+    """Through a rig of unlike, turned cameras the good pair raises no doubt, and each mistake has its name; both on their heads and both mirrored are told from swapped ones."""
+    core = StereoCore(SGBM, Rectifier(turned_rig))
+    left, right = raw
+    assert _doubts(core, left, right) == []
+    assert _doubts(core, right, left)[0] is Doubt.SWAPPED
+    assert _doubts(core, left, left)[0] is Doubt.SAME_IMAGE
+    assert _doubts(core, left, _turn(right, HALF))[0] is Doubt.TURNED
+    assert _doubts(core, _turn(left, HALF), _turn(right, HALF))[0] is Doubt.TURNED
+    assert _doubts(core, _flip(left, 1), _flip(right, 1))[0] is Doubt.MIRRORED
+    assert _doubts(core, left, _flip(right, 1))[0] is Doubt.MIRRORED
+
+
+def test_points_go_to_the_cameras_image_and_back() -> None:
+    """Points that both cameras see keep their place to 0.01 px on the way to the own image and back, and share a row."""
+    rig = unlike_rig()
+    core = StereoCore(SGBM, Rectifier(rig))
+    assert core.rectification is not None
+    maps = ThroughRig(rig, core.rectification)
+    seen = points_seen_by_both(rig, 200, seed=3)
+    rows = []
+    for side, own in ((Side.LEFT, seen.left_px), (Side.RIGHT, seen.right_px)):
+        rectified = maps.rectified(own, side)
+        assert np.abs(maps.own(rectified, side) - own).max() < 0.01
+        rows.append(rectified[:, 1])
+    assert np.abs(rows[0] - rows[1]).max() < 0.01
+
+
+def test_a_turn_goes_about_the_middle_of_the_image() -> None:
+    """The corner of an image that was turned clockwise comes back to its own corner."""
+    image = np.zeros((30, 30), np.uint8)
+    image[2, 27] = 1
+    for quarters, code in ((1, cv2.ROTATE_90_CLOCKWISE), (2, cv2.ROTATE_180), (3, cv2.ROTATE_90_COUNTERCLOCKWISE)):
+        y, x = np.argwhere(cv2.rotate(image, code))[0]
+        assert turned_back(np.array([[x, y]], np.float64), (30, 30), quarters).tolist() == [[27.0, 2.0]]
+
+
+def test_without_a_rig_only_brightness_is_judged(good: Pair) -> None:
+    """Pairs of a run without calibration are not accused of any arrangement, but a covered camera is named."""
+    swapped = Processed(RectifiedPair(good[1], good[0]), None, None, StageTimes())
+    assert image_doubts(measure_evidence(swapped, None)) == ()
+    blind = replace(swapped, pair=RectifiedPair(good[0], _noise(good[1], 3, 1)))
+    assert [concern.doubt for concern in image_doubts(measure_evidence(blind, None))] == [Doubt.COVERED]
+
+
+def test_images_without_anything_in_them_are_measured_too() -> None:
+    """Plain images of one level, and images of a few pixels, give evidence without any feature and no accusation but of blindness."""
+    for size in ((240, 320), (9, 16)):
+        plain = np.full((*size, 3), 128, np.uint8)
+        evidence = _evidence(FLAT, plain, plain)
+        assert max(support.features for support in evidence.supports) == 0
+        assert not [concern for concern in image_doubts(evidence) if concern.doubt.blocks]
+
+
+def test_depth_is_what_is_left_after_the_cut() -> None:
+    """A pair has depth if a pixel was kept; without cuts, if a disparity is known."""
+    pair = RectifiedPair(np.zeros((4, 4), np.uint8), np.zeros((4, 4), np.uint8))
+    some = np.full((4, 4), 3.0, np.float32)
+    known = Processed(pair, some, None, StageTimes())
+    assert has_depth(known)
+    assert not has_depth(replace(known, disparity=some * np.float32(np.nan)))
+    assert not has_depth(replace(known, cut=CutCounts(kept=0, too_far=16)))
+    assert not has_depth(Processed(pair, None, None, StageTimes()))
+
+
+def test_every_arrangement_is_counted_once(good: Pair) -> None:
+    """The supports name each arrangement once; most features of a good pair agree with the right one."""
+    supports = _evidence(FLAT, *good).supports
+    assert [support.arrangement for support in supports] == sorted(
+        Arrangement, key=[s.arrangement for s in supports].index
+    )
+    counts = {support.arrangement: support.features for support in supports}
+    assert counts[Arrangement.RIGHT] == max(counts.values()) or counts[Arrangement.TILTED] == max(counts.values())
+    assert counts[Arrangement.RIGHT] > 50

@@ -1,0 +1,200 @@
+"""What is concluded from the evidence: which doubts, when they stand, and the headline that follows."""
+
+import math
+from dataclasses import replace
+from typing import Any, Final
+
+import pytest
+
+from phone_host.measure.headline import Grade, answer, depth_error_m, headline
+from phone_host.measure.image_doubts import ImageFigures, ImageJudge, ImageTrust, image_doubts, median_figures
+from phone_host.measure.run_snapshot import RunSnapshot, concerns, depth_is_wrong
+from phone_host.measure.trust import Concern, Doubt
+from phone_host.model import Arrangement, Evidence, Exposure, StereoGeometry, Support
+from phone_host.report.run_json import build
+from phone_host.report.summary import summary
+from tests.unit.test_run_report import run
+
+SHARP: Final = Exposure(mean_level=110, bright_level=200, structure=30, blur_px=1.0, features=400)
+GEOMETRY: Final = StereoGeometry(focal_px=500, baseline_m=0.1, cx_px=320, cy_px=240)
+
+
+def evidence(**counts: int) -> Evidence:
+    """A good pair whose features agree with the named arrangements; 200 with the right one unless told."""
+    found = {"right": 200, "tilted": 200} | counts
+    supports = tuple(Support(kind, found.get(kind.value, 0)) for kind in Arrangement)
+    return Evidence(
+        left=SHARP, right=SHARP, density=0.9, consistency=0.9, vertical_px=0.2, vertical_offset_px=0.1,
+        supports=supports, disparity_px=25.0,
+    )  # fmt: skip
+
+
+def doubts(found: Evidence) -> list[Doubt]:
+    """What is doubtful about it."""
+    return [concern.doubt for concern in image_doubts(found)]
+
+
+COVERED: Final = Exposure(mean_level=3, bright_level=5, structure=0.3, blur_px=math.nan)
+GOOD: Final = evidence()
+SWAPPED: Final = replace(evidence(right=0, swapped=150, both_turned=150, both_mirrored=150), density=0.05)
+BLIND: Final = replace(evidence(right=0, tilted=0), right=COVERED)
+
+
+@pytest.mark.parametrize(
+    ("found", "named"),
+    [
+        (GOOD, []),
+        (SWAPPED, [Doubt.SWAPPED]),
+        (evidence(right=60, swapped=119), []),  # less than twice as many
+        (evidence(right=60, swapped=120), [Doubt.SWAPPED]),
+        (evidence(right=0, tilted=4, swapped=11), []),  # too few to name anything
+        (evidence(right=20, swapped=100, both_turned=150), [Doubt.TURNED]),
+        (evidence(right=20, swapped=100, both_mirrored=150), [Doubt.MIRRORED]),
+        (evidence(right=0, both_turned_by_quarter=150), [Doubt.TURNED_BY_QUARTER]),
+        (evidence(right=3, tilted=5, turned=90), [Doubt.TURNED]),
+        (evidence(right=3, tilted=5, turned_by_quarter=90), [Doubt.TURNED_BY_QUARTER]),
+        (evidence(right=3, tilted=5, mirrored=90), [Doubt.MIRRORED]),
+        (evidence(mirrored=90), []),  # a chessboard looks like its mirror image
+        (evidence(same_place=160), [Doubt.SAME_IMAGE]),
+        (evidence(same_place=140), []),  # a street whose far end does not move
+        (BLIND, [Doubt.COVERED]),
+        (replace(GOOD, right=replace(SHARP, mean_level=10, bright_level=20)), [Doubt.DARK]),
+        (replace(GOOD, right=replace(SHARP, blur_px=2.5)), [Doubt.UNFOCUSED]),
+        (replace(GOOD, left=replace(SHARP, blur_px=1.6), right=replace(SHARP, blur_px=0.8)), [Doubt.UNFOCUSED]),
+        (replace(GOOD, left=replace(SHARP, blur_px=1.4), right=replace(SHARP, blur_px=0.7)), []),
+        (replace(evidence(right=2, tilted=3), density=0.05), [Doubt.OTHER_SCENE]),
+        (replace(evidence(right=2, tilted=3), density=0.5), []),  # the matcher finds what features do not
+        (replace(GOOD, density=0.1), [Doubt.LOW_DENSITY]),
+        (replace(GOOD, consistency=0.2), [Doubt.LOW_CONSISTENCY]),
+        (replace(GOOD, vertical_px=2.1), [Doubt.VERTICAL_ERROR]),
+        (evidence(right=50), [Doubt.VERTICAL_ERROR]),  # most features are on tilted rows
+    ],
+)  # fmt: skip
+def test_a_doubt_needs_clear_evidence(found: Evidence, named: list[Doubt]) -> None:
+    """Exactly the named doubts follow; each has a sentence and a remedy without NaN."""
+    assert doubts(found) == named
+    assert all(concern.sentence and concern.remedy and "nan" not in concern.sentence for concern in image_doubts(found))
+
+
+def test_both_cameras_are_named_together() -> None:
+    """One covered camera is named by its side, two together."""
+    assert "the right camera sees" in image_doubts(BLIND)[0].sentence
+    assert "both cameras see" in image_doubts(replace(BLIND, left=COVERED))[0].sentence
+    dark = replace(SHARP, mean_level=10.0, bright_level=20.0)
+    assert "both cameras see" in image_doubts(replace(GOOD, left=dark, right=dark))[0].sentence
+
+
+def test_a_doubt_stands_while_most_of_the_latest_three_judgements_have_it() -> None:
+    """One judgement of three is not enough, two are; it goes when two of three are free of it."""
+    judge = ImageJudge()
+    stands: list[list[Doubt]] = []
+    for found in (GOOD, SWAPPED, GOOD, SWAPPED, SWAPPED, GOOD, GOOD):
+        judge.add(found)
+        stands.append([concern.doubt for concern in judge.concerns])
+    named = [Doubt.SWAPPED]
+    assert stands == [[], [], [], named, named, named, []]
+
+
+def test_a_run_of_one_pair_is_judged_by_it() -> None:
+    """The only judgement is most of them."""
+    judge = ImageJudge()
+    assert judge.judged == 0
+    judge.add(SWAPPED)
+    assert [concern.doubt for concern in judge.concerns] == [Doubt.SWAPPED]
+    assert judge.judged == 1
+
+
+def test_figures_move_from_the_start_to_now() -> None:
+    """The first and the latest ten judgements have medians of their own; what was not measured is left out."""
+    judge = ImageJudge()
+    for number in range(30):
+        judge.add(replace(GOOD, vertical_px=0.1 * number, consistency=math.nan))
+    assert judge.start.vertical_px == pytest.approx(0.45)
+    assert judge.now.vertical_px == pytest.approx(2.45)
+    assert math.isnan(judge.now.consistency)
+
+
+def with_images(**values: Any) -> RunSnapshot:
+    """A run of 30 pairs with a rig, as its images say."""
+    images = ImageTrust(judged=3, wants_depth=True, has_depth=True, geometry=GEOMETRY, now=median_figures([GOOD]))
+    return replace(run(30), images=replace(images, **values))
+
+
+def test_the_headline_of_a_good_run_says_how_far_to_trust_it() -> None:
+    """Depth is wrong by z^2 * e / (f b): 1 m^2 * 0.25 px / 50 px m = 5 mm."""
+    said = headline(with_images())
+    assert said.grade is Grade.GOOD
+    assert said.sentence == (
+        "Depth looks right: 90% of the pixels have depth, rows agree to 0.2 px; at 1 m it is good to about 5 mm."
+    )
+    assert depth_error_m(GEOMETRY, 2.0, 0.25) == pytest.approx(0.02)
+    assert summary(with_images()).startswith(said.sentence)
+
+
+def test_a_far_scene_is_answered_for_at_its_own_depth() -> None:
+    """At 5 px the scene is 10 m away: 100 * 0.5 / 50 = 1 m of error with the core's own half pixel; without geometry there are no metres."""
+    far = ImageFigures(density=0.9, disparity_px=5.0)
+    assert "at 10 m it is good to about 1000 mm" in answer(far, (), GEOMETRY, 0.5).sentence
+    assert "in pixels only" in answer(far, (), None).sentence
+    assert "was judged" in answer(ImageFigures(), (), None).sentence
+
+
+def test_a_blocking_doubt_is_the_headline() -> None:
+    """The gravest doubt comes first, before timing, with its remedy; a warning says `may`."""
+    swapped = with_images(concerns=image_doubts(SWAPPED))
+    said = headline(swapped)
+    assert said.grade is Grade.BAD
+    assert said.sentence.startswith("Depth is wrong: left and right are exchanged")
+    assert "swap LEFT and RIGHT" in said.sentence
+    fast = replace(swapped, motion_px_s=1e6, width_px=640)
+    assert concerns(fast)[0].doubt is Doubt.SWAPPED
+    assert len(concerns(fast)) > 1
+    unsharp = headline(with_images(concerns=image_doubts(replace(GOOD, right=replace(SHARP, blur_px=2.5)))))
+    assert (unsharp.grade, unsharp.sentence.split(":")[0]) == (Grade.WARNING, "Depth may be wrong")
+
+
+def test_a_run_that_wanted_depth_and_found_none_has_a_doubt() -> None:
+    """At the end only, and only if no graver doubt says why; without a rig nothing is wanted."""
+    none = with_images(has_depth=False)
+    assert [concern.doubt for concern in concerns(none)] == [Doubt.NO_DEPTH]
+    assert depth_is_wrong(none)
+    assert not depth_is_wrong(with_images())
+    assert concerns(replace(none, ended="running")) == ()
+    assert [concern.doubt for concern in concerns(with_images(has_depth=False, concerns=image_doubts(SWAPPED)))] == [
+        Doubt.SWAPPED
+    ]
+    assert concerns(with_images(has_depth=False, wants_depth=False)) == ()
+
+
+def test_a_run_without_a_rig_is_answered_about_delays() -> None:
+    """It measured delays only and says so; a covered camera is told all the same; no pairs are no success."""
+    plain = run(30)
+    assert headline(plain).sentence.startswith("This run measured pairs and delays only")
+    covered = replace(plain, images=ImageTrust(concerns=image_doubts(replace(BLIND, supports=()))))
+    assert headline(covered).grade is Grade.WARNING
+    assert not depth_is_wrong(covered)
+    assert headline(covered).sentence.startswith("The right camera sees no scene")
+    fast = replace(plain, motion_px_s=1e6, width_px=640)
+    assert headline(fast).grade is Grade.WARNING
+    assert headline(run(0)).grade is Grade.BAD
+    assert "whole images" in headline(replace(run(0), spoiled_images=(("too_large", 3),))).sentence
+
+
+def test_the_report_holds_the_answer_and_every_doubt() -> None:
+    """The block `trust` of report.json: grade, headline, doubts with sentence, remedy and whether they block, figures at first and now."""
+    told: Any = build(with_images(concerns=image_doubts(SWAPPED)))["trust"]
+    assert told["grade"] == "bad"
+    assert told["doubts"][0]["doubt"] == "swapped"
+    assert told["doubts"][0]["blocking"] is True
+    assert told["doubts"][0]["remedy"]
+    assert told["now"] == {"density": 0.9, "consistency": 0.9, "vertical_error_px": 0.2, "vertical_offset_px": 0.1}
+    assert told["at_first"]["density"] is None
+
+
+def test_which_doubts_block() -> None:
+    """Timing, dark, unfocused and low figures warn; what makes depth impossible blocks."""
+    blocking = {doubt.value for doubt in Doubt if doubt.blocks}
+    assert blocking == {
+        "swapped", "turned", "turned_by_quarter", "mirrored", "same_image", "other_scene", "covered", "no_depth",
+    }  # fmt: skip
+    assert not Concern(Doubt.TIME_SKEW, "", "").doubt.blocks
