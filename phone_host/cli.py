@@ -51,7 +51,7 @@ try it without hardware, in half a minute:
 
 your own photographs, taken by two cameras side by side (first of a chessboard, then of the scene):
   phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml
-  phone-host stereo left.png right.png --calibration rig.yaml --out scan
+  phone-host stereo left/ right/ --calibration rig.yaml --out scans
 
 two photographs whose rows already match, without a calibration:
   phone-host stereo left.png right.png --rectified --disparities 64 --out scan

@@ -1,5 +1,8 @@
 """The host doctor's own verdicts: Python, packages, rig and the board's answer."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 
 from common.doctor.finding import Grade
@@ -15,6 +18,10 @@ from phone_host.doctor.host_checks import (
     check_python,
     check_rig,
 )
+from phone_host.doctor.vision_checks import read_rig_readings
+from phone_host.output.rig_yaml import write_rig
+from phone_host.stereo.rectify import rectify_rig
+from tests.support.rigs import unlike_rig
 
 OK, WARN, FAIL = Grade.OK, Grade.WARN, Grade.FAIL
 
@@ -114,3 +121,12 @@ def test_ports_and_folder() -> None:
     assert check_ports((), "No module named 'serial'").verdict is WARN
     assert check_out("scan", writable=True) == []
     assert check_out("/proc", writable=False)[0].verdict is FAIL
+
+
+def test_a_rig_files_verdict_reaches_the_doctor(tmp_path: Path) -> None:
+    """A rig.yaml that says `reject` is warned of, one that says `good` is not."""
+    rig = unlike_rig()
+    for verdict, grade in (("reject", WARN), ("good", OK)):
+        judged = replace(rig, verdict=verdict)
+        write_rig(tmp_path / "rig.yaml", judged, rectify_rig(judged))
+        assert check_rig(read_rig_readings(str(tmp_path / "rig.yaml"), "")).verdict is grade
