@@ -12,7 +12,7 @@ from board_agent.rate_control import RateControl
 from board_agent.sd_notify import Notifier
 from board_agent.status import StatusLine
 from common import now
-from common.camera.base import Camera, CameraHealth, Ended, Skipped, Spoiled
+from common.camera.base import Camera, CameraHealth, Ended, Skipped, Spoiled, held_locks, lockable
 from common.camera.factory import open_camera
 from common.errors import ProtocolError, UnavailableError
 from common.frame import Frame
@@ -24,6 +24,7 @@ from common.protocol.board_session import BoardSession
 from common.protocol.message import (
     BoardCounts,
     DropReason,
+    Locks,
     Pacing,
     Pong,
     Refusal,
@@ -163,6 +164,7 @@ class Agent:
         self._session = BoardSession(session, boot_id, camera.description, dialled)
         if control is not None:
             self._session.describe(camera.description, control.rung)
+        self._held: Locks = ()
         self._had_host = False
         self._camera_ended = False
         self._held_back = False
@@ -187,12 +189,15 @@ class Agent:
                 self._grab(now_ns)
             if later_ns := self._session.take_steering():
                 self._camera.steer(later_ns, now_ns)
+            if locks := self._session.take_locks():
+                self._hold(locks, now_ns)
             self._watch_clock()
             self._flush()
             if self._control is not None and self._control.is_due(now_ns):
                 self._adapt(self._control, now_ns)
             now_ns = now.monotonic_ns()
             if now_ns >= self._session.due_ns:
+                self._watch_locks()
                 self._send_all(self._session.tick(now_ns, self._outbox.counts))
             self._watch_host(now_ns)
             if self._service is not None and self._service.notifier.due(now_ns):
@@ -209,6 +214,19 @@ class Agent:
             ended=self._camera_ended,
             camera=self._camera.health,
         )
+
+    def _hold(self, locks: Locks, now_ns: int) -> None:
+        """Hold the camera's controls as the host asks, and tell it what became of that."""
+        if (holder := lockable(self._camera)) is not None:
+            holder.hold(locks, now_ns)
+        self._held = held_locks(self._camera)
+        self._session.hold(self._held)
+
+    def _watch_locks(self) -> None:
+        """Tell the host when other controls are held than before: the camera has settled, or came back."""
+        if (held := held_locks(self._camera)) != self._held:
+            self._held = held
+            self._session.hold(held)
 
     def _due_ns(self, now_ns: int) -> int:
         if self._on_demand:
@@ -355,6 +373,10 @@ class Agent:
             self._had_host = self._session.has_host
             self._alone_since_ns = now_ns
             _LOG.info(event("host_connected" if self._had_host else "host_gone", session=self._session.session))
+            if self._session.cannot_turn:
+                turn = self._camera.description.orientation
+                remedy = "update the host's tandemscan, or leave rotate= and flip= out"
+                _LOG.warning(event("host_cannot_turn", orientation=turn, remedy=remedy))
             if self._had_host:
                 self._camera.resume(now_ns)
         elif not self._had_host and self._idle_ns is not None and now_ns - self._alone_since_ns >= self._idle_ns:

@@ -7,6 +7,7 @@ from typing import Any
 from common.camera.v4l2_controls import Control
 from common.camera.v4l2_device import Device, Identity, capture_nodes
 from common.camera.v4l2_formats import PREFERENCE, FormatOffer, Rates, rate_text
+from common.camera.v4l2_serial import serial_number
 from common.errors import UnavailableError
 
 _KNOWN = {letters: kind.value for letters, kind in PREFERENCE}
@@ -20,6 +21,7 @@ class Listed:
         path: its persistent name.
         node: the node behind that name.
         identity: what the node says about itself.
+        serial: serial number of the USB device; empty if it has none.
         formats: each encoding, with the rates of each of its sizes.
         controls: each control with its value; None if it cannot be read.
     """
@@ -29,6 +31,7 @@ class Listed:
     identity: Identity
     formats: tuple[tuple[FormatOffer, tuple[tuple[tuple[int, int], Rates], ...]], ...]
     controls: tuple[tuple[Control, int | None], ...]
+    serial: str = ""
 
 
 def list_cameras() -> list[Listed]:
@@ -65,6 +68,7 @@ def _ask(device: Device) -> Listed:
         path=device.path,
         node=device.path.resolve(),
         identity=device.identity,
+        serial=serial_number(device.path),
         formats=tuple(formats),
         controls=controls,
     )
@@ -88,10 +92,9 @@ def _read(device: Device, control: Control) -> int | None:
 
 
 def _lines(camera: Listed) -> list[str]:
-    lines = [
-        f"{camera.path}",
-        f"  {camera.identity.card} ({camera.identity.driver}, {camera.identity.bus}) {camera.node}",
-    ]
+    said = camera.identity
+    known = [said.driver, said.bus, *([f"serial {camera.serial}"] if camera.serial else [])]
+    lines = [f"{camera.path}", f"  {said.card} ({', '.join(known)}) {camera.node}"]
     lines += ["", f"  {'format':8} {'as':8} {'size':>11}  frames per second"]
     for offer, sizes in camera.formats:
         if (name := _KNOWN.get(offer.letters)) is None:
@@ -122,6 +125,7 @@ def _values(camera: Listed) -> dict[str, Any]:
         "driver": camera.identity.driver,
         "card": camera.identity.card,
         "bus": camera.identity.bus,
+        "serial": camera.serial,
         "formats": [
             {
                 "letters": offer.letters,

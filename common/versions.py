@@ -24,10 +24,18 @@ LEDGER_FORMAT: Final = 1
 REPORT_FORMAT: Final = 1
 """report.json; a file without `format_version` is of format 1."""
 
+CAMERAS_FORMAT: Final = 1
+"""cameras.json."""
+
 
 def all_versions() -> str:
     """What `--version` prints, without the newline."""
-    files = {"rig.yaml": RIG_FORMAT, "delays.jsonl": LEDGER_FORMAT, "report.json": REPORT_FORMAT}
+    files = {
+        "rig.yaml": RIG_FORMAT,
+        "delays.jsonl": LEDGER_FORMAT,
+        "report.json": REPORT_FORMAT,
+        "cameras.json": CAMERAS_FORMAT,
+    }
     formats = ", ".join(f"{name} {version}" for name, version in files.items())
     return f"tandemscan {PACKAGE_VERSION} (protocol {PROTOCOL_VERSION}, {formats})"
 

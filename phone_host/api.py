@@ -42,11 +42,11 @@ from phone_host.report.run_json import build
 from phone_host.run.host import EndReason, Host, HostSettings
 from phone_host.settings import key_folder
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.depth_limits import DepthWanted
+from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import matcher_named
 from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.rectify import Rectifier
-from phone_host.stereo.reproject import disparities_for_near
 from phone_host.sync.fifo import FifoSettings
 
 __all__ = ["Result", "RunSnapshot", "Scanner", "StereoGeometry", "open_scanner"]
@@ -341,15 +341,16 @@ def _core(
     if rig is None and geometry is None and disparities is None and isinstance(matcher, str):
         return None
     rectifier = None if rig is None else Rectifier(rig)
-    if disparities is None and rectifier is not None:
-        disparities = disparities_for_near(rectifier.geometry, near_m, rectifier.rectification.width_px)
-    return StereoCore(_matcher(matcher, disparities), rectifier, geometry)
+    wanted = DepthWanted(search_from_m=near_m if disparities is None else math.nan)
+    return StereoCore(_matcher(matcher, disparities, rectifier), rectifier, geometry, wanted)
 
 
-def _matcher(matcher: str | Matcher, disparities: int | None) -> Matcher:
+def _matcher(matcher: str | Matcher, disparities: int | None, rectifier: Rectifier | None) -> Matcher | MatchSettings:
     if not isinstance(matcher, str):
         return matcher
     chosen = matcher_named(matcher)
-    if disparities is None:
+    if disparities is not None:
+        return MatchSettings(chosen, disparities)
+    if rectifier is None:
         raise SettingsError("rectified images without disparities", "give the number of disparities, for example 64")
-    return create_matcher(MatchSettings(chosen, disparities))
+    return MatchSettings(chosen)

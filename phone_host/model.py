@@ -11,6 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from common.camera.identity import CameraState
+from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import Frame
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.protocol.message import FrameMessage
@@ -68,7 +70,8 @@ class DepthLimits:
     Attributes:
         near_m: nearer points are cut, m; 0: none.
         far_m: points are cut that have a coordinate beyond it, m.
-        disparity_error_px: the error of a disparity from which `far_m` and every depth's uncertainty follow, px.
+        disparity_error_px: the error of a disparity from which `far_m` and every depth's uncertainty follow, px of the
+            rectified images.
         from_rig: whether `far_m` follows from the rig; else the user gave it.
     """
 
@@ -99,12 +102,50 @@ class CutCounts:
     outside: int = 0
 
 
+class Epipolar(Enum):
+    """Where a point of the left image lies in the rectified right one, d px away: which way the epipolar lines run.
+
+    LEFT: on the same row, at (x - d, y). The right camera stands to the right of the left one, as is usual.
+    UP: in the same column, at (x, y - d). The "right" camera stands below the left one.
+    DOWN: in the same column, at (x, y + d). The "right" camera stands above the left one.
+    """
+
+    LEFT = "left"
+    UP = "up"
+    DOWN = "down"
+
+    @property
+    def is_vertical(self) -> bool:
+        """Whether the epipolar lines are columns: the cameras stand one above the other."""
+        return self is not Epipolar.LEFT
+
+
 @dataclass(frozen=True, slots=True)
 class RectifiedPair:
-    """Two images of equal size whose epipolar lines are their rows: a point at (x, y) left lies at (x - d, y) right."""
+    """Two images of equal size whose epipolar lines are their rows: a point at (x, y) left lies at (x - d, y) right.
+
+    Attributes:
+        left: of the reference camera.
+        right: the same size.
+        epipolar: other than LEFT if the cameras stand one above the other; then the lines are columns.
+    """
 
     left: Image
     right: Image
+    epipolar: Epipolar = Epipolar.LEFT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """How a pair was matched.
+
+    Attributes:
+        scale: size of the images that were matched, as a share of the rectified ones', in (0, 1].
+        disparities: N, px of the rectified images: 0 <= d < N was searched; 0: the matcher's own range, not known here.
+    """
+
+    scale: float = 1.0
+    disparities: int = 0
 
 
 class Side(Enum):
@@ -175,6 +216,8 @@ class Rig:
         zero_sigma_px: standard uncertainty of the disparity of infinitely far points, px, at the size of the rig's
             images; NaN = not measured.
         verdict: how the calibration judged itself (good, usable or reject); empty: not stated.
+        left_camera: which camera the left one was, and how it was set; None: not stated.
+        right_camera: the same for the right one.
     """
 
     left: CameraModel
@@ -188,6 +231,8 @@ class Rig:
     time_offset: TimeOffset = TimeOffset()
     zero_sigma_px: float = float("nan")
     verdict: str = ""
+    left_camera: CameraState | None = None
+    right_camera: CameraState | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -202,7 +247,8 @@ class Rectification:
         R_right: (3, 3) float64, the same for the right camera (R2).
         P_left: (3, 4) float64 projection of rectified points into the left rectified image (P1).
         P_right: (3, 4) float64, the same for the right rectified image (P2), metres.
-        Q: (4, 4) float64, maps (u, v, d, 1) to homogeneous metres.
+        Q: (4, 4) float64, maps (u, v, d, 1) to homogeneous metres; d >= 0 also if the cameras stand one above the other.
+        epipolar: which way the epipolar lines of the rectified images run.
     """
 
     geometry: StereoGeometry
@@ -213,6 +259,7 @@ class Rectification:
     P_left: NDArray[np.float64]
     P_right: NDArray[np.float64]
     Q: NDArray[np.float64]
+    epipolar: Epipolar = Epipolar.LEFT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -228,6 +275,7 @@ class BoardFrame:
         uncertainty_ns: uncertainty of that offset.
         asked_px: (width, height) that the camera was asked for, px. The frame itself may be smaller. Zeros: use the
             frame's own size.
+        orientation: how its image becomes upright. All sizes are those before that.
     """
 
     message: FrameMessage
@@ -237,6 +285,7 @@ class BoardFrame:
     offset_ns: int
     uncertainty_ns: int
     asked_px: tuple[int, int] = (0, 0)
+    orientation: Orientation = UPRIGHT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -271,7 +320,8 @@ class Processed:
         stages: time of each stage; `write` is still 0.
         geometry: converts this disparity to metres; None without a core or geometry.
         limits: to which the cloud was cut; None without a cloud.
-        cut: what became of the pixels; None without a core.
+        cut: what became of the pixels; None without a core. Without geometry, `kept` counts disparities.
+        search: how the pair was matched; None without a core.
     """
 
     pair: RectifiedPair
@@ -281,6 +331,7 @@ class Processed:
     geometry: StereoGeometry | None = None
     limits: DepthLimits | None = None
     cut: CutCounts | None = None
+    search: Search | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from board_agent.settings import SERVICE_SETTINGS, check, resolve_settings
 from common.doctor.finding import exit_code, settings_finding, table, values
 from common.errors import SettingsError
 from common.program import logs
+from common.program.terminal import fitted
 
 
 def run(options: argparse.Namespace) -> int:
@@ -27,5 +28,5 @@ def run(options: argparse.Namespace) -> int:
         wrong = error
     logs.set_up(logging.ERROR)  # the findings say it all
     findings = [settings_finding(str(options.config or ""), wrong), *examine(settings)]
-    print(json.dumps(values(findings)) if options.json else table(findings))
+    print(json.dumps(values(findings)) if options.json else fitted(table(findings)))
     return exit_code(findings, wrong)

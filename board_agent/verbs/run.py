@@ -25,6 +25,7 @@ from common.program.settings import log_level
 from common.program.signals import StopSignals
 from common.protocol.message import BoardCounts
 from common.stamp import board_clock
+from common.words import counted
 
 _LOG: Final = logging.getLogger("board_agent")
 
@@ -47,7 +48,10 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps({**account, "ended": summary.ended, "camera": camera}))
     else:
         drops = "".join(f", {count} {reason}" for reason, count in dropped.items()) or ", none dropped"
-        print(f"session {session}: {counts['grabbed']} frames grabbed, {counts['sent']} sent{drops}", file=sys.stderr)
+        print(
+            f"session {session}: {counted(counts['grabbed'], 'frame')} grabbed, {counts['sent']} sent{drops}",
+            file=sys.stderr,
+        )
     return INTERRUPTED if signals.interrupted else 0
 
 

@@ -5,10 +5,10 @@ A camera never blocks: it says what to wait for (`pollable`, `due_ns`) and then 
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 from common.frame import Frame, FrameFault
-from common.protocol.message import CameraDescription
+from common.protocol.message import CameraDescription, Locks
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,3 +200,30 @@ class Camera(Protocol):
 
     def close(self) -> None:
         """Release the device."""
+
+
+class LockableCamera(Protocol):
+    """What a camera offers besides if some of its controls can be held at given values. `description.controls` names them."""
+
+    @property
+    def held_locks(self) -> Locks:
+        """The controls that are held now, with the values that the device reports; none while it is away."""
+
+    def hold(self, locks: Locks, now_ns: int) -> None:
+        """Hold controls at values from now on, also after the device was away.
+
+        Args:
+            locks: each control with its value; one that the device lacks is left out.
+            now_ns: CLOCK_MONOTONIC now, ns.
+        """
+
+
+def lockable(camera: Camera) -> LockableCamera | None:
+    """Return what holds a camera's controls; None for a camera that has nothing to hold."""
+    return cast("LockableCamera", camera) if hasattr(camera, "hold") and hasattr(camera, "held_locks") else None
+
+
+def held_locks(camera: Camera) -> Locks:
+    """Return the controls of any camera that are held now, with their values."""
+    holder = lockable(camera)
+    return () if holder is None else holder.held_locks

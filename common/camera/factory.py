@@ -1,5 +1,7 @@
 """Opens the camera that a URI names. The registry of cameras: each kind is imported only when needed.
 
+Every kind takes the options `rotate` and `flip`. They are read here; no kind sees them.
+
 Other packages register cameras as entry points of the group `tandemscan.cameras`; the name is the URI's scheme in lower case. The entry point is
 a callable that takes one CameraRequest, opens the camera and returns a `common.camera.base.Camera`. It raises a SettingsError for an unusable
 option, and an UnavailableError for a device that cannot be had.
@@ -11,6 +13,8 @@ from urllib.parse import parse_qsl
 
 from common.camera.base import Camera
 from common.camera.options import EXAMPLE
+from common.camera.orientation import ORIENTING, Orientation, orientation_of
+from common.camera.turned import turned
 from common.errors import SettingsError
 from common.program.extensions import make_registered, named, registered_names
 
@@ -24,7 +28,7 @@ class CameraRequest:
     Attributes:
         uri: the whole URI, for errors.
         path: the part between the scheme and the options.
-        options: the options after the question mark, in their order.
+        options: the options after the question mark, in their order, without `rotate` and `flip`.
         clock: name of this machine's clock, for the stamps.
         now_ns: CLOCK_MONOTONIC now, ns.
     """
@@ -71,14 +75,14 @@ def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
         UnavailableError: there is no such device or folder.
         DataError: a replay's images are bad.
     """
-    scheme, path, options = _parts(uri)
+    scheme, path, options, orientation = _parts(uri)
     if scheme in _KINDS:
         settings = _read(scheme, uri, path, options, clock)
         camera: Camera = named(_KINDS[scheme].open)(settings, now_ns)
-        return camera
+        return turned(camera, orientation)
     request = CameraRequest(uri=uri, path=path, options=tuple(options.items()), clock=clock, now_ns=now_ns)
     extension: Camera = make_registered(_CAMERAS, scheme, Camera, request)
-    return extension
+    return turned(extension, orientation)
 
 
 def parse_camera(uri: str, clock: str) -> object:
@@ -94,8 +98,20 @@ def parse_camera(uri: str, clock: str) -> object:
     Raises:
         SettingsError: the URI makes no sense.
     """
-    scheme, path, options = _parts(uri)
+    scheme, path, options, _ = _parts(uri)
     return _read(scheme, uri, path, options, clock) if scheme in _KINDS else None
+
+
+def parse_orientation(uri: str) -> Orientation:
+    """Parse how a camera URI says that the camera is mounted.
+
+    Args:
+        uri: see EXAMPLE.
+
+    Raises:
+        SettingsError: the URI makes no sense.
+    """
+    return _parts(uri)[-1]
 
 
 def _read(scheme: str, uri: str, path: str, options: dict[str, str], clock: str) -> object:
@@ -103,13 +119,15 @@ def _read(scheme: str, uri: str, path: str, options: dict[str, str], clock: str)
     return settings
 
 
-def _parts(uri: str) -> tuple[str, str, dict[str, str]]:
-    """Split scheme, path and options; check that the scheme is known."""
+def _parts(uri: str) -> tuple[str, str, dict[str, str], Orientation]:
+    """Split scheme, path, options and orientation; check that the scheme is known."""
     scheme, found, rest = uri.partition(":")
     known = found and (scheme in _KINDS or scheme in registered_names(_CAMERAS))
     if not known or (scheme == "replay" and not rest):
         raise SettingsError(f"camera {uri!r} is of an unknown kind", f"give {EXAMPLE}")
-    return scheme, *_split(uri, rest)
+    path, options = _split(uri, rest)
+    others = {name: value for name, value in options.items() if name not in ORIENTING}
+    return scheme, path, others, orientation_of(options, uri)
 
 
 def _split(uri: str, rest: str) -> tuple[str, dict[str, str]]:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import Final
 
 from common.errors import SettingsError
 
@@ -31,6 +32,13 @@ class Orientation:
         """Return width and height of the upright image, given those of the camera's."""
         return size_px[::-1] if self.rotate_deg in {90, 270} else size_px
 
+    def __str__(self) -> str:
+        turn = [f"rotate={self.rotate_deg}"] if self.rotate_deg else []
+        return "&".join([*turn, *([f"flip={self.flip.value}"] if self.flip is not Flip.NONE else [])])
+
+
+ORIENTING: Final = frozenset({"rotate", "flip"})
+"""The options of every camera URI that say how the camera is mounted."""
 
 UPRIGHT = Orientation()
 """The images are used as the camera gives them."""

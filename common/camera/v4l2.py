@@ -15,15 +15,17 @@ from typing import Final
 
 from common.camera.base import CameraHealth, Grab, Mode, Offers
 from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Step, Unwanted
+from common.camera.v4l2_controls import to_axis, to_locks
 from common.camera.v4l2_device import capture_nodes, lasting_name
 from common.camera.v4l2_formats import Wanted
 from common.camera.v4l2_ring import RING_BUFFERS
+from common.camera.v4l2_stamps import rate_remedy
 from common.camera.v4l2_stream import Stream, V4l2Settings
 from common.camera.v4l2_tally import Tally
 from common.errors import TandemError, UnavailableError
 from common.frame import Frame
 from common.program.logs import event
-from common.protocol.message import CameraDescription, Pacing, Steering
+from common.protocol.message import CameraDescription, Locks, Pacing, Steering
 
 _LOG = logging.getLogger(__name__)
 
@@ -97,6 +99,8 @@ class V4l2Camera:
                 period_ns=stream.period_ns,
                 pacing=Pacing.CLOCK,
                 steering=Steering.RESTART,
+                identity=stream.identity,
+                controls=to_locks(stream.controls.lockable()),
             )
             self._rates_hz = {stream.period_ns: settings.wanted.fps}
             self._rates_hz |= {int(1_000_000_000 / rate_hz): rate_hz for rate_hz in stream.slower_hz}
@@ -149,6 +153,25 @@ class V4l2Camera:
             held=tuple((axis.value, value) for axis, value in self._wishes.held),
             period_ns=tally.rate.period_ns,
         )
+
+    @property
+    def held_locks(self) -> Locks:
+        """See LockableCamera."""
+        return () if self._stream is None else to_locks(self._stream.controls.held)
+
+    def hold(self, locks: Locks, now_ns: int) -> None:
+        """See LockableCamera. A camera that is away is held when it is back."""
+        held = tuple(to_axis(lock, value) for lock, value in locks)
+        self._wishes = self._wishes.with_held(held)
+        if self._stream is None:
+            return
+        try:
+            self._stream.controls.hold(held)
+        except OSError as error:
+            self._lose(error, now_ns)
+            return
+        told = {lock.value: value for lock, value in self.held_locks}
+        _LOG.info(event("camera_locked", camera=self._path, **told))
 
     def due_ns(self, now_ns: int) -> int:
         """When something is to be done that no descriptor reports: a stall, a retry, controls to be held."""
@@ -314,11 +337,13 @@ class V4l2Camera:
         if self._tally.grabs % 32 or self._tally.rate.differs_from(nominal_ns) is self._rate_is_off:
             return
         self._rate_is_off = not self._rate_is_off
-        measured_ms, nominal_ms = round((self._tally.rate.period_ns or 0) / 1e6, 2), round(nominal_ns / 1e6, 2)
-        say = _LOG.warning if self._rate_is_off else _LOG.info
-        say(
-            event("rate_differs" if self._rate_is_off else "rate_nominal", period_ms=measured_ms, nominal_ms=nominal_ms)
-        )
+        period_ns = self._tally.rate.period_ns or 1
+        figures = {"period_ms": round(period_ns / 1e6, 2), "nominal_ms": round(nominal_ns / 1e6, 2)}
+        if self._rate_is_off and self._stream is not None:
+            remedy = rate_remedy(period_ns, nominal_ns, self._stream.controls.exposure_ns)
+            _LOG.warning(event("rate_differs", **figures, remedy=remedy))
+        else:
+            _LOG.info(event("rate_nominal", **figures))
 
     def _lose(self, error: OSError, now_ns: int) -> None:
         if error.errno in {errno.ENODEV, errno.ENXIO}:

@@ -9,6 +9,7 @@ from enum import Enum
 from typing import Final
 
 from common.camera import v4l2_abi as abi
+from common.camera.identity import LARGEST_LOCK, Lock
 
 
 class PowerLine(Enum):
@@ -20,12 +21,37 @@ class PowerLine(Enum):
 
 
 class Axis(Enum):
-    """One thing that a camera may adjust by itself."""
+    """One thing that a camera may adjust, by itself or when told."""
 
     EXPOSURE = "exposure"
     GAIN = "gain"
     WHITE_BALANCE = "white_balance"
     FOCUS = "focus"
+    ZOOM = "zoom"
+
+
+_LOCKED: Final = {
+    Lock.EXPOSURE: Axis.EXPOSURE,
+    Lock.WHITE_BALANCE: Axis.WHITE_BALANCE,
+    Lock.FOCUS: Axis.FOCUS,
+    Lock.ZOOM: Axis.ZOOM,
+}
+_EXPOSURE_UNIT_US: Final = abi.EXPOSURE_UNIT_NS // 1000
+
+
+def to_axis(lock: Lock, value: int) -> tuple["Axis", int]:
+    """Convert a lock to the axis and the control's own unit."""
+    return _LOCKED[lock], max(1, round(value / _EXPOSURE_UNIT_US)) if lock is Lock.EXPOSURE else value
+
+
+def to_locks(held: tuple[tuple["Axis", int], ...]) -> tuple[tuple[Lock, int], ...]:
+    """Convert axes with values in the controls' own units to locks. Axes that are no locks are left out."""
+    values = dict(held)
+    found = ((lock, values[axis]) for lock, axis in _LOCKED.items() if axis in values)
+    return tuple(
+        (lock, min(LARGEST_LOCK, value * _EXPOSURE_UNIT_US) if lock is Lock.EXPOSURE else value)
+        for lock, value in found
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,6 +124,10 @@ class ControlWishes:
         """The value to hold an axis at; None: it stays automatic."""
         return dict(self.held).get(axis)
 
+    def with_held(self, held: tuple[tuple[Axis, int], ...]) -> "ControlWishes":
+        """These wishes with other values for some axes."""
+        return replace(self, held=tuple({**dict(self.held), **dict(held)}.items()))
+
     def with_found(self, found: tuple[tuple[Axis, int], ...]) -> "ControlWishes":
         """These wishes with the found axes held as well: a camera that is plugged in again comes back as it was."""
         return replace(self, held=tuple({**dict(found), **dict(self.held)}.items()))
@@ -125,6 +155,9 @@ class _AxisControls:
     value: int
 
 
+_NONE: Final = 0
+"""No control has this id."""
+
 _AXES: Final = {
     Axis.EXPOSURE: _AxisControls(
         abi.CID_AUTO_EXPOSURE, (abi.EXPOSURE_MANUAL, abi.EXPOSURE_SHUTTER_PRIORITY), abi.CID_EXPOSURE_TIME_ABSOLUTE
@@ -132,6 +165,7 @@ _AXES: Final = {
     Axis.GAIN: _AxisControls(abi.CID_AUTOGAIN, (0,), abi.CID_GAIN),
     Axis.WHITE_BALANCE: _AxisControls(abi.CID_WHITE_BALANCE_AUTOMATIC, (0,), abi.CID_WHITE_BALANCE_TEMPERATURE),
     Axis.FOCUS: _AxisControls(abi.CID_FOCUS_AUTOMATIC_CONTINUOUS, (0,), abi.CID_FOCUS_ABSOLUTE),
+    Axis.ZOOM: _AxisControls(_NONE, (), abi.CID_ZOOM_ABSOLUTE),
 }
 
 
@@ -181,6 +215,19 @@ class ControlPlan:
             if value is not None:
                 steps += self._hold(axis, value)
         return steps
+
+    def to_hold(self, held: tuple[tuple[Axis, int], ...]) -> list[Step]:
+        """How to hold axes at values while the camera runs."""
+        return [step for axis, value in held for step in self._hold(axis, value)]
+
+    def value_control(self, axis: Axis) -> Control | None:
+        """The control that holds an axis's value, if there is one."""
+        return self._by_id.get(_AXES[axis].value)
+
+    def lockable(self) -> list[tuple[Axis, Control]]:
+        """The axes that can be locked: their values can be set and read."""
+        found = [(axis, self.value_control(axis)) for axis in _LOCKED.values()]
+        return [(axis, item) for axis, item in found if item is not None and item.can_be_set and item.can_be_read]
 
     def to_set_quality(self, quality: int) -> list[Step]:
         """How to set the JPEG quality, before or during the stream; 0: leave it as it is."""

@@ -18,6 +18,7 @@ class OpenControls:
     Attributes:
         exposure_ns: exposure time as last read, ns; None if the camera does not report it.
         tells_exposure: whether the driver reports each change of the exposure time.
+        held: the axes that are held, with the values that the driver reports for them.
 
     Args:
         device: the device; must outlive this.
@@ -37,7 +38,9 @@ class OpenControls:
         self._exposure = self._plan.exposure()
         self.tells_exposure = self._exposure is not None and device.watch_control(self._exposure.id)
         self.exposure_ns: int | None = None
+        self.held: tuple[tuple[Axis, int], ...] = ()
         self.read_exposure()
+        self._read_held(wishes.held)
 
     def has_events(self) -> bool:
         """Take the waiting events; return whether there were any, which means that the exposure time has changed.
@@ -74,10 +77,33 @@ class OpenControls:
         found = tuple((axis, value) for axis, value in read if value is not None)
         self._apply(self._plan.to_lock(found, wishes))
         self.read_exposure()
+        self._read_held((*found, *wishes.held))
         held = {axis.value: value for axis, value in (*found, *wishes.held)}
         if held:
             _LOG.info(event("controls_held", camera=self._device.path, **held))
         return found
+
+    def hold(self, held: tuple[tuple[Axis, int], ...]) -> None:
+        """Hold axes at values. Drivers accept that while they stream, or refuse it, which is counted.
+
+        Args:
+            held: each axis with its value, in the control's own unit.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        self._apply(self._plan.to_hold(held))
+        self.read_exposure()
+        self._read_held((*self.held, *held))
+
+    def lockable(self) -> tuple[tuple[Axis, int], ...]:
+        """The axes that can be locked, with their present values.
+
+        Raises:
+            OSError: the camera is gone.
+        """
+        read = [(axis, self._read(control.id)) for axis, control in self._plan.lockable()]
+        return tuple((axis, value) for axis, value in read if value is not None)
 
     def qualities(self) -> tuple[int, ...]:
         """The JPEG qualities, the current one first, then the lower ones; empty if it cannot be set.
@@ -107,6 +133,16 @@ class OpenControls:
                 self._tally.refused += 1
                 reason = errno.errorcode.get(error.errno or 0, str(error))
                 _LOG.warning(event("control_refused", control=step.control.name, value=step.value, reason=reason))
+
+    def _read_held(self, wanted: tuple[tuple[Axis, int], ...]) -> None:
+        """Note what the driver made of the values; a control that cannot be read is taken to hold what was set."""
+        found: dict[Axis, int] = {}
+        for axis, value in dict(wanted).items():
+            control = self._plan.value_control(axis)
+            if control is not None:
+                read = self._read(control.id) if control.can_be_read else control.fitted(value)
+                found |= {} if read is None else {axis: read}
+        self.held = tuple(found.items())
 
     def _read(self, control_id: int) -> int | None:
         """A control's value; None if the driver does not report it."""

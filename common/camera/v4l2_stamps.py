@@ -117,6 +117,23 @@ def estimated_readout_ns(shortest_period_ns: int) -> int:
     return shortest_period_ns // 2
 
 
+def rate_remedy(period_ns: int, nominal_ns: int, exposure_ns: int | None) -> str:
+    """Say what helps when a camera does not keep its rate. Webcams lengthen their exposure in dim light, and the period with it.
+
+    Args:
+        period_ns: measured time between frames, ns.
+        nominal_ns: the time that was set, ns.
+        exposure_ns: exposure time, ns; None if the camera does not report it.
+    """
+    given, most_ms = f"fps={1e9 / period_ns:.3g}", max(1, nominal_ns * 9 // 10_000_000)
+    if period_ns < nominal_ns:
+        return f"ask for the rate that it gives: {given}"
+    light = f"more light, or exposure_ms={most_ms}"
+    if exposure_ns is not None and exposure_ns >= nominal_ns:
+        return f"each exposure takes {exposure_ns / 1e6:.0f} ms: {light}; or ask for {given}"
+    return f"{light}; if the bus is full, smaller frames or another port; or ask for {given}"
+
+
 class RateMeter:
     """The time between frames according to their stamps: running median over 31 frames; gaps are divided by the number of missing frames."""
 

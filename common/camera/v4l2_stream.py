@@ -11,6 +11,7 @@ from typing import Final
 from common import now
 from common.camera import v4l2_abi as abi
 from common.camera.base import Grab, Skipped, Spoiled
+from common.camera.identity import CameraIdentity, identity_of
 from common.camera.v4l2_controls import ControlWishes
 from common.camera.v4l2_device import Device, PixelFormatSet, taken
 from common.camera.v4l2_formats import (
@@ -26,6 +27,7 @@ from common.camera.v4l2_formats import (
 from common.camera.v4l2_open_controls import OpenControls
 from common.camera.v4l2_pack import Packing, SendPart
 from common.camera.v4l2_ring import Filled, Ring
+from common.camera.v4l2_serial import serial_number
 from common.camera.v4l2_stamps import (
     StampSource,
     Timing,
@@ -128,6 +130,12 @@ class Stream:
     def name(self) -> str:
         """The camera's name, for people."""
         return f"{self._device.identity.card} ({self._device.identity.driver})"
+
+    @property
+    def identity(self) -> CameraIdentity:
+        """Which camera it is."""
+        said = self._device.identity
+        return identity_of(said.driver, said.card, serial_number(self._device.path))
 
     @property
     def driver(self) -> str:

@@ -26,8 +26,9 @@ _HELP: Final = {
     "gain": "gain in the camera's own unit, such as gain=32",
     "white_balance": "colour temperature in K, such as white_balance=4600",
     "focus": "focus in the camera's own unit, such as focus=20",
+    "zoom": "zoom in the camera's own unit, such as zoom=100",
     "power_line": "power_line=50 or power_line=60, the mains of the lamps, or power_line=off",
-    "lock": "lock=1 to hold exposure, gain, white balance and focus as found, lock=0 to leave them automatic",
+    "lock": "lock=1 to hold exposure, gain, white balance, focus and zoom as found, lock=0 to leave them automatic",
     "readout_ms": "readout time of the sensor, such as readout_ms=16.7",
     "latency_ms": "constant between readout and stamp, such as latency_ms=4",
 }
@@ -51,7 +52,8 @@ def v4l2_settings(uri: str, path: str, options: Mapping[str, str], clock: str) -
     """
     if unknown := set(options) - set(_HELP):
         raise SettingsError(
-            f"camera {uri!r} has an unknown option {min(unknown)!r}", f"the options are {', '.join(_HELP)}"
+            f"camera {uri!r} has an unknown option {min(unknown)!r}",
+            f"the options are {', '.join(_HELP)}, rotate, flip",
         )
 
     def read(name: str, parse: Callable[[str], T], default: T) -> T:
@@ -69,6 +71,7 @@ def v4l2_settings(uri: str, path: str, options: Mapping[str, str], clock: str) -
             (Axis.GAIN, read("gain", _whole, None)),
             (Axis.WHITE_BALANCE, read("white_balance", _whole, None)),
             (Axis.FOCUS, read("focus", _whole, None)),
+            (Axis.ZOOM, read("zoom", _whole, None)),
         )
         if value is not None
     ]

@@ -5,11 +5,12 @@ from fractions import Fraction
 from typing import Final
 
 from common.camera.v4l2_formats import FormatOffer, Rates, Wanted, choose, choose_rate, rate_text
-from common.camera.v4l2_stamps import StampClock
+from common.camera.v4l2_stamps import StampClock, rate_remedy
 from common.doctor.access import Holder
 from common.doctor.finding import Finding, fail, ok, warn
 from common.errors import TandemError
 from common.frame import raw_bytes
+from common.words import counted
 
 _MB: Final = 1e6
 
@@ -81,6 +82,7 @@ class Sample:
         stamps: clock named by the stamps' flags; None without a frame.
         driver: the kernel driver's name.
         refused: controls that the driver would not set.
+        exposure_ns: exposure time at the end, ns; None if the camera does not report it.
     """
 
     frames: int
@@ -94,6 +96,7 @@ class Sample:
     stamps: StampClock | None
     driver: str
     refused: int = 0
+    exposure_ns: int | None = None
 
 
 def check_absence(nodes: int, cameras: tuple[UsbCamera, ...]) -> Finding:
@@ -108,7 +111,9 @@ def check_absence(nodes: int, cameras: tuple[UsbCamera, ...]) -> Finding:
         return fail("camera", f"USB camera {without[0]!r} has no driver", "modprobe uvcvideo; then look at dmesg")
     if nodes:
         return fail(
-            "camera", f"none of {nodes} video nodes gives images", "see the next lines; unplug and plug it again"
+            "camera",
+            f"none of {counted(nodes, 'video node')} gives images",
+            "see the next lines; unplug and plug it again",
         )
     return fail("camera", "none is plugged in", "plug one in; lsusb lists what the USB bus sees")
 
@@ -121,7 +126,8 @@ def check_format(camera: str, offered: Offered, wanted: Wanted) -> Finding:
     except TandemError as error:
         return fail("format", error.problem, error.remedy)
     width_px, height_px = choice.size_px
-    return ok("format", f"{choice.letters} {width_px}x{height_px} at {rate_text(rate_hz)} frames/s is offered")
+    offer = f"{choice.letters} {width_px}x{height_px} at {rate_text(rate_hz)} frames/s is offered"
+    return ok("format", f"{offer} by the driver; the line `stream` says what the camera gives")
 
 
 def check_bus(bus: UsbBus, frame_bytes: int, rate_hz: float) -> Finding:
@@ -133,7 +139,7 @@ def check_bus(bus: UsbBus, frame_bytes: int, rate_hz: float) -> Finding:
         rate_hz: frames a second.
     """
     needed = frame_bytes * rate_hz
-    shares = f", shared with {bus.cameras - 1} more cameras" if bus.cameras > 1 else ""
+    shares = f", shared with {counted(bus.cameras - 1, 'more camera')}" if bus.cameras > 1 else ""
     room = next((room for megabits, room in _BUS_BYTES if bus.megabits <= megabits), 0)
     if not room:
         return ok("usb", f"port {bus.port}, {bus.megabits:g} Mbit/s{shares}: {needed / _MB:.1f} MB/s is no burden")
@@ -170,15 +176,14 @@ def check_stream(sample: Sample) -> list[Finding]:
     nominal_hz = 1e9 / sample.nominal_ns
     rate = f"{1e9 / sample.period_ns:.1f}" if sample.period_ns else "too few to tell"
     text = (
-        f"{sample.frames} sound frames, {rate} of {nominal_hz:.3g} a second, {sample.frame_bytes / 1000:.0f} KB each, "
+        f"{counted(sample.frames, 'sound frame')}, {rate} of {nominal_hz:.3g} a second, {sample.frame_bytes / 1000:.0f} KB each, "
         f"the first after {sample.first_ns / 1e9:.2f} s"
     )
     if spoiled:
         finding = warn("stream", f"{text}; spoiled: {faults}", "a better cable or port: frames are cut on the USB bus")
     elif sample.period_ns and sample.nominal_ns < _SLOW * sample.period_ns:
-        finding = warn(
-            "stream", text, "more light or a fixed exposure_ms=; or the bus is full: smaller frames, other port"
-        )
+        slow = f"{text}; the camera is slower than the driver offers"
+        finding = warn("stream", slow, rate_remedy(sample.period_ns, sample.nominal_ns, sample.exposure_ns))
     elif sample.frames >= _FEW and sample.missed > _MANY_MISSED * sample.frames:
         finding = warn(
             "stream", f"{text}; {sample.missed} missed", "the machine is busy, or the bus full: smaller frames"
@@ -222,7 +227,7 @@ def _check_stamps(sample: Sample) -> Finding:
     if sample.distrusted:
         return warn(
             "stamps",
-            f"{sample.distrusted} of {sample.frames} stamps of driver {sample.driver} ({named}) cannot be true",
+            f"{sample.distrusted} of {counted(sample.frames, 'stamp')} of driver {sample.driver} ({named}) cannot be true",
             "the moment of dequeuing stands for them, some ms late and less even; a UVC webcam has better ones",
         )
     return ok("stamps", f"driver {sample.driver} stamps {named}, {meaning}; all plausible")

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Final
 
 from common import now
-from common.camera.factory import open_camera, parse_camera
+from common.camera.factory import open_camera, parse_camera, parse_orientation
+from common.camera.orientation import UPRIGHT, Orientation
 from common.camera.v4l2_device import Device, capture_nodes, lasting_name, video_nodes
 from common.camera.v4l2_formats import Wanted, choose
+from common.camera.v4l2_serial import serial_number
 from common.camera.v4l2_stream import Stream, V4l2Settings
 from common.camera.v4l2_tally import Tally
 from common.doctor import machine
@@ -64,7 +66,7 @@ def examine_camera(uri: str, account: Account, unit: Unit) -> list[Finding]:
     else:
         absent = check_absence(len(nodes), machine.read_usb_cameras())
         return [absent, *_denied(nodes, account)]
-    return list(_examine(path, settings, account, unit))
+    return list(_examine(path, settings, _turn_text(parse_orientation(uri)), account, unit))
 
 
 def _opened(uri: str) -> Finding:
@@ -73,7 +75,13 @@ def _opened(uri: str) -> Finding:
     except TandemError as error:
         return fail("camera", error.problem, error.remedy)
     camera.close()
-    return ok("camera", f"{uri} shows images of {camera.description.width_px}x{camera.description.height_px}")
+    said = camera.description
+    turn = _turn_text(said.orientation)
+    return ok("camera", f"{uri} shows images of {said.width_px}x{said.height_px}{turn}")
+
+
+def _turn_text(orientation: Orientation) -> str:
+    return f", to be turned ({orientation})" if orientation != UPRIGHT else ""
 
 
 def _denied(nodes: list[Path], account: Account) -> Iterator[Finding]:
@@ -84,7 +92,7 @@ def _denied(nodes: list[Path], account: Account) -> Iterator[Finding]:
             yield finding
 
 
-def _examine(path: Path, settings: V4l2Settings, account: Account, unit: Unit) -> Iterator[Finding]:
+def _examine(path: Path, settings: V4l2Settings, turn: str, account: Account, unit: Unit) -> Iterator[Finding]:
     node = machine.read_node(path)
     if node is None:
         yield fail(
@@ -104,7 +112,8 @@ def _examine(path: Path, settings: V4l2Settings, account: Account, unit: Unit) -
     except OSError as error:
         yield fail("camera", f"{path} failed ({error.strerror})", "unplug it and plug it in again")
         return
-    yield ok("camera", f"{identity.card} ({identity.driver}) at {path}")
+    serial = serial_number(path)
+    yield ok("camera", f"{identity.card} ({identity.driver}){f', serial {serial}' if serial else ''} at {path}{turn}")
     yield access
     possible = check_format(str(path), offered, settings.wanted)
     yield possible
@@ -170,6 +179,7 @@ def _stream(path: Path, settings: V4l2Settings) -> Sample:
                     frames += 1
                     total_bytes += len(grab.payload)
                     first_ns = first_ns or now.monotonic_ns() - started_ns
+        stream.controls.read_exposure()
     finally:
         stream.close()
     return Sample(
@@ -184,4 +194,5 @@ def _stream(path: Path, settings: V4l2Settings) -> Sample:
         stamps=tally.stamps,
         driver=stream.driver,
         refused=tally.refused,
+        exposure_ns=stream.controls.exposure_ns,
     )

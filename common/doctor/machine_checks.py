@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.doctor.finding import Finding, fail, ok, warn
+from common.words import times
 
 _MB: Final = 1_000_000
 
@@ -227,7 +228,7 @@ def _matching(log: KernelLog, pattern: re.Pattern[str]) -> list[LogLine]:
 
 
 def _times(lines: Sequence[LogLine]) -> str:
-    count = "once" if len(lines) == 1 else f"{len(lines)} times"
+    count = times(len(lines))
     return f"{count}, {'' if len(lines) == 1 else 'the last '}{_ago(lines[-1].age_s)}"
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from common.doctor.finding import Finding, fail, ok, warn
+from common.words import times
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ def check_unit(unit: Unit) -> Finding:
         return ok("service", "no systemd here: the command runs by itself")
     if not unit.installed:
         return ok("service", f"{unit.name} is not installed as a service")
-    restarts = f", restarted {unit.restarts} times" if unit.restarts else ""
+    restarts = f", restarted {times(unit.restarts)}" if unit.restarts else ""
     journal = f"journalctl -u {unit.name} ends with the reason and the remedy"
     if unit.active == "failed" or unit.sub == "auto-restart":
         return fail("service", f"{unit.name} fails ({unit.result}){restarts}", journal)

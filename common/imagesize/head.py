@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
+from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
 
 MEGAPIXEL: Final = 2**20
@@ -33,11 +34,12 @@ class ImageHead:
 
     Attributes:
         kind: the kind of image.
-        width_px: width, px, at least 1.
-        height_px: height, px, at least 1.
+        width_px: width as it is stored, px, at least 1.
+        height_px: height as it is stored, px, at least 1.
         body_at: offset of the compressed image in the bytes; 0 if it is not looked for.
         least_bytes: with fewer bytes the compressed image cannot be whole; 0 if not known.
         block_pixels: pixels of the largest piece decoded at once; 0: no more than the image has.
+        orientation: by which turn and mirroring the stored image becomes upright, as its metadata say.
     """
 
     kind: ImageKind
@@ -46,11 +48,17 @@ class ImageHead:
     body_at: int = 0
     least_bytes: int = 0
     block_pixels: int = 0
+    orientation: Orientation = UPRIGHT
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """Width and height, px."""
+        """Width and height as it is stored, px."""
         return self.width_px, self.height_px
+
+    @property
+    def upright_px(self) -> tuple[int, int]:
+        """Width and height once it is upright, px."""
+        return self.orientation.turned_size(self.size_px)
 
 
 def require_pixels(size_px: tuple[int, int], most_pixels: int, name: str) -> None:

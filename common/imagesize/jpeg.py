@@ -5,7 +5,9 @@ import struct
 from collections.abc import Iterator
 from typing import Final
 
+from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import FrameFault, SpoiledImageError
+from common.imagesize.exif import EXIF_START, exif_orientation
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind, check_length
 
 SOI: Final = b"\xff\xd8"
@@ -23,7 +25,7 @@ _SCAN_END: Final = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]", re.DOTALL)
 _BARE: Final = frozenset(range(0xD0, 0xD8)) | {0x01}
 """Markers without a length: RST0 to RST7, TEM."""
 
-_EOI_CODE, _SOI_CODE, _SOS_CODE = 0xD9, 0xD8, 0xDA
+_EOI_CODE, _SOI_CODE, _SOS_CODE, _APP1_CODE = 0xD9, 0xD8, 0xDA, 0xE1
 _BETWEEN_SCANS: Final = frozenset({0xC4, 0xCC, 0xDA, 0xDB, 0xDC, 0xDD, 0xFE, *range(0xE0, 0xF0)})
 """Segments that may stand between scans: DHT, DAC, SOS, DQT, DNL, DRI, COM, APPn (figure B.2)."""
 
@@ -43,16 +45,19 @@ def jpeg_head(data: bytes, name: str) -> ImageHead:
         name: the image's name in errors.
 
     Raises:
-        SpoiledImageError: it has no image, two frame headers, or a segment of no length.
+        SpoiledImageError: it has no image, two frame headers, a segment of no length, or an orientation that does not exist.
         struct.error: it ends within a header.
     """
     size_px, process = (0, 0), 0
+    orientation: Orientation | None = None
     for code, at in _segments(data, name):
         if code in FRAME_HEADERS:
             if process:
                 raise SpoiledImageError(FrameFault.OTHER_SIZE, f"{name} is a JPEG with two frame headers", COPY_AGAIN)
             height_px, width_px = struct.unpack_from(">HH", data, at + 5)
             size_px, process = (width_px, height_px), code
+        elif code == _APP1_CODE and orientation is None:  # the first one counts; films and maps have others
+            orientation = _app1_orientation(data, at, name)
         elif code == _SOS_CODE:
             if not process:
                 break
@@ -65,8 +70,16 @@ def jpeg_head(data: bytes, name: str) -> ImageHead:
                 height_px=size_px[1],
                 body_at=body_at,
                 least_bytes=blocks * _BLOCK_BITS.get(process, 0) // 8,
+                orientation=orientation or UPRIGHT,
             )
     raise SpoiledImageError(FrameFault.NO_END, f"{name} is cut short: it is a JPEG without an image", COPY_AGAIN)
+
+
+def _app1_orientation(data: bytes, at: int, name: str) -> Orientation | None:
+    """Return the orientation that an APP1 segment states; None if it holds something else than EXIF, such as XMP."""
+    (length,) = struct.unpack_from(">H", data, at + 2)
+    content = data[at + 4 : at + 2 + length]
+    return exif_orientation(content[len(EXIF_START) :], name) if content.startswith(EXIF_START) else None
 
 
 def _segments(data: bytes, name: str) -> Iterator[tuple[int, int]]:

@@ -1,9 +1,11 @@
-"""PNG (specification, third edition, 5 and 11.2): reads the header from its first chunk, and extracts the chunks that carry pixels."""
+"""PNG (specification, third edition, 5 and 11.2): reads the header from its first chunk and the orientation, and extracts the chunks that carry pixels."""
 
 import struct
 from typing import Final
 
+from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import FrameFault, SpoiledImageError
+from common.imagesize.exif import exif_orientation
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind, check_length, size_text
 
 PNG_START: Final = b"\x89PNG\r\n\x1a\n"
@@ -28,7 +30,7 @@ def png_head(data: bytes, name: str) -> ImageHead:
         name: the image's name in errors.
 
     Raises:
-        SpoiledImageError: its first chunk is not a sound header.
+        SpoiledImageError: its first chunk is not a sound header, or its orientation does not exist.
         struct.error: it ends within that chunk.
     """
     length, kind, width_px, height_px, bits, colour = struct.unpack_from(">I4sIIBB", data, len(PNG_START))
@@ -41,7 +43,23 @@ def png_head(data: bytes, name: str) -> ImageHead:
         height_px=height_px,
         body_at=33,
         least_bytes=height_px * row_bytes // _DEFLATE_RATIO,
+        orientation=_orientation(data, name),
     )
+
+
+def _orientation(data: bytes, name: str) -> Orientation:
+    """Return what the eXIf chunk says (specification 11.3.3.4); it may stand before or behind the pixels."""
+    at = len(PNG_START)
+    for _ in range(_MOST_CHUNKS):
+        if at + 8 > len(data):
+            break
+        length, kind = struct.unpack_from(">I4s", data, at)
+        if kind == b"eXIf":
+            return exif_orientation(data[at + 8 : at + 8 + length], name)
+        if kind == b"IEND":
+            break
+        at += 12 + length
+    return UPRIGHT
 
 
 def pixel_chunks(data: bytes, head: ImageHead, name: str) -> bytes:

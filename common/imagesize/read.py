@@ -3,14 +3,24 @@
 import struct
 from typing import Final
 
+from common.camera.orientation import UPRIGHT
 from common.frame import FrameFault, SpoiledImageError
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind, size_text
 from common.imagesize.jpeg import SOI, check_scans, jpeg_head
 from common.imagesize.png import PNG_START, pixel_chunks, png_head
 from common.imagesize.short_heads import PNM_HEADER, bmp_head, pnm_head, webp_head
-from common.imagesize.tiff import TIFF_KINDS, tiff_head
+from common.imagesize.tiff import TIFF_KINDS, as_stored, tiff_head
 
 _KNOWN: Final = "give a PNG, JPEG, TIFF, BMP, PGM, PPM or WebP image"
+
+_PHONE_KINDS: Final = dict.fromkeys(
+    (b"heic", b"heix", b"hevc", b"hevx", b"heim", b"heis", b"mif1", b"msf1"), "HEIC"
+) | {
+    b"avif": "AVIF",
+    b"avis": "AVIF",
+}
+"""Brands of the image formats of phones (ISO/IEC 23008-12, annex B; AVIF 1.0, section 6), by name. They need decoders that OpenCV does not bring
+everywhere."""
 
 
 def read_head(data: bytes, name: str) -> ImageHead:
@@ -43,7 +53,8 @@ def whole_image(data: bytes, head: ImageHead, name: str) -> bytes:
         name: the image's name in errors.
 
     Returns:
-        What a decoder should get: the same bytes. Of a PNG only the chunks that carry pixels, because texts and colour profiles may be bombs.
+        What a decoder should get: the same bytes. Of a PNG only the chunks that carry pixels, because texts and colour profiles may be bombs. A TIFF
+        says that it is upright, so that no decoder turns it; the caller does, by `head.orientation`.
 
     Raises:
         SpoiledImageError: they cannot be the whole image.
@@ -54,7 +65,9 @@ def whole_image(data: bytes, head: ImageHead, name: str) -> bytes:
             return data
         case ImageKind.PNG:
             return pixel_chunks(data, head, name)
-        case ImageKind.BMP | ImageKind.PNM | ImageKind.TIFF | ImageKind.WEBP:
+        case ImageKind.TIFF:
+            return data if head.orientation == UPRIGHT else as_stored(data, name)
+        case ImageKind.BMP | ImageKind.PNM | ImageKind.WEBP:
             return data
 
 
@@ -69,6 +82,13 @@ def _head(data: bytes, name: str) -> ImageHead:
         return tiff_head(data, name)
     if data.startswith(b"RIFF") and data[8:12] == b"WEBP":
         return webp_head(data, name)
+    if data[4:8] == b"ftyp" and (kind := _PHONE_KINDS.get(data[8:12])):
+        raise SpoiledImageError(
+            FrameFault.NO_START,
+            f"{name} is a {kind} image, which is not read",
+            f"convert it to JPEG, for example: magick {'IMG.AVIF' if kind == 'AVIF' else 'IMG.HEIC'} IMG.jpg (ImageMagick);"
+            " or set the phone's camera to save JPEG",
+        )
     if found := PNM_HEADER.match(data):
         return pnm_head(found)
     raise SpoiledImageError(FrameFault.NO_START, f"{name} is no image of a known kind", _KNOWN)

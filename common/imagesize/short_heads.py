@@ -4,13 +4,19 @@ import re
 import struct
 from typing import Final
 
+from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import FrameFault, SpoiledImageError
+from common.imagesize.exif import EXIF_START, exif_orientation
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind
 
 PNM_HEADER: Final = re.compile(rb"P([1-6])(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})")
 """Magic, width, height (netpbm's pbm(5), pgm(5), ppm(5)).
 
 Each blank can match in only one way. A nested quantifier took seconds for 30 blanks without a number after them."""
+
+
+_MOST_CHUNKS: Final = 1024
+"""Limit for a walk through a WebP: a still image has about six chunks."""
 
 
 def bmp_head(data: bytes) -> ImageHead:
@@ -59,5 +65,19 @@ def webp_head(data: bytes, name: str) -> ImageHead:
     elif kind == b"VP8X":
         packed = struct.unpack_from("<6s", data, 24)[0]
         width_px, height_px = (int.from_bytes(packed[at : at + 3], "little") + 1 for at in (0, 3))
-        return ImageHead(kind=ImageKind.WEBP, width_px=width_px, height_px=height_px)
+        orientation = _webp_orientation(data, name)
+        return ImageHead(kind=ImageKind.WEBP, width_px=width_px, height_px=height_px, orientation=orientation)
     raise SpoiledImageError(FrameFault.NO_START, f"{name} is a WebP without a sound header", COPY_AGAIN)
+
+
+def _webp_orientation(data: bytes, name: str) -> Orientation:
+    """Return what the chunk EXIF says (RFC 9649, 2.7.1.5); only files with an extended header may have one."""
+    at = 12
+    for _ in range(_MOST_CHUNKS):
+        if at + 8 > len(data):
+            break
+        kind, length = struct.unpack_from("<4sI", data, at)
+        if kind == b"EXIF":
+            return exif_orientation(data[at + 8 : at + 8 + length].removeprefix(EXIF_START), name)
+        at += 8 + length + length % 2
+    return UPRIGHT

@@ -1,17 +1,21 @@
 """TIFF (6.0) and BigTIFF: reads the header from the first directory."""
 
 import struct
+from collections.abc import Iterator
 from typing import Final
 
-from common.errors import DataError
 from common.frame import FrameFault, SpoiledImageError
+from common.imagesize.exif import ORIENTATION_TAG, orientation_named
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind
 
 TIFF_KINDS: Final = {b"II*\0": ("<", False), b"MM\0*": (">", False), b"II+\0": ("<", True), b"MM\0+": (">", True)}
 """First bytes, mapped to byte order and whether it is a BigTIFF."""
 
 _WIDTH, _HEIGHT, _TILE_WIDTH, _TILE_HEIGHT = 256, 257, 322, 323
-_ORIENTATION: Final = 274
+_DNG_VERSION: Final = 50706
+"""DNGVersion (Adobe, Digital Negative specification): four bytes, the first of which is 1."""
+
+_READ: Final = (_WIDTH, _HEIGHT, _TILE_WIDTH, _TILE_HEIGHT, ORIENTATION_TAG, _DNG_VERSION)
 _TIFF_NUMBERS: Final = {1: "B", 3: "H", 4: "I", 16: "Q"}
 """BYTE, SHORT, LONG (TIFF 6.0, section 2) and LONG8."""
 
@@ -20,17 +24,48 @@ _MOST_ENTRIES: Final = 65_535
 
 
 def tiff_head(data: bytes, name: str) -> ImageHead:
-    """Read ImageWidth, ImageLength, TileWidth and TileLength from the first directory (TIFF 6.0, sections 2, 8, 15); of duplicates, the largest.
+    """Read ImageWidth, ImageLength, TileWidth, TileLength and Orientation from the first directory (TIFF 6.0, sections 2, 8, 15); of duplicates, the largest.
 
     Args:
         data: the encoded image; begins with one of TIFF_KINDS.
         name: the image's name in errors.
 
     Raises:
-        SpoiledImageError: its directory is missing, or its size is not a number.
-        DataError: a decoder would turn or mirror it.
+        SpoiledImageError: its directory is missing, its size is not a number, its orientation does not exist, or it is
+            a raw photograph, whose first directory is a thumbnail.
         struct.error: it ends within the directory.
     """
+    values = dict.fromkeys(_READ, 0)
+    for tag, value, _, _ in _numbers(data, name):
+        values[tag] = max(values[tag], value)
+    if values[_DNG_VERSION]:
+        raise SpoiledImageError(FrameFault.NO_START, f"{name} is a raw photograph (DNG)", "save it as JPEG or PNG")
+    return ImageHead(
+        kind=ImageKind.TIFF,
+        width_px=values[_WIDTH],
+        height_px=values[_HEIGHT],
+        block_pixels=values[_TILE_WIDTH] * values[_TILE_HEIGHT],
+        orientation=orientation_named(values[ORIENTATION_TAG], name),
+    )
+
+
+def as_stored(data: bytes, name: str) -> bytes:
+    """Return a TIFF whose orientation tag says upright. Decoders turn a TIFF by that tag, some only in part; no other format.
+
+    Args:
+        data: the encoded image, whose header `tiff_head` has read.
+        name: the image's name in errors.
+    """
+    changed = bytearray(data)
+    order = TIFF_KINDS[data[:4]][0]
+    for tag, _, at, code in _numbers(data, name):
+        if tag == ORIENTATION_TAG:
+            struct.pack_into(f"{order}{code}", changed, at, 1)
+    return bytes(changed)
+
+
+def _numbers(data: bytes, name: str) -> Iterator[tuple[int, int, int, str]]:
+    """Yield the tag, the value, its offset and its struct code of each entry of the first directory that is read here."""
     order, is_big = TIFF_KINDS[data[:4]]
     (directory,) = struct.unpack_from(f"{order}{'Q' if is_big else 'I'}", data, 8 if is_big else 4)
     if directory > len(data):
@@ -38,19 +73,11 @@ def tiff_head(data: bytes, name: str) -> ImageHead:
     entry, entry_bytes, count_code = ("HHQ", 20, "Q") if is_big else ("HHI", 12, "H")
     count = min(struct.unpack_from(f"{order}{count_code}", data, directory)[0], _MOST_ENTRIES)
     first = directory + struct.calcsize(f"={count_code}")
-    values = dict.fromkeys((_WIDTH, _HEIGHT, _TILE_WIDTH, _TILE_HEIGHT, _ORIENTATION), 0)
     for at in range(first, min(first + count * entry_bytes, len(data)), entry_bytes):
         tag, kind, _ = struct.unpack_from(f"{order}{entry}", data, at)
-        if tag not in values:
+        if tag not in _READ:
             continue
         if kind not in _TIFF_NUMBERS or (kind == 16 and not is_big):
             raise SpoiledImageError(FrameFault.NO_START, f"{name} is a TIFF whose size is no whole number", COPY_AGAIN)
-        (value,) = struct.unpack_from(f"{order}{_TIFF_NUMBERS[kind]}", data, at + entry_bytes - (8 if is_big else 4))
-        values[tag] = max(values[tag], value)
-    if values[_ORIENTATION] not in {0, 1}:  # decoders rotate a TIFF by it, but no other format
-        raise DataError(
-            f"{name} must be turned or mirrored to stand upright (TIFF orientation {values[_ORIENTATION]})",
-            "save it upright, without that tag",
-        )
-    block_pixels = values[_TILE_WIDTH] * values[_TILE_HEIGHT]
-    return ImageHead(kind=ImageKind.TIFF, width_px=values[_WIDTH], height_px=values[_HEIGHT], block_pixels=block_pixels)
+        code, value_at = _TIFF_NUMBERS[kind], at + entry_bytes - (8 if is_big else 4)
+        yield tag, struct.unpack_from(f"{order}{code}", data, value_at)[0], value_at, code

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, NoReturn
 
 from common.errors import TandemError
 from common.program.invocation import as_found
+from common.program.terminal import fitted
 from common.versions import all_versions
 
 if TYPE_CHECKING:
@@ -167,7 +168,7 @@ def _ran(
 
 def _say(line: str) -> None:
     with contextlib.suppress(OSError):  # if stderr is gone too, the exit code must suffice
-        print(line, file=sys.stderr)
+        print(fitted(line, sys.stderr), file=sys.stderr)
 
 
 def _forget_stdout() -> None:

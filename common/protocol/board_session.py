@@ -8,6 +8,7 @@ come from anywhere. Any frame that this answer counts and that has not come is t
 from dataclasses import dataclass, field
 from typing import assert_never
 
+from common.camera.orientation import UPRIGHT
 from common.frame import Frame
 from common.ledger import BoardMarks
 from common.protocol.absence import Presence
@@ -22,12 +23,15 @@ from common.protocol.message import (
     HostHello,
     Knock,
     Lane,
+    Locks,
+    LockState,
     Message,
     Ping,
     Pong,
     Refusal,
     RefusalReason,
     Rung,
+    SetLocks,
     Status,
     Steer,
 )
@@ -37,6 +41,9 @@ _NEVER = 2**63 - 1
 
 STEER_REST_NS = 500 * MS
 """A camera is steered at most this often. A host must first see the effect, which takes longer than this."""
+
+LOCK_REST_NS = 500 * MS
+"""Controls are set at most this often: some webcams give no frame while they are."""
 
 
 @dataclass(slots=True)
@@ -52,6 +59,8 @@ class _Host:
         frames: the connection that frames go to; None if it was lost.
         controls: the control connections, by link.
         below_index: frames below this index may be sent.
+        reads_long: whether it reads long hellos and `LockState`.
+        knows_locks: whether it has been told how the camera is held.
     """
 
     host_id: str
@@ -62,6 +71,8 @@ class _Host:
     frames: bytes | None = None
     controls: dict[int, bytes] = field(default_factory=dict)
     below_index: int = 0
+    reads_long: bool = False
+    knows_locks: bool = False
 
     @property
     def account_lane(self) -> bytes | None:
@@ -126,6 +137,10 @@ class BoardSession:
         self._ended = False
         self._later_ns = 0
         self._steered_ns = -STEER_REST_NS
+        self._held: Locks = ()
+        self._asked: Locks | None = None
+        self._is_asked = False
+        self._locked_ns = -LOCK_REST_NS
         self._presence = Presence()
 
     @property
@@ -139,6 +154,11 @@ class BoardSession:
         """Whether there is a host to which frames can be sent now or soon."""
         host = self._host
         return host is not None and (host.frames is not None or bool(host.controls))
+
+    @property
+    def cannot_turn(self) -> bool:
+        """Whether there is a host that is too old to be told that this camera's images must be turned."""
+        return self._host is not None and not self._host.reads_long and self._camera.orientation != UPRIGHT
 
     def begin_clock(self, boot_id: str) -> None:
         """Record that this machine has slept and its clock stood still. The host must greet again and learn the clock from scratch.
@@ -159,6 +179,17 @@ class BoardSession:
         self._camera, self._rung = camera, rung
         if self._host is not None:
             self._host.status_due_ns = 0
+
+    def hold(self, held: Locks) -> None:
+        """Record which controls of the camera are held, and with which values. The host is told now if it reads that.
+
+        Args:
+            held: as the camera reports them.
+        """
+        self._held = held
+        host = self._host
+        if host is not None and host.reads_long:
+            host.knows_locks, host.status_due_ns = False, 0
 
     @property
     def has_credit(self) -> bool:
@@ -199,12 +230,18 @@ class BoardSession:
                 if now_ns - self._steered_ns >= STEER_REST_NS:
                     self._later_ns, self._steered_ns = later_ns % self._camera.period_ns, now_ns
                 return []
+            case SetLocks(locks):
+                if self._asked != locks and now_ns - self._locked_ns >= LOCK_REST_NS:
+                    self._asked, self._is_asked, self._locked_ns = locks, True, now_ns
+                elif self._asked == locks:
+                    host.knows_locks = False  # the answer was lost
+                return []
             case Bye():
                 # The final account goes behind the last frame, so any frame that it counts and that has not come is lost. It is not a
                 # Status: one of those may be under way from before the host's last credit came, with frames behind it.
                 self._host = None
                 return [] if host.frames is None else [Outgoing(host.frames, Bye(counts))]
-            case BoardHello() | Knock() | Refusal() | FrameMessage() | Pong() | Status() | End():
+            case BoardHello() | Knock() | Refusal() | FrameMessage() | Pong() | Status() | End() | LockState():
                 return []  # only a board sends these; a sound host never does
             case _:
                 assert_never(message)
@@ -213,6 +250,12 @@ class BoardSession:
         """Return by how much the host wants the camera to expose later, ns, and forget it. 0: the host wants nothing."""
         later_ns, self._later_ns = self._later_ns, 0
         return later_ns
+
+    def take_locks(self) -> Locks:
+        """Return the controls that the host wants held, and forget that it asked. Empty: it wants nothing. `hold` must follow."""
+        locks = self._asked if self._is_asked and self._asked is not None else ()
+        self._is_asked = False
+        return locks
 
     def tick(self, now_ns: int, counts: BoardCounts) -> list[Outgoing]:
         """Do what is due: send the account, give up a silent host, knock on connections that this side dialled."""
@@ -312,6 +355,11 @@ class BoardSession:
         outgoing: list[Outgoing] = []
         if (control := host.account_lane) is not None:
             outgoing.append(Outgoing(control, Status(self.session, counts, self._rung)))
+            if host.reads_long and not host.knows_locks and (self._held or self._asked is not None):
+                host.knows_locks = True
+                outgoing.append(
+                    Outgoing(control, LockState(session=self.session, asked=self._asked or (), held=self._held))
+                )
         outgoing += self._ask_for_frames_lane(host)
         if self._ended:
             outgoing += self.end(counts)
@@ -333,12 +381,18 @@ class BoardSession:
         if host is None or host.host_id != hello.host_id:
             self._host = host = _Host(hello.host_id, now_ns, now_ns + STATUS_NS, now_ns + SILENCE_NS)
         host.heard(connection, now_ns)
+        host.reads_long, host.knows_locks = hello.reads_long, False
         if hello.lane is Lane.FRAMES:
             host.below_index = self._sent  # credit from an earlier connection is void
             host.frames = connection
         else:
             host.controls[connection[0]] = connection
         told = BoardHello(
-            session=self.session, boot_id=self._boot_id, camera=self._camera, counts=counts, rung=self._rung
+            session=self.session,
+            boot_id=self._boot_id,
+            camera=self._camera if hello.reads_long else self._camera.in_short(),
+            counts=counts,
+            rung=self._rung,
+            is_long=hello.reads_long,
         )
         return [Outgoing(connection, told)]

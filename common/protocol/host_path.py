@@ -98,4 +98,4 @@ class HostPath:
 
     def say_hello(self, host_id: str, lane: Lane) -> list[Outgoing]:
         """Say hello on a lane, if its connection is known."""
-        return [Outgoing(self.lanes[lane], HostHello(host_id, lane))] if lane in self.lanes else []
+        return [Outgoing(self.lanes[lane], HostHello(host_id, lane, reads_long=True))] if lane in self.lanes else []

@@ -26,10 +26,13 @@ from common.protocol.message import (
     HostHello,
     Knock,
     Lane,
+    Locks,
+    LockState,
     Message,
     Ping,
     Pong,
     Refusal,
+    SetLocks,
     Status,
     Steer,
 )
@@ -43,6 +46,7 @@ from common.protocol.session import (
     Counted,
     LinkDown,
     LinkUp,
+    LocksTold,
     OtherBoard,
     Outgoing,
     Output,
@@ -130,9 +134,9 @@ class HostSession:
                 return self._accept(path, message, now_ns) if connection == path.lanes.get(Lane.FRAMES) else []
             case FrameMessage():
                 return self._take_frame(path, message, now_ns)
-            case HostHello() | Ping() | Credit() | Steer():
+            case HostHello() | Ping() | Credit() | Steer() | SetLocks():
                 return []  # only a host sends these; a sound board never does
-            case Pong() | Status() | End():
+            case Pong() | Status() | End() | LockState():
                 return self._attend(path, connection, message, now_ns)
             case Bye(counts):
                 return self._take_goodbye(path, connection, counts, now_ns)
@@ -184,6 +188,17 @@ class HostSession:
         """
         carrier = self._carriage.carrier
         return [] if carrier is None else [Outgoing(carrier.lanes[Lane.CONTROL], Steer(later_ns))]
+
+    def set_locks(self, locks: Locks) -> list[Output]:
+        """Ask the board to hold controls of its camera. A board that does not understand that is not asked.
+
+        Args:
+            locks: the controls with their values.
+        """
+        carrier, stream = self._carriage.carrier, self._stream
+        if carrier is None or stream is None or not stream.hello.is_long:
+            return []
+        return [Outgoing(carrier.lanes[Lane.CONTROL], SetLocks(locks))]
 
     def probe(self, now_ns: int) -> None:
         """Send the next echoes as soon as the lines permit: something waits for an answer younger than itself."""
@@ -326,7 +341,9 @@ class HostSession:
         below_index = 0 if path is not carrier or self._stream is None else self._stream.below_index
         return [*echoes, Outgoing(control, ping), *([Outgoing(control, Credit(below_index))] if below_index else [])]
 
-    def _attend(self, path: HostPath, connection: bytes, message: Pong | Status | End, now_ns: int) -> list[Output]:
+    def _attend(  # noqa: PLR0911 - one line for each kind of message
+        self, path: HostPath, connection: bytes, message: Pong | Status | End | LockState, now_ns: int
+    ) -> list[Output]:
         if path.hello is None or connection not in path.lanes.values():
             return []
         path.heard_ns = now_ns
@@ -334,6 +351,10 @@ class HostSession:
             case Pong():
                 echoes, ping = path.waves.answered(message, now_ns)
                 return [*echoes, *([] if ping is None else [Outgoing(path.lanes[Lane.CONTROL], ping)])]
+            case LockState(session=session):
+                return (
+                    [LocksTold(message)] if self._stream is not None and session == self._stream.hello.session else []
+                )
             case Status(session, counts) | End(session, counts):
                 stream = self._stream
                 if stream is None or session != stream.hello.session:

@@ -5,9 +5,11 @@ behind image bytes. `sent_index` numbers the frames that a board's session has s
 granting twice is harmless and every gap is a loss.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from common.camera.identity import UNKNOWN_CAMERA, CameraIdentity, Lock
+from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import Buffer, PixelFormat
 from common.ledger import BoardMarks
 
@@ -44,6 +46,10 @@ class DropReason(Enum):
     STOPPED = "stopped"
 
 
+Locks = tuple[tuple[Lock, int], ...]
+"""Controls of a camera, each with its value."""
+
+
 class RefusalReason(Enum):
     """Why a board does not talk to a host."""
 
@@ -72,6 +78,9 @@ class CameraDescription:
         period_ns: nominal time between frames, ns.
         pacing: whether its own clock or the host's demand sets the pace.
         steering: how its phase can be moved.
+        orientation: how its images become upright. Width and height are those before that.
+        identity: which camera it is; unknown for images that come from no device.
+        controls: the controls that can be held, with their values when it was opened.
     """
 
     name: str
@@ -81,6 +90,18 @@ class CameraDescription:
     period_ns: int
     pacing: Pacing
     steering: Steering = Steering.NONE
+    orientation: Orientation = UPRIGHT
+    identity: CameraIdentity = UNKNOWN_CAMERA
+    controls: Locks = ()
+
+    @property
+    def upright_px(self) -> tuple[int, int]:
+        """Width and height of its images once they are upright, px."""
+        return self.orientation.turned_size((self.width_px, self.height_px))
+
+    def in_short(self) -> "CameraDescription":
+        """What a short hello says of it."""
+        return replace(self, orientation=UPRIGHT, identity=UNKNOWN_CAMERA, controls=())
 
     @property
     def has_exact_stamps(self) -> bool:
@@ -113,21 +134,29 @@ class Rung:
 
 @dataclass(frozen=True, slots=True)
 class HostHello:
-    """Host: I am here, and this connection is for this lane."""
+    """Host: I am here, and this connection is for this lane.
+
+    `reads_long`: the host asks for a long hello, and understands `LockState`.
+    """
 
     host_id: str
     lane: Lane
+    reads_long: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardHello:
-    """Board: accepted. Frames will be numbered starting at `counts.sent`."""
+    """Board: accepted. Frames will be numbered starting at `counts.sent`.
+
+    `is_long`: it says everything about the camera, and the board understands `SetLocks`. Only hosts that ask for it get it.
+    """
 
     session: str
     boot_id: str
     camera: CameraDescription
     counts: BoardCounts
     rung: Rung
+    is_long: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,4 +248,42 @@ class Steer:
     later_ns: int
 
 
-Message = HostHello | BoardHello | Knock | Refusal | Credit | FrameMessage | Ping | Pong | Status | End | Bye | Steer
+@dataclass(frozen=True, slots=True)
+class SetLocks:
+    """Host: hold these controls of your camera at these values. Saying it again is harmless. `LockState` answers."""
+
+    locks: Locks
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LockState:
+    """Board: how my camera is held now. It answers `SetLocks`, and follows a long hello and every change.
+
+    Attributes:
+        session: the board's session.
+        asked: what the last `SetLocks` asked for; empty: none has come.
+        held: the controls that are held, with the values that the camera itself reports. What was asked for and is not
+            here with that value was refused.
+    """
+
+    session: str
+    asked: Locks = ()
+    held: Locks = ()
+
+
+Message = (
+    HostHello
+    | BoardHello
+    | Knock
+    | Refusal
+    | Credit
+    | FrameMessage
+    | Ping
+    | Pong
+    | Status
+    | End
+    | Bye
+    | Steer
+    | SetLocks
+    | LockState
+)

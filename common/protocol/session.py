@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Message, RefusalReason, Rung
+from common.protocol.message import BoardCounts, BoardHello, FrameMessage, LockState, Message, RefusalReason, Rung
 
 MS: Final = 1_000_000
 
@@ -143,6 +143,13 @@ class Stepped:
 
 
 @dataclass(frozen=True, slots=True)
+class LocksTold:
+    """Host: the board says how its camera is held."""
+
+    state: LockState
+
+
+@dataclass(frozen=True, slots=True)
 class Refused:
     """Host: the board at the other end of a link refuses to talk to us."""
 
@@ -180,6 +187,7 @@ Output = (
     | Echo
     | Counted
     | Stepped
+    | LocksTold
     | Refused
     | Unbelievable
     | ClockVoid

@@ -24,17 +24,22 @@ from common.protocol.message import (
     HostHello,
     Knock,
     Lane,
+    Locks,
+    LockState,
     Message,
     Ping,
     Pong,
     Refusal,
     RefusalReason,
     Rung,
+    SetLocks,
     Status,
     Steer,
 )
 from common.protocol.wire_fields import (
     DROP_REASONS,
+    FLIPS,
+    LOCKS,
     MAX_COUNT,
     MAX_SIZE_PX,
     MAX_TEXT,
@@ -46,7 +51,10 @@ from common.protocol.wire_fields import (
 from common.versions import PROTOCOL_VERSION, other_protocol
 
 MAX_HEADER_BYTES: Final = 2048
-"""The longest honest header is a board's hello with all texts at full length. It stays below 600 bytes."""
+"""The longest honest header is a board's hello with all texts at full length. It stays below 1400 bytes."""
+
+_READS_LONG: Final = "+long"
+"""Ends the id of a host that reads long hellos. Boards of 0.2 and before take an id as it comes, but refuse a hello with a field too many."""
 
 MAX_PAYLOAD_BYTES: Final = 16 * 1024 * 1024
 """Largest frame on any link (DESIGN's contract suite): 4096 x 2048 raw YUYV fits."""
@@ -64,6 +72,8 @@ _KINDS: Final[tuple[type, ...]] = (
     End,
     Bye,
     Steer,
+    SetLocks,
+    LockState,
 )
 _KIND_OF: Final = {kind: index for index, kind in enumerate(_KINDS)}
 _FRAME_RANGES: Final = (
@@ -189,10 +199,11 @@ def encode_for_any_version(version: int, refusal: Refusal) -> bytes:
 
 def _fields(message: Message) -> list[Any]:  # noqa: C901, PLR0911, PLR0912 - one line for each kind of message
     match message:
-        case HostHello(host_id, lane):
-            return [host_id, lane.value]
+        case HostHello(host_id, lane, reads_long):
+            return [host_id + _READS_LONG * reads_long, lane.value]
         case BoardHello(session=session, boot_id=boot_id, camera=camera, counts=counts, rung=rung):
-            return [session, boot_id, *_camera_fields(camera), *_counts_fields(counts), *_rung_fields(rung)]
+            short = [session, boot_id, *_camera_fields(camera), *_counts_fields(counts), *_rung_fields(rung)]
+            return [*short, _more_camera_fields(camera)] if message.is_long else short
         case Knock(lane, session):
             return [lane.value, session]
         case Refusal(reason):
@@ -217,6 +228,10 @@ def _fields(message: Message) -> list[Any]:  # noqa: C901, PLR0911, PLR0912 - on
             return _counts_fields(counts)
         case Steer(later_ns):
             return [later_ns]
+        case SetLocks(locks):
+            return [_lock_fields(locks)]
+        case LockState(session=session, asked=asked, held=held):
+            return [session, _lock_fields(asked), _lock_fields(held)]
         case _:
             assert_never(message)
 
@@ -235,6 +250,21 @@ def _camera_fields(camera: CameraDescription) -> list[Any]:
     ]
 
 
+def _more_camera_fields(camera: CameraDescription) -> list[Any]:
+    """The list that ends a long hello. A later version may add to its end; readers ignore what they do not know."""
+    turn, identity = camera.orientation, camera.identity
+    return [
+        turn.rotate_deg // 90,
+        FLIPS.index(turn.flip),
+        *(identity.driver, identity.name, identity.serial),
+        _lock_fields(camera.controls),
+    ]
+
+
+def _lock_fields(locks: Locks) -> list[int]:
+    return [n for lock, value in locks for n in (LOCKS.index(lock), value)]
+
+
 def _rung_fields(rung: Rung) -> list[Any]:
     size = [rung.width_px, rung.height_px]
     return [rung.index, rung.last, rung.changes, rung.period_ns, rung.quality, *size]
@@ -248,7 +278,7 @@ def _counts_fields(counts: BoardCounts) -> list[Any]:
     ]
 
 
-def _read(kind: type, reader: "FieldReader") -> Message:  # noqa: PLR0911 - one line for each kind of message
+def _read(kind: type, reader: "FieldReader") -> Message:  # noqa: C901, PLR0911 - one line for each kind of message
     if kind is Ping:
         wave, _, _, t0_ns = (
             reader.count(),
@@ -262,15 +292,14 @@ def _read(kind: type, reader: "FieldReader") -> Message:  # noqa: PLR0911 - one 
     if kind is Credit:
         return Credit(reader.count())
     if kind is HostHello:
-        return HostHello(reader.text(), reader.enum(Lane))
+        host_id, lane = reader.text(), reader.enum(Lane)
+        return HostHello(host_id.removesuffix(_READS_LONG), lane, host_id.endswith(_READS_LONG))
     if kind is BoardHello:
-        return BoardHello(
-            session=reader.text(),
-            boot_id=reader.text(),
-            camera=reader.camera(),
-            counts=reader.counts(),
-            rung=reader.rung(),
-        )
+        session, boot_id, camera = reader.text(), reader.text(), reader.camera()
+        counts, rung = reader.counts(), reader.rung()
+        is_long = reader.has_more
+        camera = reader.more_of(camera) if is_long else camera
+        return BoardHello(session=session, boot_id=boot_id, camera=camera, counts=counts, rung=rung, is_long=is_long)
     if kind is Knock:
         return Knock(reader.enum(Lane), reader.text())
     if kind is Refusal:
@@ -281,6 +310,10 @@ def _read(kind: type, reader: "FieldReader") -> Message:  # noqa: PLR0911 - one 
         return End(reader.text(), reader.counts())
     if kind is Steer:
         return Steer(reader.later_ns())
+    if kind is SetLocks:
+        return SetLocks(reader.locks())
+    if kind is LockState:
+        return LockState(session=reader.text(), asked=reader.locks(), held=reader.locks())
     return Bye(reader.counts())
 
 

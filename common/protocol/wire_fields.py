@@ -1,11 +1,14 @@
 """Reads the fields of a header in order, checking each for type and range. No I/O."""
 
+from dataclasses import replace
 from enum import Enum
 from typing import Any, Final, TypeVar
 
+from common.camera.identity import LARGEST_LOCK, MOST_LETTERS, CameraIdentity, Lock
+from common.camera.orientation import Flip, Orientation
 from common.errors import ProtocolError
 from common.frame import PixelFormat
-from common.protocol.message import BoardCounts, CameraDescription, DropReason, Pacing, Rung, Steering
+from common.protocol.message import BoardCounts, CameraDescription, DropReason, Locks, Pacing, Rung, Steering
 
 MAX_SIZE_PX: Final = 16384
 """Largest width and height of a frame, px: well beyond any camera. Their product fits into 28 bits."""
@@ -20,6 +23,8 @@ MAX_PERIOD_NS: Final = 3_600_000_000_000
 
 PIXEL_FORMATS: Final = tuple(PixelFormat)
 DROP_REASONS: Final = tuple(DropReason)
+FLIPS: Final = tuple(Flip)
+LOCKS: Final = tuple(Lock)
 
 E = TypeVar("E", bound=Enum)
 
@@ -57,10 +62,15 @@ class FieldReader:
         """A width or a height, px."""
         return self._integer(1, MAX_SIZE_PX)
 
-    def text(self) -> str:
+    @property
+    def has_more(self) -> bool:
+        """Whether there is another field."""
+        return self._at < len(self._items)
+
+    def text(self, most: int = MAX_TEXT) -> str:
         """A short text."""
         value = self._next()
-        if type(value) is not str or len(value) > MAX_TEXT:
+        if type(value) is not str or len(value) > most:
             raise bad_field(f"field {self._at} is not a short text")
         return value
 
@@ -88,10 +98,30 @@ class FieldReader:
             steering=self.enum(Steering),
         )
 
+    def more_of(self, camera: CameraDescription) -> CameraDescription:
+        """The list that ends a long hello. What follows the fields known here comes from a later version and is ignored."""
+        inner = FieldReader(self._list())
+        orientation = Orientation(90 * inner._integer(0, 3), inner.choice(FLIPS))
+        driver, name, serial = (inner.text(MOST_LETTERS) for _ in range(3))
+        identity = CameraIdentity(driver, name, serial)
+        return replace(camera, orientation=orientation, identity=identity, controls=inner.locks())
+
+    def locks(self) -> Locks:
+        """Controls with their values. Controls that only a later version knows are left out."""
+        flat = self._list()
+        if len(flat) % 2:
+            raise bad_field(f"field {self._at} is no list of controls")
+        inner, found = FieldReader(flat), {}
+        for _ in range(len(flat) // 2):
+            number, value = inner.count(), inner._integer(-LARGEST_LOCK - 1, LARGEST_LOCK)
+            if number < len(LOCKS):
+                found[LOCKS[number]] = value
+        return tuple(found.items())
+
     def counts(self) -> BoardCounts:
         """A board's account."""
-        grabbed, sent, flat = self.count(), self.count(), self._next()
-        if not isinstance(flat, list) or len(flat) % 2:
+        grabbed, sent, flat = self.count(), self.count(), self._list()
+        if len(flat) % 2:
             raise bad_field(f"field {self._at} is no list of drops")
         inner = FieldReader(flat)
         return BoardCounts(
@@ -111,6 +141,12 @@ class FieldReader:
             width_px=width_px,
             height_px=height_px,
         )
+
+    def _list(self) -> list[Any]:
+        value = self._next()
+        if not isinstance(value, list):
+            raise bad_field(f"field {self._at} is no list")
+        return value
 
     def _next(self) -> Any:  # noqa: ANN401 - whatever msgpack found; every caller checks it
         if self._at >= len(self._items):

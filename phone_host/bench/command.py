@@ -13,6 +13,8 @@ from common.errors import SettingsError, UnavailableError
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.signals import StopSignals
+from common.program.terminal import fitted
+from common.words import counted
 from phone_host.bench.analysis import Analysis, analyse
 from phone_host.bench.cases import Interface, cases, interfaces, parse_links, parse_qualities, parse_rates, parse_sizes
 from phone_host.bench.changes import parse_changes
@@ -20,9 +22,17 @@ from phone_host.bench.emulate import parse_profiles
 from phone_host.bench.links import why_not_measurable
 from phone_host.bench.matrix import measure, remote_cases
 from phone_host.bench.page import figure, page
-from phone_host.bench.report import PERCENTILES, Conditions, as_json, conditions, grouped
+from phone_host.bench.report import PERCENTILES, Conditions, as_json, conditions, grouped, most_compared
 from phone_host.bench.runs import CaseResult, RunSettings
-from phone_host.bench.tables import fit_lines, prediction_lines, regime_lines, rows, summary_line
+from phone_host.bench.tables import (
+    fit_lines,
+    narrow_rows,
+    prediction_lines,
+    regime_lines,
+    result_sentence,
+    rows,
+    summary_line,
+)
 from phone_host.bench.trace import TracedRun, trace_json
 from phone_host.output.atomic import write_text
 from phone_host.output.listed import claim
@@ -57,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
         raise outcome.failure
     if signals.stop:
         how = "interrupted" if signals.interrupted else "stopped"
-        print(f"delay-bench: {how} after {len(outcome.results)} of {len(planned)} runs", file=sys.stderr)
+        print(f"delay-bench: {how} after {len(outcome.results)} of {counted(len(planned), 'run')}", file=sys.stderr)
         return INTERRUPTED if signals.interrupted else 0
     return 0 if all(result.ledgers for result in outcome.results) else _NOTHING_MEASURED
 
@@ -131,7 +141,9 @@ def _write(out: Path, files: dict[str, str]) -> None:
 def _print(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> None:
     """Print a table for each kind of images, stage by stage, with the interfaces below each other."""
     console = Console(highlight=False)
-    console.print(f"{under.machine}, {under.date}, matcher {under.matcher}", soft_wrap=True)
+    print(fitted(f"{under.machine}, {under.date}, matcher {under.matcher}"))
+    if sentence := result_sentence(most_compared(results)):
+        print(fitted(sentence))
     for group in grouped(results):
         table = Table(title=f"{group[0].case.images}, delays in ms", title_justify="left")
         table.add_column("stage")
@@ -140,11 +152,26 @@ def _print(results: Sequence[CaseResult], under: Conditions, analysis: Analysis)
             table.add_column(name, justify="right")
         for row in rows(group):
             table.add_row(*row)
-        console.print(table)
+        if console.is_terminal and console.measure(table).maximum > console.width:
+            _print_narrow(console, group)
+        else:
+            console.print(table)
         for result in group:
-            console.print(f"{result.case.interface}: {summary_line(result)}", soft_wrap=True)
+            print(fitted(f"{result.case.interface}: {summary_line(result)}"))
             for line in regime_lines(result, under.fifo):
-                console.print(f"  {line}", soft_wrap=True)
-        console.print()
+                print(fitted(f"  {line}"))
+        print()
     for line in (*fit_lines(analysis), *prediction_lines(analysis)):
-        console.print(line, soft_wrap=True)
+        print(fitted(line))
+
+
+def _print_narrow(console: Console, group: Sequence[CaseResult]) -> None:
+    """Print a table for each interface, without lines, so that a terminal of 50 columns cuts no number."""
+    print(fitted(f"{group[0].case.images}, delays in ms"))
+    for result in group:
+        table = Table(title=str(result.case.interface), title_justify="left", box=None, padding=(0, 2, 0, 0))
+        for name in ("stage", "p50", "p95", "max"):
+            table.add_column(name, justify="left" if name == "stage" else "right", no_wrap=True)
+        for row in narrow_rows(result):
+            table.add_row(*row)
+        console.print(table)

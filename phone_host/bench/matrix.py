@@ -15,7 +15,7 @@ from phone_host.bench.cases import Case, Interface, Size
 from phone_host.bench.links import ask_board
 from phone_host.bench.runs import PATIENCE_NS, WARM_UP_S, CaseResult, RunSettings, film_images, render, run_case
 from phone_host.children.board_process import socket_folder
-from phone_host.run.progress_bar import bar_on, busy_bar
+from phone_host.run.progress_bar import busy_bar, progress_bar
 from phone_host.scene.film import Film
 
 _RENDER_S: Final = 0.06
@@ -118,7 +118,7 @@ class _Bar:
     """
 
     def __init__(self, total_s: float, signals: StopSignals) -> None:
-        self._progress = bar_on(Console(stderr=True))
+        self._progress = progress_bar(Console(stderr=True))
         self._task = self._progress.add_task("", total=total_s)
         self._signals = signals
         self._done_s = self._length_s = 0.0

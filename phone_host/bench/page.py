@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from html import escape
 from typing import Final
 
+from common.words import counted
 from phone_host.bench.analysis import Analysis, InterfaceFit, typical_and_slow
 from phone_host.bench.prediction import Figures, values_of
-from phone_host.bench.report import Conditions, grouped
+from phone_host.bench.report import Conditions, grouped, most_compared
 from phone_host.bench.runs import WARM_UP_S, CaseResult
 from phone_host.bench.tables import (
     FIT_COLUMNS,
@@ -18,11 +19,13 @@ from phone_host.bench.tables import (
     latency_text,
     rate_text,
     regime_lines,
+    result_sentence,
     summary_line,
     what_if_rows,
 )
+from phone_host.measure.delays import IDLE_STAGE_NS, STAGES
 from phone_host.report.page_frame import HALF_PX, document, section, table, two_widths
-from phone_host.report.report_page import DelaySeries, delay_series
+from phone_host.report.report_page import DelaySeries, Headline, delay_series, heading
 from phone_host.svg.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
 from phone_host.svg.plot_parts import STYLE, legend, point_legend
 from phone_host.svg.plots import Budget, Quantity, Strips, budgets, distributions, mean_share
@@ -55,13 +58,19 @@ def page(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -
         under: machine, date, settings.
         analysis: conclusions from the results.
     """
-    head = (
-        f"<header><h1>Delays of every interface and stage</h1><p class='sub'>{escape(under.machine)} · {escape(under.date)} · "
-        f"matcher {escape(under.matcher)}, FIFO {under.fifo.depth}:{under.fifo.overflow.value}</p></header>"
+    sub = (
+        f"{under.machine} · {under.date} · matcher {under.matcher}, FIFO {under.fifo.depth}:{under.fifo.overflow.value}"
     )
-    cards = [_glance(results, under, analysis), _fits(analysis), _model(analysis), _what_ifs(analysis)]
-    cards += [_card(group, under) for group in grouped(results)]
-    cards.append(section("How this was measured", _method(results, under), ""))
+    first = most_compared(results)
+    sentence = result_sentence(first)
+    verdict = Headline.GOOD if sentence else Headline.BAD
+    head = heading("Delays of every interface and stage", sub, verdict, sentence or "No pair was processed.")
+    cards = [
+        _card(group, under)
+        for group in sorted(grouped(results), key=lambda group: group[0].case.images != first[0].case.images)
+    ]
+    cards += [_what_ifs(analysis), section("How this was measured", _method(results, under), "")]
+    cards += [_model(analysis), _glance(results, under, analysis), _fits(analysis)]
     return document("delay-bench", head + "".join(cards))
 
 
@@ -75,8 +84,7 @@ def figure(results: Sequence[CaseResult], under: Conditions) -> str:
     Returns:
         An SVG file that stands alone, for light and dark mode.
     """
-    groups = grouped([result for result in results if result.ledgers])
-    chosen = max(groups, key=len)
+    chosen = [result for result in most_compared(results) if result.ledgers]
     measured = [(str(result.case.interface), delay_series(result.ledgers)) for result in chosen]
     bars = [Budget(name, tuple(mean_share(quantity) for quantity in series.delays)) for name, series in measured]
     day = under.date.partition("T")[0]
@@ -121,7 +129,7 @@ def _method(results: Sequence[CaseResult], under: Conditions) -> str:
 def _glance(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> str:
     missing = "".join(f"<li>{escape(str(one))} was not run: {escape(reason)}</li>" for one, reason in under.not_run)
     content = table(FIT_COLUMNS, fit_rows(analysis), tight=True) + (f"<ul>{missing}</ul>" if missing else "")
-    words = f"{len(results)} runs. Propagation = latency + bytes / rate; the clock's uncertainty and its hard bound are those at the end of the run that knew it worst."
+    words = f"{counted(len(results), 'run')}. Propagation = latency + bytes / rate; the clock's uncertainty and its hard bound are those at the end of the run that knew it worst."
     return section("The interfaces", words, content)
 
 
@@ -156,8 +164,8 @@ def _scatter(one: InterfaceFit, numbers: dict[int, int]) -> str:
 
 
 def _model(analysis: Analysis) -> str:
-    if len(analysis.checked) < 2:
-        return section("The model beside the measurement", "One run alone predicts nothing: measure two or more.", "")
+    if len(analysis.checked) < 2:  # one run alone predicts nothing
+        return ""
     names = list(dict.fromkeys(str(one.interface) for one in analysis.fits))
     numbers = {name: index for index, name in enumerate(names)}
     points = [
@@ -191,16 +199,26 @@ def _card(results: Sequence[CaseResult], under: Conditions) -> str:
     if not useful:
         return section(title, "No pair was processed.", "")
     measured = [(str(result.case.interface), delay_series(result.ledgers)) for result in useful]
-    delays, stages = measured[0][1].delays, measured[0][1].stages
+    delays = measured[0][1].delays
+    idle = [
+        all(series.stages[k].values_ns.max() <= IDLE_STAGE_NS for _, series in measured) for k in range(len(STAGES))
+    ]
+    stages = [stage for stage, nothing in zip(measured[0][1].stages, idle, strict=True) if not nothing]
     bars = [Budget(name, tuple(mean_share(quantity) for quantity in series.delays)) for name, series in measured]
-    work = [Budget(name, tuple(mean_share(quantity) for quantity in series.stages)) for name, series in measured]
-    strips = [Strips(name, _quantities(series)) for name, series in measured]
+    names = {stage.label for stage in stages}
+    work = [
+        Budget(name, tuple(mean_share(quantity) for quantity in series.stages if quantity.label in names))
+        for name, series in measured
+    ]
+    strips = [
+        Strips(name, tuple(one for one in _quantities(series) if one.values_ns.any())) for name, series in measured
+    ]
     chosen = [life for result in useful for life in _lives(result)]
     summaries = "".join(_summary(result, under) for result in results)
     content = (
-        f'<ul style="font-size:.85rem;color:var(--ink2)">{summaries}</ul>'
-        + legend([(quantity.label, quantity.colour) for quantity in delays])
+        legend([(quantity.label, quantity.colour) for quantity in delays])
         + two_widths(lambda width: budgets(bars, width))
+        + f'<ul class="small">{summaries}</ul>'
         + "<h3>Single pairs: one at the median of end-to-end, one at its 99th percentile</h3>"
         + two_widths(lambda width: lives(chosen, width))
         + "<h3>Stages of processing, means</h3>"

@@ -101,6 +101,12 @@ def grouped(results: Sequence[CaseResult]) -> list[list[CaseResult]]:
     return list(groups.values())
 
 
+def most_compared(results: Sequence[CaseResult]) -> list[CaseResult]:
+    """Return the runs of those images that were measured over the most interfaces; the first ones of several."""
+    groups = grouped(results)
+    return max(groups, key=lambda group: sum(bool(result.ledgers) for result in group)) if groups else []
+
+
 def _run(result: CaseResult, fifo: FifoSettings) -> dict[str, object]:
     case, statistics, regime = result.case, statistics_of(result), regime_of(result, fifo)
     uncertainty = statistics.spread("uncertainty")

@@ -31,7 +31,7 @@ from phone_host.run.sinks import FunctionSink
 from phone_host.scene.film import JPEG_QUALITY, Film, render_films
 from phone_host.scene.scene import DEMO_PERIOD_S, WEBCAM_LOOK, demo_scene, matched_rig
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import AnyMatcher
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.sync.fifo import FifoSettings
@@ -232,4 +232,4 @@ def _core(size: Size, matcher: AnyMatcher) -> StereoCore:
     focal_px, cx_px, cy_px = (float(rig.left.matrix[at]) for at in ((0, 0), (0, 2), (1, 2)))
     geometry = StereoGeometry(focal_px=focal_px, baseline_m=-float(rig.t_right_left_m[0]), cx_px=cx_px, cy_px=cy_px)
     disparities = disparities_for_near(geometry, NEAR_M, size.width_px)
-    return StereoCore(create_matcher(MatchSettings(matcher, disparities)), None, geometry)
+    return StereoCore(MatchSettings(matcher, disparities), None, geometry)

@@ -5,16 +5,37 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+from common.words import counted
 from phone_host.bench.analysis import Analysis, regime_of, statistics_of
 from phone_host.bench.prediction import Figures, Unknown
 from phone_host.bench.report import PERCENTILES, losses, percentiles
 from phone_host.bench.runs import CaseResult
 from phone_host.measure.delay_fit import DelayFit
-from phone_host.measure.delays import DELAYS, STAGES
+from phone_host.measure.delays import DELAYS, IDLE_STAGE_NS, STAGES, DelayStatistics
 from phone_host.svg.plot_scale import duration_text
 from phone_host.sync.fifo import FifoSettings
 
 _RATES: Final = ((1e9, "GB/s"), (1e6, "MB/s"), (1e3, "kB/s"))
+
+_HARDLY_SLOWER: Final = 1.05
+"""Medians this close are not told apart: runs of one and the same interface differ by as much."""
+
+_PARTS: Final = {
+    "capture": "capturing on the board",
+    "outbox": "waiting on the board for the link",
+    "propagation": "the way over the link",
+    "pairing": "waiting for the partner frame",
+    "queuing": "waiting for the processor",
+    "processing": "processing",
+}
+_WORK: Final = {
+    "decode": "decoding the images",
+    "interpolate": "interpolating",
+    "rectify": "rectifying",
+    "match": "matching",
+    "reproject": "computing the cloud",
+    "write": "handing over the result",
+}
 
 FIT_COLUMNS: Final = (
     "interface",
@@ -45,17 +66,64 @@ PREDICTION_COLUMNS: Final = (
 def rows(results: Sequence[CaseResult]) -> list[tuple[str, ...]]:
     """Make the terminal's table: stage, link, percentiles in ms; the stages of processing are indented below processing.
 
+    Stages that did nothing in any of the runs are left out, and so is what is zero in all of them.
+
     Args:
         results: the runs to list below each other, stage by stage.
     """
     spreads = [(str(result.case.interface), statistics_of(result)) for result in results]
     table = []
     for name in (*DELAYS[:6], *STAGES, *DELAYS[6:], "time_skew"):
+        least_ns = IDLE_STAGE_NS if name in STAGES else 0
+        if all(statistics.spread(name).max_ns <= least_ns for _, statistics in spreads):
+            continue
         for index, (link, statistics) in enumerate(spreads):
             values = percentiles(statistics.spread(name))
             label = "" if index else f"  {name}" if name in STAGES else name.replace("_", "-")
             table.append((label, link, *(_cell(values[key]) for key in PERCENTILES)))
     return table
+
+
+def narrow_rows(result: CaseResult) -> list[tuple[str, ...]]:
+    """Make the table of one run for a narrow terminal: stage, median, 95th percentile and maximum in ms."""
+    return [(label, p50, p95, most) for label, _, p50, p95, _, most in rows([result])]
+
+
+def result_sentence(results: Sequence[CaseResult]) -> str:
+    """Say in one sentence which interface is the fastest, how long it takes from exposure to depth, and what takes longest.
+
+    Args:
+        results: runs over several interfaces with the same images.
+
+    Returns:
+        The sentence; empty if nothing was measured.
+    """
+    measured = [(statistics_of(result), result) for result in results if result.ledgers]
+    if not measured:
+        return ""
+    measured.sort(key=lambda one: one[0].spread("end_to_end").p50_ns)
+    statistics, fastest = measured[0]
+    typical_ns = statistics.spread("end_to_end").p50_ns
+    name, part = str(fastest.case.interface), _largest_part(statistics)
+    takes = f"{duration_text(typical_ns)} from exposure to depth at the median, with {fastest.case.images}"
+    if len(measured) == 1:
+        return f"{name} takes {takes}; the largest part is {part}."
+    equal = [
+        str(result.case.interface)
+        for one, result in measured[1:]
+        if one.spread("end_to_end").p50_ns <= _HARDLY_SLOWER * typical_ns
+    ]
+    if equal:
+        return f"{' and '.join([name, *equal])} are equally fast: {takes}; the largest part is {part}."
+    return f"{name} is the fastest link: {takes}; the largest part is {part}."
+
+
+def _largest_part(statistics: DelayStatistics) -> str:
+    """Name the delay, or the stage of processing, that takes longest."""
+    delay = max(_PARTS, key=lambda name: statistics.spread(name).p50_ns)
+    if delay != "processing":
+        return _PARTS[delay]
+    return _WORK[max(STAGES, key=lambda name: statistics.spread(name).p50_ns)]
 
 
 def _cell(value_ns: float) -> str:
@@ -67,7 +135,7 @@ def summary_line(result: CaseResult) -> str:
     lost = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in losses(result).items()) or "nothing"
     if result.ledgers:
         worst_us = statistics_of(result).spread("uncertainty").p95_ns / 1e3
-        pairs = f"{len(result.ledgers)} pairs, {result.pairs_per_second:.1f}/s, clock of the pairs +-{worst_us:.0f} us (p95)"
+        pairs = f"{counted(len(result.ledgers), 'pair')}, {result.pairs_per_second:.1f}/s, clock of the pairs +-{worst_us:.0f} us (p95)"
     else:
         pairs = "no pairs"
     at_end = (
@@ -87,7 +155,7 @@ def regime_lines(result: CaseResult, fifo: FifoSettings) -> tuple[str, ...]:
 def error_lines(analysis: Analysis) -> list[str]:
     """Say how far predictions were from measurements; nothing if nothing was predicted."""
     return [
-        f"{what}, {errors.runs} runs: pairs/s off by {100 * errors.rate:.0f} % (median; {100 * errors.worst_rate:.0f} % at worst), "
+        f"{what}, {counted(errors.runs, 'run')}: pairs/s off by {100 * errors.rate:.0f} % (median; {100 * errors.worst_rate:.0f} % at worst), "
         f"end-to-end p50 by {100 * errors.end_to_end:.0f} % ({100 * errors.worst_end_to_end:.0f} %)"
         for what, errors in (
             ("predicted from the other runs", analysis.held_out),

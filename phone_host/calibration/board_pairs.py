@@ -15,6 +15,7 @@ class Reason(Enum):
     NO_PARTNER = "no partner"
     UNREADABLE = "unreadable"
     OTHER_SIZE = "other image size"
+    TURNED = "turned otherwise"
     NOT_FOUND_LEFT = "board not found left"
     NOT_FOUND_RIGHT = "board not found right"
     NOT_FOUND_BOTH = "board not found in both"

@@ -5,15 +5,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from common.camera.orientation import UPRIGHT, Flip, Orientation
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
+from common.imagesize.head import size_text as px_text
 from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.target import Board, Corners, agree, find_corners
-from phone_host.calibration.view_files import ViewFiles
-from phone_host.model import Image
-from phone_host.stereo.images import read_image
+from phone_host.stereo.images import decode_file, open_image
+from phone_host.stereo.view_files import ViewFiles
 
 Size = tuple[int, int]
+Mounted = tuple[Orientation, Orientation]
+"""How the left and the right camera are mounted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,32 +26,41 @@ class BoardViews:
     Attributes:
         pairs: corners of the pairs whose board was found in both images.
         rejected: all others.
-        sizes_px: width and height of the left and of the right images.
+        sizes_px: width and height of the upright left and right images.
+        turned: by which turn and mirroring the left and the right images became upright, as their EXIF headers say.
     """
 
     pairs: tuple[BoardPair, ...]
     rejected: tuple[Rejected, ...]
     sizes_px: tuple[Size, Size]
+    turned: Mounted = (UPRIGHT, UPRIGHT)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Seen:
-    name: str
-    sizes: tuple[Size, Size]
-    left: Corners
-    right: Corners
+    """What was found in one image."""
+
+    file: str
+    size_px: Size
+    turned: Orientation
+    corners: Corners
 
 
 def look_for_boards(
-    files: ViewFiles, board: Board, advance: Callable[[], None], most_pixels: int = MOST_PIXELS
+    files: ViewFiles,
+    board: Board,
+    advance: Callable[[], None],
+    most_pixels: int = MOST_PIXELS,
+    mounted: Mounted = (UPRIGHT, UPRIGHT),
 ) -> BoardViews:
-    """Read all pairs and find the board in them.
+    """Read all pairs and find the board in them, one image after the other.
 
     Args:
         files: the pairs of files.
         board: what to look for.
         advance: called after each pair, for a progress bar.
         most_pixels: an image that claims more is refused.
+        mounted: how the two cameras are mounted; applied after what the images' headers say.
 
     Returns:
         The corners, and the pairs rejected.
@@ -59,66 +71,84 @@ def look_for_boards(
     rejected = [_alone(path, "left") for path in files.left_alone] + [
         _alone(path, "right") for path in files.right_alone
     ]
-    seen: list[_Seen] = []
-    first_problem = ""
+    seen: list[tuple[str, _Seen, _Seen]] = []
+    first_problem: DataError | None = None
     for name, left, right in files.pairs:
         try:
-            images = read_image(left, most_pixels), read_image(right, most_pixels)
+            one, other = (
+                _look(path, board, most_pixels, turn) for path, turn in zip((left, right), mounted, strict=True)
+            )
         except DataError as error:
-            first_problem = first_problem or error.problem
+            first_problem = first_problem or error
             rejected.append(Rejected(name, Reason.UNREADABLE, error.problem))
         else:
-            sizes = _size(images[0]), _size(images[1])
-            seen.append(
-                _Seen(name=name, sizes=sizes, left=find_corners(images[0], board), right=find_corners(images[1], board))
-            )
+            seen.append((name, one, other))
         advance()
     if not seen:
-        raise DataError(
-            f"no pair of images could be read ({first_problem})"
-            if first_problem
-            else "no pair of images could be read",
-            f"look at {files.pairs[0][1]}" if files.pairs else "check names",
+        raise first_problem or DataError(
+            "no image has a partner on the other side", "give both images of a pair the same number"
         )
-    sizes_px = (_usual([each.sizes[0] for each in seen]), _usual([each.sizes[1] for each in seen]))
+    usual = _usual([left for _, left, _ in seen]), _usual([right for _, _, right in seen])
     pairs = []
-    for each in seen:
-        problem = _problem(each, sizes_px)
+    for name, left_seen, right_seen in seen:
+        problem = _problem(name, (left_seen, right_seen), usual)
         if problem is None:
-            pairs.append(BoardPair(each.name, each.left, agree(each.left, each.right, board)))
+            pairs.append(BoardPair(name, left_seen.corners, agree(left_seen.corners, right_seen.corners, board)))
         else:
             rejected.append(problem)
-    return BoardViews(tuple(pairs), tuple(rejected), sizes_px)
+    return BoardViews(
+        tuple(pairs), tuple(rejected), (usual[0].size_px, usual[1].size_px), (usual[0].turned, usual[1].turned)
+    )
 
 
-def _problem(seen: _Seen, sizes_px: tuple[Size, Size]) -> Rejected | None:
-    for side, size, usual in zip(("left", "right"), seen.sizes, sizes_px, strict=True):
-        if size != usual:
-            return Rejected(
-                seen.name,
-                Reason.OTHER_SIZE,
-                f"the {side} image is {size[0]}x{size[1]} px, the others are {usual[0]}x{usual[1]}",
-            )
-    match len(seen.left) > 0, len(seen.right) > 0:
+def _look(path: Path, board: Board, most_pixels: int, mounted: Orientation) -> _Seen:
+    """Read one image and find the board in it. The pixels are dropped: 50 megapixels take 150 MB."""
+    file = open_image(path, most_pixels, mounted)
+    corners = find_corners(decode_file(file), board)
+    return _Seen(file=path.name, size_px=file.size_px, turned=file.head.orientation, corners=corners)
+
+
+def _problem(name: str, pair: tuple[_Seen, _Seen], usual: tuple[_Seen, _Seen]) -> Rejected | None:
+    for side, seen, others in zip(("left", "right"), pair, usual, strict=True):
+        unlike = _unlike(seen, others, side)
+        if unlike is not None:
+            return Rejected(name, *unlike)
+    match len(pair[0].corners) > 0, len(pair[1].corners) > 0:
         case True, True:
             return None
         case False, True:
-            return Rejected(seen.name, Reason.NOT_FOUND_LEFT, "the board is not seen whole and sharp in the left image")
+            return Rejected(name, Reason.NOT_FOUND_LEFT, "the board is not seen whole and sharp in the left image")
         case True, False:
-            return Rejected(
-                seen.name, Reason.NOT_FOUND_RIGHT, "the board is not seen whole and sharp in the right image"
-            )
+            return Rejected(name, Reason.NOT_FOUND_RIGHT, "the board is not seen whole and sharp in the right image")
         case _:
-            return Rejected(seen.name, Reason.NOT_FOUND_BOTH, "the board is not seen whole and sharp in either image")
+            return Rejected(name, Reason.NOT_FOUND_BOTH, "the board is not seen whole and sharp in either image")
+
+
+def _unlike(seen: _Seen, others: _Seen, side: str) -> tuple[Reason, str] | None:
+    """Say how an image differs from most of its side, in orientation or size; None if it does not."""
+    what, own_px, usual_px = f"the {side} image {seen.file}", px_text(seen.size_px), px_text(others.size_px)
+    if seen.turned != others.turned:
+        turns = turn_text(seen.turned), turn_text(others.turned)
+        return Reason.TURNED, f"{what} is {turns[0]} by its EXIF header, the others are {turns[1]}"
+    if seen.size_px == others.size_px:
+        return None
+    if seen.size_px == others.size_px[::-1]:
+        return Reason.TURNED, f"{what} is {own_px} px, the others are {usual_px}: the camera was held another way"
+    return Reason.OTHER_SIZE, f"{what} is {own_px} px, the others are {usual_px}"
+
+
+def turn_text(orientation: Orientation) -> str:
+    """Return what is done to images with this orientation, such as "turned by 90 degrees and mirrored"."""
+    parts = [f"turned by {orientation.rotate_deg} degrees"] if orientation.rotate_deg else []
+    parts += ["mirrored"] if orientation.flip is not Flip.NONE else []
+    return " and ".join(parts) or "not turned"
 
 
 def _alone(path: Path, side: str) -> Rejected:
     return Rejected(path.name, Reason.NO_PARTNER, f"the {side} image has no partner on the other side")
 
 
-def _size(image: Image) -> Size:
-    return image.shape[1], image.shape[0]
-
-
-def _usual(sizes: list[Size]) -> Size:
-    return Counter(sizes).most_common(1)[0][0]
+def _usual(seen: list[_Seen]) -> _Seen:
+    """Return one of the images whose size and orientation most images have."""
+    usual = Counter((each.size_px, each.turned) for each in seen).most_common(1)[0][0]
+    return next(each for each in seen if (each.size_px, each.turned) == usual)

@@ -77,12 +77,14 @@ class BundleResult:
         left_errors_px: (V, N, 2) measured minus projected.
         right_errors_px: (V, N, 2), the same.
         baseline_sigma_m: standard deviation of the baseline that the corners' noise leaves, m.
+        covariance: (24, 24) of the rig's parameters, in the order of `globals_of`; 0 for those that are not estimated.
     """
 
     state: BundleState
     left_errors_px: Vector
     right_errors_px: Vector
     baseline_sigma_m: float = field(default=float("nan"))
+    covariance: Vector = field(default_factory=lambda: np.full((_GLOBALS, _GLOBALS), np.nan))
 
     def rms_px(self) -> float:
         """Return the root mean square distance of all corners of both cameras, px (counted like OpenCV's stereoCalibrate)."""
@@ -129,15 +131,18 @@ def adjust(
     errors = _errors(views, points_m, state)
     sigma_px = _sigma_px(errors)
     problem = _Problem(views, points_m, (expected, information * sigma_px**2), _HUBER_SIGMAS * sigma_px)
-    covariance = np.linalg.pinv(problem.normal_equations(state).reduced(0.0, free)[0]) * sigma_px**2
+    covariance = np.zeros((_GLOBALS, _GLOBALS))
+    reduced = problem.normal_equations(state).reduced(0.0, free)[0]
+    covariance[np.ix_(free, free)] = np.linalg.pinv(reduced) * sigma_px**2
     direction = np.zeros(_GLOBALS)
     direction[_RIG.stop - 3 :] = state.translation_m / np.linalg.norm(state.translation_m)
-    variance = float(direction[free] @ covariance @ direction[free])
+    variance = float(direction @ covariance @ direction)
     return BundleResult(
         state=state,
         left_errors_px=errors[0],
         right_errors_px=errors[1],
         baseline_sigma_m=float(np.sqrt(max(variance, 0.0))),
+        covariance=covariance,
     )
 
 
@@ -206,13 +211,13 @@ class _Problem:
         if not np.isfinite(lengths).all():
             return float("inf")
         inside = np.minimum(lengths, self.threshold_px)
-        off = self.prior[0] - _globals(state)
+        off = self.prior[0] - globals_of(state)
         return float((inside * (2 * lengths - inside)).sum() + (self.prior[1] * off**2).sum())
 
     def normal_equations(self, state: BundleState) -> "_System":
         """Linearise at a state."""
         count = len(self.views)
-        matrix, gradient = np.diag(self.prior[1]), self.prior[1] * (self.prior[0] - _globals(state))
+        matrix, gradient = np.diag(self.prior[1]), self.prior[1] * (self.prior[0] - globals_of(state))
         coupling, poses, pose_gradient = np.zeros((count, _GLOBALS, 6)), np.zeros((count, 6, 6)), np.zeros((count, 6))
         for index, view in enumerate(self.views):
             errors, by_globals, by_pose = _linearised(view, self.points_m, state, state.poses[index])
@@ -295,7 +300,8 @@ def _prior(sizes_px: tuple[tuple[int, int], tuple[int, int]]) -> tuple[Vector, V
     return expected, weight
 
 
-def _globals(state: BundleState) -> Vector:
+def globals_of(state: BundleState) -> Vector:
+    """Return the 24 parameters of a rig: left camera, right camera, rotation, translation."""
     return np.concatenate([state.left, state.right, state.rotation, state.translation_m])
 
 

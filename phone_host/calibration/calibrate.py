@@ -3,11 +3,12 @@
 A core: corners in, values out; no files. Every pair is used or rejected with its reason.
 
 Order: each camera alone (any size, any lens) -> the relative pose that most pairs agree on -> bundle adjustment of all
-(`bundle.py`) -> pairs that do not fit are rejected and the adjustment is repeated until nothing changes.
+(`bundle.py`) -> pairs that do not fit are rejected and the adjustment is repeated until nothing changes. If pairs were
+rejected, all of them get a second chance with a wide lens's distortion.
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -22,11 +23,13 @@ from phone_host.calibration.bundle import (
     Vector,
     adjust,
     camera_arrays,
+    globals_of,
     project_view,
     rms_px,
 )
 from phone_host.calibration.calibrate_alone import (
     USUAL_PAIRS,
+    Lens,
     LoneCamera,
     calibrate_alone,
     corners_of,
@@ -35,8 +38,9 @@ from phone_host.calibration.calibrate_alone import (
     with_poses,
 )
 from phone_host.calibration.target import Board, Corners
+from phone_host.calibration.zero_sigma import zero_sigma_px
 from phone_host.model import CameraModel, Rectification, Rig, Side
-from phone_host.stereo.rectify import rectify_points, rectify_rig
+from phone_host.stereo.rectify import across_lines_px, rectify_points, rectify_rig
 
 Sizes = tuple[tuple[int, int], tuple[int, int]]
 """Width and height of the left and of the right images, px."""
@@ -49,6 +53,9 @@ _FULL = np.ones(9, dtype=bool)
 # and only if it explains 1 % of the error. Of four real rigs one gains that much (0.182 -> 0.178 px); the others gain
 # 0.8 % or less.
 _FULL_PAIRS, _FULL_GAIN = 10, 0.01
+# By how much the error may grow when rejected pairs come back: a twelfth pair with the same noise changes it by some per
+# cent either way, a pair that does not belong by a multiple.
+_CHANCE_LOSS = 0.05
 
 # A pair is rejected when its error is twice the median pair's, but never below this floor: smaller errors do no harm.
 _OUTLIER_FACTOR, _OUTLIER_FLOOR_PX = 2.0, 0.3
@@ -79,26 +86,67 @@ def calibrate(
         DataError: fewer than three pairs are left.
     """
     points_m = board.points_m()
+    fitted = _best_fit(pairs, points_m, sizes_px)
+    return _summed_up(fitted, points_m=points_m, sizes_px=sizes_px, board_side=board_side)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Fitted:
+    """A rig fitted to the pairs that it explains: the optimum, those pairs, the others, and which camera parameters were estimated."""
+
+    result: BundleResult
+    kept: list[BoardPair]
+    rejected: list[Rejected]
+    free: NDArray[np.bool_]
+
+
+def _fitted(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes, lens: Lens) -> _Fitted:
+    """Fit a rig to the pairs, and reject those that do not fit it.
+
+    Raises:
+        DataError: fewer than three pairs are left.
+    """
     kept, rejected = list(pairs), list[Rejected]()
     alone: list[LoneCamera] = []
-    for side in Side:
-        kept, out, camera = calibrate_alone(kept, side, points_m, sizes_px[list(Side).index(side)])
+    for side, size_px in zip(Side, sizes_px, strict=True):
+        kept, out, camera = calibrate_alone(kept, side, points_m, size_px, lens)
         rejected += out
         alone.append(camera)
     left, right = (with_poses(camera, kept, points_m) for camera in alone)
     start, kept, out = _agreed_start(kept, points_m, left, right)
     rejected += out
-    result, kept, out, free = _adjust_robustly(kept, points_m, start, sizes_px)
-    rejected += out
-    return _summed_up(
-        result,
-        kept,
-        rejected,
-        points_m=points_m,
-        sizes_px=sizes_px,
-        board_side=board_side,
-        distortion_terms=int(free[4:].sum()),
-    )
+    result, kept, out, free = _adjust_robustly(kept, points_m, start, sizes_px, lens)
+    return _Fitted(result=result, kept=kept, rejected=rejected + out, free=free)
+
+
+def _best_fit(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -> _Fitted:
+    """Fit a rig. If pairs are rejected, judge all of them again with a wide lens's distortion; keep that if it explains more pairs, and no worse.
+
+    Raises:
+        DataError: fewer than three pairs are left.
+    """
+    try:
+        first = _fitted(pairs, points_m, sizes_px, Lens.USUAL)
+    except DataError:
+        second = _with_wide_lens(pairs, points_m, sizes_px)
+        if second is None:
+            raise
+        return second
+    second = _with_wide_lens(pairs, points_m, sizes_px) if first.rejected else None
+    if second is None or len(second.kept) <= len(first.kept):
+        return first
+    return second if second.result.rms_px() <= (1 + _CHANCE_LOSS) * first.result.rms_px() else first
+
+
+def _with_wide_lens(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -> _Fitted | None:
+    """Fit a rig with a wide lens's distortion; None if there are too few pairs for it or it leads nowhere."""
+    if len(pairs) < _FULL_PAIRS:
+        return None
+    try:
+        fitted = _fitted(pairs, points_m, sizes_px, Lens.WIDE)
+    except (DataError, cv2.error, np.linalg.LinAlgError):  # the richer model may fail where the usual one holds
+        return None
+    return fitted if _all_invertible(fitted.result.state, sizes_px) else None
 
 
 def _agreed_start(
@@ -149,12 +197,12 @@ def _relative(left: Vector, right: Vector) -> tuple[Vector, Vector]:
 
 
 def _adjust_robustly(
-    pairs: list[BoardPair], points_m: Vector, start: BundleState, sizes_px: Sizes
+    pairs: list[BoardPair], points_m: Vector, start: BundleState, sizes_px: Sizes, lens: Lens
 ) -> tuple[BundleResult, list[BoardPair], list[Rejected], NDArray[np.bool_]]:
     """Adjust, reject the worst pair and adjust again until all fit; then choose the distortion model."""
     rejected: list[Rejected] = []
     while True:
-        free = _USUAL if len(pairs) >= USUAL_PAIRS else _RADIAL_1
+        free = _FULL if lens is Lens.WIDE else _USUAL if len(pairs) >= USUAL_PAIRS else _RADIAL_1
         views = [BundleView(pair.left_px, pair.right_px) for pair in pairs]
         result = adjust(views, points_m, start, free, sizes_px)
         misfits = _misfits(pairs, result, points_m, sizes_px)
@@ -165,7 +213,7 @@ def _adjust_robustly(
         pairs = [pair for index, pair in enumerate(pairs) if index != worst]
         require_enough(pairs, rejected)
         start = replace(result.state, poses=np.delete(result.state.poses, worst, axis=0))
-    if len(pairs) >= _FULL_PAIRS:
+    if lens is Lens.USUAL and len(pairs) >= _FULL_PAIRS:
         full = adjust(views, points_m, result.state, _FULL, sizes_px)
         if full.rms_px() < (1 - _FULL_GAIN) * result.rms_px() and _all_invertible(full.state, sizes_px):
             return full, pairs, rejected, _FULL
@@ -246,17 +294,9 @@ def _misfit(pair: BoardPair, state: BundleState, points_m: Vector, *, error_px: 
     return Rejected(pair.name, reason, detail)
 
 
-def _summed_up(
-    result: BundleResult,
-    pairs: list[BoardPair],
-    rejected: list[Rejected],
-    *,
-    points_m: Vector,
-    sizes_px: Sizes,
-    board_side: Side,
-    distortion_terms: int,
-) -> Calibration:
+def _summed_up(fitted: _Fitted, *, points_m: Vector, sizes_px: Sizes, board_side: Side) -> Calibration:
     """Make a rig and its figures from the optimum."""
+    result, pairs = fitted.result, fitted.kept
     state = result.state
     rig = replace(
         _rig(state, sizes_px),
@@ -273,6 +313,8 @@ def _summed_up(
         obstacle = error
     else:
         vertical = np.array([_vertical_errors_px(pair, rig, rectification) for pair in pairs])
+        sigma_px = zero_sigma_px(result.covariance, globals_of(state), rig, rectification)
+        rig = replace(rig, zero_sigma_px=sigma_px)
     used = tuple(
         Used(name=pair.name, left_px=float(a), right_px=float(b), vertical_px=_rms(v))
         for pair, a, b, v in zip(pairs, *result.view_rms_px(), vertical, strict=True)
@@ -282,14 +324,14 @@ def _summed_up(
         rectification=rectification,
         obstacle=obstacle,
         used=used,
-        rejected=tuple(rejected),
+        rejected=tuple(fitted.rejected),
         vertical_px=np.abs(vertical).ravel(),
         baseline_sigma_m=result.baseline_sigma_m,
         tilts_deg=np.array([_tilt_deg(pose) for pose in state.poses]),
         spread=min(
             _spread([corners_of(pair, side) for pair in pairs], size) for side, size in zip(Side, sizes_px, strict=True)
         ),
-        distortion_terms=distortion_terms,
+        distortion_terms=int(fitted.free[4:].sum()),
     )
 
 
@@ -311,7 +353,7 @@ def _alone_rms_px(pairs: list[BoardPair], side: Side, points_m: Vector, paramete
 def _vertical_errors_px(pair: BoardPair, rig: Rig, rectification: Rectification) -> Vector:
     left = rectify_points(pair.left_px, rig.left, rectification.R_left, rectification.geometry)
     right = rectify_points(pair.right_px, rig.right, rectification.R_right, rectification.geometry)
-    return np.asarray(left[:, 1] - right[:, 1], dtype=np.float64)
+    return across_lines_px(left, right, rectification.epipolar)
 
 
 def _rms(values: Vector) -> float:

@@ -1,6 +1,7 @@
 """Calibrates one camera alone with OpenCV, without views that are plainly wrong. Gives `calibrate.py` its start."""
 
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import cv2
 import numpy as np
@@ -19,6 +20,25 @@ USUAL_PAIRS = 5
 
 # Nothing is certain yet, so only views that are plainly wrong are rejected.
 _GROSS_FACTOR, _GROSS_FLOOR_PX = 4.0, 1.0
+
+
+class Lens(Enum):
+    """Which distortion is estimated while pairs are judged.
+
+    Attributes:
+        USUAL: k1 k2 p1 p2, as the lenses of webcams and phones need.
+        WIDE: k3 as well. Without it, a wide lens's views of the image's corners look like wrong corners.
+    """
+
+    USUAL = "usual"
+    WIDE = "wide"
+
+
+_STEPS = {
+    Lens.USUAL: (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, np.finfo(float).eps),
+    Lens.WIDE: (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 300, np.finfo(float).eps),
+}
+"""OpenCV's own limit is 30 steps. With k3 that leaves views of a wide lens off by 10 px, which then look wrong."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +70,7 @@ def require_enough(pairs: list[BoardPair], rejected: list[Rejected]) -> None:
 
 
 def calibrate_alone(
-    pairs: list[BoardPair], side: Side, points_m: Vector, size_px: tuple[int, int]
+    pairs: list[BoardPair], side: Side, points_m: Vector, size_px: tuple[int, int], lens: Lens = Lens.USUAL
 ) -> tuple[list[BoardPair], list[Rejected], LoneCamera]:
     """Calibrate one camera; reject views that are plainly wrong until none is left.
 
@@ -59,6 +79,7 @@ def calibrate_alone(
         side: which of their views to look at.
         points_m: (N, 3) corners in the board's axes.
         size_px: width and height of the side's images.
+        lens: how its lens may bend.
 
     Returns:
         The pairs left, those rejected, and the camera with one pose for each pair left.
@@ -70,7 +91,7 @@ def calibrate_alone(
     reason = Reason.CORNERS_LEFT if side is Side.LEFT else Reason.CORNERS_RIGHT
     while True:
         require_enough(pairs, rejected)
-        camera, errors = _opencv_camera(pairs, side, points_m, size_px)
+        camera, errors = _opencv_camera(pairs, side, points_m, size_px, lens)
         limit = max(_GROSS_FACTOR * float(np.median(errors)), _GROSS_FLOOR_PX)
         if errors.max() <= limit:
             return pairs, rejected, camera
@@ -86,10 +107,10 @@ def calibrate_alone(
 
 
 def _opencv_camera(
-    pairs: list[BoardPair], side: Side, points_m: Vector, size_px: tuple[int, int]
+    pairs: list[BoardPair], side: Side, points_m: Vector, size_px: tuple[int, int], lens: Lens
 ) -> tuple[LoneCamera, Vector]:
     """OpenCV's calibration of one camera, and each view's root mean square error, px."""
-    flags = cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST
+    flags = cv2.CALIB_ZERO_TANGENT_DIST | (0 if lens is Lens.WIDE else cv2.CALIB_FIX_K3)
     if len(pairs) < USUAL_PAIRS:
         flags |= cv2.CALIB_FIX_K2
     _, matrix, distortion, turns, shifts, _, _, errors = cv2.calibrateCameraExtended(
@@ -99,6 +120,7 @@ def _opencv_camera(
         np.eye(3),
         np.zeros(5),
         flags=flags,
+        criteria=_STEPS[lens],
     )
     parameters = np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *np.ravel(distortion)[:5]])
     poses = np.array([np.concatenate([np.ravel(r), np.ravel(t)]) for r, t in zip(turns, shifts, strict=True)])

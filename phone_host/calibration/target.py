@@ -18,11 +18,9 @@ from phone_host.stereo.images import to_grey
 Corners = NDArray[np.float64]
 """(N, 2) float64, px; N = 0: the board was not found."""
 
-_UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "": 1e-3}
-_LENGTH = re.compile(r"\A\s*(\d+(?:\.\d*)?|\.\d+)\s*(mm|cm|m|)\s*\Z")
 _LEAST_CORNERS, _MOST_CORNERS = 3, 100
 _SMALLEST_SQUARE_M = 0.0005
-"""A smaller one is a length in metres whose unit was forgotten: a bare number is millimetres."""
+"""A smaller one is a length in another unit."""
 
 _LARGEST_SQUARE_M = 2.0
 
@@ -76,12 +74,12 @@ class Board:
         return np.column_stack([columns.ravel(), rows.ravel(), np.zeros(rows.size)]) * self.square_m
 
 
-def parse_board(corners: str, square: str) -> Board:
-    """Read a board as people write it.
+def parse_board(corners: str, square_mm: float) -> Board:
+    """Read a board's size as people write it.
 
     Args:
         corners: inner corners, such as "9x6".
-        square: side of a square with its unit, such as "25mm", "2.5cm", "0.025m"; a bare number is millimetres.
+        square_mm: side of a square, mm.
 
     Returns:
         The board.
@@ -92,12 +90,7 @@ def parse_board(corners: str, square: str) -> Board:
     counts = re.fullmatch(r"\s*(\d{1,3})\s*[xX]\s*(\d{1,3})\s*", corners)
     if counts is None:
         raise SettingsError(f"--board {corners!r} is not a size", "give columns x rows of inner corners, such as 9x6")
-    length = _LENGTH.match(square.lower())
-    if length is None:
-        raise SettingsError(
-            f"--square {square!r} is not a length", "give it with its unit, such as 25mm, 2.5cm or 0.025m"
-        )
-    return Board(int(counts[1]), int(counts[2]), float(length[1]) * _UNITS_M[length[2]])
+    return Board(int(counts[1]), int(counts[2]), square_mm / 1000)
 
 
 def find_corners(image: Image, board: Board) -> Corners:

@@ -10,6 +10,7 @@ from enum import Enum
 
 import numpy as np
 
+from common.words import counted
 from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
 
 GOOD_PX, USABLE_PX = 0.25, 0.5
@@ -122,7 +123,9 @@ def _hints(calibration: Calibration, rejected: tuple[Rejected, ...]) -> list[str
         )
     if len(rejected) > _MANY_REJECTED * (len(rejected) + len(calibration.used)):
         reason, count = Counter(each.reason for each in rejected).most_common(1)[0]
-        hints.append(f"{len(rejected)} pairs were rejected, {count} of them: {reason.value}: {_CURES[reason]}")
+        hints.append(
+            f"{counted(len(rejected), 'pair was', 'pairs were')} rejected, {count} of them: {reason.value}: {_CURES[reason]}"
+        )
     return hints
 
 
@@ -130,6 +133,9 @@ _CURES = {
     Reason.NO_PARTNER: "give both images of a pair the same number",
     Reason.UNREADABLE: "copy the images again",
     Reason.OTHER_SIZE: "take all images of one camera at one resolution",
+    Reason.TURNED: (
+        "hold each camera the same way in all images; if only a phone's EXIF tag differs, remove the tag from all of them"
+    ),
     Reason.NOT_FOUND_LEFT: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
     Reason.NOT_FOUND_RIGHT: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
     Reason.NOT_FOUND_BOTH: "show the whole board, sharp and evenly lit, and check --board (inner corners)",

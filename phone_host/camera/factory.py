@@ -4,10 +4,12 @@ from typing import Final
 
 from common.camera import factory as common_factory
 from common.camera.base import Camera
+from common.camera.orientation import Orientation
+from common.camera.turned import turned
 from common.frame import ImageSizeError
 from common.imagesize.head import MOST_PIXELS, require_pixels
 from common.program.extensions import named
-from phone_host.camera.http_uri import http_settings, is_http
+from phone_host.camera.http_uri import http_settings, is_http, without_orientation
 
 _HTTP: Final = "phone_host.camera.mjpeg_http:HttpCamera"
 """Named, not imported: TLS and its dependencies are loaded only if a server is asked for."""
@@ -43,8 +45,9 @@ def open_camera(uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXEL
 def _open(uri: str, clock: str, now_ns: int) -> Camera:
     if not is_http(uri):
         return common_factory.open_camera(uri, clock, now_ns)
-    camera: Camera = named(_HTTP)(http_settings(uri, clock))
-    return camera
+    address, orientation = without_orientation(uri)
+    camera: Camera = named(_HTTP)(http_settings(address, clock))
+    return turned(camera, orientation)
 
 
 def check_camera(uri: str) -> None:
@@ -54,6 +57,15 @@ def check_camera(uri: str) -> None:
         SettingsError: the URI is invalid.
     """
     if is_http(uri):
-        http_settings(uri, "")
+        http_settings(without_orientation(uri)[0], "")
     else:
         common_factory.parse_camera(uri, "")
+
+
+def camera_orientation(uri: str) -> Orientation:
+    """Return how a camera URI says that the camera is mounted, without opening anything.
+
+    Raises:
+        SettingsError: the URI is invalid.
+    """
+    return without_orientation(uri)[1] if is_http(uri) else common_factory.parse_orientation(uri)

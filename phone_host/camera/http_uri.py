@@ -9,6 +9,7 @@ from typing import Final
 from urllib.parse import parse_qsl, unquote, urlencode, urlsplit
 
 from common.camera.options import milliseconds
+from common.camera.orientation import ORIENTING, Orientation, orientation_of
 from common.errors import SettingsError
 
 EXAMPLE: Final = "http://PHONE:8080/video[?latency_ms=120&latency_uncertainty_ms=20]"
@@ -64,6 +65,27 @@ def without_password(uri: str) -> str:
 def is_http(uri: str) -> bool:
     """Return whether a camera URI names a server."""
     return uri.lower().startswith(("http://", "https://"))
+
+
+def without_orientation(uri: str) -> tuple[str, Orientation]:
+    """Take the options `rotate` and `flip` off the address of a server.
+
+    Args:
+        uri: see EXAMPLE.
+
+    Returns:
+        The rest of the address, unchanged, and how the camera is mounted.
+
+    Raises:
+        SettingsError: an option has a value that is not allowed.
+    """
+    address, mark, query = uri.partition("?")
+    items = [(item.partition("="), item) for item in query.split("&")]
+    ours = {name: value for (name, _, value), _ in items if name in ORIENTING}
+    if not ours:
+        return uri, Orientation()
+    others = "&".join(item for (name, _, _), item in items if name not in ORIENTING)
+    return (f"{address}{mark}{others}" if others else address), orientation_of(ours, _hidden(uri))
 
 
 def http_settings(uri: str, clock: str) -> HttpSettings:

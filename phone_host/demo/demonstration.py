@@ -16,13 +16,13 @@ from common.stamp import HOST_CLOCK
 from phone_host.children.board_process import board_process
 from phone_host.model import CloudImage, Processed, Result, Rig
 from phone_host.output.ply import write_ply
-from phone_host.output.preview import write_preview
+from phone_host.output.preview import disparity_picture, write_png
 from phone_host.run.host import Host, HostSettings
 from phone_host.run.sinks import FunctionSink
 from phone_host.scene.film import Film
 from phone_host.scene.scene import RectifiedView, Scene, rig_poses, truth
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
 
@@ -106,7 +106,7 @@ class DemoRun:
         self.ledgers: list[PairLedger] = []
         self.address = f"ipc://{sockets}/board"
         near = disparities_for_near(self._rectifier.geometry, NEAR_M, self._rectifier.rectification.width_px)
-        core = StereoCore(create_matcher(MatchSettings(disparities=near)), self._rectifier)
+        core = StereoCore(MatchSettings(disparities=near), self._rectifier)
         camera = open_camera(film.replay_uri(film.right), HOST_CLOCK, now.monotonic_ns())
         link = open_link(parse_link(self.address, listens_by_default=False))
         settings = HostSettings(wait_ns=_BOARD_PATIENCE_NS, out=out, save_every=0, resolved=resolved)
@@ -174,7 +174,7 @@ class DemoRun:
         assert pair.processed.cloud is not None
         cloud: CloudImage = pair.processed.cloud
         write_ply(out / "cloud.ply", cloud, pair.processed.pair.left)
-        write_preview(out / "disparity.png", pair.processed.disparity)
+        write_png(out / "disparity.png", disparity_picture(pair.processed.disparity, pair.processed.geometry))
 
     def _keep(self, result: Result) -> None:
         processed, ledger = result.processed, result.ledger

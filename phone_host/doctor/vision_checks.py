@@ -14,6 +14,7 @@ from common.camera.v4l2_stream import V4l2Settings
 from common.errors import AbsentBoardError, BusyBoardError, OtherVersionError, TandemError
 from common.keys import KeyFolder
 from common.link.factory import open_link, parse_link
+from phone_host.camera.factory import camera_orientation
 from phone_host.camera.http_uri import is_http
 from phone_host.doctor.host_checks import Answer, BoardReadings, RigReadings
 from phone_host.model import Side
@@ -58,7 +59,9 @@ def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
         raise receiver.failure
     if hello is None or estimate is None:
         return said
-    camera = f"{hello.camera.name} {hello.camera.width_px}x{hello.camera.height_px}"
+    size, turn = f"{hello.camera.width_px}x{hello.camera.height_px}", str(hello.camera.orientation)
+    serial = hello.camera.identity.serial
+    camera = f"{hello.camera.name}{f', serial {serial}' if serial else ''} {size}{f' {turn}' if turn else ''}"
     return BoardReadings(
         uri=uri,
         answer=Answer.BOARD,
@@ -89,11 +92,12 @@ def read_rig_readings(calibration: str, camera: str) -> RigReadings:
         return RigReadings(calibration, error.problem, error.remedy)
     own = rig.right if rig.board_side is Side.LEFT else rig.left
     asked = parse_camera(camera, "") if camera and not is_http(camera) else None
+    asked_px = asked.wanted.size_px if isinstance(asked, V4l2Settings) else None
     return RigReadings(
         path=calibration,
         rms_px=rig.rms_stereo_px,
         baseline_m=float(np.linalg.norm(rig.t_right_left_m)),
         host_size_px=(own.width_px, own.height_px),
         verdict=rig.verdict,
-        asked_size_px=asked.wanted.size_px if isinstance(asked, V4l2Settings) else None,
+        asked_size_px=asked_px if asked_px is None else camera_orientation(camera).turned_size(asked_px),
     )

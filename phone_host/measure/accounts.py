@@ -7,6 +7,7 @@ from typing import Final, assert_never
 
 from common.protocol.message import BoardCounts, Rung
 from common.protocol.session import StaleReason
+from common.words import times
 from phone_host.measure.delays import Series
 from phone_host.sync.quarantine import Disbelief, Suspects
 
@@ -174,4 +175,4 @@ def rung_lines(link: LinkAccount) -> list[str]:
     size = f", {rung.width_px}x{rung.height_px}" if rung.width_px else ""
     where = f"on rung {rung.index} of {rung.last}" if rung.index else "as it was asked for"
     how = f"{1e9 / rung.period_ns:.3g} frames/s{quality}{size}"
-    return [f"board camera: {where} ({how}), changed {rung.changes} times by what the link carries"]
+    return [f"board camera: {where} ({how}), changed {times(rung.changes)} by what the link carries"]

@@ -14,6 +14,9 @@ SAMPLE: Final = 4096
 """More points than a plot has pixels; about 3 MB."""
 
 DELAYS: Final = ("capture", "outbox", "propagation", "pairing", "queuing", "processing", "end_to_end", "starvation")
+IDLE_STAGE_NS: Final = 20_000
+"""A stage whose longest time is shorter did nothing: it takes 1 to 11 us to find that out (delay-bench, two cores)."""
+
 STAGES: Final = tuple(stage.name for stage in fields(StageTimes))
 OTHERS: Final = ("time_skew", "uncertainty")
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from common.camera.base import CameraHealth
 from common.frame import NOT_AS_SAID
 from phone_host.measure.accounts import LinkAccount
+from phone_host.measure.camera_match import LockMiss, settings_concerns
 from phone_host.measure.delays import DelayStatistics
 from phone_host.measure.regime import RunFigures
 from phone_host.measure.sink_account import SinkAccount
@@ -45,6 +46,7 @@ class RunSnapshot:
         spoiled_images: pairs with a spoiled image, by reason; part of `undecodable`.
         stamps_exact: whether both cameras' stamps are the times of exposure by definition.
         judged_pairs: number of newest pairs over which time and motion are judged; None: all.
+        missed_locks: controls of the rig's cameras that could not be restored.
     """
 
     ended: str
@@ -74,6 +76,7 @@ class RunSnapshot:
     phase: Phase | None = None
     alignment: Alignment | None = None
     judged_pairs: int | None = None
+    missed_locks: tuple[LockMiss, ...] = ()
 
     @property
     def stopped(self) -> int:
@@ -157,7 +160,7 @@ def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
         received=sum(account.received + account.disbelieved[Disbelief.CREDIT] for account in link.sessions),
         spoiled_images=spoiled(run),
     )
-    return unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
+    return settings_concerns(run.missed_locks) + unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
 
 
 def spoiled(run: RunSnapshot) -> dict[str, int]:

@@ -14,6 +14,7 @@ from enum import Enum
 from typing import Final
 
 from common.camera.base import CameraHealth
+from common.words import counted, times
 from phone_host.model import TimeOffset
 
 MOST_ERROR_PX: Final = 0.5
@@ -36,6 +37,7 @@ class Doubt(Enum):
     CLOCK_STEPPED = "clock_stepped"
     DISBELIEVED = "disbelieved"
     SPOILED_IMAGES = "spoiled_images"
+    CAMERA_SETTINGS = "camera_settings"
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,14 +159,14 @@ def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
     found = []
     if unbelieved.clock_steps:
         suspect = (
-            f"; up to {unbelieved.suspect_frames} pairs may be wrong because they came before that was noticed"
+            f"; up to {counted(unbelieved.suspect_frames, 'pair')} may be wrong because they came before that was noticed"
             if unbelieved.suspect_frames
             else ""
         )
         found.append(
             Concern(
                 Doubt.CLOCK_STEPPED,
-                f"one of the two clocks jumped {unbelieved.clock_steps} times{suspect}",
+                f"one of the two clocks jumped {times(unbelieved.clock_steps)}{suspect}",
                 "do not let the board or the host sleep during a run; ignore the suspect pairs, which report.json names",
             )
         )
@@ -172,7 +174,7 @@ def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
         found.append(
             Concern(
                 Doubt.SPOILED_IMAGES,
-                f"{sum(unbelieved.spoiled_images.values())} spoiled images were not used ({_reasons(unbelieved.spoiled_images)})",
+                f"{counted(sum(unbelieved.spoiled_images.values()), 'spoiled image was', 'spoiled images were')} not used ({_reasons(unbelieved.spoiled_images)})",
                 "check the cable, the camera and its format; one now and then does no harm",
             )
         )
@@ -181,7 +183,7 @@ def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
         found.append(
             Concern(
                 Doubt.DISBELIEVED,
-                f"{sum(unbelieved.disbelieved.values())} of {unbelieved.received} frames could not be true and were dropped ({reasons})",
+                f"{sum(unbelieved.disbelieved.values())} of {counted(unbelieved.received, 'frame')} could not be true and {'was' if sum(unbelieved.disbelieved.values()) == 1 else 'were'} dropped ({reasons})",
                 _STOOD_STILL if _OF_THE_CLOCK.issuperset(unbelieved.disbelieved) else _LIES,
             )
         )

@@ -29,6 +29,18 @@ class Unused:
         """Place and reason for people."""
         return f"{self.place}: {self.reason}".replace("_", " ") if self.reason else self.place
 
+    @property
+    def told(self) -> str:
+        """Number, place and reason for people: `1 pair dropped from a full FIFO`."""
+        noun, _, rest = self.place.partition(" ")
+        if noun in {"board", "host"}:
+            second, _, rest = rest.partition(" ")
+            noun = f"{noun} {second}"
+        if self.count == 1:
+            noun, rest = noun.removesuffix("s"), rest.replace("that were not whole images", "that was no whole image")
+        reason = f": {self.reason}".replace("_", " ") if self.reason else ""
+        return f"{self.count} {noun} {rest}{reason}"
+
 
 def unused(run: RunSnapshot) -> tuple[Unused, ...]:
     """Return what was not used, as far as known. Nothing is counted twice."""

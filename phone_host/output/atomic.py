@@ -7,7 +7,7 @@ that nobody waits for.
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
@@ -44,6 +44,15 @@ def replacing(path: Path, *, durable: bool = False) -> Iterator[BinaryIO]:
 
 def write_bytes(path: Path, *parts: bytes | memoryview) -> None:
     """Write the parts one after another to `path`, whole or not at all.
+
+    Raises:
+        OSError: see `replacing`.
+    """
+    write_parts(path, parts)
+
+
+def write_parts(path: Path, parts: Iterable[bytes | memoryview]) -> None:
+    """Write parts one after another to `path`, whole or not at all. Each is made only when it is written, so they need not fit into memory together.
 
     Raises:
         OSError: see `replacing`.

@@ -1,19 +1,25 @@
-"""Shows disparity as a picture: near is bright, far is dark, no value is black."""
+"""Shows disparity and depth as pictures: near is bright, far is dark, no value is black; a scale on the right."""
 
 from pathlib import Path
+from typing import Final
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from phone_host.model import Disparity, Image
+from phone_host.model import CloudImage, Disparity, Image, StereoGeometry
 from phone_host.output.atomic import write_bytes
+from phone_host.output.scale_bar import Tick, ticks, with_scale
+from phone_host.output.strips import strips
 
 # Viridis: lightness rises evenly, it works in grey prints and for colour-blind readers, and its dark end (68, 1, 84)
 # differs from the black that means "none" (Smith and van der Walt, 2015).
-_COLOUR_MAP = cv2.COLORMAP_VIRIDIS
-_SAMPLE_STEP = 3  # a ninth of the pixels gives the same percentiles to within one colour level, in a ninth of the time
+_COLOUR_MAP: Final = cv2.COLORMAP_VIRIDIS
+_LEVELS: Final = 255  # level 0 means none
+_SAMPLES: Final = 50_000  # give the same percentiles as all pixels to within one colour level
 # Single wrong matches at the ends must not use up the colours.
 _LOW_PERCENT, _HIGH_PERCENT = 1.0, 99.0
+_LEAST_DEPTH_SHARE: Final = 0.02  # of the depth: on a flat wall, noise must not become colours
 
 
 def colour_range_px(disparity: Disparity) -> tuple[float, float]:
@@ -25,12 +31,27 @@ def colour_range_px(disparity: Disparity) -> tuple[float, float]:
     Returns:
         Low and high, px; (0, 1) if there is no value at all.
     """
-    sample = disparity[::_SAMPLE_STEP, ::_SAMPLE_STEP]
-    values = sample[np.isfinite(sample)]
+    values = _sample(disparity)
     if values.size == 0:
         return 0.0, 1.0
     low, high = np.percentile(values, (_LOW_PERCENT, _HIGH_PERCENT))
     return float(low), float(max(high, low + 1.0))  # in a flat scene, noise must not become colours
+
+
+def depth_range_m(depth: NDArray[np.float32]) -> tuple[float, float]:
+    """Return the depths to show as brightest and darkest: the 1st and 99th percentile.
+
+    Args:
+        depth: (H, W) float32, m, NaN = none.
+
+    Returns:
+        Near and far, m; (0, 1) if there is no value at all.
+    """
+    values = _sample(depth)
+    if values.size == 0:
+        return 0.0, 1.0
+    near, far = np.percentile(values, (_LOW_PERCENT, _HIGH_PERCENT))
+    return float(near), float(max(far, near * (1 + _LEAST_DEPTH_SHARE)))
 
 
 def colour_disparity(disparity: Disparity, low_px: float, high_px: float) -> Image:
@@ -44,25 +65,72 @@ def colour_disparity(disparity: Disparity, low_px: float, high_px: float) -> Ima
     Returns:
         (H, W, 3) BGR; black where there is no value.
     """
-    valid = np.isfinite(disparity)
-    scaled = (np.where(valid, disparity, low_px) - low_px) * (255.0 / (high_px - low_px))
-    levels = np.clip(np.rint(scaled), 0, 255).astype(np.uint8)
-    colours = np.asarray(cv2.applyColorMap(levels, _COLOUR_MAP), dtype=np.uint8)
-    colours[~valid] = 0
-    return colours
+    return _coloured(disparity, low_px, high_px)
 
 
-def write_preview(path: Path, disparity: Disparity) -> None:
-    """Write a disparity map as a coloured PNG.
+def colour_depth(depth: NDArray[np.float32], near_m: float, far_m: float) -> Image:
+    """Colour depths.
 
     Args:
-        path: the file; it appears whole or not at all.
-        disparity: (H, W) float32, px, NaN = none.
+        depth: (H, W) float32, m, NaN = none.
+        near_m: depth of the brightest colour.
+        far_m: depth of the darkest colour, beyond `near_m`.
 
-    Raises:
-        OSError: the file cannot be written.
+    Returns:
+        (H, W, 3) BGR; black where there is no value.
     """
-    write_png(path, colour_disparity(disparity, *colour_range_px(disparity)))
+    return _coloured(depth, far_m, near_m)
+
+
+def disparity_picture(disparity: Disparity, geometry: StereoGeometry | None = None) -> Image:
+    """Colour a disparity map and add its scale.
+
+    Args:
+        disparity: (H, W) float32, px, NaN = none.
+        geometry: its scale is in metres; None: in px.
+
+    Returns:
+        (H, W + scale, 3) BGR.
+    """
+    low_px, high_px = colour_range_px(disparity)
+    is_empty = not np.isfinite(disparity).any()
+    image = _coloured(disparity, low_px, high_px)
+    span_px = high_px - low_px
+    if geometry is None:
+
+        def in_px(pitch: float) -> tuple[Tick, ...]:
+            return () if is_empty else ticks(low_px, high_px, lambda d: (d - low_px) / span_px, pitch)
+
+        return with_scale(image, _scale_colours(), in_px, "px")
+    product, doffs_px = geometry.focal_px * geometry.baseline_m, geometry.doffs_px
+
+    def in_metres(pitch: float) -> tuple[Tick, ...]:
+        if is_empty or high_px + doffs_px <= 0:  # nothing, or everything is behind infinity
+            return ()
+        far_m = product / (low_px + doffs_px) if low_px + doffs_px > 0 else float("inf")
+        near_m = product / (high_px + doffs_px)
+        return ticks(near_m, far_m, lambda z: (product / z - doffs_px - low_px) / span_px, pitch)
+
+    return with_scale(image, _scale_colours(), in_metres, "m")
+
+
+def depth_picture(cloud: CloudImage) -> Image:
+    """Colour the depths of a cloud and add a scale in metres.
+
+    Args:
+        cloud: (H, W, 3) float32, m, in the left camera's axes, NaN = none.
+
+    Returns:
+        (H, W + scale, 3) BGR.
+    """
+    depth = cloud[..., 2]
+    near_m, far_m = depth_range_m(depth)
+    is_empty = not np.isfinite(depth).any()
+
+    def in_metres(pitch: float) -> tuple[Tick, ...]:
+        return () if is_empty else ticks(near_m, far_m, lambda z: (far_m - z) / (far_m - near_m), pitch)
+
+    return with_scale(_coloured(depth, far_m, near_m), _scale_colours(), in_metres, "m")
 
 
 def write_png(path: Path, image: Image) -> None:
@@ -77,4 +145,38 @@ def write_png(path: Path, image: Image) -> None:
     """
     # Level 1 takes a third of the default's time for a few per cent more bytes; these files are viewed once.
     encoded = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
-    write_bytes(path, encoded.tobytes())
+    write_bytes(path, encoded.data)
+
+
+def _sample(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the finite ones of a regular sample of the pixels."""
+    step = max(1, int((values.size / _SAMPLES) ** 0.5))
+    sample = values[::step, ::step]
+    return sample[np.isfinite(sample)]
+
+
+def _coloured(values: NDArray[np.float32], dark: float, bright: float) -> Image:
+    """Colour values from `dark` to `bright`, whichever is greater; NaN becomes black."""
+    image = np.empty((*values.shape, 3), dtype=np.uint8)
+    table, scale = _table(), np.float32((_LEVELS - 1) / (bright - dark))
+    for rows in strips(*values.shape):
+        levels = values[rows] - np.float32(dark)
+        levels *= scale
+        levels += np.float32(1.5)  # to the nearest level, from 1
+        np.clip(levels, 1, _LEVELS, out=levels)
+        levels[~np.isfinite(values[rows])] = 0
+        image[rows] = cv2.applyColorMap(levels.astype(np.uint8), table)
+    return image
+
+
+def _table() -> Image:
+    """Return (256, 1, 3) BGR: black, then 255 colours from dark to bright."""
+    grey = np.linspace(0, 255, _LEVELS).round().astype(np.uint8)
+    colours = cv2.applyColorMap(grey[:, np.newaxis], _COLOUR_MAP)
+    return np.concatenate((np.zeros((1, 1, 3), np.uint8), colours))
+
+
+def _scale_colours() -> Image:
+    """Return (255, 3) BGR, from dark to bright."""
+    colours: Image = _table()[1:, 0]
+    return colours

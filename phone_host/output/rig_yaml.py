@@ -3,7 +3,9 @@
 Keys: format_version (absent: 1); left_image_width, left_image_height, right_image_width, right_image_height (px); M1 D1
 M2 D2 (camera matrices and distortion, left and right); R T (right from left, T in metres); R1 R2 P1 P2 Q
 (rectification); rectified_image_width, rectified_image_height (the size for which P1 and P2 hold); board_side; rms_left
-rms_right rms_stereo (px, .Nan = unknown); time_offset_ns, time_offset_uncertainty_ns (host's stamp minus board's;
+rms_right rms_stereo (px, .Nan = unknown); zero_sigma (standard uncertainty of the disparity of infinitely far points, px;
+absent or .Nan: not measured); verdict (good, usable, reject; absent: not stated); left_camera, right_camera (see
+`rig_cameras`); time_offset_ns, time_offset_uncertainty_ns (host's stamp minus board's;
 absent: not measured). This program reads only the rig and computes the rectification from it. R1 to Q are there for
 other programs.
 """
@@ -15,11 +17,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from common.camera.identity import CameraState
 from common.errors import DataError
 from common.files import read_whole
 from common.versions import RIG_FORMAT
 from phone_host.model import CameraModel, Rectification, Rig, Side, TimeOffset
 from phone_host.output.atomic import write_text
+from phone_host.output.rig_cameras import read_camera, write_camera
+
+REJECTED = "reject"
+"""The verdict of a rig that `run` and `stereo` do not use unless they are told to."""
+
+VERDICTS = ("good", "usable", REJECTED)
 
 _DISTORTION_LENGTHS = (4, 5, 8, 12, 14)  # the lengths that OpenCV's model defines
 _LARGEST_IMAGE_PX = 100_000
@@ -66,6 +75,13 @@ def write_rig(path: Path, rig: Rig, rectification: Rectification) -> None:
     storage.write("rms_left", rig.rms_left_px)
     storage.write("rms_right", rig.rms_right_px)
     storage.write("rms_stereo", rig.rms_stereo_px)
+    storage.writeComment("standard uncertainty of the disparity of infinitely far points, px; what the rig is good for")
+    storage.write("zero_sigma", rig.zero_sigma_px)
+    if rig.verdict:
+        storage.write("verdict", rig.verdict)
+    for key, camera in (("left_camera", rig.left_camera), ("right_camera", rig.right_camera)):
+        if camera is not None:
+            write_camera(storage, key, camera)
     storage.writeComment(
         "the host camera's stamp minus the board camera's for one moment, ns, and what contains it in 99.9 %"
     )
@@ -120,6 +136,10 @@ def read_rig(path: Path) -> Rig:
         rms_right_px=reader.number("rms_right"),
         rms_stereo_px=reader.number("rms_stereo"),
         time_offset=reader.time_offset(),
+        zero_sigma_px=reader.zero_sigma_px(),
+        verdict=reader.verdict(),
+        left_camera=reader.camera("left_camera", left),
+        right_camera=reader.camera("right_camera", right),
     )
 
 
@@ -265,6 +285,25 @@ class _Reader:
                 "time_offset_uncertainty_ns", f"is {uncertainty_ns:g}", "measure it: phone-host calibrate-time"
             )
         return TimeOffset(round(offset_ns), round(uncertainty_ns))
+
+    def zero_sigma_px(self) -> float:
+        """Read the uncertainty of zero disparity, which may be missing (NaN)."""
+        value = self.number("zero_sigma")
+        if value < 0 or math.isinf(value):
+            raise self.problem("zero_sigma", f"is {value:g}", "calibrate again, or remove it")
+        return value
+
+    def verdict(self) -> str:
+        """Read what the calibration is good for; empty if it is missing."""
+        node = self._storage.getNode("verdict")
+        value = "" if node.empty() else self.text("verdict", "no word")
+        if value and value not in VERDICTS:
+            raise self.problem("verdict", f"is {value!r}", f"write {', '.join(VERDICTS[:-1])} or {VERDICTS[-1]}")
+        return value
+
+    def camera(self, key: str, model: CameraModel) -> CameraState | None:
+        """Read which camera one of the two was; None if it is missing."""
+        return read_camera(self._storage.getNode(key), key, (model.width_px, model.height_px), self.problem)
 
     def text(self, key: str, default: str) -> str:
         """Read a word; return the default if it is missing."""

@@ -1,6 +1,7 @@
 """Keeps frames of both cameras with their stamps for a while: from a board and the own camera, or from folders of an earlier run.
 
-In a folder a frame's file name is its stamp: `board/<ns>.jpg` and `host/<ns>.jpg`, ns on the host's clock.
+In a folder a frame's file name is its stamp: `board/<ns>.jpg` and `host/<ns>.jpg`, ns on the host's clock. The files are as the
+cameras gave them; `board/orientation` holds the options that make them upright, such as `rotate=180&flip=h`, if there are any.
 """
 
 from collections.abc import Callable, Sequence
@@ -8,11 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 from typing import Final
+from urllib.parse import parse_qsl
 
 from common import now
 from common.camera.base import Camera
 from common.camera.imagefile import SUFFIXES, load
-from common.errors import DataError
+from common.camera.orientation import UPRIGHT, Orientation, orientation_of
+from common.errors import DataError, SettingsError
+from common.files import read_whole
 from common.frame import Frame, PixelFormat
 from common.link.base import Link
 from common.protocol.message import CameraDescription, FrameMessage
@@ -30,6 +34,9 @@ _STEP_S: Final = 0.05
 _ENOUGH_BYTES: Final = 400 * 1024 * 1024
 """Half a minute of raw 640x480 images of both cameras; limited by a phone's memory."""
 
+_ORIENTATION: Final = "orientation"
+_MOST_LETTERS: Final = 100
+
 
 @dataclass(frozen=True, slots=True)
 class Footage:
@@ -45,9 +52,14 @@ class Footage:
 
 
 class _Keeper:
-    """Keeps every frame of both cameras: the frame sink for the board's frames, and the receiver of the own camera's."""
+    """Keeps every frame of both cameras: the frame sink for the board's frames, and the receiver of the own camera's.
 
-    def __init__(self) -> None:
+    Args:
+        own: how the own camera's images become upright; a board's frame says that itself.
+    """
+
+    def __init__(self, own: Orientation) -> None:
+        self._own = own
         self.board: list[Shot] = []
         self.host: list[Shot] = []
         self.kept_bytes = 0
@@ -72,14 +84,21 @@ class _Keeper:
 
     def add_board(self, frame: BoardFrame) -> None:
         """Keep a frame of the board."""
-        self._keep(self.board, frame.marks.exposed_ns, frame.message, "board")
+        self._keep(self.board, frame.marks.exposed_ns, frame.message, "board", frame.orientation)
 
     def add_host(self, frame: Frame) -> None:
         """Keep a frame of the own camera, once the board's have begun."""
         if self.board:
-            self._keep(self.host, frame.exposed.ns, frame, "host")
+            self._keep(self.host, frame.exposed.ns, frame, "host", self._own)
 
-    def _keep(self, shots: list[Shot], exposed_ns: int, frame: Frame | FrameMessage, whose: str) -> None:
+    def _keep(
+        self,
+        shots: list[Shot],
+        exposed_ns: int,
+        frame: Frame | FrameMessage,
+        whose: str,
+        orientation: Orientation,
+    ) -> None:
         name = f"{whose} frame {frame.sequence}"
         image = EncodedImage(
             payload=bytes(frame.payload),
@@ -87,6 +106,7 @@ class _Keeper:
             width_px=frame.width_px,
             height_px=frame.height_px,
             name=name,
+            orientation=orientation,
         )
         if self.kept_bytes < _ENOUGH_BYTES and (not shots or exposed_ns > shots[-1].exposed_ns):
             shots.append(Shot(exposed_ns, image))
@@ -122,7 +142,7 @@ def film(
         for link in links:
             link.close()
         raise DataError("a camera with pace=demand has no clock", "give it pace=clock")
-    keeper = _Keeper()
+    keeper = _Keeper(camera.description.orientation)
     own = OwnCamera(camera, keeper.add_host, DemandClock(pacing))
     receiver = Receiver(links, now.random_id(), keeper)
 
@@ -169,9 +189,12 @@ def keep(footage: Footage, folder: Path) -> None:
         suffixes = {PixelFormat.MJPEG: ".jpg", PixelFormat.PNG: ".png"}
         named = [(shot, f"{shot.exposed_ns}{suffixes.get(shot.image.pixel_format, '')}") for shot in shots]
         files = {name: shot for shot, name in named if "." in name}
-        listed = ListedFolder(folder / side, r"-?[0-9]+\.(jpg|png)")
-        listed.add(*files)
+        listed = ListedFolder(folder / side, rf"-?[0-9]+\.(jpg|png)|{_ORIENTATION}")
+        turn = str(shots[0].image.orientation) if shots else ""
+        listed.add(*files, *([_ORIENTATION] if turn else []))
         listed.close()
+        if turn:
+            write_bytes(folder / side / _ORIENTATION, turn.encode())
         for name, shot in files.items():
             write_bytes(folder / side / name, bytes(shot.image.payload))
 
@@ -190,7 +213,7 @@ def read(folder: Path) -> Footage:
             raise DataError(
                 f"{folder / side} cannot be read ({error.strerror})", "give a folder kept by --keep"
             ) from None
-        shots = []
+        shots, orientation = [], _orientation(folder / side / _ORIENTATION)
         for path in paths:
             if not path.stem.isdecimal():
                 raise DataError(f"{path}: the name is not a time stamp", "name each image by its exposure in ns")
@@ -201,7 +224,21 @@ def read(folder: Path) -> Footage:
                 width_px=image.width_px,
                 height_px=image.height_px,
                 name=str(path),
+                orientation=orientation,
             )
             shots.append(Shot(int(path.stem), encoded))
         sides.append(tuple(sorted(shots, key=lambda shot: shot.exposed_ns)))
     return Footage(*sides)
+
+
+def _orientation(path: Path) -> Orientation:
+    """Read how a folder's images become upright; without the file they are."""
+    try:
+        text = read_whole(path, _MOST_LETTERS).decode("ascii", "replace").strip()
+        return orientation_of(dict(parse_qsl(text, keep_blank_values=True)), str(path))
+    except FileNotFoundError:
+        return UPRIGHT
+    except OSError as error:
+        raise DataError(f"{path} cannot be read ({error.strerror})", "check its permissions") from None
+    except SettingsError as error:
+        raise DataError(error.problem, error.remedy) from None

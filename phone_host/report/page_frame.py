@@ -1,13 +1,15 @@
 """The frame of every HTML page: document, cards, tables, plots in two widths, one style. Pure: values in, text out.
 
-A page refers to nothing outside itself and runs no script. So it opens offline, years later, from any folder, in light
-and dark mode and on a phone. All text that comes from outside is escaped.
+A page loads nothing from outside itself, so it opens offline, years later, from any folder, in light and dark mode and on
+a phone. Pages with depth run one script of ours (`depth_script`), the others none; a policy in the page's head makes the
+browser refuse everything else. All text that comes from outside is escaped.
 """
 
 from collections.abc import Callable, Sequence
 from html import escape
 from typing import Final
 
+from phone_host.report import depth_script, depth_view
 from phone_host.svg.plot_parts import STYLE
 
 WIDE_PX: Final = 960
@@ -18,17 +20,26 @@ HALF_PX: Final = 450
 """Width of a plot that shares its row with another."""
 
 
-def document(title: str, body: str) -> str:
+_POLICY: Final = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
+"""What the browser may load (Content Security Policy, level 3): pictures inside the page and its own styles."""
+
+
+def document(title: str, body: str, *, shows_depth: bool = False) -> str:
     """Make an HTML document in the style of all our pages from a body that is already HTML.
 
     Args:
         title: plain text.
         body: HTML, escaped where it has to be.
+        shows_depth: whether the body has parts of `depth_view` or commands to copy, which need the script.
     """
+    policy = f"{_POLICY}; script-src '{depth_script.HASH}'" if shows_depth else _POLICY
+    script = f"<script>{depth_script.SCRIPT}</script>" if shows_depth else ""
+    style = f"{_PAGE_STYLE}{STYLE}{depth_view.STYLE if shows_depth else ''}"
     return (
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
         '<meta name="viewport" content="width=device-width,initial-scale=1"><meta name="color-scheme" content="light dark">'
-        f"<title>{escape(title)}</title><style>{_PAGE_STYLE}{STYLE}</style></head><body><main>{body}</main></body></html>\n"
+        f"<title>{escape(title)}</title><style>{style}</style></head><body><main>{body}</main>{script}</body></html>\n"
     )
 
 
@@ -72,9 +83,9 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, tight: bool 
 
 
 _PAGE_STYLE: Final = """
-:root{color-scheme:light dark;--bg:#f4f5f7;--card:#fff;--ink:#1a1e24;--ink2:#5c6570;--line:#e2e6ea;
+:root{color-scheme:light dark;--bg:#f4f5f7;--card:#fff;--ink:#1a1e24;--ink2:#5c6570;--line:#e2e6ea;--edge:#1a1e2440;--link:#0a5fa8;
 --good:#0b7a55;--warning:#8a5a00;--bad:#b3261e}
-@media (prefers-color-scheme:dark){:root{--bg:#101318;--card:#191d24;--ink:#e9ecf0;--ink2:#9ba5b1;--line:#2b323b;
+@media (prefers-color-scheme:dark){:root{--bg:#101318;--card:#191d24;--ink:#e9ecf0;--ink2:#9ba5b1;--line:#2b323b;--edge:#ffffff38;--link:#7cc0ff;
 --good:#3ecf9b;--warning:#f0b43c;--bad:#ff8a80}}
 *{box-sizing:border-box}
 body{margin:0;background:var(--bg);color:var(--ink);font:16px/1.5 system-ui,-apple-system,"Segoe UI",sans-serif}
@@ -97,13 +108,20 @@ border:1px solid var(--line);border-radius:10px;overflow:hidden}
 section{background:var(--card);border:1px solid var(--line);border-radius:10px;padding:1.1rem 1.25rem}
 .pair{display:grid;grid-template-columns:1fr 1fr;gap:1.25rem}.pair>*{min-width:0}
 .wide+.wide,.narrow+.wide{margin-top:1rem}.narrow{display:none}
-.scroll{overflow-x:auto}table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums;min-width:50%}
+.scroll{overflow-x:auto;background:linear-gradient(to right,var(--card) 40%,transparent) left/2.5rem 100% no-repeat local,
+linear-gradient(to left,var(--card) 40%,transparent) right/2.5rem 100% no-repeat local,
+linear-gradient(to right,var(--edge),transparent) left/1.1rem 100% no-repeat,linear-gradient(to left,var(--edge),transparent) right/1.1rem 100% no-repeat}
+table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums;min-width:50%}
 th,td{text-align:left;padding:.35rem 1.5rem .35rem 0;border-bottom:1px solid var(--line)}th{color:var(--ink2);font-weight:500}
 tr:last-child td{border-bottom:0}.tight{white-space:nowrap;font-size:.75rem}.tight td,.tight th{padding-right:.55rem}.tight td:nth-child(2){white-space:normal}
 section>p:last-child{margin-bottom:0}
 details{margin-top:.75rem;font-size:.9rem;color:var(--ink2)}summary{cursor:pointer}
 .words{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1rem;margin:.5rem 0 0}.words dt{color:var(--ink)}.words dd{margin:0}
-section ul{margin:.25rem 0 0;padding-left:1.2rem}
+a{color:var(--link)}.files dt{font-weight:600}.share{display:flex;height:1rem;border-radius:4px;overflow:hidden;margin:.5rem 0}
+.command{display:flex;gap:.6rem;align-items:flex-start;margin:.25rem 0 .9rem}.command code{flex:1;min-width:0;padding:.45rem .6rem;background:var(--bg);
+border:1px solid var(--line);border-radius:6px;font:.85rem/1.5 ui-monospace,monospace;white-space:pre-wrap;overflow-wrap:anywhere}
+.command+p,.for{margin:0;font-size:.9rem;color:var(--ink2)}
+section ul.small{font-size:.85rem;color:var(--ink2);margin-top:.6rem}section ul{margin:.25rem 0 0;padding-left:1.2rem}
 @media (max-width:700px){main{padding:1.25rem .9rem 2rem}.pair{grid-template-columns:1fr}.wide{display:none}
 .narrow{display:block}.narrow+.wide+.narrow{margin-top:1rem}section{padding:1rem}.figures{grid-template-columns:1fr 1fr}
 .figures dd{font-size:1.25rem}h1{font-size:1.4rem}}

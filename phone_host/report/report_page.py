@@ -1,7 +1,6 @@
 """A run as one self-contained HTML page: pictures, delays of all pairs as plots, key figures. Pure: data in, text out.
 
-The page refers to nothing outside itself and runs no script. So it opens offline, years later, from any folder, in
-light and dark mode and on a phone. The page says what was not measured. All text that comes from outside is escaped.
+The page says what was not measured. All text that comes from outside is escaped.
 """
 
 import base64
@@ -16,7 +15,10 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from common.ledger import PairLedger, StageTimes
+from common.words import counted
+from phone_host.measure.delays import IDLE_STAGE_NS
 from phone_host.report.page_frame import HALF_PX, document, section, table, two_widths
+from phone_host.report.page_links import FileLink, NextCommand, files_section, list_section, next_section
 from phone_host.svg.plot_parts import legend
 from phone_host.svg.plots import (
     Budget,
@@ -137,7 +139,11 @@ class PageData:
         pictures: left, right, disparity.
         delays: of all pairs.
         tables: drops by reason and similar.
-        notes: what to know or try next, one sentence each.
+        notes: what to know, one sentence each.
+        steps: what to do next, one sentence each.
+        commands: what to type next.
+        depth: the last pair's card, HTML with parts of `depth_view`, shown before the pictures; may be empty.
+        files: beside the page.
     """
 
     title: str
@@ -149,6 +155,10 @@ class PageData:
     delays: DelaySeries
     tables: tuple[Table, ...] = ()
     notes: tuple[str, ...] = ()
+    steps: tuple[str, ...] = ()
+    commands: tuple[NextCommand, ...] = ()
+    depth: str = ""
+    files: tuple[FileLink, ...] = ()
 
 
 def delay_series(ledgers: Sequence[PairLedger]) -> DelaySeries:
@@ -200,21 +210,39 @@ def page(data: PageData) -> str:
     Raises:
         DataError: a picture is neither PNG nor JPEG.
     """
-    sign = {Headline.GOOD: "✓", Headline.WARNING: "!", Headline.BAD: "✕"}[data.verdict]
-    subtitle = f'<p class="sub">{escape(data.subtitle)}</p>' if data.subtitle else ""
     parts = [
-        f"<header><h1>{escape(data.title)}</h1>{subtitle}</header>",
-        f'<p class="verdict {data.verdict.value}"><b aria-hidden="true">{sign}</b><span>{escape(data.sentence)}</span></p>',
-        _figures(data.figures),
+        heading(data.title, data.subtitle, data.verdict, data.sentence),
+        figures_row(data.figures),
+        data.depth,
         _pictures(data.pictures),
         *_delays(data.delays),
-        *(_table(one) for one in data.tables),
-        _notes(data.notes),
+        *(section(one.title, "", table(one.columns, one.rows)) for one in data.tables if one.rows),
+        next_section(data.steps, data.commands),
+        list_section("Remarks", data.notes),
+        files_section(data.files),
     ]
-    return document(data.title, "".join(parts))
+    return document(data.title, "".join(parts), shows_depth=bool(data.depth or data.commands))
 
 
-def _figures(figures: tuple[Figure, ...]) -> str:
+def heading(title: str, subtitle: str, verdict: Headline, sentence: str) -> str:
+    """Make the head of a page: title, subtitle and verdict.
+
+    Args:
+        title: plain text.
+        subtitle: plain text, may be empty.
+        verdict: gives colour and symbol.
+        sentence: the verdict in words.
+    """
+    sign = {Headline.GOOD: "✓", Headline.WARNING: "!", Headline.BAD: "✕"}[verdict]
+    below = f'<p class="sub">{escape(subtitle)}</p>' if subtitle else ""
+    return (
+        f"<header><h1>{escape(title)}</h1>{below}</header>"
+        f'<p class="verdict {verdict.value}"><b aria-hidden="true">{sign}</b><span>{escape(sentence)}</span></p>'
+    )
+
+
+def figures_row(figures: tuple[Figure, ...]) -> str:
+    """Make the row of key figures; empty if there are none."""
     if not figures:
         return ""
     cards = "".join(
@@ -230,14 +258,19 @@ def _pictures(pictures: tuple[Picture, ...]) -> str:
     if not pictures:
         return ""
     items = "".join(
-        f'<figure><img alt="{escape(picture.label)}" src="{_data_uri(picture)}"><figcaption>{escape(picture.label)}'
+        f'<figure><img alt="{escape(picture.label)}" src="{picture_uri(picture)}"><figcaption>{escape(picture.label)}'
         "</figcaption></figure>"
         for picture in pictures
     )
     return f'<div class="pictures">{items}</div>'
 
 
-def _data_uri(picture: Picture) -> str:
+def picture_uri(picture: Picture) -> str:
+    """Return a picture as the address of an <img>.
+
+    Raises:
+        DataError: it is neither PNG nor JPEG.
+    """
     if picture.data.startswith(b"\x89PNG\r\n\x1a\n"):
         kind = "png"
     elif picture.data.startswith(b"\xff\xd8\xff"):
@@ -253,9 +286,11 @@ def _delays(series: DelaySeries) -> list[str]:
         return [section("Delays", "No pair was processed, so there are no delays to show.", "")]
     names = [(quantity.label, quantity.colour) for quantity in series.delays]
     mean = Budget(
-        f"mean of {series.pairs} pairs, end to end", tuple(mean_share(quantity) for quantity in series.delays)
+        f"mean of {counted(series.pairs, 'pair')}, end to end",
+        tuple(mean_share(quantity) for quantity in series.delays),
     )
-    work = Budget("mean processing delay", tuple(mean_share(quantity) for quantity in series.stages))
+    stages = tuple(stage for stage in series.stages if stage.values_ns.max() > IDLE_STAGE_NS)
+    work = Budget("mean processing delay", tuple(mean_share(quantity) for quantity in stages))
     everything = Strips("", (*series.delays, series.end_to_end, series.starvation))
     return [
         section(
@@ -271,12 +306,14 @@ def _delays(series: DelaySeries) -> list[str]:
             "Bar: 5th to 95th percentile. Line across: median. Small tick: 99th percentile. Dot: the longest. Logarithmic axis.",
             two_widths(lambda width: distributions([everything], width)) + _glossary(everything.quantities),
         ),
-        section(
+        ""
+        if not stages
+        else section(
             "Stages of processing",
             "",
-            legend([(quantity.label, quantity.colour) for quantity in series.stages])
+            legend([(quantity.label, quantity.colour) for quantity in stages])
             + two_widths(lambda width: budgets([work], width))
-            + two_widths(lambda width: distributions([Strips("", series.stages)], width)),
+            + two_widths(lambda width: distributions([Strips("", stages)], width)),
         ),
         '<div class="pair">'
         + section(
@@ -300,13 +337,3 @@ def _glossary(quantities: tuple[Quantity, ...]) -> str:
     """Make the list of what each delay means, collapsed; phones have no tooltips."""
     items = "".join(f"<dt>{escape(one.label)}</dt><dd>{escape(one.meaning)}</dd>" for one in quantities)
     return f'<details><summary>What each delay means</summary><dl class="words">{items}</dl></details>'
-
-
-def _table(one: Table) -> str:
-    return section(one.title, "", table(one.columns, one.rows or (("none",),)))
-
-
-def _notes(notes: tuple[str, ...]) -> str:
-    if not notes:
-        return ""
-    return section("What next", "", f"<ul>{''.join(f'<li>{escape(note)}</li>' for note in notes)}</ul>")

@@ -1,25 +1,42 @@
 """A run's page: the last pair, every delay, who waits for whom, how the own camera fared. The demo's page uses parts of it."""
 
 from collections.abc import Sequence
+from typing import Final
 
-import cv2
 import numpy as np
 
 from common import now
 from common.camera.base import CameraHealth
 from common.ledger import PairLedger
+from common.words import counted, times
 from phone_host.measure.accounts import rung_lines
 from phone_host.measure.regime import Judgement, Regime, judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
-from phone_host.model import Image, Processed, Side
-from phone_host.output.preview import colour_disparity, colour_range_px
+from phone_host.model import Processed, Side
+from phone_host.report.cut_words import cut_sentence
+from phone_host.report.depth_data import density, photograph
+from phone_host.report.depth_view import cloud_view, depth_view
+from phone_host.report.page_frame import section
+from phone_host.report.page_links import FileLink
 from phone_host.report.report_page import Figure, Headline, PageData, Picture, Table, delay_series, page
 from phone_host.report.summary import phase_lines
 
+_FINE: Final = frozenset({Regime.STARVED_BY_CAMERAS, Regime.UNKNOWN})
+"""Regimes in which nothing has to be done."""
 
-def run_page(run: RunSnapshot, last: Processed | None, board_side: Side, ledgers: Sequence[PairLedger]) -> str:
+_MOST_LINKS: Final = 40
+"""More links to saved pairs than this are no help; the folder lists them as well."""
+
+
+def run_page(
+    run: RunSnapshot,
+    last: Processed | None,
+    board_side: Side,
+    ledgers: Sequence[PairLedger],
+    saved: Sequence[str] = (),
+) -> str:
     """Make the page.
 
     Args:
@@ -27,6 +44,7 @@ def run_page(run: RunSnapshot, last: Processed | None, board_side: Side, ledgers
         last: its last pair; None if there was none.
         board_side: which of its views is the board's.
         ledgers: of all pairs, or of evenly chosen ones, in order.
+        saved: the run's saved files, relative to the page, in order, for example `pair-000010/cloud.ply`.
 
     Returns:
         One self-contained HTML document.
@@ -40,24 +58,82 @@ def run_page(run: RunSnapshot, last: Processed | None, board_side: Side, ledgers
             verdict=verdict,
             sentence=sentence,
             figures=_figures(run) if run.processed else (),
+            depth=depth_card(
+                last, board_side, f"The last pair: number {run.processed - 1} of this run, counted from 0"
+            ),
             pictures=pictures(last, board_side),
             delays=delay_series(ledgers),
             tables=(*links_tables(run), unused_table(run), camera_table(run.camera)),
+            steps=steps(run),
             notes=notes(run),
+            files=files(saved),
         )
     )
 
 
 def notes(run: RunSnapshot) -> tuple[str, ...]:
-    """Say who waits for whom and what would help, what makes depth wrong, and how the cameras' exposures relate in time."""
+    """Say who waits for whom, what makes depth wrong, and how the cameras' exposures relate in time."""
     judgement = judge(figures(run))
     return (
         f"Queue: {judgement.sentence}.",
-        *(f"What would help: {remedy}." for remedy in judgement.remedies),
-        *(f"Warning: {item.sentence}. Remedy: {item.remedy}." for item in concerns(run)),
+        *(_sentence(remark) for remark in judgement.remedies if judgement.regime in _FINE),
+        *(f"Warning: {item.sentence}." for item in concerns(run)),
         *phase_lines(run.phase, run.alignment),
         *rung_lines(run.link),
     )
+
+
+def steps(run: RunSnapshot) -> tuple[str, ...]:
+    """Say what to do next: what makes depth right comes before what makes it fast."""
+    judgement = judge(figures(run))
+    remedies = (*(item.remedy for item in concerns(run)), *(() if judgement.regime in _FINE else judgement.remedies))
+    return tuple(_sentence(remedy) for remedy in dict.fromkeys(remedies))
+
+
+def _sentence(words: str) -> str:
+    return f"{words[:1].upper()}{words[1:]}."
+
+
+def files(saved: Sequence[str]) -> tuple[FileLink, ...]:
+    """List the files of a run that lie beside its page.
+
+    Args:
+        saved: of saved pairs, relative to the page, in order.
+    """
+    links = [FileLink(name, _saved_words(name)) for name in saved[:_MOST_LINKS]]
+    if len(saved) > _MOST_LINKS:
+        first = saved[_MOST_LINKS].partition("/")[0]
+        links.append(FileLink(f"{first}/", f"and {len(saved) - _MOST_LINKS} more, from this folder on"))
+    return (
+        *links,
+        FileLink("report.json", "everything that this page says, for programs"),
+        FileLink("delays.jsonl", "every delay of every pair, one line each, ns"),
+    )
+
+
+def _saved_words(name: str) -> str:
+    """Say what a saved file holds."""
+    kind = name.rpartition("/")[2]
+    return {
+        "cloud.ply": "point cloud, metres: X right, Y down, Z forward from the left camera",
+        "disparity.pfm": "disparity, px",
+    }.get(kind, "")
+
+
+def depth_card(last: Processed | None, board_side: Side, title: str) -> str:
+    """Make the card of a pair with its depth, over which a pointer reads metres; empty if it has none.
+
+    Args:
+        last: the pair; None if there was none.
+        board_side: which of its views is the board's.
+        title: which pair it is.
+    """
+    if last is None or last.disparity is None or not np.isfinite(last.disparity).any():
+        return ""
+    words = f"{100 * density(last):.0f} % of the left pixels have a depth."
+    if last.cut is not None and (cut := cut_sentence(last.cut, last.limits)):
+        words += f" Cut: {cut}."
+    return section(title, words, depth_view(last, _captions(last, board_side)) + cloud_view(last))
 
 
 def links_tables(run: RunSnapshot) -> tuple[Table, ...]:
@@ -69,23 +145,26 @@ def links_tables(run: RunSnapshot) -> tuple[Table, ...]:
         age = tally.age.spread()
         ages = f"{age.p50_ns / 1e6:.1f} ms; {age.p95_ns / 1e6:.1f} ms" if age.count else "-"
         rows.append((tally.name, str(tally.frames), str(tally.carried), str(tally.lost), ages))
-    title = f"Links: the stream changed links {run.link.switches} times"
+    title = f"Links: the stream changed links {times(run.link.switches)}"
     columns = ("link", "frames", "times it took over", "times it was lost", "age of frames on arrival: median; p95")
     return (Table(title, columns, tuple(rows)),)
 
 
 def camera_table(health: CameraHealth) -> Table:
-    """Make a table of how the own camera fared."""
+    """Make a table of how the own camera fared; what did not happen is left out."""
+    troubles = (
+        ("unplugged", health.unplugged),
+        ("stalled", health.stalls),
+        ("failed", health.failures),
+        ("came back afterwards", health.returned),
+        ("frames that its driver missed", health.missed),
+        *((f"spoiled frames: {fault.value.replace('_', ' ')}", count) for fault, count in health.faults),
+        ("stamps not believed", health.distrusted_stamps),
+        ("controls that its driver refused", health.refused_controls),
+    )
     rows = [
-        ("measured rate", "unknown" if health.period_ns is None else f"{1e9 / health.period_ns:.2f} frames/s"),
-        ("unplugged", str(health.unplugged)),
-        ("stalled", str(health.stalls)),
-        ("failed", str(health.failures)),
-        ("came back afterwards", str(health.returned)),
-        ("frames that its driver missed", str(health.missed)),
-        *((f"spoiled frames: {fault.value.replace('_', ' ')}", str(count)) for fault, count in health.faults),
-        ("stamps not believed", str(health.distrusted_stamps)),
-        ("controls that its driver refused", str(health.refused_controls)),
+        *([] if health.period_ns is None else [("measured rate", f"{1e9 / health.period_ns:.2f} frames/s")]),
+        *((what, str(count)) for what, count in troubles if count),
         *((f"held: {name.replace('_', ' ')}", str(value)) for name, value in health.held),
     ]
     return Table("This machine's camera", ("what", "value"), tuple(rows))
@@ -98,8 +177,7 @@ def _verdict(run: RunSnapshot, judgement: Judgement, found: Sequence[Concern]) -
         return Headline.BAD, "No pair was processed: no frames of the two cameras came together."
     if found:
         return Headline.WARNING, f"{found[0].sentence}: {found[0].remedy}."
-    fine = judgement.regime in {Regime.STARVED_BY_CAMERAS, Regime.UNKNOWN}
-    return (Headline.GOOD if fine else Headline.WARNING), f"{judgement.sentence}."
+    return (Headline.GOOD if judgement.regime in _FINE else Headline.WARNING), f"{judgement.sentence}."
 
 
 def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
@@ -120,7 +198,7 @@ def _figures(run: RunSnapshot) -> tuple[Figure, ...]:
 
 def rate_figure(run: RunSnapshot) -> Figure:
     """How many pairs per second were processed."""
-    pairs = f"{run.processed} pairs in {run.seconds:.1f} s"
+    pairs = f"{counted(run.processed, 'pair')} in {run.seconds:.1f} s"
     return _measured("pairs per second", run.pairs_per_second, 1, "/s", pairs)
 
 
@@ -149,39 +227,25 @@ def _measured(label: str, value: float, decimals: int, unit: str, note: str) -> 
 
 
 def pictures(last: Processed | None, board_side: Side = Side.LEFT) -> tuple[Picture, ...]:
-    """Return the views of a pair, and its disparity if there is one.
+    """Return the views of a pair that has no depth; a pair with depth has a card of its own (`depth_card`).
 
     Args:
         last: the pair; None if there was none.
         board_side: which of the views is the board's.
     """
-    if last is None:
+    if last is None or (last.disparity is not None and np.isfinite(last.disparity).any()):
         return ()
+    left, right = _captions(last, board_side)
+    return (Picture(left, photograph(last.pair.left)), Picture(right, photograph(last.pair.right)))
+
+
+def _captions(last: Processed, board_side: Side) -> tuple[str, str]:
     whose = ("the board's", "the host's") if board_side is Side.LEFT else ("the host's", "the board's")
     rectified = "" if last.disparity is None else ", rectified"
-    views = (
-        Picture(f"left: {whose[0]} camera{rectified}", _jpeg(last.pair.left)),
-        Picture(f"right: {whose[1]} camera{rectified}", _jpeg(last.pair.right)),
-    )
-    if last.disparity is None or not np.isfinite(last.disparity).any():
-        return views
-    coloured = colour_disparity(last.disparity, *colour_range_px(last.disparity))
-    return (*views, Picture("disparity: bright is near, black is none", _png(coloured)))
+    return f"left: {whose[0]} camera{rectified}", f"right: {whose[1]} camera{rectified}"
 
 
 def unused_table(run: RunSnapshot) -> Table:
     """Make a table of what was not used, by place and reason."""
     rows = tuple((item.words, str(item.count)) for item in unused(run))
     return Table("Frames and pairs that were not used", ("what", "count"), rows)
-
-
-def _jpeg(image: Image) -> bytes:
-    done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 88])
-    assert done
-    return data.tobytes()
-
-
-def _png(image: Image) -> bytes:
-    done, data = cv2.imencode(".png", image)
-    assert done
-    return data.tobytes()

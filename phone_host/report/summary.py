@@ -4,7 +4,8 @@ import math
 from typing import Final
 
 from common.camera.base import CameraHealth
-from phone_host.measure.accounts import LinkAccount, rung_lines
+from common.words import counted, times
+from phone_host.measure.accounts import LinkAccount, LinkTally, rung_lines
 from phone_host.measure.delays import DELAYS
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
@@ -13,18 +14,22 @@ from phone_host.model import TimeOffset
 from phone_host.sync.phase import Alignment, Phase
 
 _MS: Final = 1e6
+_DELAY_TABLE: Final = 54
+_LINK_TABLE: Final = 64
+"""Widths of the tables, characters."""
 
 
-def summary(run: RunSnapshot) -> str:
-    """Summarise the run in a few lines."""
+def summary(run: RunSnapshot, width: int = 0) -> str:
+    """Summarise the run in a few lines.
+
+    Args:
+        run: the run.
+        width: of the terminal, in characters: tables leave columns out rather than exceed it; 0: no limit.
+    """
     rate = "" if math.isnan(run.pairs_per_second) else f" in {run.seconds:.1f} s ({run.pairs_per_second:.1f} /s)"
-    lines = [f"{run.processed} pairs{rate}, ended: {run.ended.replace('_', ' ')}"]
+    lines = [f"{counted(run.processed, 'pair')}{rate}, ended: {run.ended.replace('_', ' ')}"]
     if run.processed:
-        lines.append(f"{'delay, ms':14} {'p50':>9} {'p95':>9} {'p99':>9} {'max':>9}")
-        for name in DELAYS:
-            spread = run.delays.spread(name)
-            values = (spread.p50_ns, spread.p95_ns, spread.p99_ns, spread.max_ns)
-            lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value / _MS:9.3f}" for value in values))
+        lines += _delay_table(run, width)
     if run.estimate is not None:
         lines.append(
             f"the board's clock is known to +-{run.estimate.uncertainty_ns / 1000:.0f} us"
@@ -37,8 +42,19 @@ def summary(run: RunSnapshot) -> str:
     lines += [f"  {remedy}" for remedy in judge(figures(run)).remedies]
     lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(run)]
     lines += camera_troubles(run.camera)
-    lines += [*rung_lines(run.link), *_links(run.link), *_unused_lines(run)]
+    lines += [*rung_lines(run.link), *_links(run.link, width), *_unused_lines(run)]
     return "\n".join(lines)
+
+
+def _delay_table(run: RunSnapshot, width: int) -> list[str]:
+    """List the delays; the 99th percentile is left out where it has no room."""
+    columns = ("p50", "p95", "p99", "max") if not 0 < width < _DELAY_TABLE else ("p50", "p95", "max")
+    lines = [f"{'delay, ms':14} " + " ".join(f"{name:>9}" for name in columns)]
+    for name in DELAYS:
+        spread = run.delays.spread(name)
+        values = (getattr(spread, f"{column}_ns") / _MS for column in columns)
+        lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value:9.3f}" for value in values))
+    return lines
 
 
 def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
@@ -62,14 +78,14 @@ def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
 def camera_troubles(health: CameraHealth) -> list[str]:
     """Say in one line what went wrong with a camera; nothing if nothing did."""
     parts = [
-        *([f"unplugged {health.unplugged} times"] if health.unplugged else []),
-        *([f"stalled {health.stalls} times"] if health.stalls else []),
-        *([f"failed {health.failures} times"] if health.failures else []),
-        *([f"back {health.returned} times"] if health.returned else []),
-        *([f"{health.missed} frames missed by its driver"] if health.missed else []),
-        *(f"{count} frames {fault.value}" for fault, count in health.faults),
-        *([f"{health.distrusted_stamps} stamps not believed"] if health.distrusted_stamps else []),
-        *([f"{health.refused_controls} controls refused"] if health.refused_controls else []),
+        *([f"unplugged {times(health.unplugged)}"] if health.unplugged else []),
+        *([f"stalled {times(health.stalls)}"] if health.stalls else []),
+        *([f"failed {times(health.failures)}"] if health.failures else []),
+        *([f"back {times(health.returned)}"] if health.returned else []),
+        *([f"{counted(health.missed, 'frame')} missed by its driver"] if health.missed else []),
+        *(f"{counted(count, 'frame')} {fault.value}" for fault, count in health.faults),
+        *([f"{counted(health.distrusted_stamps, 'stamp')} not believed"] if health.distrusted_stamps else []),
+        *([f"{counted(health.refused_controls, 'control')} refused"] if health.refused_controls else []),
     ]
     return [f"this machine's camera: {', '.join(parts)}".replace("_", " ")] if parts else []
 
@@ -105,10 +121,12 @@ def _arrivals(health: CameraHealth, offset: TimeOffset) -> list[str]:
     ]
 
 
-def _links(link: LinkAccount) -> list[str]:
-    """List the links side by side, if there are several."""
+def _links(link: LinkAccount, width: int) -> list[str]:
+    """List the links side by side, if there are several; below each other where a table has no room."""
     if len(link.links) < 2:
         return []
+    if 0 < width < _LINK_TABLE:
+        return [_link_line(tally) for tally in link.links]
     lines = [f"{'link':14} {'frames':>9} {'carried':>9} {'lost':>9} {'age p50':>9} {'p95':>9}"]
     for tally in link.links:
         age = tally.age.spread()
@@ -117,10 +135,18 @@ def _links(link: LinkAccount) -> list[str]:
     return lines
 
 
+def _link_line(tally: LinkTally) -> str:
+    age = tally.age.spread()
+    ages = f", age p50 {age.p50_ns / _MS:.3f} ms, p95 {age.p95_ns / _MS:.3f} ms" if age.count else ""
+    return f"link {tally.name}: {counted(tally.frames, 'frame')}, carried {times(tally.carried)}, lost {times(tally.lost)}{ages}"
+
+
 def _unused_lines(run: RunSnapshot) -> list[str]:
     """Say what was not used, and what was not written."""
-    parts = [f"{item.count} {item.words}" for item in unused(run)]
+    parts = [item.told for item in unused(run)]
     lines = [f"not used: {', '.join(parts) or 'nothing'}"]
     if run.unwritten.lines or run.unwritten.pairs:
-        lines.append(f"not written: {run.unwritten.lines} lines, {run.unwritten.pairs} pairs ({run.unwritten.cause})")
+        lines.append(
+            f"not written: {counted(run.unwritten.lines, 'line')}, {counted(run.unwritten.pairs, 'pair')} ({run.unwritten.cause})"
+        )
     return lines

@@ -22,6 +22,7 @@ from phone_host.model import Processed, Result, Side, TimeOffset
 from phone_host.run.file_sink import FileSink
 from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.pipeline import Pipeline
+from phone_host.run.rig_cameras import RigCameras
 from phone_host.run.sinks import FunctionSink, Sink
 from phone_host.run.worker import Worker
 from phone_host.stereo.core import StereoCore
@@ -126,8 +127,17 @@ class Host:
         )
         self._camera = OwnCamera(camera, self._queue.add_host, demand)
         self._receiver = Receiver(links, now.random_id(), self._queue)
+        rig = None if core is None else core.rig
+        self._cameras = RigCameras(rig, settings.board_side, self._own, self._camera, self._receiver)
         interpolator = Interpolator() if settings.interpolate else None
-        pipeline = Pipeline(core, settings.board_side, now.monotonic_ns, interpolator, settings.most_pixels)
+        pipeline = Pipeline(
+            core,
+            settings.board_side,
+            now.monotonic_ns,
+            interpolator,
+            settings.most_pixels,
+            host_orientation=self._own.orientation,
+        )
         self._ledgerer = Ledgerer()
         self._worker = Worker(
             self._queue,
@@ -154,7 +164,7 @@ class Host:
 
         Raises:
             UnavailableError: no board came in time, or it does not talk to this host.
-            DataError: the streams' images do not fit the rig.
+            DataError: the streams' images or the cameras do not fit the rig.
         """
         try:
             self._worker.start()
@@ -198,7 +208,7 @@ class Host:
         Returns:
             Whether all results of the run were written.
         """
-        self._files.close(report, page)
+        self._files.close(report, page, self._cameras.text())
         return self._files.complete
 
     @property
@@ -255,6 +265,7 @@ class Host:
             spoiled_images=books.spoiled_images,
             stamps_exact=self._stamps_are_exact,
             judged_pairs=_RECENT if ended == "running" else None,
+            missed_locks=self._cameras.missed,
         )
 
     @property
@@ -300,6 +311,7 @@ class Host:
         while not self._worker.finished.wait(_STEP_S):
             now_ns = now.monotonic_ns()
             self._raise_failures()
+            self._cameras.look()
             self._align(now_ns)
             self._watch_trust(now_ns)
             if watch is not None:

@@ -7,14 +7,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
+from common.camera.orientation import UPRIGHT, Orientation
 from common.errors import DataError
 from common.frame import Frame
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
-from common.protocol.message import FrameMessage
 from phone_host.model import BoardFrame, FramePair, Image, Processed, RectifiedPair, Side
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.images import enlarged
 from phone_host.stereo.interpolate import LARGEST_FRACTION, Interpolator
 from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_frames
 
@@ -30,6 +29,7 @@ class Pipeline:
         clock: returns CLOCK_MONOTONIC, ns.
         interpolator: interpolates the board's image to the moment of the host's; None to leave it unchanged.
         most_pixels: largest accepted image size of either camera, pixels.
+        host_orientation: how the host camera's images become upright; a board's frame says that itself.
     """
 
     def __init__(
@@ -39,7 +39,10 @@ class Pipeline:
         clock: Callable[[], int],
         interpolator: Interpolator | None = None,
         most_pixels: int = MOST_PIXELS,
+        *,
+        host_orientation: Orientation = UPRIGHT,
     ) -> None:
+        self._host_orientation = host_orientation
         self._most_pixels = most_pixels
         self._interpolator = interpolator
         self._core = core
@@ -59,10 +62,9 @@ class Pipeline:
             SpoiledImageError: a frame's bytes are not a whole image, or its size is not believed.
             DataError: the cameras' image sizes do not fit the rig.
         """
-        board, host = _encoded(pair.board.message, "board", pair.board.asked_px), _encoded(pair.host, "host")
+        board, host = _of_board(pair.board), self._of_host(pair.host)
         start_ns = self._clock()
         board_image, host_image = decode_frames(board, host, self._most_pixels, self._check_sizes)
-        board_image = _at_asked_size(board_image, pair.board)
         decoded_ns = self._clock()
         board_image = self._at_host_time(pair, board_image)
         interpolated_ns = self._clock()
@@ -73,6 +75,16 @@ class Pipeline:
             processed = self._core.compute(left, right, self._clock)
         stages = replace(processed.stages, decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
         return replace(processed, stages=stages)
+
+    def _of_host(self, frame: Frame) -> EncodedImage:
+        return EncodedImage(
+            payload=memoryview(frame.payload),
+            pixel_format=frame.pixel_format,
+            width_px=frame.width_px,
+            height_px=frame.height_px,
+            name=f"host frame {frame.sequence}",
+            orientation=self._host_orientation,
+        )
 
     def _in_sides(self, board: T, host: T) -> tuple[T, T]:
         """Return (left, right). Only this function knows which camera is which."""
@@ -93,27 +105,20 @@ class Pipeline:
         if abs(fraction) > LARGEST_FRACTION:
             return image
         try:
-            before = _encoded(pair.before.message, "board", pair.before.asked_px)
-            earlier = _at_asked_size(decode_frame(before, self._most_pixels), pair.before)
+            earlier = decode_frame(_of_board(pair.before), self._most_pixels)
         except DataError:
             return image
         return self._interpolator.back(earlier, image, fraction) if earlier.shape == image.shape else image
 
 
-def _at_asked_size(image: Image, frame: BoardFrame) -> Image:
-    """Return the image at the size that the board's camera was asked for. Rig, matcher and geometry need that size."""
-    if not any(frame.asked_px):
-        return image
-    return enlarged(image, frame.asked_px, f"board frame {frame.message.sequence}")
-
-
-def _encoded(frame: FrameMessage | Frame, whose: str, asked_px: tuple[int, int] = (0, 0)) -> EncodedImage:
-    name = f"{whose} frame {frame.sequence}"
+def _of_board(frame: BoardFrame) -> EncodedImage:
+    message = frame.message
     return EncodedImage(
-        payload=memoryview(frame.payload),
-        pixel_format=frame.pixel_format,
-        width_px=frame.width_px,
-        height_px=frame.height_px,
-        name=name,
-        asked_px=asked_px,
+        payload=memoryview(message.payload),
+        pixel_format=message.pixel_format,
+        width_px=message.width_px,
+        height_px=message.height_px,
+        name=f"board frame {message.sequence}",
+        asked_px=frame.asked_px,
+        orientation=frame.orientation,
     )

@@ -1,16 +1,41 @@
-"""The progress bar of long work: what is being done, how much of it, and the time left. On stderr, on a terminal only."""
+"""A progress bar that fits its terminal: on a phone's, the words wrap and the bar makes room, so that no number is cut."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Final
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    TaskID,
+    TaskProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Column
+
+_WIDE: Final = 76
+"""Characters for the longest description (40), a bar and two numbers."""
 
 
-def bar_on(console: Console) -> Progress:
-    """Return a bar that is gone when it ends, and is never shown if the console is no terminal."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(compact=True), TextColumn("left"))
-    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+def progress_bar(console: Console) -> Progress:
+    """Make a progress bar with percentage and time left; it is hidden where the console is no terminal and gone when it ends.
+
+    Args:
+        console: where to draw.
+    """
+    narrow = console.width < _WIDE
+    words = TextColumn("{task.description}", table_column=Column(ratio=1) if narrow else None)
+    bar: list[ProgressColumn] = [] if narrow else [BarColumn()]
+    numbers = (
+        TaskProgressColumn(table_column=Column(no_wrap=True, min_width=4)),
+        TimeRemainingColumn(table_column=Column(no_wrap=True, min_width=7)),
+    )
+    return Progress(
+        words, *bar, *numbers, console=console, transient=True, disable=not console.is_terminal, expand=narrow
+    )
 
 
 class ShareBar:
@@ -45,7 +70,7 @@ def share_bar(what: str, then: str = "", console: Console | None = None) -> Iter
     Yields:
         The function to call with the share that is done, 0 to 1.
     """
-    with bar_on(console or Console(stderr=True)) as progress:
+    with progress_bar(console or Console(stderr=True)) as progress:
         task = progress.add_task(what, total=None if then else 1.0)
         yield ShareBar(progress, task, then)
 

@@ -11,14 +11,18 @@ from rich.table import Table
 from rich.text import Text
 
 from common import now
+from common.words import counted
 from phone_host.measure.accounts import rung_lines
-from phone_host.measure.delays import DELAYS, STAGES, Spread
+from phone_host.measure.delays import DELAYS, IDLE_STAGE_NS, STAGES, Spread
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.unused import unused
 from phone_host.report.summary import camera_troubles, phase_lines
 
 _REFRESH_S: Final = 0.25
+_WIDE: Final = 64
+"""Characters that the whole table needs."""
+
 _RECENT: Final = 300
 """Percentiles cover this many newest pairs: ten seconds at 30 pairs per second."""
 
@@ -78,24 +82,33 @@ class LiveTable:
             self._progress.update(self._task, completed=now_s - self._started_s if self._seconds else run.processed)
         bar = [self._progress] if self._task is not None else []
         # Problems come first, because a small terminal cuts off the bottom.
-        shown = Group(*_judgement(run), _table(run, self._rate), _stages(run), _state(run), *bar)
+        shown = Group(
+            *_judgement(run), _table(run, self._rate, self._live.console.width), _stages(run), _state(run), *bar
+        )
         self._live.update(shown, refresh=True)
 
 
-def _table(run: RunSnapshot, rate: float) -> Table:
-    table = Table(title=f"{run.processed} pairs, {rate:.1f} /s", title_justify="left")
-    table.add_column("delay, ms")
-    for name in ("p50", "p95", "p99", "max"):
-        table.add_column(name, justify="right")
+def _table(run: RunSnapshot, rate: float, width: int) -> Table:
+    """Make the table; on a phone's terminal without lines and without the 99th percentile, so that no number is cut."""
+    names = ("p50", "p95", "p99", "max") if width >= _WIDE else ("p50", "p95", "max")
+    table = Table(title=f"{counted(run.processed, 'pair')}, {rate:.1f} /s", title_justify="left")
+    if width < _WIDE:
+        table.box, table.padding = None, (0, 2, 0, 0)
+    table.add_column("delay, ms", no_wrap=True)
+    for name in names:
+        table.add_column(name, justify="right", no_wrap=True)
     for name in (*DELAYS, "time_skew"):
-        table.add_row(name.replace("_", "-"), *_values_ms(run.delays.spread(name, _RECENT)))
+        spread = run.delays.spread(name, _RECENT)
+        table.add_row(name.replace("_", "-"), *(_cell_ms(spread, column) for column in names))
     return table
 
 
 def _stages(run: RunSnapshot) -> Text:
     """Return the stages' shares in one line. With a row each, warnings would not fit a terminal of 24 lines."""
     medians = [(name, run.delays.spread(name, _RECENT).p50_ns) for name in STAGES]
-    shares = [f"{name} {value_ns / 1e6:.1f}" for name, value_ns in medians if value_ns == value_ns]  # noqa: PLR0124 - only NaN differs from itself
+    shares = [
+        f"{name} {value_ns / 1e6:.1f}" for name, value_ns in medians if value_ns > IDLE_STAGE_NS
+    ]  # never true of NaN
     return Text(f"processing, p50 in ms: {', '.join(shares) or 'not yet'}", style="dim")
 
 
@@ -115,12 +128,13 @@ def _state(run: RunSnapshot) -> Text:
         else "clock unknown"
     )
     board = f"board connected over {run.carrier}" if run.carrier else "waiting for the board"
-    lost = ", ".join(f"{item.count} {item.words}" for item in unused(run)) or "nothing"
+    lost = ", ".join(item.told for item in unused(run)) or "nothing"
     phase = "\n".join(phase_lines(run.phase, run.alignment))
     return Text(f"{board} · {clock} · not used: {lost}" + (f"\n{phase}" if phase else ""))
 
 
-def _values_ms(spread: Spread) -> list[str]:
+def _cell_ms(spread: Spread, name: str) -> str:
     if not spread.count:
-        return ["-"] * 4
-    return [f"{value / 1e6:.3f}" for value in (spread.p50_ns, spread.p95_ns, spread.p99_ns, spread.max_ns)]
+        return "-"
+    value = float(getattr(spread, f"{name}_ns")) / 1e6
+    return f"{value:.3f}" if abs(value) < 1000 else f"{value:.0f}"

@@ -8,6 +8,8 @@ from typing import Final
 
 import cv2
 
+from common.camera.imagefile import SUFFIXES
+from common.errors import UnavailableError
 from phone_host.model import CameraModel, Rig
 from phone_host.output.atomic import write_bytes
 from phone_host.scene.scene import Look, Renderer, Scene, rig_poses
@@ -104,11 +106,15 @@ def render_films(
 
     Raises:
         OSError: a folder cannot be written to.
+        UnavailableError: an image that is none of the film's lies in a folder; a replay would show it.
     """
     films = {
         quality: Film(left=folder / "left", right=folder / "right", frames=round(fps * seconds), fps=fps)
         for quality, folder in folders.items()
     }
+    for film in films.values():
+        for folder in (film.left, film.right):
+            _refuse_foreign(folder, film.frames)
     poses = rig_poses(rig)
     left = {quality: film.left for quality, film in films.items()}
     right = {quality: film.right for quality, film in films.items()}
@@ -116,6 +122,22 @@ def render_films(
         times_s = [index / fps for index in range(round(fps * seconds))]
         _render(Renderer(scene, model, pose, look), model, targets, times_s, advance)
     return tuple(films.values())
+
+
+def _name(index: int, frames: int) -> str:
+    return f"{index:0{len(str(frames))}d}.jpg"
+
+
+def _refuse_foreign(folder: Path, frames: int) -> None:
+    """Refuse a folder with an image that the film will not replace: it would be shown as part of the film."""
+    ours = {_name(index, frames) for index in range(frames)}
+    images = [path for path in folder.glob("*") if path.suffix.lower() in SUFFIXES]
+    foreign = sorted(path.name for path in images if path.name not in ours)
+    if foreign:
+        raise UnavailableError(
+            f"{folder / foreign[0]} is no image of the film, but would be shown with it",
+            "move it away, or give another folder with --out",
+        )
 
 
 def _render(
@@ -129,12 +151,11 @@ def _render(
         target.mkdir(parents=True, exist_ok=True)
         if target.is_symlink():
             raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(target))
-    digits = len(str(len(times_s)))
     for index, time_s in enumerate(times_s):
         image = renderer.frame(time_s)
         assert image.shape == (model.height_px, model.width_px, 3)
         for quality, target in targets.items():
             done, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
             assert done
-            write_bytes(target / f"{index:0{digits}d}.jpg", jpeg.tobytes())
+            write_bytes(target / _name(index, len(times_s)), jpeg.tobytes())
         advance()

@@ -1,33 +1,90 @@
-"""The stereo core: rectify (or pass through), match, reproject. Files and live streams use the same class and so get the same bits.
+"""The stereo core: rectify (or pass through), match, reproject, cut. Files and live streams use the same class and so get the same bits.
 
 No I/O and no clock of its own: the caller passes the clock that times the stages.
+
+Image sizes are known only with the first pair. What depends on them (maps, search range, working size, limits) is made
+then, and kept for the next pair of the same sizes.
 """
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
 
 from common.ledger import StageTimes
-from phone_host.model import Image, Processed, RectifiedPair, StereoGeometry
+from phone_host.model import (
+    CloudImage,
+    CutCounts,
+    DepthLimits,
+    Disparity,
+    Epipolar,
+    Image,
+    Processed,
+    RectifiedPair,
+    Search,
+    StereoGeometry,
+)
+from phone_host.stereo.depth_limits import (
+    DepthWanted,
+    above_zero,
+    crop_inside,
+    cut_cloud,
+    depth_limits,
+    disparity_error_px,
+)
 from phone_host.stereo.images import require_same_size, size_px
+from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.rectify import Rectifier
-from phone_host.stereo.reproject import reproject
+from phone_host.stereo.reproject import disparities_for_near, reproject
+from phone_host.stereo.scaled_rig import scaled_rig
+from phone_host.stereo.stacked import lying_pair, upright_again
+from phone_host.stereo.working import MARGIN_PX, Part, chosen_scale, part_for, reduced, to_full_size
+
+_Sizes = tuple[tuple[int, int], tuple[int, int]]
+_MOST_KEPT: Final = 4
+"""Pairs of image sizes that are kept ready. Cameras change their size rarely."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Ready:
+    """What is made once for a pair of image sizes."""
+
+    rectifier: Rectifier | None
+    geometry: StereoGeometry | None
+    width_px: int
+    height_px: int
+    matcher: Matcher
+    search: Search
+    part: Part | None
+    error_px: float
+    limits: DepthLimits | None
 
 
 class StereoCore:
     """Computes a point cloud image from two images.
 
     Attributes:
-        rig: the cameras; None when the images are already rectified.
-        geometry: converts disparity to metres; None when the images are already rectified and no geometry was given.
+        rig: the cameras, at the size of their calibration; None when the images are already rectified.
+        geometry: converts disparity to metres at that size; None when the images are already rectified and no geometry was
+            given. `Processed.geometry` is that of a result.
+        wanted: limits, crop and working size as asked for.
 
     Args:
-        matcher: finds the disparity.
+        matcher: finds the disparity: a matcher as it is, or the settings from which one is made for each image size.
         rectifier: for unrectified images; None when they are already rectified.
         geometry: for images that are already rectified; must be None with a rectifier, which has its own.
+        wanted: limits, crop and working size.
     """
 
     def __init__(
-        self, matcher: Matcher, rectifier: Rectifier | None = None, geometry: StereoGeometry | None = None
+        self,
+        matcher: Matcher | MatchSettings,
+        rectifier: Rectifier | None = None,
+        geometry: StereoGeometry | None = None,
+        wanted: DepthWanted = DepthWanted(),  # noqa: B008  # frozen
     ) -> None:
         if rectifier is not None and geometry is not None:
             raise ValueError("the rectifier brings its own geometry")
@@ -35,6 +92,10 @@ class StereoCore:
         self.rig = None if rectifier is None else rectifier.rig
         self._rectifier = rectifier
         self.geometry = geometry if rectifier is None else rectifier.geometry
+        self.wanted = wanted
+        self._kept: dict[_Sizes, _Ready] = {}
+        if isinstance(matcher, MatchSettings):
+            create_matcher(matcher)  # a name or a number that is wrong is told before the first pair comes
 
     def compute(self, left: Image, right: Image, clock: Callable[[], int]) -> Processed:
         """Run and time all stages: rectify or pass through, match, and reproject if the geometry is known.
@@ -45,21 +106,25 @@ class StereoCore:
             clock: monotonic, ns.
 
         Returns:
-            The rectified pair, its disparity, its cloud (None without geometry), and the times of these three stages.
+            The rectified pair, its disparity, its cloud (None without geometry), how they were found, and the times of
+            these three stages.
 
         Raises:
-            DataError: a size does not fit the rig, or the sizes differ and there is no rig.
+            DataError: a size does not fit the rig, the sizes differ and there is no rig, or the crop lies outside.
         """
         start_ns = clock()
-        pair = self._rectify(left, right)
+        ready = self._ready(size_px(left), size_px(right))
+        pair = RectifiedPair(left, right) if ready.rectifier is None else ready.rectifier.rectify(left, right)
         rectified_ns = clock()
-        disparity = self._matcher.match(pair)
+        matched = _match(pair, ready)
         matched_ns = clock()
-        cloud = None if self.geometry is None else reproject(disparity, self.geometry)
+        disparity, cloud, cut = _reproject(matched, ready)
         times = StageTimes(
             rectify=rectified_ns - start_ns, match=matched_ns - rectified_ns, reproject=clock() - matched_ns
         )
-        return Processed(pair, disparity, cloud, times)
+        return Processed(
+            pair, disparity, cloud, times, geometry=ready.geometry, limits=ready.limits, cut=cut, search=ready.search
+        )
 
     def require_sizes(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> None:
         """Check that images of these sizes can be rectified, before they are decoded.
@@ -71,13 +136,98 @@ class StereoCore:
         Raises:
             DataError: a size does not fit the rig, or the sizes differ and there is no rig.
         """
-        if self._rectifier is not None:
-            self._rectifier.require_sizes(left_px, right_px)
-        else:
+        if (left_px, right_px) in self._kept:
+            return
+        if self.rig is None:
             require_same_size(left_px, right_px, "the left image", "the right image")
+        else:
+            scaled_rig(self.rig, left_px, right_px)
 
-    def _rectify(self, left: Image, right: Image) -> RectifiedPair:
-        if self._rectifier is not None:
-            return self._rectifier.rectify(left, right)
-        self.require_sizes(size_px(left), size_px(right))
-        return RectifiedPair(left, right)
+    def _ready(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> _Ready:
+        """Return what these image sizes need; make it if they are new."""
+        ready = self._kept.get((left_px, right_px))
+        if ready is None:
+            self.require_sizes(left_px, right_px)
+            ready = self._made_for(left_px, right_px)
+            while len(self._kept) >= _MOST_KEPT:
+                del self._kept[next(iter(self._kept))]
+            self._kept[left_px, right_px] = ready
+        return ready
+
+    def _made_for(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> _Ready:
+        rectifier, geometry, wanted = self._rectifier, self.geometry, self.wanted
+        size, epipolar, zero_sigma_px = left_px, Epipolar.LEFT, math.nan
+        if rectifier is not None:
+            rig = scaled_rig(rectifier.rig, left_px, right_px)
+            rectifier = rectifier if rig is rectifier.rig else Rectifier(rig)
+            geometry, made = rectifier.geometry, rectifier.rectification
+            size, epipolar, zero_sigma_px = (made.width_px, made.height_px), made.epipolar, rig.zero_sigma_px
+        disparities = self._disparities(geometry, size[1] if epipolar.is_vertical else size[0])
+        crop = None if wanted.crop is None else crop_inside(wanted.crop, *size)
+        part = None if crop is None else part_for(crop, size, disparities, epipolar=epipolar)
+        scale = wanted.scale
+        if math.isnan(scale):
+            matched = size if part is None else part.size_px
+            along, across = matched[::-1] if epipolar.is_vertical else matched
+            scale = chosen_scale(along, across, disparities) if disparities else 1.0
+        if crop is not None:
+            margin_px = math.ceil(MARGIN_PX / scale)
+            part = part_for(crop, size, disparities, epipolar=epipolar, margin_px=margin_px)
+        error_px = disparity_error_px(scale, zero_sigma_px)
+        return _Ready(
+            rectifier=rectifier,
+            geometry=geometry,
+            width_px=size[0],
+            height_px=size[1],
+            matcher=self._matcher_for(max(1, math.ceil(disparities * scale))),
+            search=Search(scale=scale, disparities=disparities),
+            part=part,
+            error_px=error_px,
+            limits=None if geometry is None else depth_limits(geometry, error_px, wanted),
+        )
+
+    def _disparities(self, geometry: StereoGeometry | None, along_px: int) -> int:
+        """Return N, px of the rectified images; 0 if the matcher has its own."""
+        if not isinstance(self._matcher, MatchSettings):
+            return 0
+        if geometry is None or math.isnan(self.wanted.search_from_m):
+            return self._matcher.disparities
+        return disparities_for_near(geometry, self.wanted.search_from_m, along_px)
+
+    def _matcher_for(self, disparities: int) -> Matcher:
+        if isinstance(self._matcher, MatchSettings):
+            return create_matcher(replace(self._matcher, disparities=disparities))
+        return self._matcher
+
+
+def _match(pair: RectifiedPair, ready: _Ready) -> Disparity:
+    """Match the part that is wanted, at the working size, turned if need be; the result has the rectified images' size."""
+    part, scale, epipolar = ready.part, ready.search.scale, pair.epipolar
+    seen = pair if part is None else part.of(pair)
+    small = RectifiedPair(reduced(seen.left, scale), reduced(seen.right, scale), epipolar)
+    found = upright_again(ready.matcher.match(lying_pair(small)), epipolar)
+    height, width = seen.left.shape[:2]
+    disparity = to_full_size(found, width, height, epipolar)
+    if scale < 1 and ready.search.disparities:
+        # N was rounded up to whole pixels of the working size.
+        disparity[disparity >= ready.search.disparities] = np.nan
+    return disparity if part is None else part.placed(disparity, ready.width_px, ready.height_px)
+
+
+def _reproject(matched: Disparity, ready: _Ready) -> tuple[Disparity, CloudImage | None, CutCounts]:
+    """Drop what is no measurement, compute the points, cut them, and count."""
+    geometry, limits = ready.geometry, ready.limits
+    crop = None if ready.part is None else ready.part.crop
+    inside = matched.size if crop is None else crop.width_px * crop.height_px
+    found = int(np.count_nonzero(np.isfinite(matched)))
+    disparity, at_zero = above_zero(matched, 0.0 if geometry is None else geometry.doffs_px, ready.error_px)
+    counts = CutCounts(kept=found - at_zero)
+    cloud = None
+    if geometry is not None and limits is not None:
+        cloud = reproject(disparity, geometry)
+        counts = cut_cloud(cloud, geometry, limits)
+    return (
+        disparity,
+        cloud,
+        replace(counts, outside=matched.size - inside, unmatched=inside - found, at_zero=at_zero),
+    )

@@ -4,14 +4,15 @@ Rules:
 - files and streamed frames take the same path, so that both give the same bits;
 - nothing is decoded before its header was read: an image that claims more pixels than the limit is refused (see
   `common/imagesize`);
-- EXIF rotation is ignored: a calibration belongs to the sensor's own rows and columns;
+- an image is upright as soon as it is decoded: what its EXIF header says is applied, then what the user says of its
+  camera. A rig belongs to upright images (decision 0032);
 - images deeper than 8 bit: both images of a pair get the same scale, or the matcher would see two brightnesses (see
   `to_8_bit`).
 """
 
 import logging
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +20,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from common.camera.orientation import UPRIGHT, Orientation
 from common.errors import DataError
 from common.files import read_whole
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
@@ -27,6 +29,7 @@ from common.imagesize.head import size_text as px_text
 from common.imagesize.read import read_head, whole_image
 from common.program.logs import event
 from phone_host.model import Image
+from phone_host.stereo.orient import upright
 from phone_host.stereo.overheard import overhear
 
 _LOG = logging.getLogger(__name__)
@@ -72,16 +75,18 @@ class EncodedFile:
         payload: all bytes of the file.
         head: what its header says.
         name: how error messages call it.
+        mounted: how its camera is mounted; applied after what the header says.
     """
 
     payload: bytes
     head: ImageHead
     name: str
+    mounted: Orientation = UPRIGHT
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """Width and height, px."""
-        return self.head.size_px
+        """Width and height of the upright image, px."""
+        return self.mounted.turned_size(self.head.upright_px)
 
 
 def decode(payload: bytes | memoryview, name: str = "the image", most_pixels: int = MOST_PIXELS) -> Image:
@@ -130,13 +135,17 @@ def decode_pair(
 
 def decode_file(image: EncodedFile) -> Image:
     """Decode one examined image, like `decode`."""
-    return to_8_bit((_decoded(image),))[0]
+    return _upright(to_8_bit((_decoded(image),))[0], image)
 
 
 def decode_files(left: EncodedFile, right: EncodedFile) -> tuple[Image, Image]:
     """Decode the two examined images of a pair, like `decode_pair`."""
     first, second = to_8_bit((_decoded(left), _decoded(right)))
-    return first, second
+    return _upright(first, left), _upright(second, right)
+
+
+def _upright(image: Image, file: EncodedFile) -> Image:
+    return upright(upright(image, file.head.orientation), file.mounted)
 
 
 def examine(payload: bytes | memoryview, name: str, most_pixels: int = MOST_PIXELS) -> EncodedFile:
@@ -157,12 +166,13 @@ def examine(payload: bytes | memoryview, name: str, most_pixels: int = MOST_PIXE
     return EncodedFile(content, head, name)
 
 
-def open_image(path: Path, most_pixels: int = MOST_PIXELS) -> EncodedFile:
+def open_image(path: Path, most_pixels: int = MOST_PIXELS, mounted: Orientation = UPRIGHT) -> EncodedFile:
     """Read an image file's bytes and header; nothing is decoded.
 
     Args:
         path: the file.
         most_pixels: an image that claims more is refused.
+        mounted: how its camera is mounted; applied after what the file's header says.
 
     Raises:
         DataError: the file is missing; see also `examine`.
@@ -171,15 +181,16 @@ def open_image(path: Path, most_pixels: int = MOST_PIXELS) -> EncodedFile:
         content = read_whole(path, _BYTES_A_PIXEL * most_pixels + _MORE_BYTES)
     except OSError as error:
         raise DataError(f"{path} cannot be read ({error.strerror})", "give an image file that exists") from error
-    return examine(content, str(path), most_pixels)
+    return replace(examine(content, str(path), most_pixels), mounted=mounted)
 
 
-def read_image(path: Path, most_pixels: int = MOST_PIXELS) -> Image:
+def read_image(path: Path, most_pixels: int = MOST_PIXELS, mounted: Orientation = UPRIGHT) -> Image:
     """Read an image file as 8-bit grey or BGR.
 
     Args:
         path: the file.
         most_pixels: an image that claims more is refused.
+        mounted: how its camera is mounted; applied after what the file's header says.
 
     Returns:
         (H, W) grey or (H, W, 3) BGR, uint8; alpha is dropped.
@@ -187,7 +198,7 @@ def read_image(path: Path, most_pixels: int = MOST_PIXELS) -> Image:
     Raises:
         DataError: the file is missing, empty, spoiled, of no known kind or beyond the limit.
     """
-    return decode_file(open_image(path, most_pixels))
+    return decode_file(open_image(path, most_pixels, mounted))
 
 
 def read_pair(left: Path, right: Path, most_pixels: int = MOST_PIXELS) -> tuple[Image, Image]:
@@ -311,10 +322,10 @@ def _decoded(image: EncodedFile) -> AnyImage:
     complaint = _complaint(said.splitlines())
     if kind is ImageKind.JPEG and complaint:
         raise SpoiledImageError(FrameFault.CORRUPT, f"{name} is spoiled ({complaint})", _REPLACE)
-    if size_px(decoded) != image.size_px:
+    if size_px(decoded) != image.head.size_px:
         raise ImageSizeError(
             FrameFault.OTHER_SIZE,
-            f"{name} is {size_text(decoded)} px, its header says {px_text(image.size_px)}",
+            f"{name} is {size_text(decoded)} px, its header says {px_text(image.head.size_px)}",
             _REPLACE,
         )
     if decoded.ndim == 3:

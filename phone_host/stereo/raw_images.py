@@ -1,16 +1,18 @@
-"""Converts raw camera images (YUYV, grey, NV12) to grey or BGR, and frames of any encoding to images."""
+"""Converts raw camera images (YUYV, grey, NV12) to grey or BGR, and frames of any encoding to upright images."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import cv2
 import numpy as np
 
+from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import FrameFault, ImageSizeError, PixelFormat, SpoiledImageError, raw_bytes
 from common.imagesize.head import MOST_PIXELS, ImageKind, require_pixels, size_text
 from phone_host.model import Image
-from phone_host.stereo.images import EncodedFile, decode_file, decode_files, examine, require_same_shape
+from phone_host.stereo.images import EncodedFile, decode_file, decode_files, enlarged, examine, require_same_shape
+from phone_host.stereo.orient import upright
 
 _KINDS: Final = {PixelFormat.MJPEG: ImageKind.JPEG, PixelFormat.PNG: ImageKind.PNG}
 _LOOK: Final = "check the camera that sends it"
@@ -28,6 +30,7 @@ class EncodedImage:
         name: how error messages call it.
         asked_px: (width, height) that its camera was asked for, px; the image may be smaller. Zeros mean the size in
             the header.
+        orientation: how the image becomes upright; all sizes above are those before that.
     """
 
     payload: bytes | memoryview
@@ -36,6 +39,7 @@ class EncodedImage:
     height_px: int
     name: str
     asked_px: tuple[int, int] = (0, 0)
+    orientation: Orientation = UPRIGHT
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -44,7 +48,7 @@ class EncodedImage:
 
     @property
     def whole_px(self) -> tuple[int, int]:
-        """Width and height after enlarging to the size that the camera was asked for, px."""
+        """Width and height after enlarging to the size that the camera was asked for, before it is turned, px."""
         return self.asked_px if any(self.asked_px) else self.size_px
 
 
@@ -60,20 +64,24 @@ def decode_frames(
         first: the frame of one camera.
         second: the frame of the other, in the same encoding or another one.
         most_pixels: the limit for both camera and frame.
-        check: called with the whole sizes of both, px, before either is decoded; raises if they are of no use.
+        check: called with the whole sizes of both upright images, px, before either is decoded; raises if they are of
+            no use.
 
     Returns:
-        Both in that order, each (H, W) grey or (H, W, 3) BGR, uint8.
+        Both in that order, each (H, W) grey or (H, W, 3) BGR, uint8, upright as its EXIF header and then its camera's
+            orientation say, and as large as its camera was asked for.
 
     Raises:
         SpoiledImageError: one of the two is spoiled, or its size cannot be believed.
     """
     one, other = _examined(first, most_pixels), _examined(second, most_pixels)
     if check is not None:
-        check(first.whole_px, second.whole_px)
+        check(_turned(one, first.whole_px), _turned(other, second.whole_px))
     if isinstance(one, EncodedFile) and isinstance(other, EncodedFile):
-        return decode_files(one, other)
-    return _decoded(one), _decoded(other)
+        images = decode_files(one, other)
+    else:
+        images = _decoded(one), _decoded(other)
+    return _whole(images[0], first, one), _whole(images[1], second, other)
 
 
 def decode_frame(image: EncodedImage, most_pixels: int = MOST_PIXELS) -> Image:
@@ -84,16 +92,29 @@ def decode_frame(image: EncodedImage, most_pixels: int = MOST_PIXELS) -> Image:
         most_pixels: the limit for both its camera and the frame.
 
     Returns:
-        (H, W) grey or (H, W, 3) BGR, uint8.
+        (H, W) grey or (H, W, 3) BGR, uint8, upright and as large as `decode_frames` gives it.
 
     Raises:
         SpoiledImageError: it is spoiled, or its size cannot be believed.
     """
-    return _decoded(_examined(image, most_pixels))
+    examined = _examined(image, most_pixels)
+    return _whole(_decoded(examined), image, examined)
+
+
+def _whole(decoded: Image, image: EncodedImage, examined: EncodedImage | EncodedFile) -> Image:
+    """Enlarge an image to the size that its camera was asked for, because rig, matcher and geometry need that size."""
+    return enlarged(decoded, _turned(examined, image.asked_px), image.name) if any(image.asked_px) else decoded
+
+
+def _turned(image: EncodedImage | EncodedFile, size_px: tuple[int, int]) -> tuple[int, int]:
+    """Return the upright width and height of what is stored with this width and height. Raw frames have no EXIF header."""
+    if isinstance(image, EncodedFile):
+        return image.mounted.turned_size(image.head.orientation.turned_size(size_px))
+    return image.orientation.turned_size(size_px)
 
 
 def _decoded(image: EncodedImage | EncodedFile) -> Image:
-    return decode_raw(image) if isinstance(image, EncodedImage) else decode_file(image)
+    return upright(decode_raw(image), image.orientation) if isinstance(image, EncodedImage) else decode_file(image)
 
 
 def _examined(image: EncodedImage, most_pixels: int) -> EncodedImage | EncodedFile:
@@ -116,13 +137,13 @@ def _examined(image: EncodedImage, most_pixels: int) -> EncodedImage | EncodedFi
         raise SpoiledImageError(
             FrameFault.NO_START, f"{image.name} is {file.head.kind.value}, its header says {kind.value}", _LOOK
         )
-    if file.size_px != image.size_px:
+    if file.head.size_px != image.size_px:
         raise ImageSizeError(
             FrameFault.OTHER_SIZE,
-            f"{image.name} is {size_text(file.size_px)} px, its header says {size_text(image.size_px)}",
+            f"{image.name} is {size_text(file.head.size_px)} px, its header says {size_text(image.size_px)}",
             _LOOK,
         )
-    return file
+    return replace(file, mounted=image.orientation)
 
 
 def decode_raw(image: EncodedImage) -> Image:

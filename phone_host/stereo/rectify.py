@@ -11,6 +11,9 @@ both principal points, so it is wrong for two sizes. Here each camera's field of
   images share the principal point (doffs = 0, infinity has disparity 0) and have no black border that a matcher would
   take for texture.
 
+Cameras that stand one above the other are rectified in the same way, with the baseline as the y axis: their epipolar
+lines are columns, as with `cv2.stereoRectify`. Only the matcher turns such images, by a quarter (`stacked`).
+
 Source: J.-Y. Bouguet, Camera Calibration Toolbox, 2000; A. Fusiello et al., "A compact algorithm for rectification of stereo
 pairs", 2000; OpenCV's calib3d documentation for P1, P2 and Q.
 """
@@ -23,10 +26,11 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from common.imagesize.head import size_text
-from phone_host.model import CameraModel, Image, Rectification, RectifiedPair, Rig, Side, StereoGeometry
+from phone_host.model import CameraModel, Epipolar, Image, Rectification, RectifiedPair, Rig, Side, StereoGeometry
 from phone_host.stereo.images import size_px
 
 Matrix = NDArray[np.float64]
+Maps = tuple[cv2.typing.MatLike, cv2.typing.MatLike]
 
 _RECALIBRATE = "calibrate the rig again"
 # Undistortion is iterative; 5 iterations (OpenCV's default) leave 0.1 px in the corners of a wide lens.
@@ -37,6 +41,15 @@ _SAMPLES_PER_EDGE = 65  # the outline bends slowly: between two of 65 samples it
 # that.
 _FIELD_SHARES = (1.0, 0.97, 0.94, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5)
 _LEAST_SIZE_PX = 32
+_WHOLE_PX = 1e-6  # rounding of ideal cameras' windows, which are whole pixels wide, must not cost a row
+_MOST_KEPT_PIXELS = 4_000_000  # twice 1920 x 1080: what a live camera sends. The maps take 6 bytes per pixel and side.
+_STRIP_ROWS = 256
+_TO_RIGHT = {
+    Epipolar.LEFT: np.array([1.0, 0.0, 0.0]),
+    Epipolar.UP: np.array([0.0, 1.0, 0.0]),
+    Epipolar.DOWN: np.array([0.0, -1.0, 0.0]),
+}
+"""From the left camera to the right one in the rectified axes (x right, y down)."""
 
 
 def rectify_rig(rig: Rig) -> Rectification:
@@ -49,10 +62,10 @@ def rectify_rig(rig: Rig) -> Rectification:
         The rectification.
 
     Raises:
-        DataError: left and right are swapped, the cameras do not stand side by side, their fields of view do not
+        DataError: left and right are swapped, one camera stands in front of the other, their fields of view do not
             overlap, or a distortion model cannot be inverted.
     """
-    left_rotation, right_rotation, baseline_m = _rotations(rig)
+    left_rotation, right_rotation, baseline_m, epipolar = _rotations(rig)
     focal_px = min(_mean_focal_px(rig.left), _mean_focal_px(rig.right))
     windows = (
         _filled_window(rig.left, left_rotation, Side.LEFT),
@@ -60,8 +73,8 @@ def rectify_rig(rig: Rig) -> Rectification:
     )
     x0, y0 = np.max([window[:2] for window in windows], axis=0)
     x1, y1 = np.min([window[2:] for window in windows], axis=0)
-    width_px = math.floor(focal_px * (x1 - x0)) + 1
-    height_px = math.floor(focal_px * (y1 - y0)) + 1
+    width_px = math.floor(focal_px * (x1 - x0) + _WHOLE_PX) + 1
+    height_px = math.floor(focal_px * (y1 - y0) + _WHOLE_PX) + 1
     if width_px < _LEAST_SIZE_PX or height_px < _LEAST_SIZE_PX:
         raise DataError(
             f"the two cameras' fields of view overlap by {max(width_px, 0)}x{max(height_px, 0)} px only",
@@ -72,7 +85,7 @@ def rectify_rig(rig: Rig) -> Rectification:
     )
     projection = np.array([[focal_px, 0, geometry.cx_px, 0], [0, focal_px, geometry.cy_px, 0], [0, 0, 1, 0]])
     shift = np.zeros((3, 4))
-    shift[0, 3] = -focal_px * baseline_m
+    shift[:2, 3] = -focal_px * baseline_m * _TO_RIGHT[epipolar][:2]
     to_metres = np.array(
         [
             [1, 0, 0, -geometry.cx_px],
@@ -90,7 +103,25 @@ def rectify_rig(rig: Rig) -> Rectification:
         P_left=projection,
         P_right=projection + shift,
         Q=to_metres,
+        epipolar=epipolar,
     )
+
+
+def across_lines_px(
+    left_px: NDArray[np.floating], right_px: NDArray[np.floating], epipolar: Epipolar
+) -> NDArray[np.float64]:
+    """Measure how far rectified points lie beside each other's epipolar line: the vertical error of cameras side by side.
+
+    Args:
+        left_px: (N, 2), px, as `rectify_points` gives them.
+        right_px: (N, 2), the same points in the right image.
+        epipolar: which way the lines run.
+
+    Returns:
+        (N,) left minus right across the lines, px.
+    """
+    axis = 0 if epipolar.is_vertical else 1
+    return np.asarray(left_px[:, axis] - right_px[:, axis], dtype=np.float64)
 
 
 def rectify_points(
@@ -166,37 +197,61 @@ class Rectifier:
             DataError: an image's size differs from that of its camera in the rig.
         """
         self.require_sizes(size_px(left), size_px(right))
-        return RectifiedPair(self._left.apply(left), self._right.apply(right))
+        return RectifiedPair(self._left.apply(left), self._right.apply(right), self.rectification.epipolar)
 
 
 class _Remap:
-    """The remapping of one camera's image to the rectified one."""
+    """The remapping of one camera's image to the rectified one.
+
+    The maps of large images are not kept but computed strip by strip: those of 50 megapixels would take 300 MB a side.
+    """
 
     def __init__(self, model: CameraModel, rotation: Matrix, rectification: Rectification) -> None:
-        size = (rectification.width_px, rectification.height_px)
-        projection = rectification.P_left[:, :3]  # P_right's first three columns are the same
-        x, y = cv2.initUndistortRectifyMap(model.matrix, model.distortion, rotation, projection, size, cv2.CV_32FC1)
+        self._model, self._rotation = model, rotation
+        self._projection = rectification.P_left[:, :3]  # P_right's first three columns are the same
+        self._width, self._height = rectification.width_px, rectification.height_px
         # Bilinear interpolation reads 2 x 2 pixels. A camera twice as fine as the result would alias, so average it
         # down first.
         self._shrink = max(1, int(_mean_focal_px(model) / rectification.geometry.focal_px + 1e-6))
-        if self._shrink > 1:
-            x, y = ((axis + 0.5) / self._shrink - 0.5 for axis in (x, y))
-        self._whole, self._fraction = cv2.convertMaps(
-            x, y, cv2.CV_16SC2
-        )  # half the time of float maps, the same 1/32 px
+        self._kept = self._maps(0, self._height) if self._width * self._height <= _MOST_KEPT_PIXELS else None
 
     def apply(self, image: Image) -> Image:
         if self._shrink > 1:
             height, width = (length // self._shrink for length in image.shape[:2])
             whole_blocks = image[: height * self._shrink, : width * self._shrink]
             image = np.asarray(cv2.resize(whole_blocks, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        if self._kept is not None:
+            return self._remapped(image, self._kept)
+        result = np.empty((self._height, self._width, *image.shape[2:]), np.uint8)
+        for top in range(0, self._height, _STRIP_ROWS):
+            bottom = min(top + _STRIP_ROWS, self._height)
+            result[top:bottom] = self._remapped(image, self._maps(top, bottom))
+        return result
+
+    def _maps(self, top: int, bottom: int) -> Maps:
+        """Return where the rows from `top` to `bottom` of the result lie in the image."""
+        up = np.array([[1, 0, 0], [0, 1, -top], [0, 0, 1]], np.float64)
+        x, y = cv2.initUndistortRectifyMap(
+            self._model.matrix,
+            self._model.distortion,
+            self._rotation,
+            up @ self._projection,
+            (self._width, bottom - top),
+            cv2.CV_32FC1,
+        )
+        if self._shrink > 1:
+            x, y = ((axis + 0.5) / self._shrink - 0.5 for axis in (x, y))
+        return cv2.convertMaps(x, y, cv2.CV_16SC2)  # half the time of float maps, the same 1/32 px
+
+    @staticmethod
+    def _remapped(image: Image, maps: Maps) -> Image:
         # Replicate: the maps stay inside, but the last half block of a reduced image may lie 0.5 px outside.
-        remapped = cv2.remap(image, self._whole, self._fraction, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        remapped = cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(remapped, dtype=np.uint8)
 
 
-def _rotations(rig: Rig) -> tuple[Matrix, Matrix, float]:
-    """Return R_left, R_right and the baseline in metres; refuse rigs whose right camera is not on the right."""
+def _rotations(rig: Rig) -> tuple[Matrix, Matrix, float, Epipolar]:
+    """Return R_left, R_right, the baseline in metres and the epipolar lines; refuse rigs that have no such lines."""
     half = np.asarray(cv2.Rodrigues(rig.R_right_left)[0], dtype=np.float64) / 2
     left_to_middle = np.asarray(cv2.Rodrigues(half)[0], dtype=np.float64)
     right_to_middle = left_to_middle.T
@@ -206,18 +261,22 @@ def _rotations(rig: Rig) -> tuple[Matrix, Matrix, float]:
     if not baseline_m > 0:
         raise DataError("the rig has no baseline (T is 0)", _RECALIBRATE)
     x, y, z = to_right_m / baseline_m
-    if abs(x) < max(abs(y), abs(z)):
-        where = "above or below" if abs(y) > abs(z) else "in front of or behind"
+    if abs(z) > max(abs(x), abs(y)):
         raise DataError(
-            f"the right camera stands {where} the left one", "mount the two cameras side by side, looking the same way"
+            "the right camera stands in front of or behind the left one",
+            "mount the two cameras side by side or one above the other, looking the same way",
         )
-    if x < 0:
+    if abs(y) > abs(x):
+        epipolar = Epipolar.UP if y > 0 else Epipolar.DOWN
+    elif x > 0:
+        epipolar = Epipolar.LEFT
+    else:
         raise DataError(
             f"the right camera stands to the left of the left one (by {-x * baseline_m * 1e3:.1f} mm)",
             "swap LEFT and RIGHT",
         )
-    turn = _shortest_turn(np.array([x, y, z]), np.array([1.0, 0.0, 0.0]))
-    return turn @ left_to_middle, turn @ right_to_middle, baseline_m
+    turn = _shortest_turn(np.array([x, y, z]), _TO_RIGHT[epipolar])
+    return turn @ left_to_middle, turn @ right_to_middle, baseline_m, epipolar
 
 
 def _shortest_turn(source: Matrix, target: Matrix) -> Matrix:

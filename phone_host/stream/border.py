@@ -197,6 +197,7 @@ class Border:
             offset_ns=offset_ns,
             uncertainty_ns=uncertainty_ns,
             asked_px=asked_px,
+            orientation=arrival.camera.orientation,
         )
         return [(arrival.link, known)]
 

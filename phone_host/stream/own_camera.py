@@ -7,9 +7,9 @@ from typing import Final
 import zmq
 
 from common import now
-from common.camera.base import Camera, CameraHealth, Ended, Grab, Skipped, Spoiled
+from common.camera.base import Camera, CameraHealth, Ended, Grab, Skipped, Spoiled, held_locks, lockable
 from common.frame import Frame
-from common.protocol.message import Steering
+from common.protocol.message import Locks, Steering
 from phone_host.stream.corrections import Corrections
 from phone_host.stream.demand_clock import DemandClock
 
@@ -34,6 +34,9 @@ class OwnCamera:
         self._corrections = Corrections()
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
         self._last_health: CameraHealth | None = None
+        self._last_held: Locks | None = None
+        self._wanted: Locks = ()
+        self._asked: Locks = ()
         self.spoiled = 0
         self.skipped = 0
         self.from_the_future = 0
@@ -44,6 +47,20 @@ class OwnCamera:
     def health(self) -> CameraHealth:
         """The camera's health; after `stop`, as it was just before closing."""
         return self._last_health or self._camera.health
+
+    @property
+    def held(self) -> Locks:
+        """The controls that the camera is held at; after `stop`, as they were just before closing."""
+        return held_locks(self._camera) if self._last_held is None else self._last_held
+
+    @property
+    def has_held(self) -> bool:
+        """Whether the camera has been told everything that it is to be held at."""
+        return self._asked == self._wanted
+
+    def hold(self, locks: Locks) -> None:
+        """Hold controls of the camera from its next read on. Safe from any thread."""
+        self._wanted = locks
 
     def start(self) -> None:
         """Start to read."""
@@ -63,7 +80,7 @@ class OwnCamera:
         self._stop.set()
         self._demand.wake()
         self._thread.join()
-        self._last_health = self._camera.health
+        self._last_health, self._last_held = self._camera.health, held_locks(self._camera)
         self._camera.close()
 
     def _run(self) -> None:
@@ -80,6 +97,11 @@ class OwnCamera:
     def _read(self) -> None:
         if later_ns := self._corrections.take():
             self._camera.steer(later_ns % self._camera.description.period_ns, now.monotonic_ns())
+        if not self.has_held:
+            wanted = self._wanted
+            if (holder := lockable(self._camera)) is not None:
+                holder.hold(wanted, now.monotonic_ns())
+            self._asked = wanted
         for grab in self._camera.read(now.monotonic_ns()):
             if not self._stop.is_set():
                 self._take(grab)

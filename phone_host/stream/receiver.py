@@ -11,7 +11,7 @@ from common.errors import ProtocolError
 from common.link.base import Broken, Garbage, Incoming, Link, Packet
 from common.link.several import SeveralLinks
 from common.link.waiter import Waiter
-from common.protocol.message import BoardHello, Ping
+from common.protocol.message import BoardHello, Locks, LockState, Ping
 from common.protocol.session import Outgoing, connection_name
 from common.protocol.wire import VersionError, decode, encode_stamped
 from phone_host.measure.accounts import LinkAccount
@@ -87,6 +87,11 @@ class Receiver:
         return self._reception.hello
 
     @property
+    def locks(self) -> LockState | None:
+        """How the board's camera is held, as it said in this session; None: it has not said."""
+        return self._reception.locks
+
+    @property
     def estimate(self) -> ClockEstimate | None:
         """The clock estimate now; None before the first echo, and while it is in doubt."""
         return self._reception.estimate
@@ -110,6 +115,11 @@ class Receiver:
         hello = self._reception.hello
         self._steered_session = "" if hello is None else hello.session
         self._corrections.add(later_ns)
+        self.wake()
+
+    def hold(self, locks: Locks) -> None:
+        """Have the board's camera held like this. Safe from any thread."""
+        self._reception.hold(locks)
         self.wake()
 
     def stop(self) -> None:

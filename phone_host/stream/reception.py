@@ -12,7 +12,17 @@ from typing import Protocol
 from common.errors import UnavailableError
 from common.program.logs import event
 from common.protocol.host_session import HostSession
-from common.protocol.message import BoardCounts, BoardHello, FrameMessage, Lane, Message, RefusalReason, Rung
+from common.protocol.message import (
+    BoardCounts,
+    BoardHello,
+    FrameMessage,
+    Lane,
+    Locks,
+    LockState,
+    Message,
+    RefusalReason,
+    Rung,
+)
 from common.protocol.session import (
     Accepted,
     Arrived,
@@ -21,6 +31,7 @@ from common.protocol.session import (
     Echo,
     LinkDown,
     LinkUp,
+    LocksTold,
     OtherBoard,
     Outgoing,
     Output,
@@ -34,6 +45,7 @@ from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount, 
 from phone_host.model import BoardFrame
 from phone_host.stream.border import Arrival, Border
 from phone_host.stream.frame_sink import FrameSink
+from phone_host.stream.lock_asking import LockAsking
 from phone_host.stream.refusals import BoardRefusal, Refusals, refusal_text
 from phone_host.sync.choice import LinkChoice
 from phone_host.sync.clock import ClockEstimate
@@ -97,6 +109,7 @@ class Reception:
         self._flow = Flow()
         self._streamed_over: int | None = None
         self._refusals = Refusals()
+        self._locks = LockAsking()
         self.tail_known = False
         self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
         self._border = Border(self.account, sink.void)
@@ -120,6 +133,11 @@ class Reception:
     def hello(self) -> BoardHello | None:
         """The board's description of itself; None before the first contact."""
         return self._hello
+
+    @property
+    def locks(self) -> LockState | None:
+        """How the board's camera is held, as it said in this session; None: it has not said."""
+        return self._locks.state
 
     @property
     def estimate(self) -> ClockEstimate | None:
@@ -175,6 +193,8 @@ class Reception:
             self._handle(self._session.tick(now_ns), now_ns)
             if len(self._links) > 1 and (best := self._choice.best(now_ns)) is not None:
                 self._handle(self._session.carry(best, now_ns), now_ns)
+        if self._locks.is_due(now_ns):
+            self._handle(self._session.set_locks(self._locks.wanted), now_ns)
         self._sink.tick()
         self._grant(now_ns)
 
@@ -182,6 +202,10 @@ class Reception:
         """Ask the board's camera to expose later, by `later_ns` modulo its period. Without a board, do nothing."""
         if self._hello is not None:
             self._handle(self._session.steer(later_ns % self._hello.camera.period_ns), now_ns)
+
+    def hold(self, locks: Locks) -> None:
+        """Have the board's camera held like this, in this session and every later one."""
+        self._locks.want(locks)
 
     def slept(self, slept_ns: int, now_ns: int) -> None:
         """Take note that this machine has slept: its clock stood still while the board's and the cameras' went on."""
@@ -225,7 +249,7 @@ class Reception:
         if frames:
             self._handle(self._session.grant(frames), now_ns)
 
-    def _handle(self, outputs: list[Output], now_ns: int) -> None:
+    def _handle(self, outputs: list[Output], now_ns: int) -> None:  # noqa: C901 - one line for each kind of output
         for output in outputs:
             match output:
                 case Outgoing():
@@ -242,6 +266,8 @@ class Reception:
                     self._note_link(output, now_ns)
                 case Counted():
                     self._note_account(output, now_ns)
+                case LocksTold(state):
+                    self._locks.told(state)
                 case Stepped(rung):
                     self._note_rung(rung)
                 case Refused() | Unbelievable():
@@ -345,6 +371,7 @@ class Reception:
             self._current.vanished = False
         else:
             self.account.sessions.append(SessionAccount(hello.session, hello.counts, hello.counts))
+            self._locks.begin()
             if self._listener is not None:
                 self._listener.session_began()
             self._sink.begin(hello.camera)

@@ -207,6 +207,7 @@ def distributions(groups: Sequence[Strips], width_px: int) -> str:
     x = log_scale(np.concatenate(everything) if everything else np.zeros(0), 8.0, width_px - 12.0)
     height = 4.0
     rows = []
+    strips: list[float] = []
     for group in groups:
         if group.heading:
             rows.append(
@@ -214,12 +215,15 @@ def distributions(groups: Sequence[Strips], width_px: int) -> str:
             )
             height += 24.0
         for quantity in group.quantities:
+            strips.append(height)
             rows.append(_strip(quantity, x.px, height, width_px))
             height += 36.0
     marks = x.decades()
     # In a narrow picture only some of the decades are labelled.
     every = max(1, math.ceil(len(marks) * 52 / width_px))
-    axis = "".join(f'<path class="grid" d="M{x.px(mark):.1f} 0V{height:.0f}"/>' for mark in marks)
+    # Grid lines only cross the bars, never the numbers above them.
+    lines = "".join(f"M{x.px(mark):.1f} {top + 16:.0f}v18" for top in strips for mark in marks)
+    axis = f'<path class="grid" d="{lines}"/>' if lines else ""
     axis += "".join(
         f'<text x="{x.px(mark):.1f}" y="{height + 15:.0f}" text-anchor="{_anchor(index, len(marks))}">{_decade(mark)}</text>'
         for index, mark in enumerate(marks)

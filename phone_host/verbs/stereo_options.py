@@ -2,16 +2,42 @@
 
 import argparse
 import math
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
-from common.errors import SettingsError
-from phone_host.model import Side, StereoGeometry
+from common.errors import DataError, SettingsError
+from phone_host.declared_settings import NEAR_M
+from phone_host.model import Rig, Side, StereoGeometry
+from phone_host.output.axes import Axes
+from phone_host.output.calib_txt import is_calib_txt, read_calib_txt
 from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.match import MatchSettings, create_matcher
-from phone_host.stereo.matcher_names import matcher_named
+from phone_host.stereo.depth_limits import DepthWanted
+from phone_host.stereo.match import MatchSettings
+from phone_host.stereo.matcher_names import AnyMatcher, matcher_named
 from phone_host.stereo.rectify import Rectifier
-from phone_host.stereo.reproject import disparities_for_near
+from phone_host.stereo.scaled_rig import scaled_geometry
+from phone_host.verbs.stereo_numbers import crop_of, length_m, pixels, point_px, scale_of
+
+_REJECTED: Final = "reject"
+"""`Rig.verdict` of a rig that should not be used (`calibration.verdict`)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputOptions:
+    """How results are written.
+
+    Attributes:
+        axes: of the points in files.
+    """
+
+    axes: Axes = Axes.CAMERA
+
+
+def output_options(options: argparse.Namespace) -> OutputOptions:
+    """Read the options that only concern files."""
+    return OutputOptions(axes=Axes(options.axes))
 
 
 def build_core(
@@ -21,7 +47,7 @@ def build_core(
 
     Args:
         options: options as `add_stereo_arguments` declares them.
-        calibration: path of rig.yaml; empty for none.
+        calibration: path of rig.yaml or calib.txt; empty for none.
         matcher: name of the matcher.
         size_px: width and height of images that arrive rectified, px.
 
@@ -30,33 +56,87 @@ def build_core(
 
     Raises:
         SettingsError: the options contradict each other.
-        DataError: rig.yaml is invalid.
+        DataError: rig.yaml or calib.txt is invalid, or the rig was rejected by its calibration.
     """
     chosen = matcher_named(matcher)
-    if not (math.isfinite(options.near) and options.near > 0):
-        raise SettingsError(f"--near is {options.near:g}", "give a number of millimetres above 0")
-    if calibration and options.rectified:
+    wanted = depth_wanted(options)
+    of_rectified = bool(calibration) and is_calib_txt(Path(calibration))
+    if calibration and options.rectified and not of_rectified:
         raise SettingsError("--calibration and --rectified contradict each other", "give only one of the two")
     _refuse_idle_geometry(options, calibration)
+    if of_rectified:
+        return _by_calib_txt(options, Path(calibration), chosen, wanted, size_px), None
     if calibration:
         rig = read_rig(Path(calibration))
-        rectifier = Rectifier(rig)
-        disparities = options.disparities
-        if disparities is None:
-            width_px = rectifier.rectification.width_px
-            disparities = disparities_for_near(rectifier.geometry, options.near / 1000, width_px)
-        return StereoCore(create_matcher(MatchSettings(chosen, disparities)), rectifier), rig.board_side
+        refuse_rejected(rig, calibration, allowed=options.use_rejected_rig)
+        return StereoCore(_matcher(chosen, options.disparities), Rectifier(rig), None, wanted), rig.board_side
     if not options.rectified:
+        _refuse_idle_limits(options, ("near", "far", "crop", "scale"), "--calibration or --rectified")
         return None, None
-    if options.disparities is None:
-        raise SettingsError(
-            "--rectified without --disparities", "give the number of disparities, for example --disparities 64"
+    geometry = rectified_geometry(options, size_px)
+    if geometry is None:
+        _refuse_idle_limits(options, ("near", "far"), "--focal and --baseline, so there are no metres")
+        if options.disparities is None:
+            raise SettingsError(
+                "--rectified without --disparities", "give the number of disparities, for example --disparities 64"
+            )
+    return StereoCore(_matcher(chosen, options.disparities), None, geometry, wanted), None
+
+
+def depth_wanted(options: argparse.Namespace) -> DepthWanted:
+    """Read --near, --far, --crop and --scale.
+
+    Raises:
+        SettingsError: one of them is invalid, or nothing is left between the two limits.
+    """
+    near_m = 0.0 if options.near is None else length_m(options.near, "--near", "300mm")
+    far_m = math.nan if options.far is None else length_m(options.far, "--far", "5m")
+    if near_m >= far_m:
+        raise SettingsError(f"--near {options.near} is not nearer than --far {options.far}", "give a larger --far")
+    return DepthWanted(
+        search_from_m=(near_m or NEAR_M) if options.disparities is None else math.nan,
+        near_m=near_m,
+        far_m=far_m,
+        crop=None if options.crop is None else crop_of(options.crop),
+        scale=math.nan if options.scale is None else scale_of(options.scale),
+    )
+
+
+def _matcher(chosen: AnyMatcher, disparities: int | None) -> MatchSettings:
+    return MatchSettings(chosen) if disparities is None else MatchSettings(chosen, disparities)
+
+
+def refuse_rejected(rig: Rig, calibration: str, *, allowed: bool) -> None:
+    """Refuse a rig that its own calibration found unfit.
+
+    Args:
+        rig: as read.
+        calibration: its file, for the error.
+        allowed: whether the user wants it all the same.
+
+    Raises:
+        DataError: its verdict is reject, and it is not allowed.
+    """
+    if rig.verdict == _REJECTED and not allowed:
+        raise DataError(
+            f"{calibration} was rejected by its own calibration (verdict {_REJECTED}): its depth would be wrong",
+            "calibrate again, or give --use-rejected-rig",
         )
-    return StereoCore(
-        create_matcher(MatchSettings(chosen, options.disparities)),
-        None,
-        rectified_geometry(options, size_px),
-    ), None
+
+
+def _by_calib_txt(
+    options: argparse.Namespace, path: Path, chosen: AnyMatcher, wanted: DepthWanted, size_px: tuple[int, int]
+) -> StereoCore:
+    """Build the core for rectified images from the file that their publisher gave; N is ndisp unless the user says otherwise."""
+    found = read_calib_txt(path)
+    geometry, disparities = found.geometry, options.disparities
+    if found.size_px is not None and found.size_px != size_px:
+        geometry = scaled_geometry(geometry, found.size_px, size_px, str(path))
+    if disparities is None and options.near is None and found.disparities is not None:
+        scale = 1.0 if found.size_px is None else size_px[0] / found.size_px[0]
+        disparities = math.ceil(found.disparities * scale)
+        wanted = depth_wanted(argparse.Namespace(**{**vars(options), "disparities": disparities}))
+    return StereoCore(_matcher(chosen, disparities), None, geometry, wanted)
 
 
 def _refuse_idle_geometry(options: argparse.Namespace, calibration: str) -> None:
@@ -70,6 +150,13 @@ def _refuse_idle_geometry(options: argparse.Namespace, calibration: str) -> None
         raise SettingsError(f"{given[0]} without --focal and --baseline", "add --focal and --baseline, or leave it out")
 
 
+def _refuse_idle_limits(options: argparse.Namespace, names: tuple[str, ...], missing: str) -> None:
+    """Refuse limits that would have no effect."""
+    given = [f"--{name}" for name in names if getattr(options, name) is not None]
+    if given:
+        raise SettingsError(f"{given[0]} without {missing}", "add them, or leave it out")
+
+
 def rectified_geometry(options: argparse.Namespace, size_px: tuple[int, int]) -> StereoGeometry | None:
     """Read --focal, --baseline, --doffs and --center; None without focal length and baseline.
 
@@ -80,23 +167,14 @@ def rectified_geometry(options: argparse.Namespace, size_px: tuple[int, int]) ->
         raise SettingsError("only one of --focal and --baseline is given", "give both for a point cloud, or neither")
     if options.focal is None:
         return None
-    for name, value in (("--focal", options.focal), ("--baseline", options.baseline)):
-        if not (math.isfinite(value) and value > 0):
-            raise SettingsError(f"{name} {value:g}", "give a number above 0")
-    doffs_px = 0.0 if options.doffs is None else options.doffs
-    if not math.isfinite(doffs_px):
-        raise SettingsError(f"--doffs is {doffs_px:g}", "give a number of pixels")
-    cx_px, cy_px = ((n - 1) / 2 for n in size_px) if options.center is None else _center(options.center)
+    focal_px = pixels(options.focal, "--focal")
+    if focal_px <= 0:
+        raise SettingsError(f"--focal is {options.focal!r}", "give a number of pixels above 0")
+    cx_px, cy_px = ((n - 1) / 2 for n in size_px) if options.center is None else point_px(options.center, "--center")
     return StereoGeometry(
-        focal_px=options.focal, baseline_m=options.baseline / 1000, cx_px=cx_px, cy_px=cy_px, doffs_px=doffs_px
+        focal_px=focal_px,
+        baseline_m=length_m(options.baseline, "--baseline", "60mm"),
+        cx_px=cx_px,
+        cy_px=cy_px,
+        doffs_px=0.0 if options.doffs is None else pixels(options.doffs, "--doffs"),
     )
-
-
-def _center(text: str) -> tuple[float, float]:
-    try:
-        cx_px, cy_px = (float(part) for part in text.split(","))
-    except ValueError:
-        cx_px = cy_px = math.nan
-    if not (math.isfinite(cx_px) and math.isfinite(cy_px)):
-        raise SettingsError(f"--center is {text!r}", "give CX,CY in px, for example 319.5,239.5")
-    return cx_px, cy_px

@@ -31,3 +31,27 @@ def length_mm(text: str, option: str, example: str) -> float:
     if not (math.isfinite(value) and value > 0):
         raise SettingsError(f"{option} is {text!r}", f"give a length above 0, for example {example}")
     return value
+
+
+_LEAST_BARE_MM: Final = 0.5
+"""No chessboard has smaller squares. A smaller number without a unit is a length in metres."""
+
+
+def square_mm(text: str) -> float:
+    """Read --square, the side of a chessboard's square, like `length_mm`.
+
+    Args:
+        text: what the user wrote.
+
+    Returns:
+        mm, above 0.
+
+    Raises:
+        SettingsError: it is no length, or a number without a unit that can only mean metres.
+    """
+    value = length_mm(text, "--square", "25mm")
+    found = _LENGTH.fullmatch(text)
+    if found is not None and not found[2] and value < _LEAST_BARE_MM:
+        in_metres = f"{value * 1000:g}mm or {value:g}m"
+        raise SettingsError(f"--square {text.strip()} has no unit, and a number alone means mm", f"write {in_metres}")
+    return value

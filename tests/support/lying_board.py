@@ -11,7 +11,7 @@ from pathlib import Path
 
 from board_agent.agent import Agent
 from common import now
-from common.camera.base import Grab
+from common.camera.base import Camera, Grab
 from common.camera.replay import ReplayCamera, ReplaySettings
 from common.frame import Frame, PixelFormat
 from common.link.factory import open_link, parse_link
@@ -63,7 +63,7 @@ class LyingCamera(ReplayCamera):
 
 
 @contextmanager
-def board_of(camera: LyingCamera, uri: str) -> Iterator[Agent]:
+def board_of(camera: Camera, uri: str) -> Iterator[Agent]:
     """A board with that camera, in a thread."""
     link = open_link(parse_link(uri, listens_by_default=True))
     reader, writer = socket.socketpair()

@@ -1,9 +1,12 @@
 """Strategies for every message of the protocol, each field over its whole allowed range; and ways to corrupt headers."""
 
 import random
+from dataclasses import replace
 
 from hypothesis import strategies as st
 
+from common.camera.identity import LARGEST_LOCK, CameraIdentity, Lock
+from common.camera.orientation import Flip, Orientation
 from common.frame import PixelFormat
 from common.ledger import BoardMarks
 from common.protocol.message import (
@@ -18,6 +21,7 @@ from common.protocol.message import (
     HostHello,
     Knock,
     Lane,
+    LockState,
     Message,
     Pacing,
     Ping,
@@ -25,6 +29,7 @@ from common.protocol.message import (
     Refusal,
     RefusalReason,
     Rung,
+    SetLocks,
     Status,
     Steer,
     Steering,
@@ -34,6 +39,7 @@ NUMBERS = st.integers(0, 2**53)
 TIMES_NS = st.integers(-(2**62), 2**62)
 SIZES_PX = st.integers(1, 16384)
 PERIODS_NS = st.integers(1, 3600 * 10**9)
+IDS = st.text("0123456789abcdef", max_size=32)
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=96)
 
 COUNTS = st.builds(
@@ -51,6 +57,20 @@ CAMERAS = st.builds(
     period_ns=PERIODS_NS,
     pacing=st.sampled_from(Pacing),
     steering=st.sampled_from(Steering),
+)
+LETTERS = st.text(st.characters(exclude_categories=["Cs"]), max_size=48)
+LOCKS = st.lists(
+    st.tuples(st.sampled_from(Lock), st.integers(-LARGEST_LOCK - 1, LARGEST_LOCK)), unique_by=lambda lock: lock[0]
+).map(tuple)
+LONG_CAMERAS = st.builds(
+    replace,
+    CAMERAS,
+    orientation=st.builds(Orientation, st.sampled_from([0, 90, 180, 270]), st.sampled_from(Flip)),
+    identity=st.builds(CameraIdentity, LETTERS, LETTERS, LETTERS),
+    controls=LOCKS,
+)
+HOST_IDS = st.text(st.characters(exclude_categories=["Cs"]), max_size=64).filter(
+    lambda text: not text.endswith("+long")
 )
 FRAMES = st.builds(
     FrameMessage,
@@ -77,8 +97,17 @@ RUNGS = st.builds(
 )
 
 MESSAGES: st.SearchStrategy[Message] = st.one_of(
-    st.builds(HostHello, TEXTS, LANES),
+    st.builds(HostHello, HOST_IDS, LANES, st.booleans()),
     st.builds(BoardHello, session=TEXTS, boot_id=TEXTS, camera=CAMERAS, counts=COUNTS, rung=RUNGS),
+    st.builds(
+        BoardHello,
+        session=IDS,
+        boot_id=IDS,
+        camera=LONG_CAMERAS,
+        counts=COUNTS,
+        rung=RUNGS,
+        is_long=st.sampled_from([True]),
+    ),
     st.builds(Knock, LANES, TEXTS),
     st.builds(Refusal, st.sampled_from(RefusalReason)),
     st.builds(Credit, NUMBERS),
@@ -89,6 +118,8 @@ MESSAGES: st.SearchStrategy[Message] = st.one_of(
     st.builds(End, TEXTS, COUNTS),
     st.builds(Bye, COUNTS),
     st.builds(Steer, st.integers(0, 2**62)),
+    st.builds(SetLocks, LOCKS),
+    st.builds(LockState, session=TEXTS, asked=LOCKS, held=LOCKS),
 )
 
 

@@ -43,7 +43,7 @@ def shifted(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("matcher", ["sgbm", "block"])
-def test_a_rectified_pair_with_geometry_gives_all_four_files(shifted: Path, matcher: str) -> None:
+def test_a_rectified_pair_with_geometry_gives_all_files(shifted: Path, matcher: str) -> None:
     """Disparity is 12 everywhere, depth is f b / (d + doffs) = 500 * 0.1 / (12 + 3) = 3.333 m, and --json prints the report."""
     done = _phone_host(
         "stereo", shifted / "left.png", shifted / "right.png", "--rectified", "--disparities", 32, "--focal", 500,
@@ -62,6 +62,31 @@ def test_a_rectified_pair_with_geometry_gives_all_four_files(shifted: Path, matc
     assert report["points"] == np.isfinite(disparity).sum()
     assert set(report["times_ms"]) == {"read", "prepare", "rectify", "match", "reproject", "write", "total"}
     assert sorted(path.name for path in (shifted / "o").iterdir()) == sorted([".tandemscan", *report["files"]])
+
+
+def test_folders_give_a_folder_for_each_pair_and_a_bad_pair_is_exit_4(shifted: Path) -> None:
+    """Of pairs 3 and 12, the second has a spoiled image: the first is computed, the other named, in the lines and in --json."""
+    for side in ("left", "right"):
+        (shifted / side).mkdir()
+        (shifted / side / "3.png").write_bytes((shifted / f"{side}.png").read_bytes())
+        (shifted / side / "12.png").write_bytes((shifted / f"{side}.png").read_bytes())
+    (shifted / "left" / "12.png").write_bytes(b"spoiled")
+    (shifted / "left" / "7.png").write_bytes((shifted / "left.png").read_bytes())
+    arguments = [
+        "stereo", shifted / "left", shifted / "right", "--rectified", "--disparities", 32, "--out", shifted / "o",
+    ]  # fmt: skip
+    done = _phone_host(*arguments, "--json")
+    assert done.returncode == 4, done.stderr
+    report = json.loads(done.stdout)
+    assert report == json.loads((shifted / "o" / "report.json").read_text())
+    assert [pair["name"] for pair in report["pairs"]] == ["pair-000003", "pair-000012"]
+    assert "12.png" in report["pairs"][1]["problem"]
+    assert [Path(path).name for path in report["left_alone"]] == ["7.png"]
+    assert np.nanmedian(read_pfm(shifted / "o" / "pair-000003" / "disparity.pfm")) == pytest.approx(12, abs=0.05)
+    told = _phone_host(*arguments)
+    assert told.returncode == 4
+    for words in ("pair-000003", "pair-000012  failed: ", "1 of 2 pairs computed, 1 failed", "no partner: 7.png"):
+        assert words in told.stdout
 
 
 def test_without_focal_length_there_is_no_cloud_and_the_command_says_so(shifted: Path) -> None:
@@ -175,6 +200,10 @@ def _bad_cases(folder: Path) -> dict[str, tuple[list[object], int, str]]:
             3,
             "file is not a folder",
         ),
+        "out holds the images": ([left, right, *rectified, "--out", folder], 2, "folder of the images"),
+        "one side": ([left, *rectified, *out], 2, "only one side is given"),
+        "same image": ([left, left, *rectified, *out], 2, "both name"),
+        "folder and file": ([folder, right, *rectified, *out], 2, "is a folder, RIGHT"),
         "out is a device": ([left, right, *rectified, "--out", "/dev/null"], 3, "/dev/null is not a folder"),
     }
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,9 +12,9 @@ from common.errors import DataError
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.verdict import Assessment, Verdict, judge, vertical_p95_px
-from phone_host.model import Rig
+from phone_host.model import CameraModel, Rig
 from tests.support.boards import BOARD, exact_pairs, poses
-from tests.support.rigs import unlike_rig
+from tests.support.rigs import project_points, unlike_rig
 
 _SIZES = ((640, 480), (1280, 720))
 
@@ -169,3 +170,58 @@ def test_a_lens_that_takes_all_five_terms_gets_them() -> None:
     assert found.distortion_terms == 5
     assert found.rig.left.distortion[4] == pytest.approx(0.4, abs=0.05)
     assert found.rejected == ()
+
+
+def _wide_rig() -> Rig:
+    """Two cameras of 100 degrees whose lenses bend as a stereographic projection does: 2 tan(angle / 2) fitted by k1, k2 and k3."""
+    slopes = np.linspace(1e-3, 1.6, 300)
+    bent = 2 * np.tan(np.arctan(slopes) / 2) - slopes
+    k1, k2, k3 = np.linalg.lstsq(np.stack([slopes**3, slopes**5, slopes**7], axis=1), bent, rcond=None)[0]
+    models = [
+        CameraModel(
+            width_px=640,
+            height_px=480,
+            matrix=np.array([[316.0, 0, cx], [0, 316, cy], [0, 0, 1]]),
+            distortion=np.array([k1, k2, 0, 0, k3]),
+        )
+        for cx, cy in ((322.0, 238.0), (317.0, 243.0))
+    ]
+    rotation = np.asarray(cv2.Rodrigues(np.array([0.01, -0.02, 0.015]))[0], np.float64)
+    centre = np.array([0.06, 0.001, 0.002])
+    return Rig(left=models[0], right=models[1], R_right_left=rotation, t_right_left_m=-rotation @ centre)
+
+
+def _wide_poses(rig: Rig, count: int) -> np.ndarray:
+    """Boards near two wide cameras, up to the corners of both images."""
+    random, found = np.random.default_rng(3), list[np.ndarray]()
+    middle = BOARD.points_m().mean(axis=0)
+    while len(found) < count:
+        depth_m = random.uniform(0.16, 0.4)
+        centre = np.array([random.uniform(-0.9, 0.9), random.uniform(-0.7, 0.7), 1.0]) * depth_m + [0.03, 0, 0]
+        turn = np.append(random.uniform(-0.6, 0.6, 2), random.uniform(-0.5, 0.5))
+        rotation = np.asarray(cv2.Rodrigues(turn)[0])
+        points = (BOARD.points_m() - middle) @ rotation.T + centre
+        views = project_points(points, rig)
+        if np.hypot(*points.T[:2]).max() < 1.35 * points[:, 2].min() and all(
+            ((view > 2) & (view < [638, 478])).all() for view in views
+        ):
+            found.append(np.concatenate([turn, centre - rotation @ middle]))
+    return np.array(found)
+
+
+def test_a_wide_lens_keeps_its_pairs() -> None:
+    """Views in the corners of a wide lens only fit with k3; they are not taken for wrong corners, and the baseline is right."""
+    rig = _wide_rig()
+    found = calibrate(exact_pairs(rig, _wide_poses(rig, 12), noise_px=0.1), BOARD, ((640, 480), (640, 480)))
+    assert len(found.used) == 12
+    assert found.distortion_terms == 5
+    assert _baseline_mm(found) == pytest.approx(np.linalg.norm([60, 1, 2]), abs=0.3)
+
+
+def test_a_second_chance_brings_no_wrong_pair_back() -> None:
+    """A board that moved between the two exposures of a wide rig stays out; the others are used."""
+    rig = _wide_rig()
+    pairs = exact_pairs(rig, _wide_poses(rig, 12), noise_px=0.1)
+    pairs[4] = replace(pairs[4], right_px=pairs[4].right_px + np.array([0.0, 3.0]))
+    found = calibrate(pairs, BOARD, ((640, 480), (640, 480)))
+    assert [each.name for each in found.rejected] == ["4"]

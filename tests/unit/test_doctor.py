@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from board_agent.doctor.key_checks import check_keys
 from board_agent.doctor.link_checks import LinkReadings, check_link
 from common.camera.v4l2_formats import FormatOffer, Rates, Wanted
-from common.camera.v4l2_stamps import StampClock
+from common.camera.v4l2_stamps import StampClock, rate_remedy
 from common.doctor.access import Account, Holder, Node, check_access, may_open
 from common.doctor.camera_checks import (
     Offered,
@@ -178,6 +178,26 @@ def test_a_second_of_frames_is_judged(sample: Sample, verdict: Grade, word: str)
     assert bool(finding.remedy) is (verdict is not OK)
 
 
+@pytest.mark.parametrize(
+    ("period_ns", "exposure_ns", "remedy"),
+    [
+        (100_000_000, 100_000_000, "each exposure takes 100 ms: more light, or exposure_ms=29; or ask for fps=10"),
+        (100_000_000, None, "more light, or exposure_ms=29; if the bus is full, smaller frames or another port"),
+        (100_000_000, 5_000_000, "if the bus is full, smaller frames or another port; or ask for fps=10"),
+    ],
+)
+def test_a_camera_slower_than_offered_has_a_remedy_with_figures(
+    period_ns: int, exposure_ns: int | None, remedy: str
+) -> None:
+    """10 of 30 frames a second: the offer is the driver's, what comes is said beside it, and the longest exposure for that rate is named."""
+    slow = check_stream(replace(SOUND, period_ns=period_ns, exposure_ns=exposure_ns))[0]
+    assert "10.0 of 30 a second" in slow.text
+    assert "slower than the driver offers" in slow.text
+    assert remedy in slow.remedy
+    assert "is offered by the driver" in check_format("/dev/video0", OFFERED, Wanted()).text
+    assert rate_remedy(20_000_000, 33_333_333, None) == "ask for the rate that it gives: fps=50"
+
+
 def test_stamps_and_refused_controls_have_lines_of_their_own() -> None:
     """Impossible stamps and refused controls are warnings; a camera without frames has neither line."""
     assert [item.what for item in check_stream(SOUND)] == ["stream", "stamps"]
@@ -255,7 +275,7 @@ def test_a_full_or_read_only_disk_warns(disk: Disk, verdict: Grade) -> None:
             log("Under-voltage detected! (0x00050005)", "Undervoltage detected!"),
             Supply(),
             WARN,
-            "2 times, the last 30 s",
+            "twice, the last 30 s",
         ),
         (log("usb usb1-port1: over-current change #3"), Supply(), WARN, "over-current"),
         (log(), throttled(0x50005, "get_throttled"), FAIL, "too low now"),

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.errors import DataError
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
 from common.imagesize.head import MEGAPIXEL, MOST_PIXELS, ImageKind, require_believable
 from common.imagesize.read import read_head, whole_image
@@ -213,17 +212,6 @@ def test_what_is_decoded_has_the_size_that_was_read(suffix: str, data: st.DataOb
     except SpoiledImageError:
         return
     assert (image.shape[1], image.shape[0]) == read_head(bytes(content), "image").size_px
-
-
-@pytest.mark.parametrize("orientation", [0, 1, 3, 6])
-def test_a_tiff_that_is_to_be_turned_is_refused(orientation: int) -> None:
-    """Only upright TIFFs are taken (TIFF 6.0: 1): decoders turn a TIFF by its orientation tag, so its size would differ from the one that was read."""
-    content = short_tiff((256, 3, 70), (257, 3, 50), (274, 3, orientation))
-    if orientation <= 1:
-        assert read_head(content, "a.tif").size_px == (70, 50)
-        return
-    with pytest.raises(DataError, match=f"a.tif must be turned.*orientation {orientation}.*save it upright"):
-        read_head(content, "a.tif")
 
 
 def test_markers_without_a_length_are_passed_over() -> None:

@@ -14,7 +14,8 @@ from common.errors import DataError, SettingsError, TandemError, UnavailableErro
 from common.files import read_whole
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.listed import LIST, ListedFolder, claim
-from phone_host.run.file_sink import NAMES, PAIR_FILES, FileSink
+from phone_host.output.pair_files import PAIR_NAMES
+from phone_host.run.file_sink import NAMES, FileSink
 from phone_host.verbs.output_folders import spare_inputs
 
 FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
@@ -186,7 +187,7 @@ def test_a_list_with_ways_out_of_the_folder_leads_nowhere(tmp_path: Path) -> Non
     (out / "notes.txt").write_text("precious")
     with (out / LIST).open("a") as list_file:
         list_file.write("../report.json\nnotes.txt\n/etc/passwd\n..\n.\n")
-    ListedFolder(out, NAMES, inner=PAIR_FILES).close()
+    ListedFolder(out, NAMES, inner=PAIR_NAMES).close()
     assert (tmp_path / "report.json").read_text() == "precious"
     assert (out / "notes.txt").read_text() == "precious"
 

@@ -4,6 +4,7 @@ import resource
 import struct
 from pathlib import Path
 
+import cv2
 import hypothesis.extra.numpy as hnp
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from hypothesis import strategies as st
 
 from common.errors import DataError
 from phone_host.model import Disparity
-from phone_host.output.pfm import read_pfm, write_pfm
+from phone_host.output.axes import Axes
+from phone_host.output.pfm import read_pfm, read_xyz, write_pfm, write_xyz
 
 
 def test_file_holds_header_bottom_row_first_little_endian_and_infinity(tmp_path: Path) -> None:
@@ -77,3 +79,39 @@ def test_a_write_that_fails_half_way_leaves_the_old_file_and_no_other(tmp_path: 
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert path.read_bytes() == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["d.pfm"]
+
+
+def test_an_image_of_points_is_the_three_channels_bottom_row_first_with_nan_for_none(tmp_path: Path) -> None:
+    """The bytes of a 1x2 image: header PF, then X Y Z of the lower pixel, then of the upper one."""
+    path = tmp_path / "xyz.pfm"
+    cloud = np.array([[[1, 2, 3]], [[np.nan, np.nan, np.nan]]], dtype=np.float32)
+    write_xyz(path, cloud)
+    nan = struct.pack("<f", float("nan"))
+    assert path.read_bytes() == b"PF\n1 2\n-1\n" + 3 * nan + struct.pack("<3f", 1, 2, 3)
+    write_xyz(path, cloud, Axes.Y_UP)
+    assert path.read_bytes().endswith(struct.pack("<3f", 1, -2, -3))
+
+
+def test_an_image_of_points_is_read_by_numpy_alone_and_by_opencv(tmp_path: Path) -> None:
+    """Independent readers see every pixel in its place: numpy by hand, and OpenCV, which calls the channels B G R."""
+    path = tmp_path / "xyz.pfm"
+    cloud = np.random.default_rng(3).normal(size=(600, 500, 3)).astype(np.float32)  # several strips
+    cloud[::9, ::4] = np.nan
+    write_xyz(path, cloud)
+    header, values = path.read_bytes().split(b"\n-1\n", 1)
+    assert header == b"PF\n500 600"
+    by_hand = np.frombuffer(values, "<f4").reshape(600, 500, 3)[::-1]
+    np.testing.assert_array_equal(by_hand, cloud)
+    by_opencv = np.asarray(cv2.imread(str(path), cv2.IMREAD_UNCHANGED))[..., ::-1]
+    np.testing.assert_array_equal(by_opencv, cloud)
+    np.testing.assert_array_equal(read_xyz(path), cloud)
+
+
+def test_one_kind_of_pfm_is_not_taken_for_the_other(tmp_path: Path) -> None:
+    """Who reads points from a disparity map, or the reverse, is told how many channels it has."""
+    write_pfm(tmp_path / "d.pfm", np.ones((2, 2), np.float32))
+    write_xyz(tmp_path / "p.pfm", np.ones((2, 2, 3), np.float32))
+    with pytest.raises(DataError, match=r"d\.pfm is a PFM of one channel"):
+        read_xyz(tmp_path / "d.pfm")
+    with pytest.raises(DataError, match=r"p\.pfm is a PFM of three channels"):
+        read_pfm(tmp_path / "p.pfm")

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
+from phone_host.output.axes import Axes
 from phone_host.output.ply import read_ply, write_ply
-from phone_host.output.preview import colour_disparity, write_preview
-from phone_host.stereo.images import read_image
 
 _CLOUD = np.array([[[0.1, -0.2, 1.5], [np.nan, np.nan, np.nan]], [[1, 2, np.inf], [4, 5, 6]]], dtype=np.float32)
 _BGR = np.array([[[10, 20, 30], [1, 1, 1]], [[2, 2, 2], [40, 50, 60]]], dtype=np.uint8)
@@ -62,21 +61,32 @@ def test_bad_files_are_named(tmp_path: Path, cut: int) -> None:
         read_ply(path)
 
 
-def test_preview_is_black_without_value_and_brighter_when_nearer(tmp_path: Path) -> None:
-    """NaN is black, nothing else is, and lightness rises with disparity."""
-    disparity = np.linspace(0, 60, 64, dtype=np.float32).reshape(8, 8)
-    disparity[0, 0] = np.nan
-    colours = colour_disparity(disparity, 0, 60)
-    assert colours[0, 0].tolist() == [0, 0, 0]
-    lightness = (colours @ np.array([0.114, 0.587, 0.299])).ravel()[1:]  # ITU-R BT.601 luma
-    assert (np.diff(lightness) > -1.0).all()  # rounding to 8 bits
-    assert lightness[0] > 20
-    assert lightness[-1] > 200
-    write_preview(tmp_path / "d.png", disparity)
-    assert read_image(tmp_path / "d.png").shape == (8, 8, 3)
+@pytest.mark.parametrize(
+    ("axes", "words", "signs"),
+    [
+        (Axes.CAMERA, "x right, y down, z forward of the left camera", (1, 1, 1)),
+        (Axes.Y_UP, "x right, y up, z backward of the left camera", (1, -1, -1)),
+    ],
+)
+def test_a_comment_states_unit_and_axes_and_the_points_follow_them(
+    tmp_path: Path, axes: Axes, words: str, signs: tuple[int, int, int]
+) -> None:
+    """With y up, the point 0.2 m above the optical axis and 1.5 m ahead lies at y = +0.2, z = -1.5; both frames are right-handed."""
+    path = tmp_path / "c.ply"
+    write_ply(path, _CLOUD, _BGR, axes)
+    assert f"comment unit metre; {words}\n".encode() in path.read_bytes()
+    np.testing.assert_array_equal(read_ply(path).points_m[0], np.array([0.1, -0.2, 1.5], np.float32) * signs)
+    assert np.prod(axes.signs) == 1
 
 
-def test_preview_of_nothing_is_black(tmp_path: Path) -> None:
-    """A map without values can be shown."""
-    write_preview(tmp_path / "d.png", np.full((4, 5), np.nan, dtype=np.float32))
-    assert not read_image(tmp_path / "d.png").any()
+def test_a_cloud_of_many_strips_is_whole_and_in_the_order_of_rows(tmp_path: Path) -> None:
+    """A large image is packed some rows at a time; every point is there, once, with its own colour."""
+    height, width = 700, 900
+    cloud = np.arange(height * width * 3, dtype=np.float32).reshape(height, width, 3)
+    cloud[::7, ::5] = np.nan
+    colours = np.arange(height * width, dtype=np.uint32).reshape(height, width).astype(np.uint8)
+    chosen = np.isfinite(cloud[..., 0])
+    assert write_ply(tmp_path / "c.ply", cloud, colours) == chosen.sum()
+    read = read_ply(tmp_path / "c.ply")
+    np.testing.assert_array_equal(read.points_m, cloud[chosen])
+    np.testing.assert_array_equal(read.colours[:, 1], colours[chosen])

@@ -7,6 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
+from common.camera.identity import CameraIdentity, CameraState
+from common.camera.orientation import Flip, Orientation
 from common.errors import DataError
 from phone_host.model import UNMEASURED_NS, Rig, Side, TimeOffset
 from phone_host.output.rig_yaml import read_rig, write_rig, write_time_offset
@@ -141,3 +143,70 @@ def test_a_time_offset_of_no_use_is_named(tmp_path: Path, key: str, value: str) 
     path.write_text(re.sub(rf"^{key}:.*$", f"{key}: {value}", path.read_text(), flags=re.MULTILINE))
     with pytest.raises(DataError, match=key):
         read_rig(path)
+
+
+def test_noise_of_zero_and_verdict_come_back(tmp_path: Path) -> None:
+    """They are read as they were written; files of before, without them, say nothing."""
+    back = read_rig(_written(tmp_path, zero_sigma_px=0.375, verdict="usable"))
+    assert (back.zero_sigma_px, back.verdict) == (0.375, "usable")
+    path = _written(tmp_path)
+    path.write_text(re.sub(r"^zero_sigma:.*\n", "", path.read_text(), flags=re.MULTILINE))
+    back = read_rig(path)
+    assert np.isnan(back.zero_sigma_px)
+    assert back.verdict == ""
+    assert (back.left_camera, back.right_camera) == (None, None)
+
+
+_CAMERA = CameraState(
+    identity=CameraIdentity("uvcvideo", 'HD "Pro": C920 ü', "0123"),
+    width_px=480,
+    height_px=640,
+    orientation=Orientation(270, Flip.V),
+    locks=(("exposure_us", 10_000), ("focus", 0), ("gain", -3)),
+)
+"""A camera mounted turned, so that its 480x640 images become the rig's 640x480."""
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        _CAMERA,
+        CameraState(CameraIdentity(), 640, 480),
+        CameraState(CameraIdentity(name="phone"), 640, 480, Orientation(180)),
+    ],
+)
+def test_cameras_come_back(tmp_path: Path, camera: CameraState) -> None:
+    """What is known of a camera is read as it was written; what is not known stays away; a time offset put in later changes nothing."""
+    path = _written(tmp_path, left_camera=camera)
+    write_time_offset(path, TimeOffset(1, 2))
+    back = read_rig(path)
+    assert back.left_camera == camera
+    assert back.right_camera is None
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("verdict: splendid", "verdict is 'splendid': write good, usable or reject"),
+        ("verdict: 7", "verdict is 'no word'"),
+        ("zero_sigma: -1.", "zero_sigma is -1"),
+        ("zero_sigma: .Inf", "zero_sigma is inf"),
+        ("left_camera: usb", "left_camera is no map"),
+        ("left_camera: { rotate: 45 }", "left_camera.rotate is none of"),
+        ("left_camera: { rotate: a }", "left_camera.rotate is none of"),
+        ("left_camera: { flip: d }", "left_camera.flip is 'd'"),
+        ("left_camera: { name: 5 }", "left_camera.name is no short text"),
+        (f"right_camera: {{ serial: {'x' * 300} }}", "right_camera.serial is no short text"),
+        ("right_camera: { locks: 7 }", "right_camera.locks is no map"),
+        ("right_camera: { locks: { focus: 1.5 } }", "right_camera.locks.focus is no whole number"),
+    ],
+)
+def test_what_a_rig_says_of_itself_is_checked_by_key(tmp_path: Path, line: str, said: str) -> None:
+    """A verdict that does not exist, a negative or endless noise, and cameras that make no sense are refused by key, in one line."""
+    path = _written(tmp_path)
+    text = re.sub(r"^zero_sigma:.*\n", "", path.read_text(), flags=re.MULTILINE)
+    path.write_text(f"{text}{line}\n")
+    with pytest.raises(DataError) as failure:
+        read_rig(path)
+    assert said in str(failure.value)
+    assert "\n" not in str(failure.value)

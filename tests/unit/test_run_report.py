@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from common.camera.base import CameraHealth, CameraState
@@ -13,16 +14,18 @@ from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.measure.delays import DelayStatistics, Series
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
-from phone_host.measure.unused import unused
+from phone_host.measure.unused import Unused, unused
 from phone_host.model import PairCounts, Side, TimeOffset, Unwritten
 from phone_host.report.run_json import age_bound, build
-from phone_host.report.run_page import run_page
+from phone_host.report.run_page import camera_table, run_page
 from phone_host.report.summary import phase_lines, summary
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Aligning, Alignment, Phase
 from phone_host.sync.quarantine import Disbelief, Suspects
+from tests.support.html import Page
 from tests.support.samples import LEDGER
+from tests.support.stereo_pages import processed
 
 NAN = float("nan")
 MS = 1_000_000
@@ -78,7 +81,7 @@ def test_what_was_not_measured_is_no_number(pairs: int) -> None:
 
 def test_a_rate_needs_two_pairs() -> None:
     """One pair has no rate; 31 pairs 50 ms apart are 20 a second."""
-    assert summary(run(1)).startswith("1 pairs, ended: stopped\n")
+    assert summary(run(1)).startswith("1 pair, ended: stopped\n")
     assert summary(run(31)).startswith("31 pairs in 1.5 s (20.0 /s), ended: stopped\n")
 
 
@@ -134,7 +137,7 @@ def test_what_was_not_believed_is_told_everywhere() -> None:
     assert told["frames"]["disbelieved"] == dropped
     assert {item["doubt"] for item in told["warnings"]} == {"clock_stepped", "disbelieved", "spoiled_images"}
     for text in (summary(seen), run_page(seen, None, Side.LEFT, ())):
-        for words in ("jumped 1 times", "7 pairs", "from the future", "beyond credit", "too large"):
+        for words in ("jumped once", "7 pairs", "from the future", "beyond credit", "too large"):
             assert words in text
 
 
@@ -189,8 +192,8 @@ def test_everything_that_a_run_knows_is_told() -> None:
     assert told["links"][0]["age_ms"]["p50"] == 7.0
     text = summary(seen)
     for words in (
-        "+-30 us", "skew +2.0 ppm", "alignment: aligned", "unplugged 4 times", "stalled 2 times", "failed 3 times",
-        "back 5 times", "1 frames missed", "6 stamps not believed", "7 controls refused", "8 frames no end",
+        "+-30 us", "skew +2.0 ppm", "alignment: aligned", "unplugged 4 times", "stalled twice", "failed 3 times",
+        "back 5 times", "1 frame missed", "6 stamps not believed", "7 controls refused", "8 frames no end",
         "5 frames dropped on the board: replaced", "9 board frames without partner: no partner",
         "3 pairs dropped from a full FIFO", "2 pairs that could not be processed",
         "4 pairs still waiting at the end", "4 lines, 6 pairs (disk full)",
@@ -264,6 +267,47 @@ def test_what_was_not_used_is_told_once_each() -> None:
     assert {(item["place"], item["reason"]): item["count"] for item in told} == counts
     assert len(told) == len(counts)
     for item in unused(seen):
-        assert f"{item.count} {item.words}" in summary(seen)
+        assert item.told in summary(seen)
         assert item.words in run_page(seen, None, Side.LEFT, ())
     assert not unused(replace(run(2), ended="running"))
+
+
+@pytest.mark.parametrize(
+    ("place", "reason", "count", "told"),
+    [
+        ("frames dropped on the board", "replaced", 1, "1 frame dropped on the board: replaced"),
+        ("frames dropped on the board", "replaced", 2, "2 frames dropped on the board: replaced"),
+        ("host frames that were not whole images", "", 1, "1 host frame that was no whole image"),
+        ("board frames without partner", "too_late", 1, "1 board frame without partner: too late"),
+        ("packets of something else", "", 1, "1 packet of something else"),
+    ],
+)
+def test_one_that_was_not_used_is_singular(place: str, reason: str, count: int, told: str) -> None:
+    """The number and the noun of what was not used agree."""
+    assert Unused(place, reason, count).told == told
+
+
+def test_what_did_not_happen_has_no_row() -> None:
+    """A camera without troubles has no row of zeros on the page; one of which nothing at all is known has no card."""
+    assert camera_table(CameraHealth(CameraState.RUNNING)).rows == ()
+    health = CameraHealth(CameraState.RUNNING, stalls=2, period_ns=50 * MS)
+    assert camera_table(health).rows == (("measured rate", "20.00 frames/s"), ("stalled", "2"))
+    page = run_page(run(5), None, Side.LEFT, ())
+    assert "This machine's camera" not in page
+    assert "not used" not in page
+
+
+def test_a_runs_page_shows_the_last_pair_and_leads_to_the_saved_ones() -> None:
+    """The page shows which pair it is, its density and its depth under the pointer, and has a link to each saved cloud; many are cut short in words."""
+    saved = [f"pair-{number:06d}/cloud.ply" for number in range(0, 500, 10)]
+    page = Page(run_page(run(31), processed(), Side.RIGHT, (), saved))
+    assert not page.open
+    share = 100 * np.isfinite(processed().cloud[..., 2]).mean()  # type: ignore[index]
+    for words in ("number 30 of this run", f"{share:.0f} % of the left pixels have a depth", "15 % farther than 4 m"):
+        assert words in page.words
+    assert "left: the host's camera, rectified" in page.words
+    links = [one["href"] for one in page.every("a")]
+    assert links[:2] == ["pair-000000/cloud.ply", "pair-000010/cloud.ply"]
+    assert "and 10 more" in page.words
+    assert {"report.json", "delays.jsonl"} <= set(links)
+    assert len(page.every("canvas")) == 1

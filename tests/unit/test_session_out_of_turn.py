@@ -105,7 +105,7 @@ def test_a_caller_may_put_right_what_its_connection_is_for() -> None:
     caller = NEAR[Lane.CONTROL]
     host.receive(caller, Knock(Lane.FRAMES, "life"), NOW_NS)
     said = host.receive(caller, Knock(Lane.CONTROL, "life"), NOW_NS)
-    assert Outgoing(caller, HostHello("host", Lane.CONTROL)) in said
+    assert Outgoing(caller, HostHello("host", Lane.CONTROL, reads_long=True)) in said
     assert LinkUp(0, HELLO) in host.receive(caller, HELLO, NOW_NS)
 
 
@@ -129,10 +129,10 @@ def test_a_late_answer_does_not_move_the_frames_back() -> None:
     host.tick(NOW_NS)
     for lanes in (NEAR, FAR):
         host.receive(lanes[Lane.CONTROL], HELLO, NOW_NS)
-    assert Outgoing(FAR[Lane.FRAMES], HostHello("host", Lane.FRAMES)) in host.carry(1, NOW_NS)
+    assert Outgoing(FAR[Lane.FRAMES], HostHello("host", Lane.FRAMES, reads_long=True)) in host.carry(1, NOW_NS)
     host.receive(FAR[Lane.FRAMES], HELLO, NOW_NS)
     assert host.carrier == 1
     late = host.receive(NEAR[Lane.FRAMES], HELLO, NOW_NS)
-    assert late == [Outgoing(FAR[Lane.FRAMES], HostHello("host", Lane.FRAMES))]
+    assert late == [Outgoing(FAR[Lane.FRAMES], HostHello("host", Lane.FRAMES, reads_long=True))]
     host.receive(FAR[Lane.FRAMES], HELLO, NOW_NS)
     assert host.carrier == 1

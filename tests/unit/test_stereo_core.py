@@ -1,11 +1,16 @@
 """The stereo core's stages one by one, and what the core and the matchers refuse before they start."""
 
+from dataclasses import astuple, replace
+
+import cv2
 import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError
-from phone_host.model import Image, RectifiedPair, StereoGeometry
+from phone_host.model import Crop, CutCounts, Epipolar, Image, RectifiedPair, Rig, Search, StereoGeometry
+from phone_host.scene.scene import matched_rig, plane_scene, render, rig_poses
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.match_input import check_pair, grey
 from phone_host.stereo.matcher_names import MatcherName
@@ -60,6 +65,118 @@ def test_without_a_rig_sizes_agree_and_there_are_no_metres() -> None:
     processed = core.compute(*shifted(2), lambda: 0)
     assert processed.disparity is not None
     assert processed.cloud is None
+
+
+def total(cut: CutCounts | None) -> int:
+    """All pixels that were counted."""
+    assert cut is not None
+    return sum(astuple(cut))
+
+
+def test_a_matchers_values_stay_to_the_bit() -> None:
+    """At full size the core's disparity is the matcher's, except where it cannot be told from infinity; every pixel is counted once."""
+    left, right = shifted(3)
+    right[:, 40:] = left[:, 40:]  # there d = 0: infinity
+    alone = create_matcher(MatchSettings(disparities=16)).match(RectifiedPair(left, right))
+    processed = StereoCore(MatchSettings(disparities=16), geometry=GEOMETRY).compute(left, right, lambda: 0)
+    assert (alone[:, 50:] <= 0.25).sum() > 100
+    np.testing.assert_array_equal(processed.disparity, np.where(alone <= 0.25, np.nan, alone))
+    assert processed.cut is not None
+    assert processed.cut.at_zero == (alone <= 0.25).sum()
+    assert processed.cut.unmatched == np.isnan(alone).sum()
+    assert total(processed.cut) == 64 * 32
+    assert processed.search == Search(scale=1.0, disparities=16)
+    assert processed.geometry == GEOMETRY
+    assert processed.limits is not None
+    assert processed.limits.far_m == pytest.approx(40)
+
+
+def test_limits_cut_the_cloud_but_not_the_disparity() -> None:
+    """A plane at 5 m keeps its disparity with --far 4 m and with --near 6 m, but has no point; the counts say why."""
+    for wanted, name in ((DepthWanted(far_m=4), "too_far"), (DepthWanted(near_m=6), "too_near")):
+        processed = StereoCore(MatchSettings(disparities=16), geometry=GEOMETRY, wanted=wanted).compute(
+            *shifted(10), lambda: 0
+        )
+        assert processed.disparity is not None
+        assert processed.cloud is not None
+        at_5_m = np.abs(processed.disparity - 10) < 1
+        assert at_5_m.sum() > 500
+        assert np.isnan(processed.cloud[at_5_m]).all()
+        assert getattr(processed.cut, name) >= at_5_m.sum()
+        assert total(processed.cut) == 64 * 32
+
+
+def test_only_the_crop_has_depth_and_it_is_right() -> None:
+    """Outside the crop there is neither disparity nor point; inside, the plane is where it is without a crop."""
+    left = noise(400, 300)
+    right = np.roll(left, -10, axis=1)
+    crop = Crop(x_px=200, y_px=120, width_px=90, height_px=60)
+    processed = StereoCore(MatchSettings(disparities=16), geometry=GEOMETRY, wanted=DepthWanted(crop=crop)).compute(
+        left, right, lambda: 0
+    )
+    assert processed.disparity is not None
+    assert processed.cloud is not None
+    inside = np.s_[120:180, 200:290]
+    assert np.nanmedian(processed.disparity[inside]) == pytest.approx(10, abs=0.1)
+    assert np.isfinite(processed.disparity[inside]).mean() > 0.95
+    assert np.isfinite(processed.disparity).sum() == np.isfinite(processed.disparity[inside]).sum()
+    assert np.isfinite(processed.cloud[..., 2]).sum() == processed.cut.kept  # type: ignore[union-attr]
+    assert processed.cut.outside == 400 * 300 - 90 * 60  # type: ignore[union-attr]
+    assert total(processed.cut) == 400 * 300
+    assert processed.pair.left is left
+
+
+def test_half_the_working_size_gives_the_same_metres() -> None:
+    """At scale 0.5 the map has the input's size and its pixels: 10 px stay 10 px, 5 m stay 5 m, and the error doubles."""
+    left = np.asarray(cv2.resize(noise(200, 100), (400, 200), interpolation=cv2.INTER_CUBIC), np.uint8)
+    right = np.roll(left, -10, axis=1)
+    core = StereoCore(MatchSettings(disparities=16), geometry=GEOMETRY, wanted=DepthWanted(scale=0.5))
+    processed = core.compute(left, right, lambda: 0)
+    assert processed.disparity is not None
+    assert processed.cloud is not None
+    assert processed.disparity.shape == (200, 400)
+    inner = np.s_[20:-20, 40:-20]
+    assert np.nanmedian(processed.disparity[inner]) == pytest.approx(10, abs=0.1)
+    assert np.nanmedian(processed.cloud[inner][..., 2]) == pytest.approx(5, rel=0.01)
+    assert np.nanmax(processed.disparity) < 16
+    assert processed.limits is not None
+    assert processed.limits.disparity_error_px == 0.5
+    assert processed.limits.far_m == pytest.approx(20)
+
+
+def test_a_rig_follows_the_images_size() -> None:
+    """Images of half the calibration's size give half the focal length and search half as far, and the next pair of the first size is as before."""
+    rectifier = Rectifier(unlike_rig())
+    core = StereoCore(MatchSettings(), rectifier, wanted=DepthWanted(search_from_m=0.5))
+    sizes = ((480, 640), (720, 1280)), ((240, 320), (360, 640)), ((480, 640), (720, 1280))
+    found = [core.compute(np.zeros(a, np.uint8), np.zeros(b, np.uint8), lambda: 0) for a, b in sizes]
+    focal_px = [each.geometry.focal_px for each in found if each.geometry]
+    assert focal_px[1] == pytest.approx(focal_px[0] / 2, rel=1e-3)
+    assert focal_px[2] == focal_px[0]
+    # f b / near = 526 x 0.10026 / 0.5 = 105.5 -> 112, and half of it -> 64
+    assert [each.search.disparities for each in found if each.search] == [112, 64, 112]
+    assert found[0].pair.left.shape == found[2].pair.left.shape
+
+
+@pytest.mark.parametrize("y_m", [0.1, -0.1])
+def test_stacked_cameras_give_an_upright_cloud(y_m: float) -> None:
+    """A textured wall 1.5 m before two cameras one above the other, in either order, is found at 1.5 m, upright."""
+    model = replace(matched_rig().left)
+    rig = Rig(left=model, right=model, R_right_left=np.eye(3), t_right_left_m=np.array([0.0, -y_m, 0.0]))
+    scene = plane_scene(1.5)
+    left, right = (render(scene, model, pose) for pose in rig_poses(rig))
+    processed = StereoCore(MatchSettings(), Rectifier(rig), wanted=DepthWanted(search_from_m=0.8)).compute(
+        left, right, lambda: 0
+    )
+    cloud = processed.cloud
+    assert cloud is not None
+    assert processed.pair.epipolar is (Epipolar.UP if y_m > 0 else Epipolar.DOWN)
+    assert cloud.shape[:2] == processed.pair.left.shape[:2]
+    assert np.abs(processed.pair.left.astype(int) - left).max() == 0  # already upright and rectified
+    assert np.isfinite(cloud[..., 2]).mean() > 0.8
+    assert np.nanmedian(np.abs(cloud[..., 2] - 1.5)) < 0.005
+    # y grows downwards: f = 525 px, so 200 rows below the centre are 1.5 x 200 / 525 m.
+    assert np.nanmedian(cloud[439, :, 1]) == pytest.approx(1.5 * 199.5 / 525, rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import pytest
 
 from common.errors import SettingsError
 from phone_host.calibration.target import Board, agree, find_corners, order_by_colour, parse_board
+from phone_host.verbs.units import square_mm
 from tests.support.boards import BOARD, poses, render_pair
 from tests.support.rigs import project_points, unlike_rig
 
@@ -13,7 +14,7 @@ from tests.support.rigs import project_points, unlike_rig
 @pytest.mark.parametrize("square", ["25mm", "2.5cm", "0.025m", "25", " 25 mm ", "25MM"])
 def test_lengths_are_read_with_their_unit(square: str) -> None:
     """All ways to write 25 mm give 0.025 m; a bare number means millimetres."""
-    board = parse_board("9x6", square)
+    board = parse_board("9x6", square_mm(square))
     assert (board.columns, board.rows) == (9, 6)
     assert board.square_m == pytest.approx(0.025)
 
@@ -26,7 +27,7 @@ def test_lengths_are_read_with_their_unit(square: str) -> None:
 def test_sizes_that_make_no_sense_name_their_option(corners: str, square: str, option: str) -> None:
     """A wrong size is a usage error that names the option."""
     with pytest.raises(SettingsError, match=option):
-        parse_board(corners, square)
+        parse_board(corners, square_mm(square))
 
 
 def test_points_run_along_rows_in_metres() -> None:

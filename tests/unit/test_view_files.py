@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.view_files import pair_files
+from phone_host.stereo.view_files import pair_files
 
 
 def _touch(folder: Path, *names: str) -> Path:
@@ -71,3 +71,66 @@ def test_hidden_files_alone_are_no_images(name: str, tmp_path: Path) -> None:
     good = _touch(tmp_path / "good", "a1.png")
     with pytest.raises(DataError, match=r"LEFT .* names no image"):
         pair_files(str(tmp_path / name), str(good))
+
+
+def test_two_files_are_a_pair_whatever_their_numbers(tmp_path: Path) -> None:
+    """Who names two files means this pair."""
+    folder = _touch(tmp_path, "im0.png", "im1.png")
+    files = pair_files(str(folder / "im0.png"), str(folder / "im1.png"))
+    assert [(a.name, b.name) for _, a, b in files.pairs] == [("im0.png", "im1.png")]
+    assert files.left_alone == files.right_alone == ()
+
+
+def test_a_file_with_brackets_in_its_name_is_a_file_and_no_pattern(tmp_path: Path) -> None:
+    """A name that exists is taken as it is."""
+    folder = _touch(tmp_path, "left[1].png", "right[1].png", "left1.png")
+    files = pair_files(str(folder / "left[1].png"), str(folder / "right[1].png"))
+    assert [a.name for _, a, _ in files.pairs] == ["left[1].png"]
+
+
+def test_a_folder_beside_a_file_is_refused(tmp_path: Path) -> None:
+    """The line says which of the two is which, whatever their order."""
+    folder, file = _touch(tmp_path / "l", "1.png"), _touch(tmp_path, "right.png") / "right.png"
+    with pytest.raises(SettingsError, match=r"LEFT .* is a folder, RIGHT .*right\.png is a file"):
+        pair_files(str(folder), str(file))
+    with pytest.raises(SettingsError, match=r"RIGHT .* is a folder, LEFT .*right\.png is a file"):
+        pair_files(str(file), str(folder))
+
+
+def test_the_same_file_twice_is_refused_with_the_remedy_for_files(tmp_path: Path) -> None:
+    """For two files, no advice about folders and globs is given."""
+    file = _touch(tmp_path, "left.png") / "left.png"
+    with pytest.raises(SettingsError, match="image of the other camera as RIGHT"):
+        pair_files(str(file), str(file))
+
+
+def test_files_that_are_no_images_are_left_out_and_named_when_nothing_else_is_there(tmp_path: Path) -> None:
+    """Thumbs.db and texts lie in many folders of photographs; a pattern may catch them as well."""
+    left = _touch(tmp_path / "l", "Thumbs.db", "1.png", "notes.txt")
+    right = _touch(tmp_path / "r", "1.png", "Thumbs.db")
+    assert len(pair_files(str(left), str(right)).pairs) == 1
+    files = pair_files(str(left / "*"), str(right / "*"))
+    assert (len(files.pairs), files.left_alone, files.right_alone) == (1, (), ())
+    other = _touch(tmp_path / "o", "Thumbs.db", "notes.txt")
+    with pytest.raises(DataError, match=r"names no image, only 2 other files \(\.db, \.txt\)"):
+        pair_files(str(left), str(other))
+
+
+def test_a_name_that_leads_nowhere_does_not_exist(tmp_path: Path) -> None:
+    """A missing file is not called a pattern without images."""
+    right = _touch(tmp_path, "right.png") / "right.png"
+    with pytest.raises(DataError, match=r"left\.png' does not exist"):
+        pair_files(str(tmp_path / "left.png"), str(right))
+
+
+def test_several_files_of_a_side_are_paired_by_number(tmp_path: Path) -> None:
+    """What a shell made of unquoted globs is paired like the globs: 2 with 2, 10 with 10; 3 stays alone."""
+    left, right = (
+        [tmp_path / f"{side}{number}.png" for number in numbers]
+        for side, numbers in (("l", (10, 2, 3)), ("r", (2, 10)))
+    )
+    for path in (*left, *right):
+        path.touch()
+    files = pair_files([str(path) for path in left], [str(path) for path in right])
+    assert [name for name, _, _ in files.pairs] == ["2", "10"]
+    assert files.left_alone == (tmp_path / "l3.png",)

@@ -5,8 +5,13 @@ from pathlib import Path
 
 import pytest
 
+from common import now
+from common.camera.identity import Lock
+from common.link.factory import open_link, parse_link
+from phone_host.stream.receiver import Receiver
 from tests.support.numbered import saved_numbers
 from tests.support.programs import ledgers, until
+from tests.support.unkept import Unkept
 from tests.vm import uvc
 from tests.vm.conftest import CAMERA
 from tests.vm.guest import Guest
@@ -129,6 +134,33 @@ def test_without_lock_the_automatisms_stay_on(
         stream.finish(skew)
     assert webcam.settings[uvc.FOCUS_AUTO] == webcam.settings[uvc.WHITE_BALANCE_AUTO] == 1
     assert webcam.settings[uvc.EXPOSURE_MODE] == 8
+
+
+def test_a_host_sets_locks_on_the_boards_camera(guest: Guest, webcam: Webcam) -> None:
+    """The hello says which webcam it is and what can be held; focus is set within its step, its automatic mode first; a zoom it has not."""
+    as_new(webcam, guest)
+    guest.configure(CAMERA)
+    receiver = Receiver([open_link(parse_link(guest.link, listens_by_default=False))], now.random_id(), Unkept())
+    receiver.start()
+    try:
+        until(lambda: receiver.hello is not None and bool(receiver.hello.camera.controls), "the board says hello")
+        hello = receiver.hello
+        assert hello is not None
+        assert (hello.camera.identity.driver, hello.camera.identity.serial) == ("uvcvideo", "TEST-A")
+        assert {lock for lock, _ in hello.camera.controls} == {Lock.EXPOSURE, Lock.WHITE_BALANCE, Lock.FOCUS}
+        asked = ((Lock.FOCUS, 33), (Lock.ZOOM, 100))
+        receiver.hold(asked)
+        until(lambda: receiver.locks is not None and receiver.locks.asked == asked, "the board answers")
+        state = receiver.locks
+        assert state is not None
+        held = dict(state.held)
+        assert held[Lock.FOCUS] == webcam.settings[uvc.FOCUS] == 35
+        assert Lock.ZOOM not in held
+        requests = [where for where, _ in webcam.set_requests]
+        assert requests.index(uvc.FOCUS_AUTO) < requests.index(uvc.FOCUS)
+    finally:
+        receiver.stop()
+    assert "control_refused" not in guest.journal()
 
 
 @pytest.mark.parametrize("by_itself", [False, True], ids=["by-another-program", "by-the-camera"])

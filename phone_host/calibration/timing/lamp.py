@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from common.words import counted
 from phone_host.calibration.timing.shots import SIGMAS, Measured, Method, Times, period_s, require_shots, rolling_s
 from phone_host.model import Image, TimeOffset
 
@@ -90,7 +91,10 @@ def measure_lamp(board: Brightness, host: Brightness) -> Measured:
     edges = _edges(left), _edges(right)
     differences = _match(*edges, coarse_s, max(periods))
     if len(differences) < _LEAST_EDGES:
-        raise DataError(f"only {len(differences)} changes of the lamp were seen by both cameras", _REMEDY)
+        raise DataError(
+            f"only {counted(len(differences), 'change')} of the lamp {'was' if len(differences) == 1 else 'were'} seen by both cameras",
+            _REMEDY,
+        )
     pauses_s = np.diff([moment for moment, _ in edges[0]])
     if np.ptp(np.percentile(pauses_s, _MOST_PAUSES)) < _IRREGULAR * max(periods):
         raise DataError("the lamp blinks regularly and may keep step with the cameras", _REMEDY)

@@ -21,6 +21,7 @@ from phone_host.calibration.timing.shots import SIGMAS, Measured, Method, Shot, 
 from phone_host.model import UNMEASURED_NS, Image, Side, TimeOffset
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
+from phone_host.stereo.stacked import lying_pair
 
 _FEATURES: Final = 500
 _MOVING, _STILL = 60, 10
@@ -144,7 +145,9 @@ def _rows(
     left_s, right_s, _ = to_seconds([shot.exposed_ns for shot in left], [shot.exposed_ns for shot in right])
     step = max(1, (len(left) - 2) // _MOST_INSTANTS)
     middles = range(1, len(left) - 1, step)
-    reach_px = disparities_for_near(rectifier.geometry, _NEAR_M, rectifier.rectification.width_px)
+    made = rectifier.rectification
+    along_px = made.height_px if made.epipolar.is_vertical else made.width_px
+    reach_px = disparities_for_near(rectifier.geometry, _NEAR_M, along_px)
     parts: list[NDArray[np.float64]] = []
     for done, middle in enumerate(middles):
         advance(done / len(middles))
@@ -155,7 +158,8 @@ def _rows(
             continue  # frames were lost
         try:
             other = look(right[nearest])
-            pairs = [rectifier.rectify(look(left[at]), other) for at in (middle - 1, middle, middle + 1)]
+            upright = (rectifier.rectify(look(left[at]), other) for at in (middle - 1, middle, middle + 1))
+            pairs = [lying_pair(pair) for pair in upright]
         except SpoiledImageError:
             continue  # as good as lost
         before, now, after = (_grey(pair.left) for pair in pairs)

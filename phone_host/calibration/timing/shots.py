@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from common.words import counted
 from phone_host.model import TimeOffset
 from phone_host.stereo.raw_images import EncodedImage
 
@@ -77,7 +78,7 @@ def require_shots(board: int, host: int) -> None:
     for whose, count in (("board", board), ("host", host)):
         if count < LEAST_SHOTS:
             raise DataError(
-                f"too short: {count} frames of the {whose}'s camera, at least {LEAST_SHOTS} are needed",
+                f"too short: {counted(count, 'frame')} of the {whose}'s camera, at least {LEAST_SHOTS} are needed",
                 "film longer with --seconds, or check that the camera delivers frames",
             )
 

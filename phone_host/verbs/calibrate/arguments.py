@@ -4,21 +4,24 @@ import argparse
 from pathlib import Path
 
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
+from phone_host.verbs.orientation_arguments import add_orientation_arguments
 
 SUMMARY = "calibrate two cameras from pictures of a chessboard"
 
 EXAMPLES = """  phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml
   phone-host calibrate 'views/left*.png' 'views/right*.png' --board 9x6 --square 25mm --out rig.yaml --json
+  phone-host calibrate left/ right/ --board 9x6 --square 25mm --rotate-right 180 --out rig.yaml    # right camera on its head
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
-    parser.add_argument("left", metavar="LEFT", help="pictures of the left camera: a folder or a quoted glob")
     parser.add_argument(
-        "right",
-        metavar="RIGHT",
-        help="pictures of the right camera; each is paired with the left picture that has the same number in its name",
+        "images",
+        nargs="+",
+        metavar="LEFT RIGHT",
+        help="pictures of the left and of the right camera: two folders or two globs; each left picture is paired with the"
+        " right one that has the same number in its name. Pictures are turned upright by their EXIF orientation",
     )
     parser.add_argument("--board", required=True, metavar="9x6", help="inner corners of the chessboard: columns x rows")
     parser.add_argument(
@@ -33,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="left",
         help="which of the two is the board's camera (default left)",
     )
+    add_orientation_arguments(parser)
     parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
     parser.add_argument(
         "--out",

@@ -15,17 +15,21 @@ from common.program.commandline import INTERRUPTED
 from common.program.invocation import command_line, program_name
 from common.program.settings import with_origins
 from common.program.signals import StopSignals
+from common.program.terminal import columns, fitted
+from common.words import counted
 from phone_host.children.board_process import socket_folder
 from phone_host.demo.demo_page import demo_page
 from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, truth_json
 from phone_host.model import Rig
 from phone_host.output.atomic import write_text
 from phone_host.output.listed import ListedFolder
+from phone_host.output.pair_files import PAIR_NAMES
 from phone_host.output.rig_yaml import write_rig
+from phone_host.report.page_links import NextCommand
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
-from phone_host.run.file_sink import NAMES, PAIR_FILES
-from phone_host.run.progress_bar import bar_on, busy_bar
+from phone_host.run.file_sink import NAMES
+from phone_host.run.progress_bar import busy_bar, progress_bar
 from phone_host.run.terminal_view import LiveTable
 from phone_host.scene.film import Film, render_film
 from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
@@ -63,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
             report = build(snapshot) | {"truth": truth_json(errors)}
             complete = demo.host.write_report(report)
             demo.write_pictures(out)
-            write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers))
+            write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers, _by_hand(out, film)))
     except _StoppedError:
         return INTERRUPTED if signals.interrupted else 0
     except OSError as error:
@@ -71,8 +75,8 @@ def run(options: argparse.Namespace) -> int:
             f"{error.filename or out} cannot be written ({error.strerror})",
             "make room on the disk, or give another folder with --out",
         ) from None
-    print(json.dumps(report) if options.json else summary(snapshot))
-    print(_closing(out, film, errors), file=sys.stderr)
+    print(json.dumps(report) if options.json else fitted(summary(snapshot, columns())))
+    print(fitted(_closing(out, film, errors), sys.stderr), file=sys.stderr)
     if signals.stop:
         return INTERRUPTED if signals.interrupted else 0
     return 0 if errors.pairs and not errors.wrong_pairs and complete else _CHECK_FAILED
@@ -86,7 +90,7 @@ def _clear(out: Path) -> None:
         OSError: the folder cannot be used.
     """
     names = rf"{NAMES}|rig\.yaml|cloud\.ply|disparity\.png"
-    folder = ListedFolder(out, names, kept="film", inner=PAIR_FILES)
+    folder = ListedFolder(out, names, kept="film", inner=PAIR_NAMES)
     folder.add("film", "rig.yaml", "cloud.ply", "disparity.png", "index.html")
     folder.close()
 
@@ -102,7 +106,7 @@ def _render(scene: Scene, rig: Rig, folder: Path, console: Console, signals: Sto
         _StoppedError: a stop signal came.
         OSError: the folder cannot be written to.
     """
-    with bar_on(console) as progress:
+    with progress_bar(console) as progress:
         task = progress.add_task("rendering a moving scene for two cameras", total=2 * FPS * DEMO_PERIOD_S)
 
         def advance() -> None:
@@ -114,14 +118,26 @@ def _render(scene: Scene, rig: Rig, folder: Path, console: Console, signals: Sto
         return render_film(scene, rig, looks, folder, fps=FPS, seconds=DEMO_PERIOD_S, advance=advance)
 
 
-def _closing(out: Path, film: Film, errors: DepthErrors) -> str:
+def _by_hand(out: Path, film: Film) -> tuple[NextCommand, ...]:
+    """Return the commands that do the same as the demo, and what comes after it."""
     board = command_line("board-agent", "run", "--camera", film.replay_uri(film.left))
     own, rig = film.replay_uri(film.right), out / "rig.yaml"
     host = command_line("phone-host", "run", "--camera", own, "--calibration", rig, "--out", "scan")
+    return (
+        NextCommand("The same by hand: the board, in one terminal", board),
+        NextCommand("and the host, in another one", host),
+        NextCommand(
+            "Your own two cameras: calibrate them from photographs of a chessboard", "phone-host calibrate --help"
+        ),
+    )
+
+
+def _closing(out: Path, film: Film, errors: DepthErrors) -> str:
+    board, host = (one.command for one in _by_hand(out, film)[:2])
     if not errors.pairs:
         return f"no pair was processed in that time, so nothing could be checked: give more --seconds; see {out}/index.html"
     wrong = (
-        f"\nWRONG: {errors.wrong_pairs} of {errors.pairs} checked pairs show two different moments"
+        f"\nWRONG: {errors.wrong_pairs} of {counted(errors.pairs, 'checked pair')} show two different moments"
         if errors.wrong_pairs
         else ""
     )

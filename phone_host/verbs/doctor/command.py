@@ -6,6 +6,7 @@ import math
 
 from common.doctor.finding import exit_code, settings_finding, table, values
 from common.errors import SettingsError
+from common.program.terminal import fitted
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.doctor.host_doctor import Question, examine
 from phone_host.settings import check, key_folder, resolve_settings
@@ -31,5 +32,5 @@ def run(options: argparse.Namespace) -> int:
         keys=key_folder(settings.keys),
     )
     findings = [settings_finding(str(options.config or ""), wrong), *examine(question)]
-    print(json.dumps(values(findings)) if options.json else table(findings))
+    print(json.dumps(values(findings)) if options.json else fitted(table(findings)))
     return exit_code(findings, wrong)

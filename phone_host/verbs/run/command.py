@@ -15,12 +15,14 @@ from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.settings import Resolved, log_level, with_origins
 from common.program.signals import StopSignals
+from common.program.terminal import columns, fitted
 from common.stamp import HOST_CLOCK
 from phone_host.boards.discovery import find_board_and_say, remember
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
+from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.model import Side, TimeOffset
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
@@ -57,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
         spare_inputs(options.out, NAMES, {what: Path(path) for what, path in inputs.items() if path})
     fifo = FifoSettings.parse(settings.fifo)
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
-    core, board_side = _core(options, settings, (camera.description.width_px, camera.description.height_px))
+    core, board_side = _core(options, settings, camera.description.upright_px)
     keys = key_folder(settings.keys)
     named = settings.link or (find_board_and_say(keys.path, options.wait),)
     uris = [parse_link(uri, listens_by_default=False) for uri in named]
@@ -77,13 +79,20 @@ def run(options: argparse.Namespace) -> int:
         remember(keys.path, named[0])
     snapshot = host.snapshot(ended.value)
     report = build(snapshot)
-    page = run_page(snapshot, host.last, board_side, host.sample()) if options.out else ""
+    page = _page(host, snapshot, board_side, options.out) if options.out else ""
     complete = host.write_report(report, page)
-    print(json.dumps(report) if options.json else summary(snapshot))
+    print(json.dumps(report) if options.json else fitted(summary(snapshot, columns())))
     if signals.interrupted:
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     return _CHECK_FAILED if too_few or not complete else 0
+
+
+def _page(host: Host, snapshot: RunSnapshot, board_side: Side, out: Path) -> str:
+    """Make the page of a run, with links to the clouds it saved (maps where it has no geometry)."""
+    saved = sorted(path.relative_to(out).as_posix() for path in out.glob("pair-*/cloud.ply"))
+    saved = saved or sorted(path.relative_to(out).as_posix() for path in out.glob("pair-*/disparity.pfm"))
+    return run_page(snapshot, host.last, board_side, host.sample(), saved)
 
 
 def _core(

@@ -4,11 +4,14 @@ import argparse
 from pathlib import Path
 
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
+from phone_host.verbs.orientation_arguments import add_orientation_arguments
 from phone_host.verbs.stereo_arguments import add_stereo_arguments
 
-SUMMARY = "compute the disparity and the point cloud of one pair of images"
+SUMMARY = "compute disparity and point clouds of pairs of images"
 
 EXAMPLES = """  phone-host stereo left.png right.png --calibration rig.yaml --out scan
+  phone-host stereo left/ right/ --calibration rig.yaml --out scans    # folders: a folder scans/pair-NNNNNN per pair
+  phone-host stereo 'views/left*.jpg' 'views/right*.jpg' --calibration rig.yaml --out scans
   phone-host stereo im0.png im1.png --rectified --disparities 64 --out scan    # no focal length: no cloud.ply
   phone-host stereo im0.png im1.png --rectified --disparities 80 --focal 994.978 --baseline 193.001 \\
       --doffs 31.086 --center 311.193,254.877 --out scan
@@ -17,14 +20,21 @@ EXAMPLES = """  phone-host stereo left.png right.png --calibration rig.yaml --ou
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
-    parser.add_argument("left", type=Path, metavar="LEFT", help="image of the left camera (8 or 16 bit)")
-    parser.add_argument("right", type=Path, metavar="RIGHT", help="image of the right camera")
+    parser.add_argument(
+        "images",
+        nargs="+",
+        metavar="LEFT RIGHT",
+        help="images of the left and of the right camera: two files, two folders or two globs; images of folders and globs"
+        " are paired by the number in the name, else in name order",
+    )
     add_stereo_arguments(parser)
+    add_orientation_arguments(parser)
     parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
     parser.add_argument(
         "--out",
         type=Path,
         required=True,
         metavar="DIR",
-        help="folder for the results; it is created if it does not exist",
+        help="folder for the results, not that of the images; it is created if it does not exist. Several pairs get a folder"
+        " DIR/pair-NNNNNN each, with the number in their names",
     )

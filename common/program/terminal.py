@@ -1,0 +1,65 @@
+"""Fits text to a terminal: a phone's has about 50 columns. Text that goes to a file or a pipe stays as it is."""
+
+import os
+import re
+import sys
+import textwrap
+from typing import Final, TextIO
+
+_COMMAND: Final = re.compile(
+    r"\s*(\S+ \S+ {2,})?((?:'[^']*/|\S*/)?(phone-host|board-agent|delay-bench)\b|(python3?|pipx?|sudo|make|\.) )"
+)
+"""A line that is a command, maybe behind a label of two words. It stays whole, because it is there to be pasted."""
+
+_COLUMN: Final = re.compile(r"\S( {2,})(?=\S)")
+_FARTHEST: Final = 0.45
+"""Continued lines begin below the text's column if that lies in this part of the terminal."""
+
+
+def columns(stream: TextIO | None = None) -> int:
+    """Return the width of the terminal that a stream writes to, in characters; 0 if it is no terminal.
+
+    Args:
+        stream: standard output if left out.
+    """
+    stream = stream or sys.stdout
+    try:
+        return os.get_terminal_size(stream.fileno()).columns
+    except (OSError, ValueError):  # no terminal, or no file at all
+        return 0
+
+
+def fitted(text: str, stream: TextIO | None = None) -> str:
+    """Fold text to the terminal that a stream writes to; see `folded`."""
+    return folded(text, columns(stream))
+
+
+def folded(text: str, width: int) -> str:
+    """Fold lines that are longer than a terminal's at spaces. Words, numbers and paths are never cut, commands stay whole.
+
+    Args:
+        text: lines.
+        width: of the terminal; 0: no limit.
+
+    Returns:
+        The lines; those that continue one are indented.
+    """
+    return "\n".join(_fold(line, width) for line in text.split("\n")) if width else text
+
+
+def _fold(line: str, width: int) -> str:
+    if len(line) <= width or _COMMAND.match(line):
+        return line
+    gaps = [gap.end() for gap in _COLUMN.finditer(line) if gap.end() <= _FARTHEST * width]
+    hang = gaps[-1] if gaps else len(line) - len(line.lstrip()) + 2
+    return "\n".join(
+        textwrap.wrap(
+            line,
+            width,
+            subsequent_indent=" " * hang,
+            break_long_words=False,
+            break_on_hyphens=False,
+            replace_whitespace=False,
+            expand_tabs=False,
+        )
+    )

@@ -1,0 +1,24 @@
+"""Words that all texts share: a number and its noun agree. Pure."""
+
+
+def counted(count: int, noun: str, plural: str = "") -> str:
+    """Write a number with its noun: `1 pair`, `2 pairs`, `0 pairs`.
+
+    Args:
+        count: how many.
+        noun: the noun for one; may be several words, of which the last one is counted.
+        plural: the noun for several; empty: `noun` with an s.
+
+    Returns:
+        The number and the noun that fits it.
+    """
+    return f"{count} {noun if count == 1 else plural or noun + 's'}"
+
+
+def times(count: int) -> str:
+    """Write how often something happened: `once`, `twice`, `3 times`.
+
+    Args:
+        count: how often.
+    """
+    return {1: "once", 2: "twice"}.get(count, f"{count} times")

@@ -1,0 +1,33 @@
+"""The axes of points in files. Inside the programs they are always the left camera's: x right, y down, z forward. Pure.
+
+Viewers such as MeshLab and Blender take y for up and look along -z: half a turn about x. Both frames are right-handed, so nothing is mirrored.
+"""
+
+from enum import Enum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Axes(Enum):
+    """Which way the axes of a file's points go."""
+
+    CAMERA = "camera"
+    Y_UP = "y-up"
+
+    @property
+    def text(self) -> str:
+        """The axes in words, as files and reports state them."""
+        return _TEXTS[self]
+
+    @property
+    def signs(self) -> NDArray[np.float32]:
+        """(3,) float32: factors of x, y, z that take the left camera's axes to these."""
+        return np.array([1, 1, 1] if self is Axes.CAMERA else [1, -1, -1], dtype=np.float32)
+
+
+_TEXTS: Final = {
+    Axes.CAMERA: "x right, y down, z forward of the left camera",
+    Axes.Y_UP: "x right, y up, z backward of the left camera",
+}

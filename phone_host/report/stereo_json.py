@@ -1,0 +1,73 @@
+"""report.json of `stereo`. Pure.
+
+One pair's object is the same whether it was computed alone or as one of several.
+"""
+
+from dataclasses import asdict
+from typing import Any
+
+from common.imagesize.head import size_text
+from common.versions import REPORT_FORMAT
+from phone_host.report.stereo_report import ALWAYS, FailedPair, PairReport, SetReport
+from phone_host.report.stereo_verdict import pair_verdict, set_verdict
+
+
+def pair_json(report: PairReport) -> dict[str, Any]:
+    """Make the object of report.json for one pair."""
+    search, written = report.search, report.written
+    verdict, sentence = pair_verdict(report)
+    return {
+        "format_version": REPORT_FORMAT,
+        "verdict": verdict.value,
+        "headline": sentence,
+        "left": {"file": report.left, "size": size_text(report.left_px)},
+        "right": {"file": report.right, "size": size_text(report.right_px)},
+        "size": size_text(report.rectified_px),
+        "matcher": report.matcher,
+        "disparities": search.disparities or None if search else None,
+        "scale": round(search.scale, 4) if search else None,
+        "geometry": None if report.geometry is None else asdict(report.geometry),
+        "limits": None if report.limits is None else asdict(report.limits),
+        "cut": None if report.cut is None else asdict(report.cut),
+        "density": round(report.density, 5),
+        "points": written.points,
+        "unit": "metre" if written.points is not None else None,
+        "axes": report.axes.text if written.points is not None else None,
+        "not_in_depth_png": written.not_in_depth_png,
+        "warnings": [remark.text for remark in report.remarks],
+        "times_ms": {stage: round(ms, 3) for stage, ms in report.stages_ms},
+        "files": [*written.files, *ALWAYS],
+    }
+
+
+def set_json(report: SetReport) -> dict[str, Any]:
+    """Make the object of report.json for several pairs."""
+    verdict, sentence = set_verdict(report)
+    return {
+        "format_version": REPORT_FORMAT,
+        "verdict": verdict.value,
+        "headline": sentence,
+        "paired_by": "number" if report.by_number else "name order",
+        "left_alone": list(report.left_alone),
+        "right_alone": list(report.right_alone),
+        "computed": len(report.computed),
+        "failed": len(report.failed),
+        "warnings": [remark.text for remark in report.remarks],
+        "pairs": [_entry(pair) for pair in report.pairs],
+        "files": [*(pair.name for pair in report.computed), *ALWAYS],
+    }
+
+
+def _entry(pair: PairReport | FailedPair) -> dict[str, Any]:
+    """Make the object of one of several pairs; its folder's report.json has the rest."""
+    both = {"name": pair.name, "left": pair.left, "right": pair.right}
+    if isinstance(pair, FailedPair):
+        return {**both, "problem": pair.problem, "remedy": pair.remedy}
+    return {
+        **both,
+        "verdict": pair_verdict(pair)[0].value,
+        "density": round(pair.density, 5),
+        "points": pair.written.points,
+        "warnings": [remark.text for remark in pair.remarks],
+        "files": [*pair.written.files, *ALWAYS],
+    }

@@ -1,0 +1,171 @@
+"""The report of `stereo`: what became of each pair of image files. Pure.
+
+`stereo_json`, `stereo_lines` and `stereo_page` tell it to programs, on a terminal and on a page.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from common.words import counted
+from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
+from phone_host.output.axes import Axes
+from phone_host.output.pair_files import WrittenPair
+
+ALWAYS: Final = ("report.json", "index.html")
+"""Files that lie in every folder of results."""
+
+_MOST_NAMES: Final = 5
+
+Size = tuple[int, int]
+"""Width and height, px."""
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """Something that the user must know about a result.
+
+    Attributes:
+        problem: what it is, with figures.
+        remedy: what to do about it; empty: nothing.
+        is_blocking: whether the result must not be taken for right; the command then ends with exit code 4.
+        is_doubt: whether it speaks against the depth; else it only limits it.
+    """
+
+    problem: str
+    remedy: str = ""
+    is_blocking: bool = False
+    is_doubt: bool = False
+
+    @property
+    def text(self) -> str:
+        """Problem and remedy on one line."""
+        return f"{self.problem}: {self.remedy}" if self.remedy else self.problem
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairReport:
+    """A pair that was computed.
+
+    Attributes:
+        name: of its folder; empty for the only pair, whose files lie in the results folder itself.
+        left: the left image file, as it was named.
+        right: the right image file.
+        left_px: size of the left image as matched or rectified from.
+        right_px: the same for the right image.
+        rectified_px: size of the rectified images, and so of the disparity.
+        matcher: its name.
+        search: how the pair was matched.
+        geometry: None: unknown, so there is no cloud.
+        limits: of the cloud; None without one.
+        cut: what became of the pixels; None: not counted.
+        density: share of the pixels that have a disparity.
+        axes: of cloud.ply and xyz.pfm.
+        written: the files.
+        stages_ms: how long each stage took, and `total`.
+        remarks: what the user must know.
+    """
+
+    name: str
+    left: str
+    right: str
+    left_px: Size
+    right_px: Size
+    rectified_px: Size
+    matcher: str
+    search: Search | None
+    geometry: StereoGeometry | None
+    limits: DepthLimits | None
+    cut: CutCounts | None
+    density: float
+    axes: Axes
+    written: WrittenPair
+    stages_ms: tuple[tuple[str, float], ...]
+    remarks: tuple[Remark, ...] = ()
+
+    @property
+    def has_depth(self) -> bool:
+        """Whether any pixel has a depth; without a geometry, a disparity."""
+        return self.density > 0 if self.written.points is None else self.written.points > 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FailedPair:
+    """A pair that could not be computed.
+
+    Attributes:
+        name: its folder would have been called so.
+        left: the left image file.
+        right: the right image file.
+        problem: what is wrong.
+        remedy: what to do about it.
+    """
+
+    name: str
+    left: str
+    right: str
+    problem: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetReport:
+    """All pairs of a command.
+
+    Attributes:
+        pairs: in order; at least one of them was computed.
+        by_number: whether the files were paired by the numbers in their names; else in name order.
+        left_alone: left images without a partner.
+        right_alone: right images without a partner.
+        remarks: what the user must know about all of them.
+    """
+
+    pairs: tuple[PairReport | FailedPair, ...]
+    by_number: bool
+    left_alone: tuple[str, ...] = ()
+    right_alone: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
+
+    @property
+    def computed(self) -> tuple[PairReport, ...]:
+        """The pairs that were computed."""
+        return tuple(pair for pair in self.pairs if isinstance(pair, PairReport))
+
+    @property
+    def failed(self) -> tuple[FailedPair, ...]:
+        """The pairs that were not."""
+        return tuple(pair for pair in self.pairs if isinstance(pair, FailedPair))
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether nothing failed, nothing blocks and some pixel has a depth. Everything that makes the exit code 4 is here."""
+        remarks = [*self.remarks, *(remark for pair in self.computed for remark in pair.remarks)]
+        any_depth = any(pair.has_depth for pair in self.computed)
+        return any_depth and not self.failed and not any(remark.is_blocking for remark in remarks)
+
+
+def alone_remarks(left: Sequence[str], right: Sequence[str], *, by_number: bool, pairs: int) -> tuple[Remark, ...]:
+    """Say which images have no partner, and if pairs were guessed.
+
+    Args:
+        left: left images without a partner.
+        right: right images without a partner.
+        by_number: whether the files were paired by the numbers in their names.
+        pairs: how many pairs there are.
+    """
+    remarks = []
+    for side, alone in (("left", left), ("right", right)):
+        if alone:
+            named = ", ".join(alone[:_MOST_NAMES]) + (", …" if len(alone) > _MOST_NAMES else "")
+            remarks.append(
+                Remark(f"{counted(len(alone), f'{side} image has', f'{side} images have')} no partner: {named}")
+            )
+    if not by_number and pairs > 1:
+        unequal = " though the counts differ" if left or right else ""
+        remarks.append(
+            Remark(
+                f"the images were paired in the order of their names{unequal}, because the names share no numbers",
+                "check that each pair shows one moment, or give the two images of a moment the same number",
+            )
+        )
+    return tuple(remarks)

@@ -1,0 +1,258 @@
+"""Computes pairs of image files, one at a time, and writes what comes of each. The root of `stereo`.
+
+A pair that cannot be computed ends the work only if it is the only one; of several, it is named and the others go on.
+Wrong settings and a results folder that cannot be written to end the work at once.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Protocol
+
+import numpy as np
+
+from common import now
+from common.camera.orientation import UPRIGHT, Orientation
+from common.errors import DataError
+from common.imagesize.head import MOST_PIXELS
+from common.ledger import StageTimes
+from phone_host.output.atomic import write_text
+from phone_host.output.axes import Axes
+from phone_host.output.json_text import json_text
+from phone_host.output.pair_files import STEREO_FILES, available, write_pair
+from phone_host.report.page_links import NextCommand
+from phone_host.report.report_page import Picture
+from phone_host.report.stereo_json import pair_json, set_json
+from phone_host.report.stereo_report import (
+    FailedPair,
+    PairReport,
+    Remark,
+    SetReport,
+    Size,
+    alone_remarks,
+)
+from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
+from phone_host.run.stereo_remarks import pair_remarks, turned_remarks
+from phone_host.run.stereo_results import StereoResults
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.images import EncodedFile, decode_files, open_image, require_same_size, size_px
+from phone_host.stereo.view_files import ViewFiles
+
+_WRITERS: Final = 2
+"""Threads that write one pair's files. Packing and compressing release the interpreter; the disk is one."""
+
+_CORE_STAGES: Final = ("rectifying", "matching", "computing points")
+
+
+class Watcher(Protocol):
+    """Is told how far the work is."""
+
+    def __call__(self, amount: int = 1) -> None:
+        """So many more pairs are done."""
+
+    def say(self, what: str) -> None:
+        """This is being done from now on."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StereoJob:
+    """What to compute, and where to.
+
+    Attributes:
+        files: the pairs.
+        out: the results folder.
+        make_core: makes the stereo core for images of this size (width and height of the left one, px).
+        matcher: its name, for the report.
+        axes: of cloud.ply and xyz.pfm.
+        most_pixels: an image that claims more is refused.
+        mounted: by which turns the left and the right images become upright, after what their EXIF headers say.
+        commands: what to do next, for the pages.
+    """
+
+    files: ViewFiles
+    out: Path
+    make_core: Callable[[Size], StereoCore]
+    matcher: str
+    axes: Axes = Axes.CAMERA
+    most_pixels: int = MOST_PIXELS
+    mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
+    commands: tuple[NextCommand, ...] = ()
+
+
+def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
+    """Compute and write all pairs.
+
+    Args:
+        job: what to do.
+        watcher: is told how far it is.
+
+    Returns:
+        The report. report.json holds it: that of the only pair, or that of all pairs together.
+
+    Raises:
+        DataError: the only pair, or all pairs, could not be computed.
+        SettingsError: the core cannot be made so.
+        UnavailableError: a file in the results folder was not written by this program.
+        OSError: the results cannot be written.
+    """
+    with StereoResults(job.out) as results:
+        work = _Work(job, results, watcher)
+        if len(job.files.pairs) == 1:
+            _, left, right = job.files.pairs[0]
+            return _set(job, (work.computed("", left, right),))
+        pairs: list[PairReport | FailedPair] = []
+        for number, (name, left, right) in enumerate(job.files.pairs):
+            folder = f"pair-{int(name) if job.files.by_number else number:06d}"
+            pairs.append(work.tried(folder, left, right))
+            watcher()
+        report = _set(job, tuple(pairs))
+        if not report.computed:
+            first = report.failed[0]
+            raise DataError(
+                f"none of the {len(pairs)} pairs can be computed; the first: {first.problem} ({first.remedy})",
+                "mend what this names, then try again",
+            )
+        results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
+        results.write_text("index.html", set_page(report, work.thumbnails, job.commands))
+        return report
+
+
+def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...]) -> SetReport:
+    left, right = (tuple(map(str, alone)) for alone in (job.files.left_alone, job.files.right_alone))
+    return SetReport(
+        pairs=pairs,
+        by_number=job.files.by_number,
+        left_alone=left,
+        right_alone=right,
+        remarks=() if len(pairs) == 1 else _alone(job),
+    )
+
+
+def _alone(job: StereoJob) -> tuple[Remark, ...]:
+    left, right = ([path.name for path in alone] for alone in (job.files.left_alone, job.files.right_alone))
+    return alone_remarks(left, right, by_number=job.files.by_number, pairs=len(job.files.pairs))
+
+
+class _StopWatch:
+    """Times the stages of one pair, one after the other."""
+
+    def __init__(self) -> None:
+        self._laps_ns: list[tuple[str, int]] = []
+        self._start_ns = self._last_ns = now.monotonic_ns()
+
+    def lap(self, stage: str) -> None:
+        at_ns = now.monotonic_ns()
+        self._laps_ns.append((stage, at_ns - self._last_ns))
+        self._last_ns = at_ns
+
+    def take_over(self, stages: StageTimes) -> None:
+        """Add the stages that the core has timed meanwhile."""
+        self._laps_ns += [(stage, getattr(stages, stage)) for stage in ("rectify", "match", "reproject")]
+        self._last_ns = now.monotonic_ns()
+
+    def times_ms(self) -> tuple[tuple[str, float], ...]:
+        laps = [*self._laps_ns, ("total", self._last_ns - self._start_ns)]
+        return tuple((stage, ns / 1e6) for stage, ns in laps)
+
+
+class _StageClock:
+    """The core's clock. The core asks for the time at the start of each stage, so this also tells which one begins."""
+
+    def __init__(self, watcher: Watcher, about: str) -> None:
+        self._watcher, self._about = watcher, about
+        self._stages = iter(_CORE_STAGES)
+
+    def __call__(self) -> int:
+        if (stage := next(self._stages, None)) is not None:
+            self._watcher.say(f"{stage}{self._about}")
+        return now.monotonic_ns()
+
+
+class _Work:
+    """Computes one pair after the other with as few cores as possible."""
+
+    def __init__(self, job: StereoJob, results: StereoResults, watcher: Watcher) -> None:
+        self._job, self._results, self._watcher = job, results, watcher
+        self._core: StereoCore | None = None
+        self._core_px: Size = (0, 0)
+        self._has_no_core = False
+        self.thumbnails: dict[str, Picture] = {}
+
+    def tried(self, folder: str, left: Path, right: Path) -> PairReport | FailedPair:
+        """Compute and write a pair, or say why not."""
+        try:
+            return self.computed(folder, left, right)
+        except DataError as error:
+            if self._has_no_core:  # no pair can be computed without one
+                raise
+            return FailedPair(name=folder, left=str(left), right=str(right), problem=error.problem, remedy=error.remedy)
+
+    def computed(self, folder: str, left: Path, right: Path) -> PairReport:
+        """Compute and write a pair. `folder` is empty for the only one."""
+        watch, about = _StopWatch(), f" {folder}" if folder else ""
+        self._watcher.say(f"reading{about}")
+        limit, (of_left, of_right) = self._job.most_pixels, self._job.mounted
+        opened = open_image(left, limit, of_left), open_image(right, limit, of_right)
+        core = self._core_for(*opened)
+        watch.lap("prepare")
+        images = decode_files(*opened)
+        self._results.open()
+        watch.lap("read")
+        processed = core.compute(*images, _StageClock(self._watcher, about))
+        watch.take_over(processed.stages)
+        self._watcher.say(f"writing{about}")
+        planned = available(
+            STEREO_FILES, has_disparity=processed.disparity is not None, has_cloud=processed.cloud is not None
+        )
+        names = [*(file.value for file in planned), "report.json", "index.html"]
+        with (
+            ThreadPoolExecutor(_WRITERS) as writers,
+            self._results.folder_of(folder, names, writers.map) as place,
+        ):
+            written = write_pair(place, processed, planned, self._job.axes, writers.map)
+            watch.lap("write")
+            density = 0.0 if processed.disparity is None else float(np.isfinite(processed.disparity).mean())
+            remarks = [
+                *turned_remarks(*opened),
+                *pair_remarks(processed, density, written, core.wanted.search_from_m),
+                *(() if folder else _alone(self._job)),
+            ]
+            report = PairReport(
+                name=folder,
+                left=str(left),
+                right=str(right),
+                left_px=size_px(images[0]),
+                right_px=size_px(images[1]),
+                rectified_px=size_px(processed.pair.left),
+                matcher=self._job.matcher,
+                search=processed.search,
+                geometry=processed.geometry,
+                limits=processed.limits,
+                cut=processed.cut,
+                density=density,
+                axes=self._job.axes,
+                written=written,
+                stages_ms=watch.times_ms(),
+                remarks=tuple(remarks),
+            )
+            write_text(place / "report.json", json_text(pair_json(report), indent=2) + "\n")
+            write_text(place / "index.html", pair_page(report, processed, self._job.commands))
+        if folder and (picture := pair_thumbnail(processed)) is not None:
+            self.thumbnails[folder] = picture
+        return report
+
+    def _core_for(self, left: EncodedFile, right: EncodedFile) -> StereoCore:
+        """Return the core for these images; refuse images that it cannot take, before they are decoded."""
+        is_rectified = self._core is not None and self._core.rig is None
+        if self._core is None or (is_rectified and left.size_px != self._core_px):
+            try:
+                made = self._job.make_core(left.size_px)
+            except DataError:
+                self._has_no_core = self._core is None
+                raise
+            self._core, self._core_px = made, left.size_px
+        if self._core.rig is None:
+            require_same_size(left.size_px, right.size_px, left.name, right.name)
+        self._core.require_sizes(left.size_px, right.size_px)
+        return self._core

@@ -1,0 +1,98 @@
+"""The results folder of `stereo`: one pair's files in it, or a folder for each of several pairs.
+
+What an earlier run left there is removed once the first pair's images are known to be sound, or an earlier result would be lost for
+nothing.
+"""
+
+import errno
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+
+from phone_host.output.atomic import write_text
+from phone_host.output.listed import ListedFolder, RunAll
+from phone_host.output.pair_files import PAIR_NAMES, STEREO_NAMES
+
+NAMES: Final = rf"{STEREO_NAMES}|pair-[0-9]{{6,}}"
+"""The names that `stereo` writes into its folder: of the only pair, or a folder for each of several."""
+
+
+class StereoResults:
+    """A results folder.
+
+    Args:
+        path: created with the first pair.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._own: ListedFolder | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._own is not None:
+            self._own.close()
+
+    def open(self) -> None:
+        """Remove what an earlier run left, unless that was done.
+
+        Raises:
+            UnavailableError: something there was not written by this program.
+            OSError: as the operating system reports it.
+        """
+        if self._own is None:
+            self._own = ListedFolder(self._path, NAMES, inner=PAIR_NAMES)
+
+    @contextmanager
+    def folder_of(self, name: str, files: Sequence[str], run_all: RunAll) -> Iterator[Path]:
+        """Give a pair a place for its files. The folder is open.
+
+        Args:
+            name: of its own folder, which appears when the block ends; empty: its files go into the results folder.
+            files: names of its files.
+            run_all: see `ListedFolder.new_folder`.
+
+        Yields:
+            Where to write them.
+
+        Raises:
+            OSError: as the operating system reports it.
+        """
+        assert self._own is not None
+        if name:
+            with self._own.new_folder(name, run_all) as folder:
+                yield folder
+        else:
+            self._own.add(*files)
+            yield self._path
+
+    def write_text(self, name: str, text: str) -> None:
+        """Write a file of all pairs together.
+
+        Raises:
+            OSError: as the operating system reports it.
+        """
+        assert self._own is not None
+        self._own.add(name)
+        write_text(self._path / name, text)
+
+
+def require_writable(path: Path) -> None:
+    """Check before the work that a folder can be made or written to.
+
+    Args:
+        path: the folder; it need not exist.
+
+    Raises:
+        OSError: it cannot.
+    """
+    there = next(each for each in (path, *path.absolute().parents) if each.exists())
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(there))

@@ -1,0 +1,94 @@
+"""A rig at another resolution: the same two cameras, whose images came out larger or smaller than in the calibration.
+
+Only a scaling of the whole image can be told from a size alone. A crop cannot: it may have been cut anywhere.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from common.errors import DataError
+from common.imagesize.head import size_text
+from phone_host.model import CameraModel, Rig, Side, StereoGeometry
+
+_ROUNDING_PX = 1.0
+"""A scaled size is whole pixels. Cameras round either way, so the smaller of two sizes may be off by less than this."""
+
+
+def scaled_rig(rig: Rig, left_px: tuple[int, int], right_px: tuple[int, int]) -> Rig:
+    """Scale a rig to the sizes of its images; each camera may have a scale of its own.
+
+    Args:
+        rig: two calibrated cameras.
+        left_px: width and height of the left image, px.
+        right_px: width and height of the right image, px.
+
+    Returns:
+        The rig for these sizes, with its uncertainty at infinity; the rig itself if they are those of the calibration.
+
+    Raises:
+        DataError: a size is no scaling of the size that its camera was calibrated for.
+    """
+    left, right = _scaled(rig.left, left_px, Side.LEFT), _scaled(rig.right, right_px, Side.RIGHT)
+    if left is rig.left and right is rig.right:
+        return rig
+    # Disparities are in px of the rectified images, whose focal length is that of the coarser camera (`rectify`).
+    finer = coarser_focal_px(left, right) / coarser_focal_px(rig.left, rig.right)
+    return replace(rig, left=left, right=right, zero_sigma_px=rig.zero_sigma_px * finer)
+
+
+def scaled_geometry(
+    geometry: StereoGeometry, from_px: tuple[int, int], to_px: tuple[int, int], name: str
+) -> StereoGeometry:
+    """Scale the geometry of rectified images to a copy of another size.
+
+    Args:
+        geometry: for images of the first size.
+        from_px: width and height for which it holds, px.
+        to_px: width and height of the copies, px.
+        name: of its file, for errors.
+
+    Raises:
+        DataError: the second size is no scaling of the first.
+    """
+    if not _is_scaling(from_px, to_px):
+        raise DataError(
+            f"the images are {size_text(to_px)} px, no scaling of the {size_text(from_px)} px that {name} is for",
+            "give the calibration of these images",
+        )
+    scale_x, scale_y = (new / old for new, old in zip(to_px, from_px, strict=True))
+    return replace(
+        geometry,
+        focal_px=geometry.focal_px * scale_x,
+        cx_px=(geometry.cx_px + 0.5) * scale_x - 0.5,
+        cy_px=(geometry.cy_px + 0.5) * scale_y - 0.5,
+        doffs_px=geometry.doffs_px * scale_x,
+    )
+
+
+def coarser_focal_px(left: CameraModel, right: CameraModel) -> float:
+    """Return the smaller mean focal length of two cameras, px: that of their rectified images."""
+    return min(float(model.matrix[0, 0] + model.matrix[1, 1]) / 2 for model in (left, right))
+
+
+def _scaled(model: CameraModel, size_px: tuple[int, int], side: Side) -> CameraModel:
+    own_px = (model.width_px, model.height_px)
+    if size_px == own_px:
+        return model
+    if not _is_scaling(own_px, size_px):
+        raise DataError(
+            f"the {side.value} image is {size_text(size_px)} px, no scaling of the {size_text(own_px)} px that the rig"
+            " was calibrated for",
+            "use a resolution of the calibration's aspect ratio, or calibrate again at this one",
+        )
+    scale_x, scale_y = (new / old for new, old in zip(size_px, own_px, strict=True))
+    # Pixel centres are integers, so an image begins at -0.5: x' + 0.5 = (x + 0.5) s.
+    to_scaled = np.array([[scale_x, 0, (scale_x - 1) / 2], [0, scale_y, (scale_y - 1) / 2], [0, 0, 1]], np.float64)
+    return replace(model, width_px=size_px[0], height_px=size_px[1], matrix=to_scaled @ model.matrix)
+
+
+def _is_scaling(one_px: tuple[int, int], other_px: tuple[int, int]) -> bool:
+    """Return whether one size is the other times one number, up to the rounding of the smaller one."""
+    small, large = sorted((one_px, other_px))
+    by_width = large[1] * small[0] / large[0]
+    return min(small) > 0 and abs(by_width - small[1]) < _ROUNDING_PX

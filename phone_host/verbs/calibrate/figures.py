@@ -1,0 +1,175 @@
+"""What phone-host calibrate reports: report.json's values, and the same as text."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from common.camera.orientation import UPRIGHT
+from common.errors import DataError
+from common.versions import REPORT_FORMAT
+from phone_host.calibration.board_pairs import Calibration, Rejected
+from phone_host.calibration.board_views import BoardViews, turn_text
+from phone_host.calibration.verdict import Assessment
+from phone_host.declared_settings import NEAR_M
+from phone_host.model import Rectification
+from phone_host.output.rig_yaml import REJECTED
+from phone_host.stereo.depth_limits import DepthWanted, depth_limits, disparity_error_px
+from phone_host.stereo.reproject import disparities_for_near
+from phone_host.stereo.view_files import ViewFiles
+from phone_host.stereo.working import chosen_scale
+
+_WHOLE_METRES = 10.0
+"""From here on a limit in tenths of a metre says nothing."""
+
+
+def report_of(
+    files: ViewFiles, views: BoardViews, rejected: tuple[Rejected, ...], calibration: Calibration, judgement: Assessment
+) -> dict[str, Any]:
+    """Return the report of a calibration that gave a rig."""
+    return {
+        "format_version": REPORT_FORMAT,
+        "pairs": _pairs(files, rejected, len(calibration.used)),
+        **_figures(calibration),
+        **_turned(views),
+        "verdict": judgement.verdict.value,
+        "remedy": "; ".join(judgement.remedies),
+    }
+
+
+def report_of_failure(files: ViewFiles, views: BoardViews, error: DataError) -> dict[str, Any]:
+    """Return the report of a calibration that gave no rig."""
+    return {
+        "format_version": REPORT_FORMAT,
+        "pairs": _pairs(files, views.rejected, 0),
+        **_turned(views),
+        "verdict": REJECTED,
+        "problem": error.problem,
+        "remedy": error.remedy,
+    }
+
+
+def _turned(views: BoardViews) -> dict[str, Any]:
+    """Return what the EXIF headers of the sides say, where it changes anything."""
+    sides = {side: turn for side, turn in zip(("left", "right"), views.turned, strict=True) if turn != UPRIGHT}
+    turns = {side: {"rotate_deg": turn.rotate_deg, "flip": turn.flip.value} for side, turn in sides.items()}
+    return {"exif_orientation": turns} if turns else {}
+
+
+def _pairs(files: ViewFiles, rejected: tuple[Rejected, ...], used: int) -> dict[str, Any]:
+    return {
+        "found": len(files.pairs),
+        "used": used,
+        "paired_by": "number" if files.by_number else "name order",
+        "rejected": [{"pair": each.name, "reason": each.reason.value, "detail": each.detail} for each in rejected],
+    }
+
+
+def _figures(calibration: Calibration) -> dict[str, Any]:
+    rig, vertical = calibration.rig, calibration.vertical_px
+    known = calibration.obstacle is None
+    return {
+        "views": [
+            {
+                "pair": used.name,
+                "left_px": round(used.left_px, 4),
+                "right_px": round(used.right_px, 4),
+                "vertical_px": round(used.vertical_px, 4) if known else None,
+            }
+            for used in calibration.used
+        ],
+        "rms_px": {
+            "left": round(rig.rms_left_px, 4),
+            "right": round(rig.rms_right_px, 4),
+            "stereo": round(rig.rms_stereo_px, 4),
+        },
+        "vertical_error_px": {
+            "mean": round(float(vertical.mean()), 4) if known else None,
+            "p95": round(float(np.percentile(vertical, 95)), 4) if known else None,
+            "max": round(float(vertical.max()), 4) if known else None,
+        },
+        "baseline_mm": round(float(np.linalg.norm(rig.t_right_left_m)) * 1e3, 4),
+        "baseline_sigma_mm": _rounded(calibration.baseline_sigma_m * 1e3, 4),
+        "zero_sigma_px": _rounded(rig.zero_sigma_px, 4),
+        "depth_limit_m": _rounded(depth_limit_m(calibration), 3),
+        "focal_px": {
+            "left": [round(float(rig.left.matrix[i, i]), 3) for i in (0, 1)],
+            "right": [round(float(rig.right.matrix[i, i]), 3) for i in (0, 1)],
+        },
+        "sizes": {
+            "left": f"{rig.left.width_px}x{rig.left.height_px}",
+            "right": f"{rig.right.width_px}x{rig.right.height_px}",
+            "rectified": None
+            if calibration.rectification is None
+            else f"{calibration.rectification.width_px}x{calibration.rectification.height_px}",
+        },
+        "board_side": rig.board_side.value,
+        "distortion_coefficients": calibration.distortion_terms,
+        "board_spread": round(calibration.spread, 3),
+        "largest_tilt_deg": round(float(calibration.tilts_deg.max()), 1),
+    }
+
+
+def _rounded(value: float, digits: int) -> float | None:
+    return round(value, digits) if math.isfinite(value) else None
+
+
+def depth_limit_m(calibration: Calibration) -> float:
+    """Return the far limit that `stereo` uses with this rig if the user gives none, m; NaN if it cannot be rectified."""
+    made: Rectification | None = calibration.rectification
+    if made is None:
+        return math.nan
+    along, across = (made.height_px, made.width_px) if made.epipolar.is_vertical else (made.width_px, made.height_px)
+    scale = chosen_scale(along, across, disparities_for_near(made.geometry, NEAR_M, along))
+    error_px = disparity_error_px(scale, calibration.rig.zero_sigma_px)
+    return depth_limits(made.geometry, error_px, DepthWanted()).far_m
+
+
+def rejections(rejected: tuple[Rejected, ...]) -> str:
+    """Return one line per pair that is not used."""
+    return "\n".join(f"{each.name:>8}  rejected: {each.reason.value} ({each.detail})" for each in rejected)
+
+
+def unwritten(report: dict[str, Any], out: Path) -> list[str]:
+    """Say that there is no new rig, and where the earlier one is."""
+    return [f"{out} was not written{_earlier(report)}"]
+
+
+def _earlier(report: dict[str, Any]) -> str:
+    return f"; the earlier one is now {report['earlier_rig']}" if "earlier_rig" in report else ""
+
+
+def summary(
+    report: dict[str, Any], views: BoardViews, calibration: Calibration, rejected: tuple[Rejected, ...], out: Path
+) -> str:
+    """Return the report as text."""
+    rows = [f"{'pair':>8}  {'left px':>8} {'right px':>8} {'vertical px':>11}"]
+    rows += [f"{u.name:>8}  {u.left_px:8.3f} {u.right_px:8.3f} {u.vertical_px:11.3f}" for u in calibration.used]
+    if rejected:
+        rows.append(rejections(rejected))
+    rms, vertical, used = report["rms_px"], report["vertical_error_px"], report["pairs"]["used"]
+    rows.append(f"{used} {'pair' if used == 1 else 'pairs'} used, {len(rejected)} rejected")
+    for side, turn in zip(("left", "right"), views.turned, strict=True):
+        if turn != UPRIGHT:
+            rows.append(f"EXIF     {side} images are {turn_text(turn)}")
+    rows.append(f"RMS      left {rms['left']:.3f}, right {rms['right']:.3f}, stereo {rms['stereo']:.3f} px")
+    if vertical["p95"] is not None:
+        rows.append(f"vertical mean {vertical['mean']:.3f}, 95 % {vertical['p95']:.3f}, max {vertical['max']:.3f} px")
+    rows.append(f"baseline {report['baseline_mm']:.2f} +- {calibration.baseline_sigma_m * 1e3:.2f} mm")
+    if report["zero_sigma_px"] is not None:
+        far_m = report["depth_limit_m"]
+        far = f"{far_m:.0f}" if far_m >= _WHOLE_METRES else f"{far_m:.1f}"
+        rows.append(f"zero     disparity +- {report['zero_sigma_px']:.2f} px; depth beyond {far} m is a guess")
+    rows.append(f"verdict  {report['verdict']}")
+    rows += [f"remedy   {remedy}" for remedy in report["remedy"].split("; ") if remedy]
+    return "\n".join([*rows, *_written(report, calibration, out)])
+
+
+def _written(report: dict[str, Any], calibration: Calibration, out: Path) -> list[str]:
+    if calibration.rectification is None:
+        return unwritten(report, out)
+    rows = [f"written to {out} and {out.with_name('report.json')}{_earlier(report)}"]
+    if report["verdict"] == REJECTED:
+        rows.append("run and stereo refuse this calibration unless --use-rejected-rig is given")
+    return rows

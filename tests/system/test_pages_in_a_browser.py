@@ -1,0 +1,90 @@
+"""Pages in a real browser: the script runs under its policy, a pointer reads metres, the cloud turns, nothing is wider than a phone."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from phone_host.report.page_links import NextCommand
+from phone_host.report.stereo_page import stereo_page
+from tests.support.browser import Browser, browser, needs_chromium
+from tests.support.stereo_pages import page_data
+
+pytestmark = needs_chromium
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Browser, str]]:
+    """A browser, and the address of a page of a wall at 2 m with a box at 1 m before it."""
+    folder = tmp_path_factory.mktemp("page")
+    page = folder / "index.html"
+    page.write_text(stereo_page(page_data(commands=(NextCommand("Again:", "phone-host stereo a b"),))))
+    with browser(folder / "profile") as running:
+        yield running, page.as_uri()
+
+
+def test_a_pointer_reads_metres_and_where_there_are_none(shown: tuple[Browser, str]) -> None:
+    """Over the box the page says 1 m with its uncertainty, over the wall 2 m, elsewhere why there is none; the match is 40 px further left."""
+    page, address = shown
+    page.open(address)
+    page.wait("document.documentElement.dataset.ready === 'yes'")
+    left, top, width, height = box(page, "[data-side=left]")
+
+    def read(x: float, y: float) -> str:
+        page.move(left + width * (x + 0.5) / 160, top + height * (y + 0.5) / 120)
+        return str(page.ask("document.querySelector('.readout').textContent"))
+
+    # 1^2 / 40 * 0.5 = 0.0125 m; 2^2 / 40 * 0.5 = 0.05 m; X = 0.5 px * 1 m / 400 px
+    assert read(80, 60) == "1.000 m ± 0.013 m, x 80, y 60 px (X 0.001 m, Y 0.001 m)"
+    assert page.ask("document.querySelector('[data-side=right] i').style.left") == f"{40.5 / 160 * 100:g}%"
+    assert read(100, 100).startswith("2.00 m ± 0.05 m, x 100, y 100 px")
+    assert read(5, 60) == "no depth here, x 5, y 60 px"
+    assert read(100, 5) == "cut: outside the depth limits, x 100, y 5 px"
+    assert page.complaints == []
+
+
+def test_mouse_and_fingers_turn_and_zoom_the_cloud(shown: tuple[Browser, str]) -> None:
+    """A drag turns the cloud by the way of the mouse, two fingers that part to twice their distance halve the distance; points are drawn."""
+    page, address = shown
+    page.open(address)
+    page.wait("document.querySelector('.cloudview').dataset.drawn")
+    page.ask("document.querySelector('canvas').scrollIntoView()")
+    left, top, width, height = box(page, "canvas")
+    x, y = left + width / 2, top + height / 2
+    assert drawn(page) == [0.45, 0.22, 2.0]
+    page.move(x, y, kind="mousePressed", held=True)
+    page.move(x + 50, y + 10, held=True)
+    page.move(x + 50, y + 10, kind="mouseReleased")
+    page.wait("!document.querySelector('.cloudview').dataset.drawn.startsWith('0.450')")
+    assert drawn(page) == [pytest.approx(0.45 - 50 * 0.008), pytest.approx(0.22 + 10 * 0.008), 2.0]
+    page.touch("touchStart", (x - 40, y), (x + 40, y))
+    page.touch("touchMove", (x - 80, y), (x + 80, y))
+    page.touch("touchEnd")
+    page.wait("!document.querySelector('.cloudview').dataset.drawn.endsWith('2.000')")
+    assert drawn(page)[2] == pytest.approx(1.0, abs=0.05)
+    painted = "[...document.querySelector('canvas').getContext('2d').getImageData(0, 0, 900, 400).data].filter((v, i) => i % 4 === 3 && v).length"
+    assert page.ask(painted) > 10_000
+    assert page.complaints == []
+
+
+@pytest.mark.parametrize("width_px", [390, 1400])
+def test_the_page_fits_the_window(shown: tuple[Browser, str], width_px: int) -> None:
+    """On a phone and on a desktop, in the dark, too, no part of the page is wider than the window; the copy button is there."""
+    page, address = shown
+    page.open(address, width_px, dark=True)
+    page.wait("document.documentElement.dataset.ready === 'yes'")
+    assert page.ask("document.documentElement.scrollWidth") <= width_px
+    assert page.ask("document.querySelector('button.copy').hidden") is False
+    assert page.ask("getComputedStyle(document.body).backgroundColor") == "rgb(16, 19, 24)"
+
+
+def box(page: Browser, selector: str) -> list[float]:
+    """Return left, top, width and height of the first such element in the window."""
+    found = page.ask(
+        f"(() => {{ const b = document.querySelector('{selector}').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; }})()"
+    )
+    return [float(value) for value in found]
+
+
+def drawn(page: Browser) -> list[float]:
+    """Return the angles and the distance at which the cloud was last drawn."""
+    return [float(value) for value in page.ask("document.querySelector('.cloudview').dataset.drawn").split()]

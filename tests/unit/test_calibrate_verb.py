@@ -1,0 +1,98 @@
+"""phone-host calibrate in this process: what it writes when it rejects, and what it says about turned photographs."""
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from common.errors import SettingsError
+from phone_host.model import Image
+from phone_host.output.rig_yaml import read_rig
+from phone_host.verbs.calibrate.arguments import add_arguments
+from phone_host.verbs.calibrate.command import run
+from tests.support.boards import poses, render_pair
+from tests.support.oriented import oriented
+from tests.support.pictures import encoded
+from tests.support.rigs import small_rig
+
+_PAIRS = [render_pair(small_rig(), pose) for pose in poses(4, seed=8, depth_m=(0.4, 0.5))]
+
+
+def _folders(folder: Path, right: Callable[[Image], bytes]) -> Path:
+    """Two folders of four photographs; `right` makes the right images' files."""
+    for side in ("left", "right"):
+        (folder / side).mkdir()
+    for index, pair in enumerate(_PAIRS):
+        (folder / "left" / f"{index}.png").write_bytes(encoded(".png", pair[0]))
+        (folder / "right" / f"{index}.png").write_bytes(right(pair[1]))
+    return folder
+
+
+def _shaken(image: Image) -> Image:
+    """The image with each column moved up or down, by up to 2 px, as a wave of 120 px."""
+    columns, rows = np.meshgrid(np.arange(image.shape[1]), np.arange(image.shape[0]))
+    moved = (rows + 2 * np.sin(columns / 120 * 2 * np.pi)).astype(np.float32)
+    return np.asarray(cv2.remap(image, columns.astype(np.float32), moved, cv2.INTER_LINEAR), np.uint8)
+
+
+def _calibrate(folder: Path, *options: str) -> tuple[int, dict[str, Any]]:
+    """Exit code and report.json."""
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    parser.add_argument("--json", action="store_true")
+    given = [str(folder / "left"), str(folder / "right"), "--board", "9x6", "--square", "25mm", *options]
+    code = run(parser.parse_args([*given, "--out", str(folder / "rig.yaml")]))
+    report: dict[str, Any] = json.loads((folder / "report.json").read_text())
+    return code, report
+
+
+def test_a_rejected_rig_is_written_as_such_and_a_good_one_is_kept_aside(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Right images whose columns shake by 2 px leave rows that do not match: exit 4, verdict reject in rig.yaml; the good rig stays in rig.yaml.old, also after a second time."""
+    folder = _folders(tmp_path, lambda image: encoded(".png", image))
+    code, report = _calibrate(folder)
+    good = read_rig(folder / "rig.yaml")
+    assert (code, good.verdict) == (0, report["verdict"])
+    assert good.zero_sigma_px > 0
+    assert report["zero_sigma_px"] == pytest.approx(good.zero_sigma_px, abs=1e-4)
+    assert report["depth_limit_m"] > 0
+    for earlier in ("rig.yaml.old", None):
+        for index, pair in enumerate(_PAIRS):
+            (folder / "right" / f"{index}.png").write_bytes(encoded(".png", _shaken(pair[1])))
+        code, report = _calibrate(folder)
+        assert (code, report["verdict"], report.get("earlier_rig")) == (4, "reject", earlier)
+        assert read_rig(folder / "rig.yaml").verdict == "reject"
+        assert read_rig(folder / "rig.yaml.old").verdict == good.verdict
+        assert "refuse this calibration unless --use-rejected-rig is given" in capsys.readouterr().out
+
+
+def test_exif_headers_that_disagree_with_the_rig_are_told_with_the_option_that_helps(tmp_path: Path) -> None:
+    """Two phones stand alike, but the right one wrote EXIF 6 when it lay flat: the remedy names the turn, and with it the true baseline comes."""
+    folder = _folders(tmp_path, lambda image: oriented(".png", image, 6))
+    _, report = _calibrate(folder)
+    assert report["exif_orientation"] == {"right": {"rotate_deg": 90, "flip": "none"}}
+    assert "EXIF headers differ" in report["remedy"]
+    assert "--rotate-right 270" in report["remedy"]
+    code, report = _calibrate(folder, "--rotate-right", "270")
+    assert code == 0
+    true_mm = float(np.linalg.norm(small_rig().t_right_left_m)) * 1e3
+    assert report["baseline_mm"] == pytest.approx(true_mm, rel=0.02)
+    camera = read_rig(folder / "rig.yaml").right_camera
+    assert camera is not None
+    assert camera.orientation.rotate_deg == 270
+
+
+@pytest.mark.parametrize("square", ["0.025", "0.3"])
+def test_a_square_without_a_unit_that_no_board_has_is_refused(tmp_path: Path, square: str) -> None:
+    """0.025 could be metres or a slip; both ways to write the metres are named, before any image is read."""
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    given = ["none", "none", "--board", "9x6", "--square", square, "--out", str(tmp_path / "rig.yaml")]
+    with pytest.raises(SettingsError, match=rf"write {float(square) * 1000:g}mm or {square}m"):
+        run(parser.parse_args(given))

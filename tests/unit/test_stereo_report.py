@@ -1,0 +1,159 @@
+"""What `stereo` tells about pairs: limits, cuts, images without partner."""
+
+from dataclasses import replace
+
+import pytest
+
+from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
+from phone_host.output.axes import Axes
+from phone_host.output.pair_files import WrittenPair
+from phone_host.report.report_page import Headline
+from phone_host.report.stereo_json import pair_json
+from phone_host.report.stereo_lines import cut_lines, pair_lines, set_lines
+from phone_host.report.stereo_report import (
+    FailedPair,
+    PairReport,
+    Remark,
+    SetReport,
+    alone_remarks,
+)
+from phone_host.report.stereo_verdict import pair_verdict, set_verdict
+
+# 1000 pixels; f b = 50 px m, so an error of 0.25 px makes a depth of 40 m wrong by 0.25 * 40 / 50 = 20 %.
+_PAIR = PairReport(
+    name="",
+    left="l.png",
+    right="r.png",
+    left_px=(40, 25),
+    right_px=(40, 25),
+    rectified_px=(40, 25),
+    matcher="sgbm",
+    search=Search(scale=0.5, disparities=64),
+    geometry=StereoGeometry(focal_px=500, baseline_m=0.1, cx_px=20, cy_px=12),
+    limits=DepthLimits(near_m=0.0, far_m=40.0, disparity_error_px=0.25, from_rig=True),
+    cut=CutCounts(kept=700, unmatched=150, at_zero=30, too_far=120),
+    density=0.82,
+    axes=Axes.CAMERA,
+    written=WrittenPair(files=("cloud.ply",), points=700),
+    stages_ms=(("total", 123.4),),
+)
+
+
+def test_what_was_cut_is_told_in_percent_with_the_limit_and_its_reason() -> None:
+    """120 of 1000 pixels are farther than 40 m, where 0.25 px are a fifth of the disparity."""
+    [line] = cut_lines(_PAIR)
+    assert "12 % farther than 40 m, where depth is wrong by more than 20%" in line
+    assert "3.0 % with a disparity no larger than the noise of zero" in line
+
+
+def test_limits_that_the_user_gave_have_no_other_reason() -> None:
+    """--near 300mm and --far 2m are named, and no error is."""
+    limits = DepthLimits(near_m=0.3, far_m=2.0, disparity_error_px=0.25, from_rig=False)
+    [line] = cut_lines(replace(_PAIR, limits=limits, cut=CutCounts(kept=980, too_far=10, too_near=10)))
+    assert line == "cut: 1.0 % farther than 2 m; 1.0 % nearer than 300 mm"
+
+
+def test_a_pair_of_which_nothing_was_cut_says_where_its_cloud_ends() -> None:
+    """The far limit is told all the same."""
+    assert cut_lines(replace(_PAIR, cut=CutCounts(kept=1000))) == ["the cloud ends at 40 m"]
+
+
+def test_lines_of_a_pair_hold_its_size_search_density_points_and_axes() -> None:
+    """The first line says whether the depth is right, the next two have what a user needs to judge it."""
+    answer, *lines = pair_lines(_PAIR, "scan")
+    assert "82% of the pixels" in answer
+    assert "40 m it is wrong by no more than 20%" in answer
+    for words in ("40x25 px", "sgbm", "64 disparities", "matched at 50% of the size", "82.0%", "123 ms"):
+        assert words in lines[0]
+    for words in ("700 points", "70.0%", "x right, y down, z forward", "metres"):
+        assert words in lines[1]
+    assert lines[-1] == "written to scan: cloud.ply, report.json, index.html"
+
+
+def test_the_object_of_a_pair_states_limits_cuts_unit_and_axes() -> None:
+    """Programs read them without words."""
+    told = pair_json(_PAIR)
+    assert told["limits"] == {"near_m": 0.0, "far_m": 40.0, "disparity_error_px": 0.25, "from_rig": True}
+    assert (told["cut"]["too_far"], told["cut"]["kept"]) == (120, 700)
+    assert (told["unit"], told["scale"], told["disparities"], told["points"]) == ("metre", 0.5, 64, 700)
+    flat = pair_json(replace(_PAIR, geometry=None, limits=None, written=WrittenPair(files=())))
+    assert (flat["unit"], flat["axes"], flat["limits"]) == (None, None, None)
+
+
+def test_a_remedy_that_several_pairs_share_is_told_once() -> None:
+    """Twenty pairs do not repeat the same advice twenty times."""
+    remark = Remark("only 10% of the pixels have depth", "check the rig")
+    pairs = tuple(replace(_PAIR, name=f"pair-{number:06d}", remarks=(remark,)) for number in range(3))
+    lines = set_lines(SetReport(pairs=pairs, by_number=True), "scans")
+    assert sum("check the rig" in line for line in lines) == 1
+    assert sum("only 10%" in line for line in lines) == 3
+
+
+@pytest.mark.parametrize(
+    ("report", "sound"),
+    [
+        (SetReport(pairs=(_PAIR,), by_number=True), True),
+        (SetReport(pairs=(_PAIR,), by_number=True, remarks=(Remark("2 left images have no partner"),)), True),
+        (SetReport(pairs=(replace(_PAIR, remarks=(Remark("same image", is_blocking=True),)),), by_number=True), False),
+        (
+            SetReport(
+                pairs=(_PAIR, FailedPair(name="p", left="l", right="r", problem="bad", remedy="mend")), by_number=True
+            ),
+            False,
+        ),
+        (SetReport(pairs=(replace(_PAIR, written=WrittenPair(files=(), points=0)),), by_number=True), False),
+        (SetReport(pairs=(replace(_PAIR, density=0.0, written=WrittenPair(files=())),), by_number=True), False),
+    ],
+    ids=["good", "alone", "blocking", "failed", "all cut", "nothing matched"],
+)
+def test_a_result_is_sound_if_nothing_failed_nothing_blocks_and_there_is_depth(
+    report: SetReport, *, sound: bool
+) -> None:
+    """Exactly these decide on exit code 4."""
+    assert report.is_sound is sound
+
+
+def test_images_without_partner_are_counted_and_named_and_pairing_by_order_is_told() -> None:
+    """Nothing is left out silently; a long list is cut short."""
+    [one] = alone_remarks([], ["r9.png"], by_number=True, pairs=4)
+    assert one.text == "1 right image has no partner: r9.png"
+    many, order = alone_remarks([f"{n}.png" for n in range(7)], [], by_number=False, pairs=4)
+    assert many.problem == "7 left images have no partner: 0.png, 1.png, 2.png, 3.png, 4.png, …"
+    assert "order of their names though the counts differ" in order.problem
+    assert alone_remarks([], [], by_number=False, pairs=1) == ()
+
+
+@pytest.mark.parametrize(
+    ("pair", "verdict", "words"),
+    [
+        (_PAIR, Headline.GOOD, "Nothing speaks against"),
+        (replace(_PAIR, remarks=(Remark("nothing nearer than 400 mm is found"),)), Headline.GOOD, "Nothing speaks"),
+        (replace(_PAIR, remarks=(Remark("only 10%", "check", is_doubt=True),)), Headline.WARNING, "Only 10%: check."),
+        (replace(_PAIR, remarks=(Remark("same image", "mend", is_blocking=True),)), Headline.BAD, "Same image: mend."),
+        (replace(_PAIR, written=WrittenPair(files=(), points=0)), Headline.BAD, "No pixel has depth"),
+        (
+            replace(_PAIR, geometry=None, limits=None, written=WrittenPair(files=())),
+            Headline.WARNING,
+            "focal length and baseline are unknown",
+        ),
+    ],
+    ids=["good", "limited", "doubt", "blocking", "no depth", "no metres"],
+)
+def test_the_verdict_of_a_pair_answers_whether_its_depth_is_right(
+    pair: PairReport, verdict: Headline, words: str
+) -> None:
+    """A limit is no doubt; a doubt is no alarm; nothing without depth looks right."""
+    found, sentence = pair_verdict(pair)
+    assert found is verdict
+    assert words in sentence
+
+
+def test_the_verdict_of_several_pairs_counts_them() -> None:
+    """All good is good, all bad is bad, anything else is told in numbers."""
+    bad = replace(_PAIR, written=WrittenPair(files=(), points=0))
+    failed = FailedPair(name="p", left="l", right="r", problem="bad", remedy="mend")
+    assert set_verdict(SetReport(pairs=(_PAIR, _PAIR), by_number=True))[0] is Headline.GOOD
+    assert set_verdict(SetReport(pairs=(bad, failed), by_number=True))[0] is Headline.BAD
+    verdict, sentence = set_verdict(SetReport(pairs=(_PAIR, failed, bad), by_number=True))
+    assert verdict is Headline.WARNING
+    assert sentence == "1 of 3 pairs looks right, 2 gave no depth or cannot be right."
