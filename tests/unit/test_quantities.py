@@ -93,7 +93,12 @@ def test_no_option_for_a_time_is_forgotten() -> None:
             parser,
             *(verb for item in parser._actions if isinstance(item.choices, dict) for verb in item.choices.values()),
         ]
-        actions = [(one.prog, action) for one in parsers for action in one._actions if action.metavar in {"S", "MS"} and action.dest != "scale"]
+        actions = [
+            (one.prog, action)
+            for one in parsers
+            for action in one._actions
+            if action.metavar in {"S", "MS"} and action.dest != "scale"
+        ]
         forgotten += [
             f"{prog} {action.option_strings}" for prog, action in actions if action.type in {None, float, int}
         ]
