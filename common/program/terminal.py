@@ -6,7 +6,9 @@ import sys
 import textwrap
 from typing import Final, TextIO
 
-_COMMAND: Final = re.compile(r"\s*(\S+ \S+ {2,})?(phone-host|board-agent|delay-bench|python3?|pipx?|sudo|make|\.) ")
+_COMMAND: Final = re.compile(
+    r"\s*(\S+ \S+ {2,})?((?:'[^']*/|\S*/)?(phone-host|board-agent|delay-bench)\b|(python3?|pipx?|sudo|make|\.) )"
+)
 """A line that is a command, maybe behind a label of two words. It stays whole, because it is there to be pasted."""
 
 _COLUMN: Final = re.compile(r"\S( {2,})(?=\S)")
