@@ -147,9 +147,10 @@ def match(left: Features, right: Features, *, is_mirrored: bool) -> Matches:
     if min(len(left.points_px), len(right.points_px)) < 2:
         return Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, np.float32))
     descriptors = right.descriptors[:, _MIRRORED_BINS] if is_mirrored else right.descriptors
-    likeness = cv2.gemm(
-        left.descriptors, descriptors, 1.0, None, 0.0, flags=cv2.GEMM_2_T
-    )  # squared distance = 2 - 2 * likeness
+    # Squared distance = 2 - 2 * likeness. OpenCV's product takes one thread; NumPy's wakes one on every core.
+    none = np.zeros((len(left.descriptors), len(descriptors)), np.float32)
+    product = cv2.gemm(left.descriptors, np.ascontiguousarray(descriptors), 1.0, none, 0.0, flags=cv2.GEMM_2_T)
+    likeness = np.asarray(product, np.float32)
     best = likeness.argmax(axis=1)
     rows = np.arange(len(best))
     mutual = likeness.argmax(axis=0)[best] == rows
