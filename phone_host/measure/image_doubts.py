@@ -43,10 +43,10 @@ _DARK_MEAN: Final = 25.0
 _DARK_BRIGHT: Final = 50.0
 """An image is dark if its mean and its bright parts are below these levels: a tenth of what a camera's exposure aims at."""
 
-_BLURRED_PX: Final = 1.8
+_BLURRED_PX: Final = 2.0
 _BLURRED_RATIO: Final = 1.8
 _BLURRED_BESIDE_PX: Final = 1.5
-"""Sharp images of all kinds measure 0.8 to 1.25 px at up to 640 px of width. Beyond 1.8 px fine texture is gone."""
+"""Sharp images measure 0.8 to 1.3 px at up to 640 px of width, and 1.8 px if nothing in the scene has a sharp edge."""
 
 _LEAST_DENSITY: Final = 0.15
 """Chessboards before white walls reach 0.23, the hardest textured pairs 0.33; swapped ones mostly stay below 0.1."""

@@ -22,6 +22,9 @@ _FEATURES: Final = 400
 _CONTRAST: Final = 0.02
 """SIFT's own threshold is 0.04; images of plain rooms have too few features above it."""
 
+_LEAST_SIZE_PX: Final = 16
+"""SIFT's descriptors are wider than a smaller image."""
+
 _RATIO: Final = 0.85
 """Greatest distance of a match relative to the second best. Lowe takes 0.8; the geometry sorts out the wrong ones here."""
 
@@ -45,8 +48,13 @@ _STRICT_OFFSET: Final = 0.015
 _TURNED_OFFSET: Final = 0.025
 """Greatest offset of strict rows after a turn about the middle of the image: principal points lie that far beside it, 12 px of 480."""
 
-_LOST_ZERO: Final = 0.004
-"""Disparities above minus this share of the width count as not negative: 2.5 px of 640, more than a good rig's zero is off."""
+_LOST_ZERO: Final = 0.0016
+"""Disparities above minus this share of the width count as not negative: 1 px of 640, a rig's usual error of zero."""
+
+_SURE_SHIFT: Final = 0.004
+_SURE_SPREAD: Final = 0.003
+"""Exchanged features are shifted by this share of the width, 2.5 px of 640, or spread over that one. If neither, the scene
+is far away and the rig's zero is lost."""
 
 _FARTHEST: Final = 0.6
 """Greatest disparity as a share of the width; matchers search half of it at most."""
@@ -72,6 +80,10 @@ class Features:
     directions_deg: NDArray[np.float32]
     sizes_px: NDArray[np.float32]
     descriptors: Matrix
+
+
+_NONE: Final = np.zeros(0, np.float32)
+_NO_FEATURES: Final = Features(np.zeros((0, 2)), _NONE, _NONE, np.zeros((0, 128), np.float32))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,11 +114,12 @@ def find_features(image: Image, scale: float) -> Features:
         image: (H, W) uint8 grey, reduced.
         scale: its size relative to the whole image.
     """
+    if min(image.shape) < _LEAST_SIZE_PX:
+        return _NO_FEATURES
     detector = cv2.SIFT.create(nfeatures=_FEATURES, contrastThreshold=_CONTRAST)
     found, raw = detector.detectAndCompute(image, None)
     if not found:
-        none = np.zeros(0, np.float32)
-        return Features(np.zeros((0, 2)), none, none, np.zeros((0, 128), np.float32))
+        return _NO_FEATURES
     points = (np.array([point.pt for point in found]) + 0.5) / scale - 0.5
     descriptors = np.asarray(raw, np.float32)
     descriptors = np.sqrt(descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), np.float32(1e-6)))
@@ -134,12 +147,16 @@ def match(left: Features, right: Features, *, is_mirrored: bool) -> Matches:
     if min(len(left.points_px), len(right.points_px)) < 2:
         return Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, np.float32))
     descriptors = right.descriptors[:, _MIRRORED_BINS] if is_mirrored else right.descriptors
-    likeness = left.descriptors @ descriptors.T  # squared distance = 2 - 2 * likeness
+    # Squared distance = 2 - 2 * likeness. OpenCV's product takes one thread; NumPy's wakes one on every core.
+    none = np.zeros((len(left.descriptors), len(descriptors)), np.float32)
+    product = cv2.gemm(left.descriptors, np.ascontiguousarray(descriptors), 1.0, none, 0.0, flags=cv2.GEMM_2_T)
+    likeness = np.asarray(product, np.float32)
     best = likeness.argmax(axis=1)
     rows = np.arange(len(best))
-    two = np.partition(likeness, -2, axis=1)[:, -2:]
-    clear = (1 - two[:, 1]) <= _RATIO**2 * (1 - two[:, 0])
     mutual = likeness.argmax(axis=0)[best] == rows
+    first = likeness[rows, best]
+    likeness[rows, best] = -1.0
+    clear = (1 - first) <= _RATIO**2 * (1 - likeness.max(axis=1))
     ratio = right.sizes_px[best] / left.sizes_px
     kept = np.flatnonzero(clear & mutual & (ratio <= _SCALE) & (ratio >= 1 / _SCALE))
     there = best[kept]
@@ -164,8 +181,12 @@ def on_common_rows(left_px: Points, right_px: Points, height_px: int) -> NDArray
         return none
     with np.errstate(invalid="ignore"):
         down = right_px[:, 1] - left_px[:, 1]
-        usable = np.isfinite(down) & (np.abs(down) <= 2 * _OFFSET * height_px)
-    design = np.column_stack([np.ones(len(down)), (left_px - left_px.mean(axis=0)) / height_px])
+        usable = np.isfinite(left_px).all(axis=1) & (np.abs(down) <= 2 * _OFFSET * height_px)
+    if not usable.any():
+        return none
+    middle = left_px[usable].mean(axis=0)
+    slopes = np.where(usable[:, np.newaxis], (left_px - middle) / height_px, 0.0)
+    design = np.column_stack([np.ones(len(down)), slopes])
     model = np.array([_mode(down[usable], _ROUGH * height_px), 0.0, 0.0])
     near = none
     for share in (_ROUGH, _ROUGH, _FINE * 2, _FINE):
@@ -319,7 +340,11 @@ class _Undoing:
 
     def _in_order(self, left_px: Points, right_px: Points) -> int:
         same = on_same_rows(left_px, right_px, self.size_px[1])
-        return int((same & _in_order(left_px, right_px, self.size_px[0], _LOST_ZERO)).sum())
+        fits = same & _in_order(left_px, right_px, self.size_px[0], _LOST_ZERO)
+        if not fits.any():
+            return 0
+        low, middle, high = np.percentile((left_px - right_px)[fits, 0] / self.size_px[0], (10, 50, 90))
+        return int(fits.sum()) if middle >= _SURE_SHIFT or high - low >= _SURE_SPREAD else 0
 
 
 def _unmoved(upright: Matches, maps: PointMaps) -> int:

@@ -67,6 +67,8 @@ def _edge_width_px(image: Image) -> float:
 
 def _widths(image: Image) -> NDArray[np.float32]:
     """Return the widths of the edges that cross the rows, px."""
+    if min(image.shape) < 2 * _REACH_PX + 1:
+        return np.zeros(0, np.float32)
     smooth = np.asarray(cv2.blur(image, (1, 3)), np.int16)  # along the edge only
     slope = np.abs(smooth[:, 2:] - smooth[:, :-2]).astype(np.float32) / 2
     window = np.ones((1, 2 * _REACH_PX + 1), np.uint8)

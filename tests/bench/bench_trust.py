@@ -64,7 +64,6 @@ class _Scene:
     left: Image
     right: Image
     core: StereoCore
-    has_mistakes: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,19 +89,6 @@ class Row:
     doubts: tuple[str, ...]
     cpu_ms: float
     size_px: tuple[int, int]
-
-
-def _given(data: Path) -> Iterator[_Scene]:
-    series: Counter[str] = Counter()
-    for number, pair in enumerate(given_pairs(data)):
-        family = next((name for name in _FAMILIES if pair.name.startswith(name)), pair.name)
-        series[family] += 1
-        yield _scene(pair, number, has_mistakes=series[family] == 1 and "board" not in family)
-
-
-def _scene(pair: GivenPair, number: int, *, has_mistakes: bool) -> _Scene:
-    half = _TUNED_ON if number % 2 == 0 else _HELD_OUT
-    return _Scene(pair.name, "given", half, pair.left, pair.right, pair.core(), has_mistakes)
 
 
 def _judge(core: StereoCore, left: Image, right: Image) -> tuple[frozenset[Doubt], float]:
@@ -140,41 +126,64 @@ def _outcome(found: frozenset[Doubt], right_names: frozenset[Doubt]) -> str:
     return "other" if found else "missed"
 
 
-def _given_scene_rows(scene: _Scene, foreign: Image) -> list[Row]:
+@dataclass(frozen=True, slots=True, eq=False)
+class GivenJob:
+    """A given pair to judge.
+
+    Attributes:
+        pair: the pair.
+        half: tuned on or held out.
+        foreign: the right image of another scene; None: no mistakes are made on this pair.
+    """
+
+    pair: GivenPair
+    half: str
+    foreign: Image | None
+
+
+def given_jobs(data: Path) -> list[GivenJob]:
+    """List all given pairs, with mistakes to be made on the first of each series."""
+    pairs = list(given_pairs(data))
+    series: Counter[str] = Counter()
+    jobs = []
+    for number, pair in enumerate(pairs):
+        family = next((name for name in _FAMILIES if pair.name.startswith(name)), pair.name)
+        series[family] += 1
+        others = [other for other in pairs if other.name.split()[0] != pair.name.split()[0]]
+        makes = series[family] == 1 and "board" not in family
+        foreign = others[(7 * number) % len(others)].right if makes else None
+        jobs.append(GivenJob(pair, _TUNED_ON if number % 2 == 0 else _HELD_OUT, foreign))
+    return jobs
+
+
+def given_rows(job: GivenJob) -> list[Row]:
+    """Judge a given pair, and the mistakes made on it."""
     cv2.setNumThreads(1)  # the CPU time of a judgement is asked for
-    return [_good(scene, scene.left, scene.right), *(_mistaken(scene, foreign) if scene.has_mistakes else ())]
+    pair = job.pair
+    scene = _Scene(pair.name, "given", job.half, pair.left, pair.right, pair.core())
+    rows = [_good(scene, scene.left, scene.right)]
+    return rows if job.foreign is None else [*rows, *_mistaken(scene, job.foreign)]
 
 
-def _room_rows(seed: int) -> list[Row]:
+def room_rows(seed: int) -> list[Row]:
     """Judge a short good run in a rendered room; in some rooms make the mistakes as well."""
     cv2.setNumThreads(1)
     made = room(seed)
     half = _TUNED_ON if seed < _ROOMS // 2 else _HELD_OUT
     pairs = made.pairs(_PAIRS_OF_A_RUN)
-    scene = _Scene(f"room {seed}", "room", half, *pairs[0], made.core(), has_mistakes=True)
+    scene = _Scene(f"room {seed}", "room", half, *pairs[0], made.core())
     rows = [_good(scene, left, right) for left, right in pairs]
     if seed % (_ROOMS // _ROOMS_WITH_MISTAKES) == 0:
         rows += _mistaken(scene, room(seed + _ROOMS).pairs(1)[0][1])
     return rows
 
 
-def _families(data: Path) -> list[list[Row]]:
-    """Judge all given pairs, and the mistakes made on one pair of each series."""
-    scenes = list(_given(data))
-    done = []
-    for number, scene in enumerate(scenes):
-        others = [other for other in scenes if other.name.split()[0] != scene.name.split()[0]]
-        done.append(_given_scene_rows(scene, others[(7 * number) % len(others)].right))
-    return done
-
-
 def all_rows(data: Path, jobs: int, progress: Progress) -> list[Row]:
     """Judge everything, in several processes."""
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-        given = pool.submit(_families, data)
-        rooms = [pool.submit(_room_rows, seed) for seed in range(_ROOMS)]
-        found = [room.result() for room in progress.track(rooms, description="rooms")]
-        return [row for rows in (*given.result(), *found) for row in rows]
+        parts = [pool.submit(given_rows, job) for job in given_jobs(data)]
+        parts += [pool.submit(room_rows, seed) for seed in range(_ROOMS)]
+        return [row for part in progress.track(parts, description="scenes") for row in part.result()]
 
 
 def judge(rows: Sequence[Row]) -> list[Verdict]:

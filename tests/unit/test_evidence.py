@@ -220,8 +220,8 @@ def test_without_a_rig_only_brightness_is_judged(good: Pair) -> None:
 
 
 def test_images_without_anything_in_them_are_measured_too() -> None:
-    """Plain images of one level, and images of a few pixels, give evidence without any feature and no accusation but of blindness."""
-    for size in ((240, 320), (9, 16)):
+    """Plain images of one level, and images of a few pixels or one, give evidence without any feature and no accusation but of blindness."""
+    for size in ((240, 320), (16, 9), (1, 40), (1, 1)):
         plain = np.full((*size, 3), 128, np.uint8)
         evidence = _evidence(FLAT, plain, plain)
         assert max(support.features for support in evidence.supports) == 0
