@@ -196,5 +196,6 @@ def test_which_doubts_block() -> None:
     blocking = {doubt.value for doubt in Doubt if doubt.blocks}
     assert blocking == {
         "swapped", "turned", "turned_by_quarter", "mirrored", "same_image", "other_scene", "covered", "no_depth",
+        "no_whole_image",
     }  # fmt: skip
     assert not Concern(Doubt.TIME_SKEW, "", "").doubt.blocks

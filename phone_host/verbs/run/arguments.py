@@ -12,7 +12,7 @@ from phone_host.verbs.stereo_arguments import add_stereo_arguments
 SUMMARY = "pair the board's frames with those of this machine's camera, compute depth, measure every delay"
 
 EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --calibration rig.yaml --out scan
-  phone-host run --link ipc://$XDG_RUNTIME_DIR/board --camera replay:right --rectified --disparities 64 --out scan        (photographs, by number)
+  phone-host run --link ipc://$XDG_RUNTIME_DIR/board --camera replay:right --rectified --disparities 64 --out scan    # photographs, by number
   phone-host run --link tcp://192.168.7.2:5555 --camera 'http://127.0.0.1:8080/video?latency_ms=120' --calibration rig.yaml --out scan
   phone-host run --link serial:/dev/ttyACM0 --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --out scan
   phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --align-phase    # both cameras expose together
@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--seconds",
-        type=float,
+        type=reading(seconds, "--seconds"),
         default=0.0,
         metavar="S",
         help="end S seconds after the first pair; exit with code 4 if none comes within 10 seconds more (default: no limit)",
