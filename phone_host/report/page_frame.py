@@ -92,7 +92,7 @@ body{margin:0;background:var(--bg);color:var(--ink);font:16px/1.5 system-ui,-app
 main{max-width:1040px;margin:0 auto;padding:2rem 1.25rem 3rem;display:grid;gap:1.25rem}
 main>*{min-width:0;margin:0}
 h1{font-size:1.7rem;line-height:1.2;letter-spacing:-.01em;margin:0}h2{font-size:1.05rem;margin:0 0 .25rem}h3{font-size:.95rem;margin:1.25rem 0 .5rem}
-.sub,section>p{color:var(--ink2);margin:.25rem 0 0}section>p{font-size:.9rem;margin:0 0 .75rem;max-width:95ch}
+.sub,section>p{color:var(--ink2);margin:.25rem 0 0}h1,.sub{overflow-wrap:anywhere}section>p{font-size:.9rem;margin:0 0 .75rem;max-width:95ch}
 .verdict{display:flex;gap:.75rem;align-items:baseline;padding:.8rem 1rem;border-radius:10px;background:var(--card);
 border:1px solid var(--line);border-left:4px solid currentColor}
 .verdict span{color:var(--ink)}.good{color:var(--good)}.warning{color:var(--warning)}.bad{color:var(--bad)}

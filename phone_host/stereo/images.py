@@ -230,11 +230,15 @@ def require_same_size(left_px: tuple[int, int], right_px: tuple[int, int], left_
     Raises:
         DataError: their sizes differ.
     """
-    if left_px != right_px:
+    if left_px == right_px:
+        return
+    differ = f"{left_name} is {px_text(left_px)} px, {right_name} is {px_text(right_px)} px"
+    if left_px == right_px[::-1]:
         raise DataError(
-            f"{left_name} is {px_text(left_px)} px, {right_name} is {px_text(right_px)} px",
-            "a rectified pair has one size; for two unlike cameras give --calibration rig.yaml",
+            f"{differ}: one of the two lies on its side",
+            "turn it upright: --rotate-left 90 or 270, or --rotate-right 90 or 270; for a camera, rotate=90 or 270 in its address",
         )
+    raise DataError(differ, "a rectified pair has one size; for two unlike cameras give --calibration rig.yaml")
 
 
 def size_px(image: AnyImage) -> tuple[int, int]:

@@ -76,11 +76,13 @@ def _scaled(model: CameraModel, size_px: tuple[int, int], side: Side) -> CameraM
     if size_px == own_px:
         return model
     if not _is_scaling(own_px, size_px):
-        raise DataError(
-            f"the {side.value} image is {size_text(size_px)} px, no scaling of the {size_text(own_px)} px that the rig"
-            " was calibrated for",
-            "use a resolution of the calibration's aspect ratio, or calibrate again at this one",
-        )
+        differ = f"the {side.value} image is {size_text(size_px)} px, no scaling of the {size_text(own_px)} px that the rig was calibrated for"
+        if _is_scaling(own_px, size_px[::-1]):
+            raise DataError(
+                f"{differ}: it lies on its side",
+                f"turn it upright: --rotate-{side.value} 90 or 270; for a camera, rotate=90 or 270 in its address",
+            )
+        raise DataError(differ, "use a resolution of the calibration's aspect ratio, or calibrate again at this one")
     scale_x, scale_y = (new / old for new, old in zip(size_px, own_px, strict=True))
     # Pixel centres are integers, so an image begins at -0.5: x' + 0.5 = (x + 0.5) s.
     to_scaled = np.array([[scale_x, 0, (scale_x - 1) / 2], [0, scale_y, (scale_y - 1) / 2], [0, 0, 1]], np.float64)

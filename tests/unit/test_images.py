@@ -151,3 +151,9 @@ def test_two_sizes_are_no_rectified_pair() -> None:
     """The message names both files with their sizes, width first."""
     with pytest.raises(DataError, match=r"a\.png is 4x3 px, b\.png is 5x3 px.*--calibration"):
         require_same_size((4, 3), (5, 3), "a.png", "b.png")
+
+
+def test_an_image_on_its_side_is_told_from_one_of_another_camera() -> None:
+    """Width and height exchanged between the two: the remedy is a turn."""
+    with pytest.raises(DataError, match=r"lies on its side.*--rotate-left 90"):
+        require_same_size((4, 3), (3, 4), "a.png", "b.png")
