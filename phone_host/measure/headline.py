@@ -16,9 +16,6 @@ from phone_host.model import StereoGeometry
 USUAL_ERROR_PX: Final = 0.25
 """A matcher's median error on real images (`tests/bench/bench_depth.py`), where the core states none."""
 
-_NEAR_1_M: Final = 3.0
-"""Up to this factor from 1 m the answer is given at 1 m, which people can imagine; else at the scene's own depth."""
-
 
 class Grade(Enum):
     """How good the answer is; its values are those of the page's headline."""
@@ -77,17 +74,20 @@ def answer(
 
 
 def _reach(figures: ImageFigures, geometry: StereoGeometry | None, error_px: float) -> str:
+    """Say how good the depth is in the middle of the scene: at its median disparity."""
     if geometry is None:
         return "it is in pixels only, because focal length and baseline are not known."
-    depth_m = 1.0
     shifted_px = figures.disparity_px + geometry.doffs_px
-    if shifted_px > 0:
-        middle_m = geometry.focal_px * geometry.baseline_m / shifted_px
-        if not 1 / _NEAR_1_M <= middle_m <= _NEAR_1_M:
-            depth_m = float(f"{middle_m:.1g}")
+    depth_m = geometry.focal_px * geometry.baseline_m / shifted_px if shifted_px > 0 else 1.0
     error_mm = depth_error_m(geometry, depth_m, error_px) * 1e3
-    shown = f"{error_mm:.0f} mm" if error_mm >= 1 else f"{error_mm:.1f} mm"
-    return f"at {depth_m:g} m it is good to about {shown}."
+    shown = f"{error_mm:.0f} mm" if 1 <= error_mm < 1000 else metres(error_mm / 1e3) if error_mm >= 1 else f"{error_mm:.1f} mm"
+    return f"at {metres(depth_m)}, the middle of the scene, it is good to about {shown}."
+
+
+def metres(depth_m: float) -> str:
+    """Write a depth with two digits, such as 0.85 m, 2.6 m or 38 m."""
+    rounded = float(f"{depth_m:.2g}")
+    return f"{rounded:.0f} m" if rounded >= 10 else f"{rounded:.2g} m"
 
 
 def headline(run: RunSnapshot) -> Answer:

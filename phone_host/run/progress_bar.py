@@ -5,16 +5,19 @@ It fits its terminal: on a phone's, the words wrap and the bar makes room, so th
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Final
+from enum import Enum
+from typing import Final, assert_never
 
 from rich.console import Console
 from rich.progress import (
     BarColumn,
+    MofNCompleteColumn,
     Progress,
     ProgressColumn,
     TaskID,
     TaskProgressColumn,
     TextColumn,
+    TimeElapsedColumn,
     TimeRemainingColumn,
 )
 from rich.table import Column
@@ -23,22 +26,40 @@ _WIDE: Final = 76
 """Characters for the longest description (40), a bar and two numbers."""
 
 
-def progress_bar(console: Console) -> Progress:
-    """Make a progress bar with percentage and time left; it is hidden where the console is no terminal and gone when it ends.
+class Amount(Enum):
+    """How a bar tells how much is done: a share and the time left, units and the time left, or only the time that has passed."""
+
+    SHARE = "share"
+    UNITS = "units"
+    UNKNOWN = "unknown"
+
+
+def progress_bar(console: Console, amount: Amount = Amount.SHARE) -> Progress:
+    """Make a progress bar; it is hidden where the console is no terminal, and gone when it ends.
 
     Args:
         console: where to draw.
+        amount: how it tells how much is done.
     """
     narrow = console.width < _WIDE
     words = TextColumn("{task.description}", table_column=Column(ratio=1) if narrow else None)
     bar: list[ProgressColumn] = [] if narrow else [BarColumn()]
-    numbers = (
-        TaskProgressColumn(table_column=Column(no_wrap=True, min_width=4)),
-        TimeRemainingColumn(table_column=Column(no_wrap=True, min_width=7)),
-    )
     return Progress(
-        words, *bar, *numbers, console=console, transient=True, disable=not console.is_terminal, expand=narrow
+        words, *bar, *_numbers(amount), console=console, transient=True, disable=not console.is_terminal, expand=narrow
     )
+
+
+def _numbers(amount: Amount) -> tuple[ProgressColumn, ...]:
+    left = TimeRemainingColumn(table_column=Column(no_wrap=True, min_width=7)), TextColumn("left")
+    match amount:
+        case Amount.SHARE:
+            return TaskProgressColumn(table_column=Column(no_wrap=True, min_width=4)), *left
+        case Amount.UNITS:
+            return MofNCompleteColumn(table_column=Column(no_wrap=True)), *left
+        case Amount.UNKNOWN:
+            return (TimeElapsedColumn(table_column=Column(no_wrap=True, min_width=7)),)
+        case _:
+            assert_never(amount)
 
 
 class ShareBar:
@@ -78,6 +99,43 @@ def share_bar(what: str, then: str = "", console: Console | None = None) -> Iter
         yield ShareBar(progress, task, then)
 
 
+class StepBar:
+    """A bar that counts units of work.
+
+    Args:
+        progress: the bar it is drawn in.
+        task: the bar's task.
+    """
+
+    def __init__(self, progress: Progress, task: TaskID) -> None:
+        self._progress, self._task = progress, task
+
+    def __call__(self, amount: int = 1) -> None:
+        """Count so many units as done."""
+        self._progress.advance(self._task, amount)
+
+    def say(self, what: str) -> None:
+        """Show what is being done from now on."""
+        self._progress.update(self._task, description=what)
+
+
+@contextmanager
+def step_bar(what: str, total: int | None, console: Console | None = None) -> Iterator[StepBar]:
+    """Show a bar on stderr while a block runs.
+
+    Args:
+        what: what is being done, such as "finding the board".
+        total: the units of work; None: not known, so only the time that has passed is shown.
+        console: where to draw; stderr by default.
+
+    Yields:
+        The function to call after each unit.
+    """
+    amount = Amount.UNKNOWN if total is None else Amount.UNITS
+    with progress_bar(console or Console(stderr=True), amount) as progress:
+        yield StepBar(progress, progress.add_task(what, total=total))
+
+
 @contextmanager
 def busy_bar(what: str, console: Console | None = None) -> Iterator[None]:
     """Show on stderr that something goes on while a block runs, if nobody knows how long it takes.
@@ -86,8 +144,5 @@ def busy_bar(what: str, console: Console | None = None) -> Iterator[None]:
         what: what is being done.
         console: where to draw; stderr by default.
     """
-    shown = console or Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn())
-    with Progress(*columns, console=shown, transient=True, disable=not shown.is_terminal) as progress:
-        progress.add_task(what, total=None)
+    with step_bar(what, None, console):
         yield

@@ -17,8 +17,7 @@ def judge_pair(core: StereoCore, processed: Processed) -> PairTrust:
         processed: its result.
     """
     evidence = measure_evidence(processed, maps_of(core, processed))
-    # What the images tell of swapped, turned or shifted views assumes that the epipolar lines are rows.
-    found = () if processed.pair.epipolar.is_vertical else image_doubts(evidence)
+    found = image_doubts(evidence)
     if not has_depth(processed) and not any(concern.doubt.blocks for concern in found):
         found = gravest_first((NO_DEPTH, *found))
     figures = median_figures((evidence,))

@@ -17,6 +17,7 @@ from phone_host.stereo.evidence_features import Matches, find_features, match, o
 from phone_host.stereo.evidence_light import measure_exposure
 from phone_host.stereo.evidence_points import PointMaps, ThroughRig, Unmoved
 from phone_host.stereo.match_align import with_levels_of
+from phone_host.stereo.stacked import lying, lying_pair
 
 _FEATURE_PX: Final = 72_000
 """Pixels of the images in which features are searched, some 310 x 232: twice as many take twice as long and find no more mistakes."""
@@ -63,14 +64,19 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
     """Measure the evidence in one pair.
 
     Args:
-        processed: the pair; rectified if `maps` is given.
+        processed: the pair; rectified if `maps` is given. Stacked cameras' pairs are laid on their side first, so that
+            rows are rows.
         maps: the way of a point from the cameras' own images; None if the pair is not rectified. Then only brightness
             and sharpness are measured.
     """
-    left, right = _grey(processed.pair.left), _grey(processed.pair.right)
-    if maps is None or processed.disparity is None:
+    pair, disparity, epipolar = lying_pair(processed.pair), processed.disparity, processed.pair.epipolar
+    left, right = _grey(pair.left), _grey(pair.right)
+    if maps is None or disparity is None:
         return Evidence(left=measure_exposure(left, 0), right=measure_exposure(right, 0))
     height_px, width_px = left.shape
+    if epipolar.is_vertical:
+        # Points then take the way of images that came rectified: a turned camera's axis is taken for the image's middle.
+        disparity, maps = lying(disparity, epipolar), Unmoved(width_px, height_px)
     scale = min(1.0, math.sqrt(_FEATURE_PX / left.size))
     found = [find_features(_stretched(_reduced(image, scale)), scale) for image in (left, right)]
     plain, turned_over = (match(*found, is_mirrored=mirror) for mirror in (False, True))
@@ -79,9 +85,9 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
     return Evidence(
         left=measure_exposure(left, len(found[0].points_px)),
         right=measure_exposure(right, len(found[1].points_px)),
-        density=float(np.isfinite(processed.disparity).mean()),
-        disparity_px=_middle(processed.disparity),
-        consistency=_consistency(left, right, processed.disparity, 0.0 if math.isnan(offset_px) else offset_px),
+        density=float(np.isfinite(disparity).mean()),
+        disparity_px=_middle(disparity),
+        consistency=_consistency(left, right, disparity, 0.0 if math.isnan(offset_px) else offset_px),
         vertical_px=vertical_px,
         vertical_offset_px=offset_px,
         supports=supports(upright, plain, turned_over, maps, (width_px, height_px)),

@@ -51,7 +51,7 @@ def scaled_geometry(
     Raises:
         DataError: the second size is no scaling of the first.
     """
-    if not _is_scaling(from_px, to_px):
+    if not is_scaling(from_px, to_px):
         raise DataError(
             f"the images are {size_text(to_px)} px, no scaling of the {size_text(from_px)} px that {name} is for",
             "give the calibration of these images",
@@ -75,9 +75,9 @@ def _scaled(model: CameraModel, size_px: tuple[int, int], side: Side) -> CameraM
     own_px = (model.width_px, model.height_px)
     if size_px == own_px:
         return model
-    if not _is_scaling(own_px, size_px):
+    if not is_scaling(own_px, size_px):
         differ = f"the {side.value} image is {size_text(size_px)} px, no scaling of the {size_text(own_px)} px that the rig was calibrated for"
-        if _is_scaling(own_px, size_px[::-1]):
+        if is_scaling(own_px, size_px[::-1]):
             raise DataError(
                 f"{differ}: it lies on its side",
                 f"turn it upright: --rotate-{side.value} 90 or 270; for a camera, rotate=90 or 270 in its address",
@@ -89,8 +89,8 @@ def _scaled(model: CameraModel, size_px: tuple[int, int], side: Side) -> CameraM
     return replace(model, width_px=size_px[0], height_px=size_px[1], matrix=to_scaled @ model.matrix)
 
 
-def _is_scaling(one_px: tuple[int, int], other_px: tuple[int, int]) -> bool:
-    """Return whether one size is the other times one number, up to the rounding of the smaller one."""
+def is_scaling(one_px: tuple[int, int], other_px: tuple[int, int]) -> bool:
+    """Return whether one size (width and height, px) is the other times one number, up to the rounding of the smaller one."""
     small, large = sorted((one_px, other_px))
     by_width = large[1] * small[0] / large[0]
     return min(small) > 0 and abs(by_width - small[1]) < _ROUNDING_PX

@@ -121,11 +121,12 @@ def with_images(**values: Any) -> RunSnapshot:
 
 
 def test_the_headline_of_a_good_run_says_how_far_to_trust_it() -> None:
-    """Depth is wrong by z^2 * e / (f b): 1 m^2 * 0.25 px / 50 px m = 5 mm."""
+    """Depth is wrong by z^2 * e / (f b): (2 m)^2 * 0.25 px / 50 px m = 20 mm."""
     said = headline(with_images())
     assert said.grade is Grade.GOOD
     assert said.sentence == (
-        "Depth looks right: 90% of the pixels have depth, rows agree to 0.2 px; at 1 m it is good to about 5 mm."
+        "Depth looks right: 90% of the pixels have depth, rows agree to 0.2 px;"
+        " at 2 m, the middle of the scene, it is good to about 20 mm."
     )
     assert depth_error_m(GEOMETRY, 2.0, 0.25) == pytest.approx(0.02)
     assert summary(with_images()).startswith(said.sentence)
@@ -134,7 +135,7 @@ def test_the_headline_of_a_good_run_says_how_far_to_trust_it() -> None:
 def test_a_far_scene_is_answered_for_at_its_own_depth() -> None:
     """At 5 px the scene is 10 m away: 100 * 0.5 / 50 = 1 m of error with the core's own half pixel; without geometry there are no metres."""
     far = ImageFigures(density=0.9, disparity_px=5.0)
-    assert "at 10 m it is good to about 1000 mm" in answer(far, (), GEOMETRY, 0.5).sentence
+    assert "at 10 m, the middle of the scene, it is good to about 1 m" in answer(far, (), GEOMETRY, 0.5).sentence
     assert "in pixels only" in answer(far, (), None).sentence
     assert "was judged" in answer(ImageFigures(), (), None).sentence
 

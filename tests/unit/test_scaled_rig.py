@@ -47,9 +47,9 @@ def test_a_size_rounded_to_whole_pixels_is_a_scaling(scale: float) -> None:
         assert scaled_rig(unlike_rig(), left, (1280, 720)).left.width_px == left[0]
 
 
-@pytest.mark.parametrize("size", [(640, 360), (480, 640), (640, 470), (1920, 1080), (100, 60)])
+@pytest.mark.parametrize("size", [(640, 360), (640, 470), (1920, 1080), (100, 60)])
 def test_another_shape_is_refused_with_both_sizes(size: tuple[int, int]) -> None:
-    """Neither a crop nor a turned image can be told from its size; the error names both sizes and the remedy."""
+    """A crop cannot be told from its size; the error names both sizes and the remedy."""
     with pytest.raises(DataError, match=rf"left image is {size[0]}x{size[1]} px, .*640x480") as caught:
         scaled_rig(unlike_rig(), size, (1280, 720))
     assert "aspect ratio" in caught.value.remedy
@@ -64,3 +64,9 @@ def test_the_geometry_of_rectified_images_scales_but_not_their_baseline() -> Non
     assert half == StereoGeometry(focal_px=500, baseline_m=0.2, cx_px=149.5, cy_px=99.5, doffs_px=15)
     with pytest.raises(DataError, match="300x300 px, no scaling of the 600x400 px"):
         scaled_geometry(full, (600, 400), (300, 300), "calib.txt")
+
+
+def test_a_turned_image_is_told_from_another_shape() -> None:
+    """Width and height exchanged: the remedy is a turn of that side."""
+    with pytest.raises(DataError, match=r"left image is 480x640 px.*lies on its side.*--rotate-left 90"):
+        scaled_rig(unlike_rig(), (480, 640), (1280, 720))

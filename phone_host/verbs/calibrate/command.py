@@ -18,13 +18,13 @@ from phone_host.model import Rig, Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_yaml import REJECTED, is_rig, read_rig, write_rig
+from phone_host.run.progress_bar import step_bar
 from phone_host.settings import most_pixels
 from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.calibrate.figures import rejections, report_of, report_of_failure, summary, unwritten
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, unwritable
-from phone_host.verbs.progress import progress
 from phone_host.verbs.units import square_mm
 
 _CHECK_FAILED = 4
@@ -73,7 +73,7 @@ def _calibrated(
 ) -> tuple[BoardViews, Calibration | DataError]:
     """Search all images and calibrate; return why there is no calibration if there is none."""
     limit = most_pixels(None, options.max_megapixels)
-    with progress("finding the board", len(files.pairs)) as step:
+    with step_bar("finding the board", len(files.pairs)) as step:
         views = look_for_boards(files, board, step, limit, mounted)
         step.say("fitting the rig")
         try:

@@ -15,6 +15,7 @@ from phone_host.report.page_links import NextCommand
 from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_lines import pair_lines, set_lines
 from phone_host.report.stereo_report import Size
+from phone_host.run.progress_bar import step_bar
 from phone_host.run.stereo_job import StereoJob, run_stereo
 from phone_host.run.stereo_results import NAMES, require_writable
 from phone_host.settings import most_pixels
@@ -23,7 +24,6 @@ from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
-from phone_host.verbs.progress import progress
 from phone_host.verbs.stereo_options import build_core, output_options
 
 _DEFAULT_MATCHER: Final = "sgbm"
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     )
     count = len(files.pairs)
     try:
-        with progress("reading", count if count > 1 else None) as watcher:
+        with step_bar("reading", count if count > 1 else None) as watcher:
             report = run_stereo(job, watcher)
     except OSError as error:
         raise unwritable(options.out, error) from error
