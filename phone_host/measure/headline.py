@@ -80,7 +80,13 @@ def _reach(figures: ImageFigures, geometry: StereoGeometry | None, error_px: flo
     shifted_px = figures.disparity_px + geometry.doffs_px
     depth_m = geometry.focal_px * geometry.baseline_m / shifted_px if shifted_px > 0 else 1.0
     error_mm = depth_error_m(geometry, depth_m, error_px) * 1e3
-    shown = f"{error_mm:.0f} mm" if 1 <= error_mm < 1000 else metres(error_mm / 1e3) if error_mm >= 1 else f"{error_mm:.1f} mm"
+    shown = (
+        f"{error_mm:.0f} mm"
+        if 1 <= error_mm < 1000
+        else metres(error_mm / 1e3)
+        if error_mm >= 1
+        else f"{error_mm:.1f} mm"
+    )
     return f"at {metres(depth_m)}, the middle of the scene, it is good to about {shown}."
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Final
 
 import cv2
+import numpy as np
 
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
@@ -64,6 +65,9 @@ def prepare(folder: Path) -> None:
             cv2.imwrite(str(folder / side / f"{number:02d}.png"), image)
             cv2.imwrite(str(folder / f"{side}.png"), image)
     write_rig(folder / "rig.yaml", rig, rectify_rig(rig))
+    wide = cv2.GaussianBlur(np.random.default_rng(3).integers(0, 256, (240, 340), dtype=np.uint8), (0, 0), 1.0)
+    cv2.imwrite(str(folder / "im0.png"), wide[:, :320])
+    cv2.imwrite(str(folder / "im1.png"), wide[:, 20:])  # rectified, 20 px of disparity everywhere
 
 
 def run(command: Command, folder: Path) -> subprocess.CompletedProcess[str]:

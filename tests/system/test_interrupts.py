@@ -49,16 +49,16 @@ def test_ctrl_c_while_a_command_is_imported_is_one_line_and_130(
 def test_ctrl_c_during_a_long_match_leaves_nothing_half_written(tmp_path: Path) -> None:
     """The matcher would need a minute for these 50 megapixels; the command ends before it returns, with 130, and writes no result."""
     tile = np.random.default_rng(1).integers(0, 256, (722, 1083), dtype=np.uint8)
-    cv2.imwrite(str(tmp_path / "image.jpg"), np.tile(tile, (8, 8)))
+    images = [str(tmp_path / f"{side}.jpg") for side in ("left", "right")]
+    for image in images:
+        cv2.imwrite(image, np.tile(tile, (8, 8)))
     out = tmp_path / "out"
-    image = str(tmp_path / "image.jpg")
-    arguments = ["stereo", image, image, "--rectified", "--disparities", "1024", "--max-megapixels", "64"]
+    arguments = ["stereo", *images, "--rectified", "--disparities", "1024", "--scale", "1", "--max-megapixels", "64"]
     with program("phone_host.start", [*arguments, "--out", str(out)], tmp_path, "stereo") as running:
-        until((out / ".tandemscan").exists, "the images are read")
         clock = Path(f"/proc/{running.process.pid}/stat")
-        begun = int(clock.read_text().split()[13])
-        until(lambda: int(clock.read_text().split()[13]) > begun + 100, "it has computed for a second")
+        # Start and decoding take two seconds of processor time.
+        until(lambda: int(clock.read_text().split()[13]) > 400, "it has computed for four seconds")
         assert running.stop(signal.SIGINT) == 130
         assert "Traceback" not in running.stderr
         assert running.stderr.endswith("interrupted\n")
-    assert [path.name for path in out.iterdir()] == [".tandemscan"]
+    assert not out.exists() or {path.name for path in out.iterdir()} <= {".tandemscan"}

@@ -91,7 +91,7 @@ def test_the_rate_follows_the_line(film: tuple[str, int], tmp_path: Path) -> Non
     assert session["camera"]["lowest_rung"] == 3  # 10, 6.7 and 5 frames/s
     assert session["camera"]["changes"] == len(rungs(sender)) == len(rungs(receiver)) >= 2
     assert session["camera"]["fps"] == pytest.approx(FPS, abs=0.01)
-    assert "board camera: as it was asked for" in (out / "index.html").read_text()
+    assert "Board camera: as it was asked for" in (out / "index.html").read_text()
     assert json.loads((out / "report.json").read_text())["sessions"][0]["camera"] == session["camera"]
 
 

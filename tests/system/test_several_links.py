@@ -15,6 +15,7 @@ from common.camera.factory import open_camera
 from common.frame import Buffer
 from common.link.base import SendResult
 from common.link.zeromq import ZeroMqListener
+from common.words import times
 from phone_host.bench.emulate import Profile
 from phone_host.bench.relay import relay_process
 from tests.support.keys import acquainted
@@ -108,7 +109,7 @@ def test_a_pulled_cable_and_back(film: str, cable: PtyLine, network: tuple[str, 
     assert serial["lost"] == 1
     assert report["switches"] == serial["carried"] + over_tcp["carried"] - 1 >= 2
     page = (out / "index.html").read_text()
-    assert f"the stream changed links {report['switches']} times" in page
+    assert f"the stream changed links {times(report['switches'])}" in page
     assert f"<td>tcp</td><td>{over_tcp['frames']}</td>" in page
     assert "link_switched source=serial target=tcp" in receiver.stderr
     assert "link_switched source=tcp target=serial" in receiver.stderr
