@@ -101,6 +101,10 @@ class CutCounts:
     too_near: int = 0
     outside: int = 0
 
+    def __add__(self, other: "CutCounts") -> "CutCounts":
+        """Return the counts of both."""
+        return CutCounts(**{name: getattr(self, name) + getattr(other, name) for name in self.__slots__})
+
 
 class Epipolar(Enum):
     """Where a point of the left image lies in the rectified right one, d px away: which way the epipolar lines run.
@@ -349,6 +353,21 @@ class Result:
     pair: FramePair
     processed: Processed
     ledger: PairLedger
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DepthAccount:
+    """What became of the pixels of all pairs of a run.
+
+    Attributes:
+        cut: the counts of all pairs together; None without a core.
+        limits: of the newest pair; None without a cloud.
+        search: how the newest pair was matched; None without a core.
+    """
+
+    cut: CutCounts | None = None
+    limits: DepthLimits | None = None
+    search: Search | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,7 +26,7 @@ from phone_host.measure.trust import (
     timing_concerns,
     unbelieved_concerns,
 )
-from phone_host.model import PairCounts, TimeOffset, Unwritten
+from phone_host.model import DepthAccount, PairCounts, TimeOffset, Unwritten
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.phase import Alignment, Phase
@@ -58,6 +58,7 @@ class RunSnapshot:
         judged_pairs: number of newest pairs over which time and motion are judged; None: all.
         missed_locks: controls of the rig's cameras that could not be restored.
         images: what the images say about the depth.
+        depth: what became of the pixels of all pairs.
     """
 
     ended: str
@@ -94,6 +95,7 @@ class RunSnapshot:
     gaps: int = 0
     gap_s: float = 0.0
     images: ImageTrust = field(default_factory=ImageTrust)
+    depth: DepthAccount = field(default_factory=DepthAccount)
 
     @property
     def stopped(self) -> int:

@@ -15,7 +15,7 @@ from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, dis
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
-from phone_host.model import TimeOffset
+from phone_host.model import DepthAccount, TimeOffset
 from phone_host.sync.fifo import Overflow
 
 _MS: Final = 1e6
@@ -73,6 +73,7 @@ def build(run: RunSnapshot) -> dict[str, object]:
             "orphaned": dict(run.counts.host_orphans),
             "camera": _camera(run.camera),
         },
+        "depth": _depth(run.depth),
         "regime": _regime(judge(figures(run))),
         "image_motion_px_per_s": _number(run.motion_px_s),
         "trust": _trust(run),
@@ -96,6 +97,18 @@ def build(run: RunSnapshot) -> dict[str, object]:
 def _is_untold(run: RunSnapshot, name: str) -> bool:
     """Whether a delay is counted from an exposure that has no time."""
     return run.timeless and name in FROM_EXPOSURE
+
+
+def _depth(depth: DepthAccount) -> dict[str, object] | None:
+    """Return what became of the pixels of all pairs, and between which limits; None without a core."""
+    if depth.cut is None:
+        return None
+    return {
+        "scale": None if depth.search is None else round(depth.search.scale, 4),
+        "disparities": None if depth.search is None else depth.search.disparities or None,
+        "limits": None if depth.limits is None else asdict(depth.limits),
+        "cut": asdict(depth.cut),
+    }
 
 
 def _trust(run: RunSnapshot) -> dict[str, object]:

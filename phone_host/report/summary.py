@@ -13,7 +13,8 @@ from phone_host.measure.image_doubts import ImageTrust
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.unused import unused
-from phone_host.model import TimeOffset
+from phone_host.model import DepthAccount, TimeOffset
+from phone_host.report.cut_words import cut_sentence
 from phone_host.sync.phase import Alignment, Phase
 from phone_host.sync.stills import PairedBy
 
@@ -47,6 +48,7 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
     lines += [f"  {remedy}" for remedy in judge(figures(run)).remedies]
     lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(run)]
     lines += depth_lines(run.images)
+    lines += cut_lines(run.depth)
     lines += camera_troubles(run.camera)
     lines += [*rung_lines(run.link), *_links(run.link, width), *_unused_lines(run)]
     return "\n".join(lines)
@@ -106,6 +108,12 @@ def depth_lines(images: ImageTrust) -> list[str]:
     if not math.isnan(start.vertical_px + end.vertical_px):
         parts.append(f"vertical error {start.vertical_px:.2f}, {end.vertical_px:.2f} px")
     return [f"depth: {'; '.join(parts)}"]
+
+
+def cut_lines(depth: DepthAccount) -> list[str]:
+    """Say in one line what was cut from the clouds of all pairs; nothing if nothing was."""
+    words = "" if depth.cut is None else cut_sentence(depth.cut, depth.limits)
+    return [f"cut from the clouds: {words}"] if words else []
 
 
 def camera_troubles(health: CameraHealth) -> list[str]:

@@ -307,6 +307,7 @@ class Host:
             gaps=books.gaps,
             gap_s=books.gap_ns / 1e9,
             images=self._trust.trust,
+            depth=books.depth,
         )
 
     def _is_unneeded(self, account: SinkAccount) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from common.frame import FrameFault, SpoiledImageError
 from common.ledger import HostMarks, PairLedger
 from phone_host.measure.delays import DelayStatistics, Sample
-from phone_host.model import FramePair, Processed
+from phone_host.model import CutCounts, DepthAccount, FramePair, Processed
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +37,7 @@ class Books:
         first_done_ns: when the first pair was done; 0: none yet.
         last_done_ns: when the last pair was done; 0: none yet.
         delays: delays of all pairs.
+        depth: what became of the pixels.
         gaps: how often the board was away between two pairs.
         gap_ns: time between those pairs, in all.
     """
@@ -69,6 +70,7 @@ class Ledgerer:
         self._lock = threading.Lock()
         self._delays, self._sample = DelayStatistics(), Sample()
         self._spoiled: Counter[FrameFault] = Counter()
+        self._depth = DepthAccount()
         self.last: Processed | None = None
         self.processed = self.undecodable = 0
         self.first_done_ns = self.last_done_ns = 0
@@ -116,6 +118,7 @@ class Ledgerer:
             self._gap_ns += idle_ns if is_gap else 0
             self._delays.add(ledger, after_gap=is_gap, timeless=self._is_timeless())
             self._sample.add(ledger)
+            self._depth = _with(self._depth, processed)
             self.last = processed
             self.first_done_ns = self.first_done_ns or marks.done_ns
             self.last_done_ns = marks.done_ns
@@ -139,6 +142,7 @@ class Ledgerer:
                 first_done_ns=self.first_done_ns,
                 last_done_ns=self.last_done_ns,
                 delays=self._delays.copy(),
+                depth=self._depth,
                 gaps=self._gaps,
                 gap_ns=self._gap_ns,
             )
@@ -147,3 +151,12 @@ class Ledgerer:
         """Return ledgers for plots, in order: all of them, or an evenly spaced sample."""
         with self._lock:
             return tuple(self._sample.ledgers)
+
+
+def _with(depth: DepthAccount, processed: Processed) -> DepthAccount:
+    """Return the account with one more pair."""
+    if processed.cut is None:
+        return depth
+    return DepthAccount(
+        cut=(depth.cut or CutCounts()) + processed.cut, limits=processed.limits, search=processed.search
+    )

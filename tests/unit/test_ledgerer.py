@@ -2,17 +2,17 @@
 
 from phone_host.measure.absence import Absence
 from phone_host.measure.accounts import LinkAccount
-from phone_host.model import FramePair, Processed, RectifiedPair
+from phone_host.model import CutCounts, FramePair, Processed, RectifiedPair
 from phone_host.run.ledgerer import Ledgerer, WorkerMarks
 from tests.support.numbered import draw
 from tests.support.samples import LEDGER
 from tests.unit.test_pair_queue import MS, board_frame, host_frame
 
 
-def enter(books: Ledgerer, at_ns: int) -> None:
+def enter(books: Ledgerer, at_ns: int, cut: CutCounts | None = None) -> None:
     """Enter a pair that was queued at a time and done 5 ms later."""
     image = draw(1)
-    processed = Processed(RectifiedPair(image, image), None, None, LEDGER.stages)
+    processed = Processed(RectifiedPair(image, image), None, None, LEDGER.stages, cut=cut)
     pair = FramePair(
         board=board_frame(0, at_ns), host=host_frame(0, at_ns), time_skew_ns=0, paired_ns=at_ns, queued_ns=at_ns
     )
@@ -42,3 +42,13 @@ def test_labels_give_no_delay_from_an_exposure() -> None:
     enter(books, 1000 * MS)
     delays = books.books().delays
     assert [delays.spread(name).count for name in ("capture", "end_to_end", "time_skew", "processing")] == [0, 0, 0, 1]
+
+
+def test_what_was_cut_is_summed_over_all_pairs() -> None:
+    """A run's report counts the pixels of every pair; a run without a core has none."""
+    books = Ledgerer()
+    enter(books, 1000 * MS)
+    assert books.books().depth.cut is None
+    enter(books, 1050 * MS, CutCounts(kept=5, too_far=3))
+    enter(books, 1100 * MS, CutCounts(kept=6, unmatched=1, too_far=1))
+    assert books.books().depth.cut == CutCounts(kept=11, unmatched=1, too_far=4)
