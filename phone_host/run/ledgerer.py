@@ -48,6 +48,7 @@ class Books:
     first_done_ns: int
     last_done_ns: int
     delays: DelayStatistics
+    depth: DepthAccount
     gaps: int = 0
     gap_ns: int = 0
 
