@@ -474,6 +474,12 @@ class Evidence:
         vertical_offset_px: how far too low the right image lies, px.
         supports: how many features agree with each arrangement; empty without a core.
         disparity_px: the middle one of the disparities, px.
+        beyond_share: share of the features on common rows that are nearer than was searched.
+        enough_disparities: a search that reaches all but a few features, px; 0: not known.
+        enough_from_m: the same as a depth, m.
+        ambiguous_share: share of sampled patches that fit another place of the search as well as the best one.
+        skew_px: how unevenly rows are off over the image once the common offset is taken away, px of the matched images.
+        from_rig: whether a rig has rectified the pair.
     """
 
     left: Exposure
@@ -484,3 +490,9 @@ class Evidence:
     vertical_offset_px: float = float("nan")
     supports: tuple[Support, ...] = ()
     disparity_px: float = float("nan")
+    beyond_share: float = float("nan")
+    enough_disparities: int = 0
+    enough_from_m: float = float("nan")
+    ambiguous_share: float = float("nan")
+    skew_px: float = float("nan")
+    from_rig: bool = True

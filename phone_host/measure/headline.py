@@ -61,16 +61,21 @@ def answer(
         error_px: error of a disparity, px; NaN: the usual one.
     """
     if found:
-        grade = Grade.BAD if found[0].doubt.blocks else Grade.WARNING
+        grade = Grade.BAD if found[0].doubt.blocks or found[0].is_certain else Grade.WARNING
         opening = "Depth is wrong" if grade is Grade.BAD else "Depth may be wrong"
         return Answer(grade, f"{opening}: {found[0].sentence}. Remedy: {found[0].remedy}.")
     if math.isnan(figures.density):
         return Answer(Grade.GOOD, "Depth was computed; no pair of this run was judged.")
     parts = [f"{figures.density:.0%} of the pixels have depth"]
-    if not math.isnan(figures.vertical_px):
+    checked = not math.isnan(figures.vertical_px)
+    if checked:
         parts.append(f"rows agree to {max(figures.vertical_px, 0.1):.1f} px")
-    text = f"Depth looks right: {', '.join(parts)}; "
-    return Answer(Grade.GOOD, text + _reach(figures, geometry, USUAL_ERROR_PX if math.isnan(error_px) else error_px))
+    opening = "Depth looks right" if checked else "Depth could not be checked, too few features"
+    text = f"{opening}: {', '.join(parts)}; "
+    return Answer(
+        Grade.GOOD if checked else Grade.WARNING,
+        text + _reach(figures, geometry, USUAL_ERROR_PX if math.isnan(error_px) else error_px),
+    )
 
 
 def _reach(figures: ImageFigures, geometry: StereoGeometry | None, error_px: float) -> str:

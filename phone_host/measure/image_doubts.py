@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from phone_host.measure.search_doubts import ambiguous, too_short
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement, Evidence, Exposure, StereoGeometry
 
@@ -56,6 +57,12 @@ _LEAST_CONSISTENCY: Final = 0.25
 
 _MOST_VERTICAL_PX: Final = 2.0
 """Matchers correct up to 2 px of common offset; beyond it they lose points."""
+
+_MOST_SKEW_PX: Final = 0.8
+"""Given pairs measure 0.62 px (KITTI) and less; a camera rolled by half a degree 0.95 px on 350 px of width."""
+
+_EDGE_TO_EDGE: Final = 3.5
+"""The full height of a ramp relative to its root mean square."""
 
 _TILTED_SHARE: Final = 0.3
 """If fewer of the related features than this share their rows, the rectification does not fit the cameras."""
@@ -319,18 +326,32 @@ def _are_strangers(evidence: Evidence, support: dict[Arrangement, int]) -> bool:
 
 
 def _figures(evidence: Evidence, support: dict[Arrangement, int]) -> tuple[Concern, ...]:
-    found = []
+    short, unsure = too_short(evidence), ambiguous(evidence)
+    return (*_vertical(evidence, support), *short, *unsure, *(() if short or unsure else _sparse(evidence)))
+
+
+def _vertical(evidence: Evidence, support: dict[Arrangement, int]) -> tuple[Concern, ...]:
     related, right = support[Arrangement.TILTED], support[Arrangement.RIGHT]
     is_tilted = related >= 2 * _LEAST_SUPPORT and right < _TILTED_SHARE * related
-    if is_tilted or evidence.vertical_px > _MOST_VERTICAL_PX:
-        found.append(
-            Concern(
-                Doubt.VERTICAL_ERROR,
-                "the rows of the two images do not agree"
-                + (f" (by {evidence.vertical_px:.1f} px)" if evidence.vertical_px > _MOST_VERTICAL_PX else ""),
-                "the calibration does not fit these cameras any more, or never did: calibrate the rig again",
-            )
-        )
+    off, skewed = evidence.vertical_px > _MOST_VERTICAL_PX, evidence.skew_px > _MOST_SKEW_PX
+    if not (is_tilted or off or skewed):
+        return ()
+    how_much = f" (by {evidence.vertical_px:.1f} px)" if off else ""
+    if skewed and not off:
+        how_much = f" (one edge is off against the other by {_EDGE_TO_EDGE * evidence.skew_px:.1f} px)"
+    return (
+        Concern(
+            Doubt.VERTICAL_ERROR,
+            f"the rows of the two images do not agree{how_much}",
+            "the calibration does not fit these cameras any more, or never did: calibrate the rig again"
+            if evidence.from_rig
+            else "these images are not rectified: calibrate your cameras and give --calibration rig.yaml",
+        ),
+    )
+
+
+def _sparse(evidence: Evidence) -> tuple[Concern, ...]:
+    found = []
     if evidence.density < _LEAST_DENSITY:
         found.append(
             Concern(

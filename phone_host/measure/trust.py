@@ -52,6 +52,8 @@ class Doubt(Enum):
     LOW_DENSITY = "low_density"
     LOW_CONSISTENCY = "low_consistency"
     VERTICAL_ERROR = "vertical_error"
+    SEARCH_TOO_SHORT = "search_too_short"
+    AMBIGUOUS = "ambiguous"
     NO_DEPTH = "no_depth"
 
     @property
@@ -158,11 +160,13 @@ class Concern:
         doubt: the kind of reason.
         sentence: the reason in words, with figures.
         remedy: what helps.
+        is_certain: whether most of the depth is wrong, though the doubt does not block.
     """
 
     doubt: Doubt
     sentence: str
     remedy: str
+    is_certain: bool = False
 
 
 NO_DEPTH: Final = Concern(

@@ -11,11 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import Disparity, Evidence, Image, Processed
+from phone_host.model import Disparity, Evidence, Image, Processed, Search
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence_features import Matches, find_features, match, on_common_rows, supports
 from phone_host.stereo.evidence_light import measure_exposure
 from phone_host.stereo.evidence_points import PointMaps, ThroughRig, Unmoved
+from phone_host.stereo.evidence_search import ambiguity, measure_fit
 from phone_host.stereo.match_align import with_levels_of
 from phone_host.stereo.stacked import lying, lying_pair
 
@@ -74,6 +75,7 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
     if maps is None or disparity is None:
         return Evidence(left=measure_exposure(left, 0), right=measure_exposure(right, 0))
     height_px, width_px = left.shape
+    from_rig = isinstance(maps, ThroughRig)
     if epipolar.is_vertical:
         # Points then take the way of images that came rectified: a turned camera's axis is taken for the image's middle.
         disparity, maps = lying(disparity, epipolar), Unmoved(width_px, height_px)
@@ -82,6 +84,8 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
     plain, turned_over = (match(*found, is_mirrored=mirror) for mirror in (False, True))
     upright = _tracked(left, right, plain.turned_by(0))
     vertical_px, offset_px = _vertical(upright, height_px)
+    fit = measure_fit(upright, processed, disparity)
+    check = min(1.0, _CHECK_WIDTH_PX / width_px)
     return Evidence(
         left=measure_exposure(left, len(found[0].points_px)),
         right=measure_exposure(right, len(found[1].points_px)),
@@ -91,6 +95,14 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
         vertical_px=vertical_px,
         vertical_offset_px=offset_px,
         supports=supports(upright, plain, turned_over, maps, (width_px, height_px)),
+        beyond_share=fit.beyond_share,
+        enough_disparities=fit.enough_disparities,
+        enough_from_m=fit.enough_from_m,
+        skew_px=fit.skew_px,
+        ambiguous_share=ambiguity(
+            _reduced(left, check), _reduced(right, check), disparity, (processed.search or Search()).disparities, check
+        ),
+        from_rig=from_rig,
     )
 
 

@@ -1,0 +1,156 @@
+"""Measures whether a search could find the right disparity at all: is it wide enough, and is there only one answer? Pure.
+
+Features are matched over the whole image, so that they also tell disparities that were not searched. Where a pattern
+repeats along the rows, a patch of the left image fits several places of the right one, and no matcher can know which.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.model import Disparity, Image, Processed, Search
+from phone_host.stereo.evidence_features import Matches, on_common_rows
+from phone_host.stereo.evidence_points import Points
+from phone_host.stereo.evidence_rows import row_skew_px
+from phone_host.stereo.reproject import nearest_depth_m
+
+_FEWEST: Final = 20
+"""A share of fewer features says little: one wrong match of 20 is 5 %."""
+
+_NEAREST_PERCENTILE: Final = 98
+_MARGIN: Final = 1.05
+_STEP: Final = 16
+"""What is asked for covers all but a fiftieth of the features (wrong matches) with a twentieth more, in the matchers' own steps."""
+
+_PATCHES: Final = 160
+_FEWEST_PATCHES: Final = 40
+_PATCH_PX: Final = 15
+"""Edge of a patch at the size of the check: with 9 px, twigs and letters repeat by chance; larger ones see no more."""
+
+_APART_PX: Final = 4
+"""Nearer than this, a second place belongs to the same peak."""
+
+_AS_LIKE: Final = 0.05
+"""Two places fit equally well if their likeness (of at most 1) differs by less: noise of 3 grey levels changes it by 0.02."""
+
+_SURE: Final = 0.8
+"""A best place below this fits badly by itself; it says nothing about other places."""
+
+_VALLEY: Final = 0.3
+"""Between the repeats of a pattern, the likeness falls by more than this. Along a level edge it does not: nothing repeats there."""
+
+
+def beyond_search(disparities_px: NDArray[np.float64], searched: int) -> tuple[float, int]:
+    """Tell how much of a scene is nearer than a search reaches.
+
+    Args:
+        disparities_px: (N,) of features on common rows, px of the rectified images.
+        searched: N, px of the rectified images; 0: not known.
+
+    Returns:
+        Share of the features, NaN with too few of them or an unknown search; and the search that would reach them.
+    """
+    if searched < 1 or len(disparities_px) < _FEWEST:
+        return math.nan, 0
+    nearest = float(np.percentile(disparities_px, _NEAREST_PERCENTILE)) * _MARGIN
+    return float(np.mean(disparities_px >= searched)), _STEP * max(1, math.ceil(nearest / _STEP))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fit:
+    """How a search and the rows fit the features of a pair; NaN = not measured.
+
+    Attributes:
+        beyond_share: share of the features that are nearer than was searched.
+        enough_disparities: a search that reaches all but a few, px; 0: not known.
+        enough_from_m: the same as a depth, m.
+        skew_px: see `row_skew_px`, px of the matched images.
+    """
+
+    beyond_share: float
+    enough_disparities: int
+    enough_from_m: float
+    skew_px: float
+
+
+def measure_fit(upright: Matches, processed: Processed, disparity: Disparity) -> Fit:
+    """Compare matched features with the search and the rows.
+
+    Args:
+        upright: matches of features that have the same direction in both images, as exact as possible.
+        processed: the pair.
+        disparity: (H, W), px, its rows as `upright` has them.
+    """
+    height_px, width_px = disparity.shape
+    search = processed.search or Search()
+    rows = on_common_rows(upright.left_px, upright.right_px, height_px)
+    left_px, right_px = upright.left_px[rows], upright.right_px[rows]
+    wanted = _inside_the_crop(left_px, processed, disparity)
+    beyond_share, enough = beyond_search((left_px - right_px)[wanted, 0], search.disparities)
+    geometry = processed.geometry
+    return Fit(
+        beyond_share=beyond_share,
+        enough_disparities=enough,
+        enough_from_m=nearest_depth_m(geometry, enough) if geometry is not None and enough else math.nan,
+        skew_px=row_skew_px(left_px, (right_px - left_px)[:, 1], (width_px, height_px)) * search.scale,
+    )
+
+
+def _inside_the_crop(points_px: Points, processed: Processed, disparity: Disparity) -> NDArray[np.bool_]:
+    """Tell which points lie where depth was wanted: all of them, or with a crop those amid its disparities."""
+    known = np.isfinite(disparity)
+    if processed.cut is None or not processed.cut.outside or not known.any():
+        return np.ones(len(points_px), np.bool_)
+    x, y = (np.flatnonzero(known.any(axis=axis)) for axis in (0, 1))
+    low, high = np.array([x[0], y[0]]), np.array([x[-1], y[-1]])
+    return np.asarray(((points_px >= low) & (points_px <= high)).all(axis=1))
+
+
+def ambiguity(left: Image, right: Image, disparity: Disparity, searched: int, scale: float) -> float:
+    """Tell for how many patches of the left image another place of the search fits as well as the best one.
+
+    Args:
+        left: (h, w) uint8, reduced.
+        right: the same size.
+        disparity: (H, W), px, of the whole images; only pixels that have one are asked.
+        searched: N, px of the whole images; 0: as far as the greatest disparity.
+        scale: size of the reduced images relative to the whole ones.
+
+    Returns:
+        Share of the patches that fit anywhere at all; NaN with too few of them.
+    """
+    known = np.argwhere(np.isfinite(disparity))
+    if len(known) < _PATCHES:
+        return math.nan
+    sample = known[np.linspace(0, len(known) - 1, _PATCHES).astype(np.intp)]
+    reach = math.ceil((searched or float(np.nanmax(disparity))) * scale)
+    half, tried, unsure = _PATCH_PX // 2, 0, 0
+    for y, x in np.rint((sample + 0.5) * scale - 0.5).astype(np.intp).tolist():
+        first = max(half, x - reach)
+        if y < half or x < half or x - first < 2 * _APART_PX:
+            continue
+        patch = left[y - half : y + half + 1, x - half : x + half + 1]
+        strip = right[y - half : y + half + 1, first - half : x + half + 1]
+        if patch.shape != (_PATCH_PX, _PATCH_PX) or strip.shape[0] < _PATCH_PX:
+            continue
+        likeness = np.asarray(cv2.matchTemplate(strip, patch, cv2.TM_CCOEFF_NORMED), np.float32).ravel()
+        if likeness.max() < _SURE:
+            continue
+        tried += 1
+        unsure += _has_rival(likeness)
+    return unsure / tried if tried >= _FEWEST_PATCHES else math.nan
+
+
+def _has_rival(likeness: NDArray[np.float32]) -> bool:
+    """Tell whether a likeness along a row has a second peak as high as the best one, and a valley between the two."""
+    best = int(likeness.argmax())
+    rivals = np.flatnonzero(likeness >= likeness[best] - _AS_LIKE)
+    for rival in rivals[np.abs(rivals - best) >= _APART_PX]:
+        between = likeness[min(best, rival) : max(best, rival) + 1]
+        if between.min() <= likeness[rival] - _VALLEY:
+            return True
+    return False
