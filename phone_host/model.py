@@ -474,7 +474,7 @@ class Evidence:
         vertical_offset_px: how far too low the right image lies, px.
         supports: how many features agree with each arrangement; empty without a core.
         disparity_px: the middle one of the disparities, px.
-        beyond_share: share of the features on common rows that are nearer than was searched.
+        beyond_share: share of the image, as far as features tell, that is nearer than was searched.
         enough_disparities: a search that reaches all but a few features, px; 0: not known.
         enough_from_m: the same as a depth, m.
         ambiguous_share: share of sampled patches that fit another place of the search as well as the best one.

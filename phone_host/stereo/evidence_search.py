@@ -21,6 +21,9 @@ from phone_host.stereo.reproject import nearest_depth_m
 _FEWEST: Final = 20
 """A share of fewer features says little: one wrong match of 20 is 5 %."""
 
+_TILES: Final = 8
+"""The image is cut into 8 by 8 tiles: a chessboard holds most of an image's features and covers little of it."""
+
 _NEAREST_PERCENTILE: Final = 98
 _MARGIN: Final = 1.05
 _STEP: Final = 16
@@ -44,20 +47,27 @@ _VALLEY: Final = 0.3
 """Between the repeats of a pattern, the likeness falls by more than this. Along a level edge it does not: nothing repeats there."""
 
 
-def beyond_search(disparities_px: NDArray[np.float64], searched: int) -> tuple[float, int]:
+def beyond_search(
+    left_px: Points, disparities_px: NDArray[np.float64], searched: int, size_px: tuple[int, int]
+) -> tuple[float, int]:
     """Tell how much of a scene is nearer than a search reaches.
 
     Args:
+        left_px: (N, 2) features of the left image, px.
         disparities_px: (N,) of features on common rows, px of the rectified images.
         searched: N, px of the rectified images; 0: not known.
+        size_px: width and height of the image.
 
     Returns:
-        Share of the features, NaN with too few of them or an unknown search; and the search that would reach them.
+        Share of the features, those of each tile of the image together weighing as much, NaN with too few of them or an unknown search; and the search that would reach them.
     """
     if searched < 1 or len(disparities_px) < _FEWEST:
         return math.nan, 0
     nearest = float(np.percentile(disparities_px, _NEAREST_PERCENTILE)) * _MARGIN
-    return float(np.mean(disparities_px >= searched)), _STEP * max(1, math.ceil(nearest / _STEP))
+    column, row = np.clip(left_px / np.array(size_px) * _TILES, 0, _TILES - 1).astype(np.intp).T
+    _, tile, count = np.unique(row * _TILES + column, return_inverse=True, return_counts=True)
+    share = float(np.average(disparities_px >= searched, weights=1.0 / count[tile]))
+    return share, _STEP * max(1, math.ceil(nearest / _STEP))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,13 +100,14 @@ def measure_fit(upright: Matches, processed: Processed, disparity: Disparity) ->
     rows = on_common_rows(upright.left_px, upright.right_px, height_px)
     left_px, right_px = upright.left_px[rows], upright.right_px[rows]
     wanted = _inside_the_crop(left_px, processed, disparity)
-    beyond_share, enough = beyond_search((left_px - right_px)[wanted, 0], search.disparities)
+    size_px, shifts_px = (width_px, height_px), (left_px - right_px)[:, 0]
+    beyond_share, enough = beyond_search(left_px[wanted], shifts_px[wanted], search.disparities, size_px)
     geometry = processed.geometry
     return Fit(
         beyond_share=beyond_share,
         enough_disparities=enough,
         enough_from_m=nearest_depth_m(geometry, enough) if geometry is not None and enough else math.nan,
-        skew_px=row_skew_px(left_px, (right_px - left_px)[:, 1], (width_px, height_px)) * search.scale,
+        skew_px=row_skew_px(left_px, (right_px - left_px)[:, 1], size_px) * search.scale,
     )
 
 

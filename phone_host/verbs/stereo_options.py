@@ -17,6 +17,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import AnyMatcher, matcher_named
+from phone_host.stereo.plausible import require_plausible
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.scaled_rig import scaled_geometry
 from phone_host.verbs.stereo_numbers import crop_of, length_m, pixels, point_px, scale_of
@@ -176,10 +177,12 @@ def rectified_geometry(options: argparse.Namespace, size_px: tuple[int, int]) ->
     if focal_px <= 0:
         raise SettingsError(f"--focal is {options.focal!r}", "give a number of pixels above 0")
     cx_px, cy_px = ((n - 1) / 2 for n in size_px) if options.center is None else point_px(options.center, "--center")
-    return StereoGeometry(
+    geometry = StereoGeometry(
         focal_px=focal_px,
         baseline_m=length_m(options.baseline, "--baseline", "60mm"),
         cx_px=cx_px,
         cy_px=cy_px,
         doffs_px=0.0 if options.doffs is None else pixels(options.doffs, "--doffs"),
     )
+    require_plausible(geometry, size_px)
+    return geometry

@@ -36,7 +36,15 @@ from tests.bench.depth_scenes import Image
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.bench.trust_rooms import room
-from tests.bench.trust_scenes import MISTAKES, OTHER_SCENE, GivenPair, given_pairs, other_scene
+from tests.bench.trust_scenes import (
+    MISTAKES,
+    OTHER_SCENE,
+    SHORT_SEARCH,
+    GivenPair,
+    given_pairs,
+    other_scene,
+    short_core,
+)
 
 _ROOMS: Final = 100
 _ROOMS_WITH_MISTAKES: Final = 20
@@ -162,7 +170,14 @@ def given_rows(job: GivenJob) -> list[Row]:
     pair = job.pair
     scene = _Scene(pair.name, "given", job.half, pair.left, pair.right, pair.core())
     rows = [_good(scene, scene.left, scene.right)]
-    return rows if job.foreign is None else [*rows, *_mistaken(scene, job.foreign)]
+    if job.foreign is None:
+        return rows
+    rows += _mistaken(scene, job.foreign)
+    if pair.rig is None:
+        found, took_ms = _judge(short_core(pair), pair.left, pair.right)
+        outcome = _outcome(found, frozenset({Doubt.SEARCH_TOO_SHORT}))
+        rows.append(_row(scene, SHORT_SEARCH, outcome, found, took_ms))
+    return rows
 
 
 def room_rows(seed: int) -> list[Row]:
@@ -189,7 +204,7 @@ def all_rows(data: Path, jobs: int, progress: Progress) -> list[Row]:
 def judge(rows: Sequence[Row]) -> list[Verdict]:
     """Compare with the figures to reach."""
     verdicts = []
-    for mistake in (*MISTAKES, OTHER_SCENE):
+    for mistake in (*MISTAKES, OTHER_SCENE, SHORT_SEARCH):
         made = [row for row in rows if row.mistake == mistake]
         verdicts.append(_share(mistake, made))
     for kind in ("given", "room"):
@@ -214,7 +229,7 @@ def _print(rows: Sequence[Row]) -> None:
     table.add_column("mistake")
     for kind, half in groups:
         table.add_column(f"{kind}, {half}", justify="right")
-    for mistake in (*MISTAKES, OTHER_SCENE):
+    for mistake in (*MISTAKES, OTHER_SCENE, SHORT_SEARCH):
         cells = []
         for group in groups:
             found = Counter(row.outcome for row in rows if row.mistake == mistake and (row.kind, row.half) == group)

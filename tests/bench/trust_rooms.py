@@ -10,7 +10,7 @@ import numpy as np
 from phone_host.model import CameraModel, Rig
 from phone_host.scene.scene import Body, Box, Look, Plane, Renderer, Scene, Sphere, Texture, rig_poses, rotation
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
@@ -68,7 +68,7 @@ class Room:
         """The core that a user of this rig would run."""
         rectifier = Rectifier(self.rig)
         count = disparities_for_near(rectifier.geometry, 0.5, rectifier.rectification.width_px)
-        return StereoCore(create_matcher(MatchSettings(MatcherName.SGBM, count)), rectifier)
+        return StereoCore(MatchSettings(MatcherName.SGBM, count), rectifier)
 
 
 def room(seed: int, size_px: tuple[int, int] | None = None) -> Room:

@@ -17,13 +17,16 @@ from phone_host.measure.trust import Doubt
 from phone_host.model import CameraModel, Rig
 from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
 from tests.bench.depth_scenes import Image
 
 Pair = tuple[Image, Image]
+
+_NEAREST_BASELINES: Final = 2
+"""Some of the given chessboards were held so near."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,16 +54,16 @@ class GivenPair:
 
 @lru_cache(maxsize=64)
 def _flat_core(disparities: int) -> StereoCore:
-    return StereoCore(create_matcher(MatchSettings(MatcherName.SGBM, disparities)))
+    return StereoCore(MatchSettings(MatcherName.SGBM, disparities))
 
 
 @lru_cache(maxsize=16)
 def _rig_core(rig: Rig) -> StereoCore:
     rectifier = Rectifier(rig)
     count = disparities_for_near(
-        rectifier.geometry, rectifier.geometry.baseline_m * 5, rectifier.rectification.width_px
+        rectifier.geometry, rectifier.geometry.baseline_m * _NEAREST_BASELINES, rectifier.rectification.width_px
     )
-    return StereoCore(create_matcher(MatchSettings(MatcherName.SGBM, count)), rectifier)
+    return StereoCore(MatchSettings(MatcherName.SGBM, count), rectifier)
 
 
 def given_pairs(data: Path) -> Iterator[GivenPair]:
@@ -216,6 +219,23 @@ def _flip(image: Image, axis: int) -> Image:
     return np.asarray(cv2.flip(image, axis), np.uint8)
 
 
+def rolled(image: Image, angle_deg: float, zoom: float) -> Image:
+    """The image of a camera that was turned about its axis or zoomed after the calibration."""
+    height, width = image.shape[:2]
+    move = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), angle_deg, zoom)
+    flags, border = cv2.INTER_CUBIC, cv2.BORDER_REPLICATE
+    return np.asarray(cv2.warpAffine(image, move, (width, height), flags=flags, borderMode=border), np.uint8)
+
+
+def pattern(image: Image, shift_px: int) -> Image:
+    """What a camera sees of a wall of regular checks, of a size that depends on the image's: a period of 2 squares."""
+    height, width = image.shape[:2]
+    square = max(6, width // 50)
+    y, x = np.mgrid[:height, :width]
+    checks = ((x + shift_px) // square + y // square) % 2 * 180 + 30
+    return noisy(np.asarray(np.dstack([checks] * 3), np.uint8), 3.0)
+
+
 _EXCHANGED: Final = frozenset({Doubt.SWAPPED})
 _TURNED: Final = frozenset({Doubt.TURNED})
 _QUARTER: Final = frozenset({Doubt.TURNED_BY_QUARTER})
@@ -223,6 +243,8 @@ _MIRRORED: Final = frozenset({Doubt.MIRRORED})
 _SAME: Final = frozenset({Doubt.SAME_IMAGE})
 _COVERED: Final = frozenset({Doubt.COVERED})
 _DARK: Final = frozenset({Doubt.DARK})
+_ROWS: Final = frozenset({Doubt.VERTICAL_ERROR})
+_REPEATED: Final = frozenset({Doubt.AMBIGUOUS})
 _UNFOCUSED: Final = frozenset({Doubt.UNFOCUSED})
 
 MISTAKES: Final[dict[str, tuple[frozenset[Doubt], Callable[[Image, Image], Pair]]]] = {
@@ -246,6 +268,9 @@ MISTAKES: Final[dict[str, tuple[frozenset[Doubt], Callable[[Image, Image], Pair]
     "both dark": (_DARK, _both(dim)),
     "right unfocused": (_UNFOCUSED, lambda left, right: (left, blurred(right, 5.0))),
     "left unfocused": (_UNFOCUSED, lambda left, right: (blurred(left, 7.0), right)),
+    "right rolled by a degree": (_ROWS, lambda left, right: (left, rolled(right, 1.0, 1.0))),
+    "right zoomed by 2 %": (_ROWS, lambda left, right: (left, rolled(right, 0.0, 1.02))),
+    "repeated pattern": (_REPEATED, lambda left, right: (pattern(left, 0), pattern(right, left.shape[1] // 30))),
     "both unfocused": (_UNFOCUSED, _both(lambda image: blurred(image, 6.0))),
 }
 """Each mistake with its right names. Without a rig, both cameras on their heads and both images mirrored look like exchanged images. The sentence says so."""
@@ -256,6 +281,15 @@ def _dimmer(image: Image) -> Image:
 
 
 OTHER_SCENE: Final = "another scene"
+SHORT_SEARCH: Final = "search too short"
+
+_QUARTER_OF_SEARCH: Final = 4
+"""In most scenes a quarter of the search that they need leaves most features out."""
+
+
+def short_core(pair: GivenPair) -> StereoCore:
+    """The core of a user who searches a quarter of what the scene needs, at least as far as any matcher does."""
+    return _flat_core(max(4, pair.disparities // _QUARTER_OF_SEARCH))
 
 
 def other_scene(left: Image, right: Image) -> Pair:
