@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.measure.search_doubts import ambiguous, too_short
+from phone_host.measure.search_doubts import ambiguous, is_pattern, too_short
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement, Evidence, Exposure, StereoGeometry
 
@@ -181,6 +181,11 @@ def image_doubts(evidence: Evidence) -> tuple[Concern, ...]:
         return dark
     light = (*dark, *_unfocused(evidence.left, evidence.right))
     mistake = _arrangement(support)
+    if is_pattern(evidence) and _NAMED[Arrangement.SAME_PLACE] not in mistake:
+        return (
+            *light,
+            *ambiguous(evidence),
+        )  # features of a pattern match any repeat: what they say of mistakes is chance
     if not mistake and not light and _are_strangers(evidence, support):
         mistake = (_OTHER_SCENE,)
     return (*mistake, *light) if mistake else (*light, *_figures(evidence, support))

@@ -13,6 +13,18 @@ _MOSTLY_BEYOND: Final = 0.5
 _AMBIGUOUS_SHARE: Final = 0.5
 """Good pairs measure 0.2 at most, regular stripes and checks 0.9 and more."""
 
+_PATTERN_SHARE: Final = 0.8
+"""Given scenes with any mistake measure 0.41 at most, where depth was found at all."""
+
+
+def is_pattern(evidence: Evidence) -> bool:
+    """Tell whether nearly all that the images show repeats, so that matched features prove nothing.
+
+    Args:
+        evidence: of the pair.
+    """
+    return evidence.ambiguous_share > _PATTERN_SHARE
+
 
 def too_short(evidence: Evidence) -> tuple[Concern, ...]:
     """Say how much of the scene is nearer than was searched; empty if hardly any.

@@ -230,7 +230,7 @@ def rolled(image: Image, angle_deg: float, zoom: float) -> Image:
 def pattern(image: Image, shift_px: int) -> Image:
     """What a camera sees of a wall of regular checks, of a size that depends on the image's: a period of 2 squares."""
     height, width = image.shape[:2]
-    square = max(6, width // 50)
+    square = max(3, width // 100)
     y, x = np.mgrid[:height, :width]
     checks = ((x + shift_px) // square + y // square) % 2 * 180 + 30
     return noisy(np.asarray(np.dstack([checks] * 3), np.uint8), 3.0)

@@ -54,6 +54,15 @@ BLIND: Final = replace(evidence(right=0, tilted=0), right=COVERED)
         (evidence(right=3, tilted=5, turned=90), [Doubt.TURNED]),
         (evidence(right=3, tilted=5, turned_by_quarter=90), [Doubt.TURNED_BY_QUARTER]),
         (evidence(right=3, tilted=5, mirrored=90), [Doubt.MIRRORED]),
+        (replace(evidence(right=0, tilted=5, mirrored=90), ambiguous_share=0.9), [Doubt.AMBIGUOUS]),  # a regular pattern
+        (replace(evidence(right=0, tilted=5, mirrored=90), ambiguous_share=0.5), [Doubt.MIRRORED]),
+        (replace(SWAPPED, ambiguous_share=math.nan), [Doubt.SWAPPED]),
+        (replace(GOOD, ambiguous_share=0.6), [Doubt.AMBIGUOUS]),
+        (replace(GOOD, ambiguous_share=0.4), []),
+        (replace(GOOD, beyond_share=0.06, enough_disparities=80, density=0.1), [Doubt.SEARCH_TOO_SHORT]),
+        (replace(GOOD, beyond_share=0.04), []),
+        (replace(GOOD, skew_px=0.9), [Doubt.VERTICAL_ERROR]),
+        (replace(GOOD, skew_px=0.7), []),
         (evidence(mirrored=90), []),  # a chessboard looks like its mirror image
         (evidence(same_place=160), [Doubt.SAME_IMAGE]),
         (evidence(same_place=140), []),  # a street whose far end does not move
