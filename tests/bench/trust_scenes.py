@@ -247,6 +247,8 @@ _ROWS: Final = frozenset({Doubt.VERTICAL_ERROR})
 _REPEATED: Final = frozenset({Doubt.AMBIGUOUS})
 _UNFOCUSED: Final = frozenset({Doubt.UNFOCUSED})
 
+PATTERN: Final = "repeated pattern"
+
 MISTAKES: Final[dict[str, tuple[frozenset[Doubt], Callable[[Image, Image], Pair]]]] = {
     "swapped": (_EXCHANGED, lambda left, right: (right, left)),
     "both on their heads": (_EXCHANGED | _TURNED, _both(lambda image: turned(image, 2))),
@@ -270,7 +272,7 @@ MISTAKES: Final[dict[str, tuple[frozenset[Doubt], Callable[[Image, Image], Pair]
     "left unfocused": (_UNFOCUSED, lambda left, right: (blurred(left, 7.0), right)),
     "right rolled by a degree": (_ROWS, lambda left, right: (left, rolled(right, 1.0, 1.0))),
     "right zoomed by 2 %": (_ROWS, lambda left, right: (left, rolled(right, 0.0, 1.02))),
-    "repeated pattern": (_REPEATED, lambda left, right: (pattern(left, 0), pattern(right, left.shape[1] // 30))),
+    PATTERN: (_REPEATED, lambda left, right: (pattern(left, 0), pattern(right, left.shape[1] // 30))),
     "both unfocused": (_UNFOCUSED, _both(lambda image: blurred(image, 6.0))),
 }
 """Each mistake with its right names. Without a rig, both cameras on their heads and both images mirrored look like exchanged images. The sentence says so."""
