@@ -8,11 +8,12 @@ with the right arrangement; where the images hold too little, nothing is named. 
 import math
 from collections import Counter, deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
+from phone_host.measure.file_remedies import FILE_REMEDIES, ImageSource
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement, Evidence, Exposure, StereoGeometry
 
@@ -158,11 +159,12 @@ def gravest_first(found: tuple[Concern, ...]) -> tuple[Concern, ...]:
     return tuple(sorted(found, key=lambda concern: not concern.doubt.blocks))
 
 
-def image_doubts(evidence: Evidence) -> tuple[Concern, ...]:
+def image_doubts(evidence: Evidence, source: ImageSource = ImageSource.CAMERAS) -> tuple[Concern, ...]:
     """Say what the images of one pair make doubtful, gravest first; empty if nothing.
 
     Args:
         evidence: of the pair; without supports (an unrectified pair) only brightness is judged.
+        source: where the images come from: remedies name the options of a camera's address, or those for files.
     """
     support = {item.arrangement: item.features for item in evidence.supports}
     sees = max(support.values(), default=0) >= _LEAST_SUPPORT
@@ -173,7 +175,7 @@ def image_doubts(evidence: Evidence) -> tuple[Concern, ...]:
     if not support:
         return dark
     light = (*dark, *_unfocused(evidence.left, evidence.right))
-    mistake = _arrangement(support)
+    mistake = _arrangement(support, source)
     if not mistake and not light and _are_strangers(evidence, support):
         mistake = (_OTHER_SCENE,)
     return (*mistake, *light) if mistake else (*light, *_figures(evidence, support))
@@ -293,23 +295,28 @@ _OTHER_SCENE: Final = Concern(
 )
 
 
-def _arrangement(support: dict[Arrangement, int]) -> tuple[Concern, ...]:
+def _named(arrangement: Arrangement, source: ImageSource) -> Concern:
+    concern = _NAMED[arrangement]
+    return concern if source is ImageSource.CAMERAS else replace(concern, remedy=FILE_REMEDIES[arrangement].words)
+
+
+def _arrangement(support: dict[Arrangement, int], source: ImageSource) -> tuple[Concern, ...]:
     """Name the mistake that clearly more features agree with than with the right arrangement."""
     related = max(support[Arrangement.RIGHT], support[Arrangement.TILTED])
     same = support[Arrangement.SAME_PLACE]
     if same >= max(_LEAST_SUPPORT, _SAME_SHARE * related):
-        return (_NAMED[Arrangement.SAME_PLACE],)
+        return (_named(Arrangement.SAME_PLACE, source),)
     # These turn the features themselves: not even tilted rows explain them.
     turned = (Arrangement.TURNED, Arrangement.TURNED_BY_QUARTER, Arrangement.MIRRORED)
     best = max(turned, key=lambda arrangement: support[arrangement])
     if support[best] >= max(_LEAST_SUPPORT, _MARGIN * related):
-        return (_NAMED[best],)
+        return (_named(best, source),)
     best = max(_OF_BOTH, key=lambda arrangement: support[arrangement])
     if support[best] < max(_LEAST_SUPPORT, _MARGIN * support[Arrangement.RIGHT]):
         return ()
     if support[best] < _CLEARLY_MORE * support[Arrangement.SWAPPED]:
         best = Arrangement.SWAPPED  # without a rig the three cannot be told apart; its remedy names them all
-    return (_NAMED[best],)
+    return (_named(best, source),)
 
 
 def _are_strangers(evidence: Evidence, support: dict[Arrangement, int]) -> bool:

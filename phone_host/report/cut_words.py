@@ -1,6 +1,8 @@
 """Says what became of a left image's pixels: how many have a point, and why the others have none. Pure."""
 
-from phone_host.model import CutCounts, DepthLimits
+import math
+
+from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 
 
 def cut_rows(cut: CutCounts, limits: DepthLimits | None) -> tuple[tuple[str, int], ...]:
@@ -51,3 +53,16 @@ def share_text(count: int, total: int) -> str:
 def distance_text(metres: float) -> str:
     """Write a distance with about three digits: `38 m`, `1.25 m`, `300 mm`."""
     return f"{metres * 1000:.3g} mm" if metres < 1.0 else f"{metres:.3g} m" if metres < 1000 else f"{metres:.0f} m"
+
+
+def searched_from_m(geometry: StereoGeometry | None, search: Search | None) -> float:
+    """Return the depth from which a pair was searched, m: that of the largest disparity, N - 1; NaN: not known.
+
+    Args:
+        geometry: of the rectified pair; None: not known.
+        search: how it was matched; None: not known.
+    """
+    if geometry is None or search is None or not search.disparities:
+        return math.nan
+    largest_px = search.disparities - 1 + geometry.doffs_px
+    return geometry.focal_px * geometry.baseline_m / largest_px if largest_px > 0 else math.nan

@@ -15,7 +15,7 @@ from common.words import counted
 from phone_host.model import Processed
 from phone_host.output.preview import colour_disparity, colour_range_px
 from phone_host.report import depth_data
-from phone_host.report.cut_words import cut_rows, distance_text, share_text
+from phone_host.report.cut_words import cut_rows, distance_text, searched_from_m, share_text
 from phone_host.report.depth_view import THIN, cloud_view, depth_view, uncertainty_m
 from phone_host.report.page_frame import document, section, table
 from phone_host.report.page_links import FileLink, NextCommand, address, files_section, list_section, next_section
@@ -195,11 +195,12 @@ def _figures(processed: Processed) -> tuple[Figure, ...]:
 
 
 def _uncertainty_words(processed: Processed) -> str:
+    from_m = searched_from_m(processed.geometry, processed.search)
+    words = "" if math.isnan(from_m) else f"Searched from {distance_text(from_m)}: nothing nearer can be found. "
     if processed.limits is None or processed.geometry is None:
-        return ""
-    return (
-        f"Behind ± is what an error of {processed.limits.disparity_error_px:.2g} px of disparity changes in the depth."
-    )
+        return words
+    error_px = processed.limits.disparity_error_px
+    return f"{words}Behind ± is what an error of {error_px:.2g} px of disparity changes in the depth."
 
 
 def _pixels(processed: Processed) -> str:

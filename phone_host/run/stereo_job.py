@@ -219,7 +219,7 @@ class _Work:
             density = 0.0 if processed.disparity is None else float(np.isfinite(processed.disparity).mean())
             remarks = [
                 *turned_remarks(*opened),
-                *pair_remarks(processed, written, trust, core.wanted.search_from_m),
+                *pair_remarks(processed, trust, core.wanted.search_from_m),
                 *(() if folder else _alone(self._job)),
             ]
             report = PairReport(

@@ -1,12 +1,23 @@
 """Judges one processed pair of images from files: its doubts, and the answer to whether its depth is right."""
 
+from dataclasses import replace
+from typing import Final
+
+from phone_host.measure.file_remedies import ImageSource
 from phone_host.measure.headline import answer
 from phone_host.measure.image_doubts import gravest_first, image_doubts, median_figures
-from phone_host.measure.trust import NO_DEPTH
+from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Processed
+from phone_host.report.depth_data import density
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
+
+_NO_DEPTH: Final = Concern(
+    Doubt.NO_DEPTH,
+    "no pixel has depth",
+    "check that the scene has texture, and that --calibration or --rectified fits the images",
+)
 
 
 def judge_pair(core: StereoCore, processed: Processed) -> PairTrust:
@@ -17,9 +28,13 @@ def judge_pair(core: StereoCore, processed: Processed) -> PairTrust:
         processed: its result.
     """
     evidence = measure_evidence(processed, maps_of(core, processed))
-    found = image_doubts(evidence)
+    found = image_doubts(evidence, ImageSource.FILES)
     if not has_depth(processed) and not any(concern.doubt.blocks for concern in found):
-        found = gravest_first((NO_DEPTH, *found))
+        # That there are few disparities, too, says nothing more.
+        further = (concern for concern in found if concern.doubt is not Doubt.LOW_DENSITY)
+        found = gravest_first((_NO_DEPTH, *further))
     figures = median_figures((evidence,))
     error_px = float("nan") if processed.limits is None else processed.limits.disparity_error_px
-    return PairTrust(figures, found, answer(figures, found, processed.geometry, error_px))
+    # The headline counts what the files hold: the pixels that have a point, where metres are known.
+    shown = replace(figures, density=density(processed))
+    return PairTrust(figures, found, answer(shown, found, processed.geometry, error_px))

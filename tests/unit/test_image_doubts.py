@@ -1,11 +1,14 @@
 """What is concluded from the evidence: which doubts, when they stand, and the headline that follows."""
 
+import argparse
 import math
+import re
 from dataclasses import replace
 from typing import Any, Final
 
 import pytest
 
+from phone_host.measure.file_remedies import EXCHANGE, ImageSource, tries_of
 from phone_host.measure.headline import Grade, answer, depth_error_m, headline
 from phone_host.measure.image_doubts import ImageFigures, ImageJudge, ImageTrust, image_doubts, median_figures
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, depth_is_wrong
@@ -13,6 +16,7 @@ from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement, Evidence, Exposure, StereoGeometry, Support
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
+from phone_host.verbs.orientation_arguments import add_orientation_arguments
 from tests.unit.test_run_report import run
 
 SHARP: Final = Exposure(mean_level=110, bright_level=200, structure=30, blur_px=1.0, features=400)
@@ -74,6 +78,33 @@ def test_a_doubt_needs_clear_evidence(found: Evidence, named: list[Doubt]) -> No
     """Exactly the named doubts follow; each has a sentence and a remedy without NaN."""
     assert doubts(found) == named
     assert all(concern.sentence and concern.remedy and "nan" not in concern.sentence for concern in image_doubts(found))
+
+
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (SWAPPED, "swap LEFT and RIGHT;"),
+        (evidence(right=3, tilted=5, turned=90), "--rotate-left 180 or --rotate-right 180"),
+        (evidence(right=3, tilted=5, turned_by_quarter=90), "with 90 or 270"),
+        (evidence(right=20, swapped=100, both_turned=150), "--rotate-left 180 --rotate-right 180"),
+        (evidence(right=20, swapped=100, both_mirrored=150), "--flip-left h --flip-right h"),
+        (evidence(right=0, both_turned_by_quarter=150), "both with 90 or both with 270"),
+        (evidence(right=3, tilted=5, mirrored=90), "v if top and bottom are"),
+        (evidence(same_place=160), "give the images of two cameras"),
+    ],
+)
+def test_remedies_for_files_name_what_stereo_takes(found: Evidence, words: str) -> None:
+    """No option of a camera's address, no --board-side; every option that is named is one of `stereo`, and so is each try."""
+    [concern] = image_doubts(found, ImageSource.FILES)
+    assert words in concern.remedy
+    assert not re.search(r"rotate=|flip=|board-side|camera's app", concern.remedy)
+    parser = argparse.ArgumentParser()
+    add_orientation_arguments(parser)
+    for given in tries_of(concern.remedy):
+        if given != (EXCHANGE,):
+            parser.parse_args(given)  # ends the test if it takes them not
+    assert set(re.findall(r"--[a-z-]+", concern.remedy)) <= set(parser._option_string_actions)
+    assert tries_of(image_doubts(found)[0].remedy) == ()
 
 
 def test_both_cameras_are_named_together() -> None:

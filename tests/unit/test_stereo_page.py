@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.model import CutCounts
+from phone_host.model import CutCounts, Search
 from phone_host.report import depth_data
-from phone_host.report.cut_words import cut_rows, cut_sentence
+from phone_host.report.cut_words import cut_rows, cut_sentence, distance_text
 from phone_host.report.depth_script import SCRIPT
 from phone_host.report.page_frame import document
 from phone_host.report.page_links import FileLink, NextCommand
@@ -153,6 +153,13 @@ def test_the_figures_follow_from_the_depth() -> None:
     assert "± 50 mm" in words
     assert "15 % farther than 4 m" in words  # a sixth of the rows, without the eighth that has no match: 7/48
     assert "12 % found no match" in words  # an eighth
+
+
+def test_the_page_says_from_where_on_depth_was_searched() -> None:
+    """Depth nearer than f b / (N - 1) cannot be found: 50 px m over 63 px with the page's geometry."""
+    found = replace(processed(), search=Search(disparities=64))
+    from_m = GEOMETRY.focal_px * GEOMETRY.baseline_m / (63 + GEOMETRY.doffs_px)
+    assert f"Searched from {distance_text(from_m)}: nothing nearer" in stereo_page(page_data(processed=found))
 
 
 def test_cut_pixels_are_told_in_words() -> None:
