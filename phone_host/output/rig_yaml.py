@@ -180,7 +180,10 @@ class _Reader:
             raise self._no_storage()
 
     def _no_storage(self) -> DataError:
-        return DataError(f"{self._path} is not a calibration file", "give the rig.yaml of `phone-host calibrate`")
+        return DataError(
+            f"{self._path} is not a calibration file",
+            "give the rig.yaml of `phone-host calibrate`, or a calib.txt of Middlebury, ETH3D or KITTI",
+        )
 
     def problem(self, key: str, what: str, remedy: str) -> DataError:
         return DataError(f"{self._path}: {key} {what}", remedy)
