@@ -145,8 +145,13 @@ def summary(
     report: dict[str, Any], views: BoardViews, calibration: Calibration, rejected: tuple[Rejected, ...], out: Path
 ) -> str:
     """Return the report as text."""
-    rows = [f"{'pair':>8}  {'left px':>8} {'right px':>8} {'vertical px':>11}"]
-    rows += [f"{u.name:>8}  {u.left_px:8.3f} {u.right_px:8.3f} {u.vertical_px:11.3f}" for u in calibration.used]
+    # A rig that cannot be rectified has no vertical errors.
+    known = calibration.obstacle is None
+    rows = [f"{'pair':>8}  {'left px':>8} {'right px':>8}" + (f" {'vertical px':>11}" if known else "")]
+    rows += [
+        f"{u.name:>8}  {u.left_px:8.3f} {u.right_px:8.3f}" + (f" {u.vertical_px:11.3f}" if known else "")
+        for u in calibration.used
+    ]
     if rejected:
         rows.append(rejections(rejected))
     rms, vertical, used = report["rms_px"], report["vertical_error_px"], report["pairs"]["used"]
