@@ -90,22 +90,23 @@ def disparity_picture(disparity: Disparity, geometry: StereoGeometry | None = No
         geometry: its scale is in metres; None: in px.
 
     Returns:
-        (H, W + scale, 3) BGR.
+        (H, W + scale, 3) BGR; without any value black and without a scale.
     """
     low_px, high_px = colour_range_px(disparity)
-    is_empty = not np.isfinite(disparity).any()
     image = _coloured(disparity, low_px, high_px)
+    if not np.isfinite(disparity).any():
+        return image
     span_px = high_px - low_px
     if geometry is None:
 
         def in_px(pitch: float) -> tuple[Tick, ...]:
-            return () if is_empty else ticks(low_px, high_px, lambda d: (d - low_px) / span_px, pitch)
+            return ticks(low_px, high_px, lambda d: (d - low_px) / span_px, pitch)
 
         return with_scale(image, _scale_colours(), in_px, "px")
     product, doffs_px = geometry.focal_px * geometry.baseline_m, geometry.doffs_px
 
     def in_metres(pitch: float) -> tuple[Tick, ...]:
-        if is_empty or high_px + doffs_px <= 0:  # nothing, or everything is behind infinity
+        if high_px + doffs_px <= 0:  # everything is behind infinity
             return ()
         far_m = product / (low_px + doffs_px) if low_px + doffs_px > 0 else float("inf")
         near_m = product / (high_px + doffs_px)
@@ -121,14 +122,15 @@ def depth_picture(cloud: CloudImage) -> Image:
         cloud: (H, W, 3) float32, m, in the left camera's axes, NaN = none.
 
     Returns:
-        (H, W + scale, 3) BGR.
+        (H, W + scale, 3) BGR; without any depth black and without a scale.
     """
     depth = cloud[..., 2]
     near_m, far_m = depth_range_m(depth)
-    is_empty = not np.isfinite(depth).any()
+    if not np.isfinite(depth).any():
+        return _coloured(depth, far_m, near_m)
 
     def in_metres(pitch: float) -> tuple[Tick, ...]:
-        return () if is_empty else ticks(near_m, far_m, lambda z: (far_m - z) / (far_m - near_m), pitch)
+        return ticks(near_m, far_m, lambda z: (far_m - z) / (far_m - near_m), pitch)
 
     return with_scale(_coloured(depth, far_m, near_m), _scale_colours(), in_metres, "m")
 

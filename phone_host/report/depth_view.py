@@ -213,7 +213,8 @@ def _disparity_figure(processed: Processed) -> str:
         marks = [(product / z - geometry.doffs_px, f"{z:g} m") for z in _round_depths(near, far)]
         caption = f"disparity, {low:.1f} to {high:.1f} px: bright is near, black is none; the scale is in metres"
     places = [((value - low) / (high - low), words) for value, words in marks]
-    return _figure(depth_data.drawing(picture), caption, "left", below=_scale(places))
+    below = _scale(places) if np.isfinite(processed.disparity).any() else ""
+    return _figure(depth_data.drawing(picture), caption, "left", below=below)
 
 
 def _depth_figure(processed: Processed) -> str:
@@ -225,7 +226,8 @@ def _depth_figure(processed: Processed) -> str:
     span = math.log(far / near)
     places = [(math.log(far / z) / span, f"{z:g} m") for z in _round_depths(near, far)]
     caption = "depth Z, metres along the left camera's axis: bright is near, black is none or cut"
-    return _figure(depth_data.drawing(picture), caption, "left", below=_scale(places))
+    below = _scale(places) if np.isfinite(depth).any() else ""
+    return _figure(depth_data.drawing(picture), caption, "left", below=below)
 
 
 def _round_depths(near_m: float, far_m: float) -> list[float]:

@@ -162,6 +162,16 @@ def test_the_page_says_from_where_on_depth_was_searched() -> None:
     assert f"Searched from {distance_text(from_m)}: nothing nearer" in stereo_page(page_data(processed=found))
 
 
+def test_without_any_value_no_picture_has_a_scale() -> None:
+    """A black picture beside "0.5 px" or "1.2 m" would promise values; with values, disparity and depth have one each."""
+    full = processed()
+    assert full.disparity is not None
+    assert full.cloud is not None
+    empty = replace(full, disparity=np.full_like(full.disparity, np.nan), cloud=np.full_like(full.cloud, np.nan))
+    assert stereo_page(page_data(processed=full)).count('<div class="bar"') == 2
+    assert '<div class="bar"' not in stereo_page(page_data(processed=empty))
+
+
 def test_cut_pixels_are_told_in_words() -> None:
     """Shares are of all pixels; zeros are left out; a small share is never called 0 %."""
     cut = CutCounts(kept=50_000, unmatched=20_000, at_zero=30, too_far=12_000, too_near=3_000, outside=15_000 - 30)
