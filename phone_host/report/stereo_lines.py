@@ -2,7 +2,7 @@
 
 from common.imagesize.head import size_text
 from common.words import counted
-from phone_host.report.cut_words import distance_text, share_text
+from phone_host.report.cut_words import distance_text, pixels_text, share_text
 from phone_host.report.stereo_report import ALWAYS, FailedPair, PairReport, SetReport
 from phone_host.report.stereo_verdict import pair_verdict, set_verdict
 
@@ -22,12 +22,13 @@ def pair_lines(report: PairReport, out: str) -> list[str]:
         how.append(f"matched at {search.scale:.0%} of the size")
     lines = [
         pair_verdict(report)[1],
-        f"{', '.join(how)}: {report.density:.1%} of the pixels have one ({total_ms:.0f} ms)",
+        f"{', '.join(how)}: {report.density:.1%} {pixels_text(report.cut)} have one ({total_ms:.0f} ms)",
     ]
     if report.geometry is not None and written.points is not None:
-        share = written.points / (report.rectified_px[0] * report.rectified_px[1])
+        inside = report.rectified_px[0] * report.rectified_px[1] if report.cut is None else report.cut.inside
+        share = written.points / max(1, inside)
         lines += [
-            f"{counted(written.points, 'point')}, {share:.1%} of the pixels; {report.axes.text}, in metres",
+            f"{counted(written.points, 'point')}, {share:.1%} {pixels_text(report.cut)}; {report.axes.text}, in metres",
             f"f = {report.geometry.focal_px:.1f} px, b = {report.geometry.baseline_m * 1e3:.2f} mm",
             *cut_lines(report),
         ]

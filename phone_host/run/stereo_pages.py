@@ -54,7 +54,6 @@ def pair_page(report: PairReport, processed: Processed, commands: Sequence[NextC
         files=_files([*report.written.files, "report.json"], report.axes.text),
         commands=tuple(commands),
         notes=tuple(remark.text for remark in report.remarks),
-        stacked=processed.pair.epipolar.is_vertical,
         back="../index.html" if report.name else "",
     )
     return stereo_page(data)

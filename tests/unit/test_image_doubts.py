@@ -6,7 +6,8 @@ from typing import Any, Final
 
 import pytest
 
-from phone_host.measure.headline import Grade, answer, depth_error_m, headline
+from phone_host.measure.depth_error import depth_error_m
+from phone_host.measure.headline import Grade, answer, headline
 from phone_host.measure.image_doubts import ImageFigures, ImageJudge, ImageTrust, image_doubts, median_figures
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, depth_is_wrong
 from phone_host.measure.trust import Concern, Doubt
