@@ -1,5 +1,6 @@
 """Says what became of a left image's pixels: how many have a point, and why the others have none. Pure."""
 
+from common.words import distance_text
 from phone_host.model import CutCounts, DepthLimits
 
 
@@ -55,8 +56,3 @@ def share_text(count: int, total: int) -> str:
     if percent < 0.1:
         return "< 0.1 %" if count else "0 %"
     return f"{percent:.1f} %" if percent < 10.0 else f"{percent:.0f} %"
-
-
-def distance_text(metres: float) -> str:
-    """Write a distance with about three digits: `38 m`, `1.25 m`, `300 mm`."""
-    return f"{metres * 1000:.3g} mm" if metres < 1.0 else f"{metres:.3g} m" if metres < 1000 else f"{metres:.0f} m"

@@ -1,8 +1,8 @@
 """What `stereo` says on a terminal: first whether the depth is right. Pure."""
 
 from common.imagesize.head import size_text
-from common.words import counted
-from phone_host.report.cut_words import distance_text, pixels_text, share_text
+from common.words import counted, distance_text
+from phone_host.report.cut_words import pixels_text, share_text
 from phone_host.report.stereo_report import ALWAYS, FailedPair, PairReport, SetReport
 from phone_host.report.stereo_verdict import pair_verdict, set_verdict
 

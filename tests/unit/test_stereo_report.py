@@ -6,7 +6,7 @@ import pytest
 
 from phone_host.measure.headline import Answer, Grade
 from phone_host.measure.image_doubts import ImageFigures
-from phone_host.measure.trust import NO_DEPTH
+from phone_host.measure.no_depth import no_depth
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
@@ -25,7 +25,7 @@ from phone_host.report.stereo_verdict import set_verdict
 
 # 1000 pixels; f b = 50 px m, so an error of 0.25 px makes a depth of 40 m wrong by 0.25 * 40 / 50 = 20 %.
 _GOOD = PairTrust(ImageFigures(), (), Answer(Grade.GOOD, "Depth looks right."))
-_BAD = PairTrust(ImageFigures(), (NO_DEPTH,), Answer(Grade.BAD, "Depth is wrong."))
+_BAD = PairTrust(ImageFigures(), (no_depth(None, None),), Answer(Grade.BAD, "Depth is wrong."))
 
 _PAIR = PairReport(
     name="",
