@@ -1,13 +1,11 @@
-"""Answers the user's question in one sentence: is my depth right, and how far can I trust it? Pure.
-
-A depth z from a disparity with an error of e px is wrong by z^2 * e / (f * b): the derivative of z = f b / (d + doffs).
-"""
+"""Answers the user's question in one sentence: is my depth right, and how far can I trust it? Pure."""
 
 import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
+from phone_host.measure.depth_error import depth_error_m
 from phone_host.measure.image_doubts import ImageFigures
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.trust import Concern
@@ -36,17 +34,6 @@ class Answer:
 
     grade: Grade
     sentence: str
-
-
-def depth_error_m(geometry: StereoGeometry, depth_m: float, error_px: float) -> float:
-    """Compute how wrong a depth is, m.
-
-    Args:
-        geometry: of the rectified pair.
-        depth_m: the depth, m.
-        error_px: error of its disparity, px.
-    """
-    return depth_m * depth_m * error_px / (geometry.focal_px * geometry.baseline_m)
 
 
 def answer(

@@ -12,12 +12,12 @@ from phone_host.measure.accounts import LinkAccount
 from phone_host.measure.camera_match import LockMiss, settings_concerns
 from phone_host.measure.delays import DelayStatistics
 from phone_host.measure.image_doubts import ImageTrust, gravest_first
+from phone_host.measure.no_depth import no_depth
 from phone_host.measure.numbers import ImageEvidence, number_concerns
 from phone_host.measure.regime import RunFigures
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.spoiled import SpoiledCounts, spoiled_concerns
 from phone_host.measure.trust import (
-    NO_DEPTH,
     NO_DOUBT,
     Concern,
     Timing,
@@ -218,7 +218,7 @@ def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
         return found
     if any(concern.doubt.blocks for concern in found):
         return found  # which says why there is none
-    return (NO_DEPTH, *found)
+    return (no_depth(run.depth.cut, run.depth.limits), *found)
 
 
 def depth_is_wrong(run: RunSnapshot) -> bool:

@@ -165,13 +165,6 @@ class Concern:
     remedy: str
 
 
-NO_DEPTH: Final = Concern(
-    Doubt.NO_DEPTH,
-    "no pair has depth",
-    "check that --calibration or --rectified fits the cameras, and that both see the same scene",
-)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unbelieved:
     """The arrivals that were not believed.

@@ -45,11 +45,11 @@ def depth_range_m(depth: NDArray[np.float32]) -> tuple[float, float]:
         depth: (H, W) float32, m, NaN = none.
 
     Returns:
-        Near and far, m; (0, 1) if there is no value at all.
+        Near and far, m; (1, 2) if there is no value at all.
     """
     values = _sample(depth)
     if values.size == 0:
-        return 0.0, 1.0
+        return 1.0, 2.0
     near, far = np.percentile(values, (_LOW_PERCENT, _HIGH_PERCENT))
     return float(near), float(max(far, near * (1 + _LEAST_DEPTH_SHARE)))
 
@@ -66,20 +66,6 @@ def colour_disparity(disparity: Disparity, low_px: float, high_px: float) -> Ima
         (H, W, 3) BGR; black where there is no value.
     """
     return _coloured(disparity, low_px, high_px)
-
-
-def colour_depth(depth: NDArray[np.float32], near_m: float, far_m: float) -> Image:
-    """Colour depths.
-
-    Args:
-        depth: (H, W) float32, m, NaN = none.
-        near_m: depth of the brightest colour.
-        far_m: depth of the darkest colour, beyond `near_m`.
-
-    Returns:
-        (H, W, 3) BGR; black where there is no value.
-    """
-    return _coloured(depth, far_m, near_m)
 
 
 def disparity_picture(disparity: Disparity, geometry: StereoGeometry | None = None) -> Image:

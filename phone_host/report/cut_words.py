@@ -2,6 +2,7 @@
 
 import math
 
+from common.words import distance_text
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 
 
@@ -42,17 +43,21 @@ def cut_sentence(cut: CutCounts, limits: DepthLimits | None) -> str:
     )
 
 
+def pixels_text(cut: CutCounts | None) -> str:
+    """Say of which pixels a density is the share: `of the pixels`, `of the pixels inside the crop`.
+
+    Args:
+        cut: the counts; None: not counted.
+    """
+    return "of the pixels inside the crop" if cut is not None and cut.outside else "of the pixels"
+
+
 def share_text(count: int, total: int) -> str:
     """Write a share in percent; a small one is never called 0 %."""
     percent = 100.0 * count / max(1, total)
     if percent < 0.1:
         return "< 0.1 %" if count else "0 %"
     return f"{percent:.1f} %" if percent < 10.0 else f"{percent:.0f} %"
-
-
-def distance_text(metres: float) -> str:
-    """Write a distance with about three digits: `38 m`, `1.25 m`, `300 mm`."""
-    return f"{metres * 1000:.3g} mm" if metres < 1.0 else f"{metres:.3g} m" if metres < 1000 else f"{metres:.0f} m"
 
 
 def searched_from_m(geometry: StereoGeometry | None, search: Search | None) -> float:

@@ -3,8 +3,8 @@
 import math
 
 from common.imagesize.head import size_text
-from common.words import counted
-from phone_host.report.cut_words import distance_text, share_text
+from common.words import counted, distance_text
+from phone_host.report.cut_words import pixels_text, share_text
 from phone_host.report.stereo_report import (
     ALWAYS,
     FailedPair,
@@ -35,11 +35,11 @@ def pair_lines(report: PairReport, out: str) -> list[str]:
         how.append(f"searched from {distance_text(report.searched_from_m)}")
     lines = [
         pair_verdict(report)[1],
-        f"{', '.join(how)}: {report.density:.1%} of the pixels matched ({total_ms:.0f} ms)",
+        f"{', '.join(how)}: {report.density:.1%} {pixels_text(report.cut)} matched ({total_ms:.0f} ms)",
     ]
     if report.geometry is not None and written.points is not None:
         lines += [
-            f"{counted(written.points, 'point')}, {report.share:.1%} of the pixels; {report.axes.text}, in metres",
+            f"{counted(written.points, 'point')}, {report.share:.1%} {pixels_text(report.cut)}; {report.axes.text}, in metres",
             f"f = {report.geometry.focal_px:.1f} px, b = {report.geometry.baseline_m * 1e3:.2f} mm",
             *cut_lines(report),
         ]

@@ -6,8 +6,8 @@ from pathlib import PurePath
 from typing import Final
 
 from common.imagesize.head import size_text
+from common.words import distance_text
 from phone_host.model import Processed
-from phone_host.report.cut_words import distance_text
 from phone_host.report.page_links import FileLink, NextCommand
 from phone_host.report.report_page import Headline, Picture
 from phone_host.report.stereo_page import (
@@ -58,7 +58,6 @@ def pair_page(report: PairReport, processed: Processed, commands: Sequence[NextC
         ),
         commands=tuple(commands),
         notes=tuple(remark.text for remark in report.remarks_beside_headline),
-        stacked=processed.pair.epipolar.is_vertical,
         back="../index.html" if report.name else "",
     )
     return stereo_page(data)

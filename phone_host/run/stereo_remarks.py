@@ -1,9 +1,10 @@
 """What the user of `stereo` must know about a pair's result. Doubts that are found in the images belong here, too."""
 
 from common.camera.orientation import UPRIGHT
+from common.words import distance_text
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed
-from phone_host.report.cut_words import distance_text, searched_from_m
+from phone_host.report.cut_words import searched_from_m
 from phone_host.report.stereo_report import Remark
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.stereo.images import EncodedFile

@@ -6,18 +6,16 @@ from typing import Final
 from phone_host.measure.file_remedies import ImageSource
 from phone_host.measure.headline import answer
 from phone_host.measure.image_doubts import gravest_first, image_doubts, median_figures
-from phone_host.measure.trust import Concern, Doubt
+from phone_host.measure.no_depth import no_depth
+from phone_host.measure.trust import Doubt
 from phone_host.model import Processed
 from phone_host.report.depth_data import density
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
 
-_NO_DEPTH: Final = Concern(
-    Doubt.NO_DEPTH,
-    "no pixel has depth",
-    "check that the scene has texture, and that --calibration or --rectified fits the images",
-)
+_UNMATCHED: Final = no_depth(None, None)
+_OF_FILES: Final = "check that the scene has texture, and that --calibration or --rectified fits the images"
 
 
 def judge_pair(core: StereoCore, processed: Processed) -> PairTrust:
@@ -32,7 +30,10 @@ def judge_pair(core: StereoCore, processed: Processed) -> PairTrust:
     if not has_depth(processed) and not any(concern.doubt.blocks for concern in found):
         # That there are few disparities, too, says nothing more.
         further = (concern for concern in found if concern.doubt is not Doubt.LOW_DENSITY)
-        found = gravest_first((_NO_DEPTH, *further))
+        why = no_depth(processed.cut, processed.limits)
+        remedy = _OF_FILES if why == _UNMATCHED else why.remedy
+        sentence = why.sentence.replace("no pair has", "no pixel has", 1)  # it may be the only pair
+        found = gravest_first((replace(why, sentence=sentence, remedy=remedy), *further))
     figures = median_figures((evidence,))
     error_px = float("nan") if processed.limits is None else processed.limits.disparity_error_px
     # The headline counts what the files hold: the pixels that have a point, where metres are known.

@@ -201,23 +201,6 @@ def read_image(path: Path, most_pixels: int = MOST_PIXELS, mounted: Orientation 
     return decode_file(open_image(path, most_pixels, mounted))
 
 
-def read_pair(left: Path, right: Path, most_pixels: int = MOST_PIXELS) -> tuple[Image, Image]:
-    """Read the two image files of a pair, with one common scale where they are deeper than 8 bit.
-
-    Args:
-        left: the left image's file.
-        right: the right image's file.
-        most_pixels: an image that claims more is refused.
-
-    Returns:
-        Left and right, each (H, W) grey or (H, W, 3) BGR, uint8.
-
-    Raises:
-        DataError: a file is missing, empty, spoiled, of no known kind or beyond the limit.
-    """
-    return decode_files(open_image(left, most_pixels), open_image(right, most_pixels))
-
-
 def require_same_size(left_px: tuple[int, int], right_px: tuple[int, int], left_name: str, right_name: str) -> None:
     """Check that two images can be a rectified pair.
 

@@ -8,12 +8,22 @@ from typing import Any, Final
 
 import pytest
 
+from phone_host.measure.depth_error import depth_error_m
 from phone_host.measure.file_remedies import EXCHANGE, ImageSource, tries_of
-from phone_host.measure.headline import Grade, answer, depth_error_m, headline
+from phone_host.measure.headline import Grade, answer, headline
 from phone_host.measure.image_doubts import ImageFigures, ImageJudge, ImageTrust, image_doubts, median_figures
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, depth_is_wrong
 from phone_host.measure.trust import Concern, Doubt
-from phone_host.model import Arrangement, Evidence, Exposure, StereoGeometry, Support
+from phone_host.model import (
+    Arrangement,
+    CutCounts,
+    DepthAccount,
+    DepthLimits,
+    Evidence,
+    Exposure,
+    StereoGeometry,
+    Support,
+)
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
 from phone_host.verbs.orientation_arguments import add_orientation_arguments
@@ -196,6 +206,32 @@ def test_a_run_that_wanted_depth_and_found_none_has_a_doubt() -> None:
         Doubt.SWAPPED
     ]
     assert concerns(with_images(has_depth=False, wants_depth=False)) == ()
+
+
+GIVEN = DepthLimits(near_m=0.3, far_m=0.002, disparity_error_px=0.25, from_rig=False)
+OF_RIG = DepthLimits(near_m=0.3, far_m=38.0, disparity_error_px=0.25, from_rig=True)
+
+
+@pytest.mark.parametrize(
+    ("cut", "limits", "sentence", "remedy"),
+    [
+        (CutCounts(unmatched=60, too_far=40), GIVEN, "all points lie farther than --far 2 mm", "larger --far"),
+        (CutCounts(too_far=60, too_near=40), GIVEN, "most points lie farther than --far 2 mm", "larger --far"),
+        (CutCounts(too_far=100), OF_RIG, "all points lie farther than 38 m", "farther apart"),
+        (CutCounts(too_near=100, outside=900), OF_RIG, "all points lie nearer than --near 300 mm", "smaller --near"),
+        (CutCounts(at_zero=90, too_far=10), OF_RIG, "noise of zero", "farther apart"),
+        (CutCounts(unmatched=90, too_far=10), OF_RIG, "no pair has depth", "--calibration or --rectified fits"),
+    ],
+)
+def test_what_became_of_the_pixels_says_why_there_is_no_depth(
+    cut: CutCounts, limits: DepthLimits, sentence: str, remedy: str
+) -> None:
+    """The limit that cut the points is named with its option, and the remedy is to move it; where hardly anything was matched, images and calibration do not fit."""
+    none = replace(with_images(has_depth=False), depth=DepthAccount(cut=cut, limits=limits))
+    [concern] = concerns(none)
+    assert concern.doubt is Doubt.NO_DEPTH
+    assert sentence in concern.sentence
+    assert remedy in concern.remedy
 
 
 def test_a_run_without_a_rig_is_answered_about_delays() -> None:

@@ -305,7 +305,7 @@ def test_a_runs_page_shows_the_last_pair_and_leads_to_the_saved_ones() -> None:
     page = Page(run_page(run(31), processed(), Side.RIGHT, (), saved))
     assert not page.open
     share = 100 * np.isfinite(processed().cloud[..., 2]).mean()  # type: ignore[index]
-    for words in ("number 30 of this run", f"{share:.0f} % of the left pixels have a depth", "15 % farther than 4 m"):
+    for words in ("number 30 of this run", f"{share:.0f} % of the pixels have a depth", "15 % farther than 4 m"):
         assert words in page.words
     assert "left: the host's camera, rectified" in page.words
     links = [one["href"] for one in page.every("a")]

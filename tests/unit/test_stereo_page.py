@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.model import CutCounts, Search
+from common.words import distance_text
+from phone_host.model import CutCounts, Epipolar, Search
 from phone_host.report import depth_data
-from phone_host.report.cut_words import cut_rows, cut_sentence, distance_text
+from phone_host.report.cut_words import cut_rows, cut_sentence
 from phone_host.report.depth_script import SCRIPT
 from phone_host.report.page_frame import document
 from phone_host.report.page_links import FileLink, NextCommand
@@ -209,7 +210,9 @@ def test_nothing_measured_makes_a_page_all_the_same() -> None:
 
 def test_stacked_cameras_have_column_lines() -> None:
     """Where epipolar lines run along columns, the pictures stand above each other, and the lines and the match run along columns."""
-    text = stereo_page(page_data(stacked=True))
+    flat = processed()
+    pair = replace(flat.pair, epipolar=Epipolar.DOWN)
+    text = stereo_page(page_data(processed=replace(flat, pair=pair)))
     assert "column lines" in Page(text).words
     assert "views stack" in text
     assert "views rows" not in text

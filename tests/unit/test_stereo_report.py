@@ -7,7 +7,7 @@ import pytest
 
 from phone_host.measure.headline import Answer, Grade
 from phone_host.measure.image_doubts import ImageFigures
-from phone_host.measure.trust import NO_DEPTH
+from phone_host.measure.no_depth import no_depth
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
@@ -26,7 +26,7 @@ from phone_host.report.stereo_verdict import set_verdict
 
 # 1000 pixels; f b = 50 px m, so an error of 0.25 px makes a depth of 40 m wrong by 0.25 * 40 / 50 = 20 %.
 _GOOD = PairTrust(ImageFigures(), (), Answer(Grade.GOOD, "Depth looks right."))
-_BAD = PairTrust(ImageFigures(), (NO_DEPTH,), Answer(Grade.BAD, "Depth is wrong."))
+_BAD = PairTrust(ImageFigures(), (no_depth(None, None),), Answer(Grade.BAD, "Depth is wrong."))
 
 _PAIR = PairReport(
     name="",
@@ -133,7 +133,7 @@ def test_pairs_without_numbers_of_their_own_are_told_with_a_file() -> None:
 
 def test_what_the_headline_tells_is_no_warning_beside_it() -> None:
     """A doubt is told once, by the headline with its remedy; report.json lists it all the same."""
-    remarks = (Remark(NO_DEPTH.sentence, NO_DEPTH.remedy), Remark("something else"))
+    remarks = (Remark(_BAD.concerns[0].sentence, _BAD.concerns[0].remedy), Remark("something else"))
     bad = replace(_PAIR, trust=_BAD, remarks=remarks)
     assert [line for line in pair_lines(bad, "scan") if line.startswith("warning")] == ["warning: something else"]
     assert len(pair_json(bad)["warnings"]) == 2
