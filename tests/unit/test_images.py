@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
-from phone_host.stereo.images import decode, decode_pair, read_image, read_pair, require_same_size, to_8_bit
+from phone_host.stereo.eight_bit import to_8_bit
+from phone_host.stereo.images import decode, decode_pair, read_image, read_pair, require_same_size
 
 _RAMP = np.arange(256, dtype=np.uint8).reshape(16, 16)
 _COLOUR = np.dstack([_RAMP, _RAMP.T, 255 - _RAMP])
