@@ -100,8 +100,9 @@ def _plain(message: str) -> str:
         verbs = re.findall(r"[\w-]+", found[2])
         listed = f" (the verbs are {', '.join(verbs)})"
         return f"unknown verb {found[1]}{_guess(found[1], verbs) or listed}"
-    if found := re.fullmatch(r"argument (\S+): invalid (?:float|int) value: (.*)", message):
-        return f"{found[1]} is {found[2]}, which is not a number (leave units out)"
+    if found := re.fullmatch(r"argument (\S+): invalid (float|int) value: (.*)", message):
+        kind = "a whole number, such as 30" if found[2] == "int" else "a number without a unit, such as 1.5"
+        return f"{found[1]} is {found[3]}, but must be {kind}"
     if found := re.fullmatch(r"argument (\S+): expected (?:one|at least one|\d+) arguments?", message):
         return f"{found[1]} needs a value"
     if found := re.fullmatch(r"argument (\S+): (is empty .*)", message):

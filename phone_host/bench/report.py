@@ -69,6 +69,7 @@ def as_json(results: Sequence[CaseResult], under: Conditions, analysis: Analysis
         analysis: conclusions from the results.
     """
     return {
+        "command": "delay-bench",
         "machine": under.machine,
         "date": under.date,
         "matcher": under.matcher,

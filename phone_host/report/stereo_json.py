@@ -20,6 +20,7 @@ def pair_json(report: PairReport) -> dict[str, Any]:
     verdict, sentence = pair_verdict(report)
     return {
         "format_version": REPORT_FORMAT,
+        "command": "stereo",
         "verdict": verdict.value,
         "headline": sentence,
         "left": {"file": report.left, "size": size_text(report.left_px)},
@@ -49,6 +50,7 @@ def set_json(report: SetReport) -> dict[str, Any]:
     verdict, sentence = set_verdict(report)
     return {
         "format_version": REPORT_FORMAT,
+        "command": "stereo",
         "verdict": verdict.value,
         "headline": sentence,
         "paired_by": "number" if report.by_number else "name order",

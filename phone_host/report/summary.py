@@ -62,6 +62,8 @@ def _delay_table(run: RunSnapshot, width: int) -> list[str]:
         spread = run.delays.spread(name)
         if not spread.count:
             continue  # stills: nothing is counted from an exposure
+        if name == "starvation" and run.timeless and not spread.max_ns:
+            continue  # they come when the processor asks for them
         values = (getattr(spread, f"{column}_ns") / _MS for column in columns)
         lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value:9.3f}" for value in values))
     return lines

@@ -176,7 +176,7 @@ def run_stereo(folder: Path, size_px: tuple[int, int], options: Sequence[str]) -
         disparities=report["disparities"],
         seconds=seconds,
         cpu_seconds=cpu_seconds,
-        megabytes=kilobytes / 1000,
+        megabytes=kilobytes * 1024 / 1e6,
         density=100 * float(valued.sum() / both.sum()),
         wrong=100 * float(wrong.mean()),
     )

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
+from phone_host.stereo.eight_bit import to_8_bit
 from phone_host.stereo.images import (
     decode,
     decode_files,
@@ -17,7 +18,6 @@ from phone_host.stereo.images import (
     open_image,
     read_image,
     require_same_size,
-    to_8_bit,
 )
 
 _RAMP = np.arange(256, dtype=np.uint8).reshape(16, 16)

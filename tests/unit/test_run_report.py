@@ -340,6 +340,12 @@ def test_stills_have_no_figures_from_an_exposure() -> None:
     assert set(report["not_measured"]) == {"capture", "end_to_end", "time_skew"}
     lines = summary(seen).splitlines()
     assert not any(line.startswith(("capture", "end-to-end")) for line in lines)
+    starved = DelayStatistics()
+    starved.add(replace(LEDGER, queued_ns=3 * MS), timeless=True)
+    assert not any(line.startswith("starvation") for line in lines)
+    assert any(
+        line.startswith("starvation") for line in summary(replace(seen, delays=starved, processed=1)).splitlines()
+    )
     assert any(line.startswith("processing") for line in lines)
     page = run_page(seen, None, Side.LEFT, [LEDGER] * 12)
     assert "Time skew of the pairs" not in page

@@ -31,6 +31,7 @@ def report_of(
     """Return the report of a calibration that gave a rig."""
     return {
         "format_version": REPORT_FORMAT,
+        "command": "calibrate",
         "pairs": _pairs(files, rejected, len(calibration.used)),
         **_figures(calibration),
         **_turned(views),
@@ -43,6 +44,7 @@ def report_of_failure(files: ViewFiles, views: BoardViews, error: DataError) -> 
     """Return the report of a calibration that gave no rig."""
     return {
         "format_version": REPORT_FORMAT,
+        "command": "calibrate",
         "pairs": _pairs(files, views.rejected, 0),
         **_turned(views),
         "verdict": REJECTED,

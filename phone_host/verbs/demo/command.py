@@ -59,12 +59,12 @@ def run(options: argparse.Namespace) -> int:
                 with live or nullcontext():
                     demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
             except BaseException:
-                demo.host.write_report(build(demo.host.snapshot("failed")))
+                demo.host.write_report(build(demo.host.snapshot("failed"), "demo"))
                 raise
         snapshot = demo.host.snapshot("stopped" if signals.stop else "time_over")
         with busy_bar("comparing the depth with the known scene, writing the page", console):
             errors = demo.check(scene)
-            report = build(snapshot) | {"truth": truth_json(errors)}
+            report = build(snapshot, "demo") | {"truth": truth_json(errors)}
             complete = demo.host.write_report(report)
             demo.write_pictures(out)
             write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers, _by_hand(out, film)))

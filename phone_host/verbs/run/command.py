@@ -113,7 +113,10 @@ def _core(
     options: argparse.Namespace, settings: PhoneHostSettings, size_px: tuple[int, int]
 ) -> tuple[StereoCore | None, Side]:
     """Return the stereo core, if any, and the side of the board's camera: from the option, else the rig, else left."""
-    core, rig_side = build_core(options, settings.calibration, settings.matcher, size_px)
+    images = replayed(settings.camera)
+    core, rig_side = build_core(
+        options, settings.calibration, settings.matcher, size_px, Path(images) if images else None
+    )
     board_side = Side(options.board_side) if options.board_side else rig_side or Side.LEFT
     if rig_side not in {None, board_side}:
         raise SettingsError(
