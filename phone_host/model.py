@@ -11,10 +11,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from common.camera.identity import CameraState
-from common.camera.orientation import UPRIGHT, Orientation
+from common.camera_identity import RememberedCamera
 from common.frame import Frame
 from common.ledger import BoardMarks, PairLedger, StageTimes
+from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import FrameMessage
 
 Image = NDArray[np.uint8]
@@ -235,8 +235,8 @@ class Rig:
     time_offset: TimeOffset = TimeOffset()
     zero_sigma_px: float = float("nan")
     verdict: str = ""
-    left_camera: CameraState | None = None
-    right_camera: CameraState | None = None
+    left_camera: RememberedCamera | None = None
+    right_camera: RememberedCamera | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,7 +2,7 @@
 
 import math
 
-from common.camera.orientation import UPRIGHT
+from common.orientation import UPRIGHT
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed
 from phone_host.output.pair_files import WrittenPair

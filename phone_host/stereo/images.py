@@ -20,13 +20,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from common.camera.orientation import UPRIGHT, Orientation
 from common.errors import DataError
 from common.files import read_whole
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
 from common.imagesize.head import MOST_PIXELS, ImageHead, ImageKind, require_believable
 from common.imagesize.head import size_text as px_text
 from common.imagesize.read import read_head, whole_image
+from common.orientation import UPRIGHT, Orientation
 from common.program.logs import event
 from phone_host.model import Image
 from phone_host.stereo.orient import upright

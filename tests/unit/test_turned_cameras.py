@@ -9,9 +9,9 @@ import pytest
 from common import now
 from common.camera.base import Camera
 from common.camera.factory import parse_camera, parse_orientation
-from common.camera.orientation import UPRIGHT, Flip, Orientation
 from common.camera.v4l2_stream import V4l2Settings
 from common.errors import DataError, SettingsError
+from common.orientation import UPRIGHT, Flip, Orientation
 from common.protocol.message import FrameMessage
 from phone_host.calibration.timing.shots import Shot
 from phone_host.camera import factory as host_factory
