@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from contextlib import ExitStack, closing
 from typing import Final
 
-from board_agent.agent import Agent, Service, Summary, wait_for_camera
+from board_agent.agent import Agent, Service, Summary
+from board_agent.await_camera import wait_for_camera
 from board_agent.rate_control import RateControl, ladder, ways
 from board_agent.sd_notify import Notifier
 from board_agent.settings import BoardSettings, check, key_folder, resolve_settings
