@@ -13,9 +13,9 @@ from urllib.parse import parse_qsl
 
 from common.camera.base import Camera
 from common.camera.options import EXAMPLE
-from common.camera.orientation import ORIENTING, Orientation, orientation_of
 from common.camera.turned import turned
 from common.errors import SettingsError
+from common.orientation import ORIENTING, Orientation, orientation_of
 from common.program.extensions import make_registered, named, registered_names
 
 _CAMERAS: Final = "tandemscan.cameras"

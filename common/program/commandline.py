@@ -180,6 +180,8 @@ def _ran(
         _say(f"{parser.prog}: error: {error}")
         return error.exit_code
     except KeyboardInterrupt:
+        if not interrupts.is_heard():
+            interrupts.leave()  # saying so would block, and the interpreter's end too
         _say(f"{parser.prog}: interrupted")
         return INTERRUPTED
 

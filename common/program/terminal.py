@@ -7,9 +7,10 @@ import textwrap
 from typing import Final, TextIO
 
 _COMMAND: Final = re.compile(
-    r"\s*(\S+ \S+ {2,})?((?:'[^']*/|\S*/)?(phone-host|board-agent|delay-bench)\b|(python3?|pipx?|sudo|make|\.) )"
+    r"\s*(\S+ \S+ {2,})?((?:'[^']*/|\S*/)?(phone-host|board-agent|delay-bench)(?!\S)|(python3?|pipx?|sudo|make|\.) )"
 )
-"""A line that is a command, maybe behind a label of two words. It stays whole, because it is there to be pasted."""
+"""A line that is a command, maybe behind a label of two words. It stays whole, because it is there to be pasted.
+An error begins with a command's name too, but with a colon behind it."""
 
 _COLUMN: Final = re.compile(r"\S( {2,})(?=\S)")
 _FARTHEST: Final = 0.45

@@ -4,10 +4,10 @@ from typing import Final
 
 from common.camera import factory as common_factory
 from common.camera.base import Camera
-from common.camera.orientation import Orientation
 from common.camera.turned import turned
 from common.frame import ImageSizeError
 from common.imagesize.head import MOST_PIXELS, require_pixels
+from common.orientation import Orientation
 from common.program.extensions import named
 from phone_host.camera.http_uri import http_settings, is_http, without_orientation
 

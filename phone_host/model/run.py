@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from common.camera.orientation import UPRIGHT, Orientation
+from common.orientation import UPRIGHT, Orientation
 from common.frame import Frame
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.protocol.message import FrameMessage

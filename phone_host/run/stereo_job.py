@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from common import now
-from common.camera.orientation import UPRIGHT, Orientation
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
+from common.orientation import UPRIGHT, Orientation
 from phone_host.output.atomic import write_text
 from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text

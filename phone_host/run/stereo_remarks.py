@@ -1,6 +1,6 @@
 """What the user of `stereo` must know about a pair's result. Doubts that are found in the images belong here, too."""
 
-from common.camera.orientation import UPRIGHT
+from common.orientation import UPRIGHT
 from common.words import distance_text
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed

@@ -19,13 +19,13 @@ from typing import Final
 import cv2
 import numpy as np
 
-from common.camera.orientation import UPRIGHT, Orientation
 from common.errors import DataError
 from common.files import read_whole
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
 from common.imagesize.head import MOST_PIXELS, ImageHead, ImageKind, require_believable
 from common.imagesize.head import size_text as px_text
 from common.imagesize.read import read_head, whole_image
+from common.orientation import UPRIGHT, Orientation
 from common.program.logs import event
 from phone_host.model import Image
 from phone_host.stereo.eight_bit import AnyImage, to_8_bit

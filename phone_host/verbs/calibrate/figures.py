@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from common.camera.orientation import UPRIGHT
 from common.errors import DataError
+from common.orientation import UPRIGHT
 from common.versions import REPORT_FORMAT
 from common.words import counted
 from phone_host.calibration.board_pairs import Calibration, Rejected

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from common import now
+from common.camera.base import upright_px
 from common.errors import SettingsError
 from common.link.factory import open_links, parse_link, tell_insecure
 from common.program import logs
@@ -64,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
         spare_inputs(options.out, NAMES, {what: Path(path) for what, path in inputs.items() if path})
     fifo = FifoSettings.parse(settings.fifo)
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
-    core, board_side = _core(options, settings, camera.description.upright_px)
+    core, board_side = _core(options, settings, upright_px(camera))
     keys = key_folder(settings.keys)
     named = settings.link or (find_board_and_say(keys.path, options.wait),)
     uris = [parse_link(uri, listens_by_default=False) for uri in named]
