@@ -16,7 +16,7 @@ from common.program.commandline import INTERRUPTED
 from common.program.interrupts import leave
 from common.program.settings import Resolved, log_level, with_origins
 from common.program.signals import StopSignals
-from common.program.terminal import columns, fitted
+from common.program.terminal import columns, headed, rows
 from common.stamp import HOST_CLOCK
 from phone_host.boards.discovery import find_board_and_say, remember
 from phone_host.camera.examples import EXAMPLE
@@ -90,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
     report = build(snapshot)
     page = _page(host, snapshot, board_side, options.out) if options.out else ""
     complete = host.write_report(report, page)
-    text = json.dumps(report) if options.json else fitted(summary(snapshot, columns()))
+    text = json.dumps(report) if options.json else headed(summary(snapshot, columns()), columns(), rows())
     print(text, flush=host.has_given_up)
     if signals.interrupted and host.has_given_up:
         leave()  # the interpreter's end would wait for native code
