@@ -89,7 +89,9 @@ def run(options: argparse.Namespace) -> int:
     report = build(snapshot)
     page = _page(host, snapshot, board_side, options.out) if options.out else ""
     complete = host.write_report(report, page)
-    text = json.dumps(report) if options.json else headed(summary(snapshot, columns()), columns(), rows())
+    missing = f"\nnot written: {host.missing_files}: make room and run again" if host.missing_files else ""
+    told = summary(snapshot, columns()) + missing
+    text = json.dumps(report) if options.json else headed(told, columns(), rows())
     print(text, flush=host.has_given_up)
     if signals.interrupted and host.has_given_up:
         leave()  # the interpreter's end would wait for native code
