@@ -30,6 +30,34 @@ def columns(stream: TextIO | None = None) -> int:
         return 0
 
 
+def rows(stream: TextIO | None = None) -> int:
+    """Return the height of the terminal that a stream writes to, in lines; 0 if it is no terminal.
+
+    Args:
+        stream: standard output if left out.
+    """
+    stream = stream or sys.stdout
+    try:
+        return os.get_terminal_size(stream.fileno()).lines
+    except (OSError, ValueError):
+        return 0
+
+
+def headed(text: str, width: int, height: int) -> str:
+    """Fold text; where it is higher than the terminal, so that its first line is out of sight, say that line again at the end.
+
+    Args:
+        text: lines, the most important one first.
+        width: of the terminal; 0: no limit.
+        height: of the terminal; 0: no limit.
+    """
+    whole = folded(text, width)
+    # The prompt that follows takes one more line.
+    if not height or whole.count("\n") + 2 <= height:
+        return whole
+    return f"{whole}\n\n{folded(text.partition(chr(10))[0], width)}"
+
+
 def fitted(text: str, stream: TextIO | None = None) -> str:
     """Fold text to the terminal that a stream writes to; see `folded`."""
     return folded(text, columns(stream))

@@ -240,6 +240,11 @@ class Host:
         return self._files.complete
 
     @property
+    def missing_files(self) -> str:
+        """The files that `write_report` could not write, and why, in words; empty: none."""
+        return self._files.missing
+
+    @property
     def last(self) -> Processed | None:
         """The newest pair's images and depth."""
         return self._ledgerer.last

@@ -1,5 +1,6 @@
 """Calibration against rigs whose every number is known."""
 
+import re
 from dataclasses import replace
 
 import cv2
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from common.errors import DataError
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
 from phone_host.calibration.calibrate import calibrate
+from phone_host.calibration.calibrate_alone import off_words
 from phone_host.calibration.verdict import Assessment, Verdict, judge, vertical_p95_px
 from phone_host.model import CameraModel, Rig
 from tests.support.boards import BOARD, exact_pairs, poses
@@ -88,6 +90,26 @@ def test_a_pair_of_two_moments_is_rejected(shift_m: float) -> None:
     later[4] += shift_m
     found = calibrate(_changed(pairs, 4, exact_pairs(rig, later[np.newaxis])[0].right_px), BOARD, _SIZES)
     assert [(each.name, each.reason) for each in found.rejected] == [("4", Reason.MOVED)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_exchanged_pairs_are_told_with_numbers_that_mean_something(seed: int) -> None:
+    """Five pairs whose right images went to their neighbours: no error above 1000 px is printed, and an error says to check the pairs."""
+    pairs = exact_pairs(_rig(), poses(5, seed=seed), noise_px=0.1, seed=seed)
+    shuffled = [BoardPair(a.name, a.left_px, b.right_px) for a, b in zip(pairs, [*pairs[1:], pairs[0]], strict=True)]
+    try:
+        text = " ".join(each.detail for each in calibrate(shuffled, BOARD, _SIZES).rejected)
+    except DataError as error:
+        text = str(error)
+    assert not re.search(r"[0-9]{4,}\.", text)
+    assert "only " not in text or "check that the two images of each pair belong together" in text
+
+
+def test_how_far_corners_are_off_is_told_up_to_a_thousand_pixels() -> None:
+    """A fit that has diverged gives errors of millions of pixels; they are told as more than 1000."""
+    assert off_words(3.214, 0.3) == "by 3.21 px, others by 0.30 px"
+    assert off_words(114029453.03, 59.94) == "by more than 1000 px, others by 59.94 px"
+    assert off_words(float("nan"), 0.3) == "by more than 1000 px, others by 0.30 px"
 
 
 def test_swapped_sides_are_told_with_the_remedy() -> None:

@@ -87,6 +87,29 @@ def test_a_rate_needs_two_pairs() -> None:
     assert summary(run(31)).splitlines()[1] == "31 pairs in 1.5 s (20.0 /s), ended: stopped"
 
 
+def test_a_drift_that_takes_hours_is_not_told() -> None:
+    """A turn of 50 ms at 13.9 ppm takes 3597 s and is told; at 13.8 ppm it takes 3623 s and is not."""
+    told, untold = (
+        phase_lines(Phase(time_skew_ns=0.0, period_ns=50 * MS, drift=drift, first_ns=0), None)[0]
+        for drift in (13.9e-6, -13.8e-6)
+    )
+    assert told.endswith("one full turn in 3597 s")
+    assert untold == "phase: the board exposes 0.0 of 50.0 ms after the host"
+
+
+def test_what_could_not_be_written_is_told_without_zeros() -> None:
+    """Only what is missing is listed: lines, pairs or both."""
+    ends = [
+        summary(replace(run(31), unwritten=Unwritten(lines, pairs, "disk full"))).splitlines()[-1]
+        for lines, pairs in ((0, 13), (1, 0), (4, 6))
+    ]
+    assert ends == [
+        "not written: 13 pairs (disk full)",
+        "not written: 1 line of delays.jsonl (disk full)",
+        "not written: 4 lines of delays.jsonl, 6 pairs (disk full)",
+    ]
+
+
 def test_the_phase_is_told_with_its_side() -> None:
     """A board that exposes 5 ms earlier is shown as before the host, and a phase without drift has no beat."""
     assert phase_lines(Phase(time_skew_ns=-5.0 * MS, period_ns=50 * MS, drift=0.0, first_ns=0), None) == [
@@ -198,7 +221,7 @@ def test_everything_that_a_run_knows_is_told() -> None:
         "back 5 times", "1 frame missed", "6 stamps not believed", "7 controls refused", "8 frames no end",
         "5 frames dropped on the board: replaced", "9 board frames without partner: no partner",
         "3 pairs dropped from a full FIFO", "2 pairs that could not be processed",
-        "4 pairs still waiting at the end", "4 lines, 6 pairs (disk full)",
+        "4 pairs still waiting at the end", "4 lines of delays.jsonl, 6 pairs (disk full)",
     ):  # fmt: skip
         assert words in text
     [head, ipc, tcp] = text[text.index("link  ") :].splitlines()[:3]
