@@ -56,7 +56,7 @@ _LEAST_CONSISTENCY: Final = 0.25
 """Good pairs reach 0.33 and more, the worst of them before white walls."""
 
 _MOST_VERTICAL_PX: Final = 2.0
-"""Matchers correct up to 2 px of common offset; beyond it they lose points."""
+"""Matchers correct up to 2 px of common offset; beyond it they lose points. In px of the images that they match."""
 
 _TILTED_SHARE: Final = 0.3
 """If fewer of the related features than this share their rows, the rectification does not fit the cameras."""
@@ -329,12 +329,12 @@ def _figures(evidence: Evidence, support: dict[Arrangement, int]) -> tuple[Conce
     found = []
     related, right = support[Arrangement.TILTED], support[Arrangement.RIGHT]
     is_tilted = related >= 2 * _LEAST_SUPPORT and right < _TILTED_SHARE * related
-    if is_tilted or evidence.vertical_px > _MOST_VERTICAL_PX:
+    is_off = evidence.vertical_px * evidence.matched_scale > _MOST_VERTICAL_PX
+    if is_tilted or is_off:
         found.append(
             Concern(
                 Doubt.VERTICAL_ERROR,
-                "the rows of the two images do not agree"
-                + (f" (by {evidence.vertical_px:.1f} px)" if evidence.vertical_px > _MOST_VERTICAL_PX else ""),
+                "the rows of the two images do not agree" + (f" (by {evidence.vertical_px:.1f} px)" if is_off else ""),
                 "the calibration does not fit these cameras any more, or never did: calibrate the rig again",
             )
         )

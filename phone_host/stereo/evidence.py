@@ -108,6 +108,7 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
         vertical_px=vertical_px,
         vertical_offset_px=offset_px,
         supports=supports(upright, plain, turned_over, maps, (width_px, height_px)),
+        matched_scale=1.0 if processed.search is None else processed.search.scale,
     )
 
 

@@ -13,7 +13,7 @@ from common.errors import DataError
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.calibrate_alone import off_words
-from phone_host.calibration.verdict import Assessment, Verdict, judge, vertical_p95_px
+from phone_host.calibration.verdict import Assessment, Verdict, judge, size_factor, vertical_p95_px
 from phone_host.model import CameraModel, Rig
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import project_points, unlike_rig
@@ -247,3 +247,35 @@ def test_a_second_chance_brings_no_wrong_pair_back() -> None:
     pairs[4] = replace(pairs[4], right_px=pairs[4].right_px + np.array([0.0, 3.0]))
     found = calibrate(pairs, BOARD, ((640, 480), (640, 480)))
     assert [each.name for each in found.rejected] == ["4"]
+
+
+def _larger(camera: CameraModel, factor: int) -> CameraModel:
+    """The same lens before a sensor with pixels so many times smaller."""
+    to_larger = np.array([[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1]], np.float64)
+    size = {"width_px": camera.width_px * factor, "height_px": camera.height_px * factor}
+    return replace(camera, matrix=to_larger @ camera.matrix, **size)
+
+
+@pytest.mark.parametrize(("noise_px", "verdict"), [(0.08, Verdict.GOOD), (0.17, Verdict.USABLE)])
+def test_enlarged_pictures_have_the_verdict_of_the_small_ones(noise_px: float, verdict: Verdict) -> None:
+    """Corners of 1280x960 and 1280x720 images, and the same four times as large with four times the error: one verdict. Remedies name the limit that holds."""
+    rig = _rig()
+    rig = replace(rig, left=_larger(rig.left, 2))
+    large = replace(rig, left=_larger(rig.left, 4), right=_larger(rig.right, 4))
+    judged = []
+    for each, noise, factor in ((rig, noise_px, 1), (large, 4 * noise_px, 4)):
+        sizes = tuple((camera.width_px, camera.height_px) for camera in (each.left, each.right))
+        found = calibrate(exact_pairs(each, poses(12, seed=8), noise_px=noise, seed=8), BOARD, (sizes[0], sizes[1]))
+        assert size_factor(found.rig) == factor
+        judged.append(judge(found, ()))
+    assert [each.verdict for each in judged] == [verdict, verdict]
+    if verdict is Verdict.USABLE:
+        assert "1.00 px is good" in judged[1].remedies[0]
+
+
+def test_small_pictures_have_no_narrower_limits() -> None:
+    """Below 1280 px the limits stay; of two cameras the coarser one counts."""
+    rig = _rig()
+    assert size_factor(rig) == 1.0
+    assert size_factor(replace(rig, right=_larger(rig.right, 4))) == 1.0
+    assert size_factor(replace(rig, left=_larger(rig.left, 3), right=_larger(rig.right, 4))) == 1.5

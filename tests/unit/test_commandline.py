@@ -100,7 +100,9 @@ def test_an_error_that_is_not_stdouts_is_not_called_so() -> None:
     [
         (["ron"], "unknown verb ron (did you mean run?)"),
         (["walk"], "unknown verb walk (the verbs are run)"),
-        (["run", "--cuont", "3"], "missing: --count"),
+        (["run"], "missing: --count"),
+        (["run", "--cuont", "3"], "unknown option --cuont (did you mean --count?)"),
+        (["--spede"], "unknown option --spede"),
         (["run", "--count"], "--count needs a value"),
         (["run", "--count", "3", "--knid", "a"], "unknown option --knid (did you mean --kind?)"),
         (["run", "--count", "3", "left2.jpg"], "nothing takes left2.jpg (put patterns such as 'left*.jpg' in quotes)"),

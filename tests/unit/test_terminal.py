@@ -16,9 +16,11 @@ from rich.console import Console
 from common.ledger import BoardMarks
 from common.program.terminal import columns, folded
 from phone_host.bench.tables import narrow_rows
+from phone_host.calibration.board_pairs import Reason, Rejected
 from phone_host.measure.accounts import LinkAccount, LinkTally
 from phone_host.report.summary import summary
 from phone_host.run.terminal_view import LiveTable
+from phone_host.verbs.calibrate.figures import rejections
 from tests.support.samples import LEDGER
 from tests.support.terminal import in_terminal
 from tests.unit.test_bench_report import result
@@ -153,3 +155,14 @@ def test_the_list_of_interfaces_fits_a_phone(tmp_path: Path) -> None:
     lines = running.seen.decode().split("\r\n")
     assert "usb-serial: serial, 1000 kB/s, 1 to 2 ms" in lines
     assert max(len(line) for line in lines) <= PHONE
+
+
+def test_rejected_pairs_fit_a_phones_terminal() -> None:
+    """The line of a pair that is not used goes on below its reason; nothing is wider than 50 columns."""
+    line = rejections(
+        (Rejected("12", Reason.NOT_FOUND_LEFT, "the board is not seen whole and sharp in the left image"),)
+    )
+    lines = folded(line, PHONE).split("\n")
+    assert len(lines) == 3
+    assert all(len(each) <= PHONE for each in lines)
+    assert all(each.startswith(" " * 10) for each in lines[1:])
