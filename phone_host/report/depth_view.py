@@ -44,7 +44,7 @@ color:var(--ink2);border-radius:8px;border:1px solid var(--line)}
 .clouds canvas:active{cursor:grabbing}.clouds canvas:focus-visible,.view:focus-visible{outline:2px solid var(--c5);outline-offset:2px}
 button{font:inherit;font-size:.85rem;color:var(--ink);background:var(--bg);border:1px solid var(--line);border-radius:6px;padding:.35rem .8rem;cursor:pointer}
 .buttons{display:flex;flex-wrap:wrap;gap:.5rem;margin:.6rem 0 0}
-@media (max-width:700px){.views.maps{grid-template-columns:1fr}.clouds canvas{height:56vh}.readout{font-size:.9rem}}
+@media (max-width:700px){.views.maps{grid-template-columns:1fr}.clouds canvas{height:min(56vh,120vw)}.readout{font-size:.9rem}}
 """
 
 THIN: Final = "\u202f"

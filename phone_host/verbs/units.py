@@ -101,6 +101,6 @@ def _not_metres(text: str, option: str, example: str, least_mm: float) -> float:
     if found is not None and not found[2] and value < least_mm:
         raise SettingsError(
             f"{option} {text.strip()} has no unit, and a number alone means mm",
-            f"write {value:g}m, or {value:g}mm if you mean that",
+            f"write {value * 1000:g}mm or {value:g}m; {value:g}mm if you mean that",
         )
     return value

@@ -26,7 +26,7 @@ def test_a_number_alone_that_can_only_mean_metres_is_refused_with_both_readings(
     for read, text in ((baseline_mm, "0.193"), (lambda word: limit_mm(word, "--far", "5m"), "2")):
         with pytest.raises(SettingsError, match="has no unit") as caught:
             read(text)
-        assert f"{text}m," in caught.value.remedy
+        assert f"or {text}m;" in caught.value.remedy
         assert f"{text}mm" in caught.value.remedy
 
 
