@@ -4,7 +4,7 @@ A pair that cannot be computed ends the work only if it is the only one; of seve
 Wrong settings and a results folder that cannot be written to end the work at once.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,7 +67,7 @@ class StereoJob:
         axes: of cloud.ply and xyz.pfm.
         most_pixels: an image that claims more is refused.
         mounted: by which turns the left and the right images become upright, after what their EXIF headers say.
-        commands: what to do next, for the pages.
+        commands: returns what to do next, for the page of these pairs.
     """
 
     files: ViewFiles
@@ -77,7 +77,7 @@ class StereoJob:
     axes: Axes = Axes.CAMERA
     most_pixels: int = MOST_PIXELS
     mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
-    commands: tuple[NextCommand, ...] = ()
+    commands: Callable[[Sequence[PairReport]], tuple[NextCommand, ...]] = lambda _: ()
 
 
 def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
@@ -114,7 +114,7 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
                 "mend what this names, then try again",
             )
         results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
-        results.write_text("index.html", set_page(report, work.thumbnails, job.commands))
+        results.write_text("index.html", set_page(report, work.thumbnails, job.commands(report.computed)))
         return report
 
 
@@ -240,7 +240,7 @@ class _Work:
                 trust=trust,
             )
             write_text(place / "report.json", json_text(pair_json(report), indent=2) + "\n")
-            write_text(place / "index.html", pair_page(report, processed, self._job.commands))
+            write_text(place / "index.html", pair_page(report, processed, self._job.commands((report,))))
         if folder and (picture := pair_thumbnail(processed)) is not None:
             self.thumbnails[folder] = picture
         return report

@@ -3,16 +3,14 @@
 import argparse
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError
-from common.program.invocation import command_line
 from common.program.terminal import fitted
-from phone_host.output.axes import Axes
 from phone_host.output.calib_txt import is_calib_txt
 from phone_host.output.json_text import json_text
-from phone_host.report.page_links import NextCommand
 from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_lines import pair_lines, set_lines
 from phone_host.report.stereo_report import Size
@@ -25,6 +23,7 @@ from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
+from phone_host.verbs.stereo.next_commands import Typed, next_commands
 from phone_host.verbs.stereo_options import build_core, output_options
 
 _DEFAULT_MATCHER: Final = "sgbm"
@@ -48,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
         axes=output_options(options).axes,
         most_pixels=most_pixels(None, options.max_megapixels),
         mounted=orientations(options),
-        commands=_next(options),
+        commands=partial(next_commands, _typed(options)),
     )
     count = len(files.pairs)
     try:
@@ -71,18 +70,16 @@ def _core(options: argparse.Namespace, size_px: Size, image: Path) -> StereoCore
     return core
 
 
-def _next(options: argparse.Namespace) -> tuple[NextCommand, ...]:
-    """Return commands to copy from the page."""
-    commands = []
-    if options.axes == Axes.CAMERA.value and sys.argv[1:2] == ["stereo"]:
-        words = (*(word for word in sys.argv[1:] if word != "--json"), "--axes", Axes.Y_UP.value)
-        again = command_line("phone-host", *words)
-        commands.append(NextCommand("the same with y up, as most 3D viewers expect", again))
-    if options.calibration and not is_calib_txt(Path(options.calibration)):  # live images are not rectified
-        cameras = ("--link", "tcp://192.168.7.2:5555", "--camera", "v4l2:/dev/video0")
-        run = command_line("phone-host", "run", *cameras, "--calibration", options.calibration, "--out", "live")
-        commands.append(NextCommand("the same rig live: the board's camera and this machine's", run))
-    return tuple(commands)
+def _typed(options: argparse.Namespace) -> Typed:
+    """Return what the user typed, for the pages' commands."""
+    is_rig = options.calibration and not is_calib_txt(Path(options.calibration))  # live images are not rectified
+    return Typed(
+        words=tuple(word for word in sys.argv[1:] if word != "--json") if sys.argv[1:2] == ["stereo"] else (),
+        images=tuple(options.images),
+        axes=output_options(options).axes,
+        rig=options.calibration if is_rig else "",
+        folder=Path.cwd(),
+    )
 
 
 def _require_place(out: Path, files: ViewFiles) -> None:
