@@ -21,7 +21,6 @@ from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.scaled_rig import scaled_geometry
 from phone_host.verbs.stereo_numbers import crop_of, length_m, pixels, point_px, scale_of
 
-_REJECTED: Final = "reject"
 """`Rig.verdict` of a rig that should not be used (`calibration.verdict`)."""
 
 _KITTI_COLOUR: Final = re.compile(r"\bimage_0?2\b")
@@ -120,9 +119,9 @@ def refuse_rejected(rig: Rig, calibration: str, *, allowed: bool) -> None:
     Raises:
         DataError: its verdict is reject, and it is not allowed.
     """
-    if rig.verdict == _REJECTED and not allowed:
+    if rig.is_rejected and not allowed:
         raise DataError(
-            f"{calibration} was rejected by its own calibration (verdict {_REJECTED}): its depth would be wrong",
+            f"{calibration} was rejected by its own calibration (verdict {rig.verdict}): its depth would be wrong",
             "calibrate again, or give --use-rejected-rig",
         )
 

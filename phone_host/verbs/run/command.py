@@ -92,6 +92,8 @@ def run(options: argparse.Namespace) -> int:
     complete = host.write_report(report, page)
     text = json.dumps(report) if options.json else fitted(summary(snapshot, columns()))
     print(text, flush=host.has_given_up)
+    if options.json and snapshot.shortfall:
+        print(f"phone-host: {snapshot.shortfall}", file=sys.stderr)
     if signals.interrupted and host.has_given_up:
         leave()  # the interpreter's end would wait for native code
     if signals.interrupted:
