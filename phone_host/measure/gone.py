@@ -27,7 +27,7 @@ def gone_concerns(ended: str, away: Sequence[Away], camera: CameraHealth, last_s
             Concern(
                 Doubt.BOARD_GONE,
                 f"the board went away at {away[-1].at_s:.0f} s and {back}: there is no newer depth",
-                "check its power, its cable or network, and that board-agent still runs there; a new run goes on where it is",
+                "check its power, its cable or network, and that board-agent still runs there",
             )
         )
     if camera.state is CameraState.GONE:

@@ -11,7 +11,7 @@ from typing import Final
 from phone_host.measure.doubt_history import past, past_seconds
 from phone_host.measure.gone import GONE
 from phone_host.measure.image_doubts import ImageFigures, figure_doubts
-from phone_host.measure.run_snapshot import RunSnapshot, concerns
+from phone_host.measure.run_snapshot import RunSnapshot, concerns, history
 from phone_host.measure.trust import Concern
 from phone_host.model import StereoGeometry
 
@@ -143,8 +143,8 @@ def _of_images(run: RunSnapshot, found: tuple[Concern, ...]) -> Answer:
     if newest:
         remedy = f"Remedy: {newest[0].remedy}."
         return Answer(Grade.WARNING, f"Depth looked right until the last judged pair: {newest[0].sentence}. {remedy}")
-    if gone := past(images.history):
-        total_s = past_seconds(images.history)
+    if gone := past(history(run)):
+        total_s = past_seconds(history(run))
         but = f"but for {total_s:.0f} of {max(total_s, run.seconds):.0f} s it was not: {gone[0].concern.sentence}"
         return Answer(Grade.WARNING, f"{said.sentence.removesuffix('.')}; {but}.")
     return said

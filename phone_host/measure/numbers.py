@@ -9,6 +9,7 @@ from typing import Final, assert_never
 
 from common.camera.image_numbers import ImageNumbers
 from phone_host.measure.trust import Concern, Doubt
+from phone_host.model import Arrangement
 from phone_host.sync.stills import PairedBy
 
 _SAME_RATE: Final = 0.01
@@ -146,17 +147,9 @@ def _by_time(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) ->
     )
 
 
-_CONSEQUENCES: Final = frozenset(
-    {
-        Doubt.SWAPPED,
-        Doubt.TURNED,
-        Doubt.TURNED_BY_QUARTER,
-        Doubt.MIRRORED,
-        Doubt.SAME_IMAGE,
-        Doubt.OTHER_SCENE,
-    }
-)
-"""What two images of different moments may look like."""
+_CONSEQUENCES: Final = frozenset({Doubt.SWAPPED, Doubt.OTHER_SCENE})
+_OF_BOTH: Final = frozenset({Arrangement.BOTH_TURNED, Arrangement.BOTH_MIRRORED, Arrangement.BOTH_TURNED_BY_QUARTER})
+"""What two images of different moments may look like. One camera turned or mirrored looks so at any moment."""
 
 
 def with_cause(
@@ -167,14 +160,26 @@ def with_cause(
     Args:
         numbers: the concerns about the images' numbers.
         images: the concerns about what the images show.
-        evidence: of the numbers. Images paired by their numbers are of one moment, and show what they show.
+        evidence: of the numbers.
 
     Returns:
         Both, with the cause of depth that cannot be right in the first.
     """
-    if not numbers or evidence.paired_by is PairedBy.NUMBER:
-        return numbers, images
-    kept = tuple(concern for concern in images if concern.doubt not in _CONSEQUENCES)
+    kept = tuple(concern for concern in images if blamed(concern, numbers, evidence) is concern)
     if len(kept) == len(images):
         return numbers, images
     return tuple(replace(concern, doubt=Doubt.IMAGES_APART) for concern in numbers), kept
+
+
+def blamed(concern: Concern, numbers: tuple[Concern, ...], evidence: ImageEvidence) -> Concern:
+    """Return the cause of what an image shows: the concern itself, or that the pairs are of different moments.
+
+    Args:
+        concern: about what the images show.
+        numbers: the concerns about the images' numbers.
+        evidence: of the numbers. Images paired by their numbers are of one moment, and show what they show.
+    """
+    may_be = concern.doubt in _CONSEQUENCES or concern.arrangement in _OF_BOTH
+    if not may_be or not numbers or evidence.paired_by is PairedBy.NUMBER:
+        return concern
+    return replace(numbers[0], doubt=Doubt.IMAGES_APART)

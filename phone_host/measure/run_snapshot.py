@@ -13,9 +13,10 @@ from phone_host.measure.absence import Away
 from phone_host.measure.accounts import LinkAccount
 from phone_host.measure.camera_match import LockMiss, settings_concerns
 from phone_host.measure.delays import DelayStatistics
+from phone_host.measure.doubt_history import Episode
 from phone_host.measure.gone import gone_concerns
 from phone_host.measure.image_doubts import ImageTrust, gravest_first
-from phone_host.measure.numbers import ImageEvidence, number_concerns, with_cause
+from phone_host.measure.numbers import ImageEvidence, blamed, number_concerns, with_cause
 from phone_host.measure.orient_words import with_final_options
 from phone_host.measure.regime import RunFigures
 from phone_host.measure.sink_account import SinkAccount
@@ -233,9 +234,15 @@ def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
     numbers, images = with_cause(number_concerns(run.replayed), image_concerns(run), run.replayed)
     rejected = (REJECTED_RIG,) if run.rig_rejected else ()
     gone = gone_concerns(run.ended, run.away, run.camera, run.last_s) if run.processed else ()
-    told = (*spoiled_concerns(run.spoiled_counts), *numbers, *settings_concerns(run.missed_locks))
+    told = (*spoiled_concerns(run.spoiled_counts), *settings_concerns(run.missed_locks))
     timing = unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
-    return gravest_first((*rejected, *images, *told, *gone, *timing))
+    return gravest_first((*rejected, *numbers, *images, *told, *gone, *timing))
+
+
+def history(run: RunSnapshot) -> tuple[Episode, ...]:
+    """Return which doubts about the images stood during a run, and when, in order of beginning."""
+    numbers = number_concerns(run.replayed)
+    return tuple(replace(item, concern=blamed(item.concern, numbers, run.replayed)) for item in run.images.history)
 
 
 def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:

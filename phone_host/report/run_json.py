@@ -12,7 +12,7 @@ from phone_host.measure.doubt_history import Episode, saved_pairs
 from phone_host.measure.headline import headline
 from phone_host.measure.image_doubts import ImageFigures
 from phone_host.measure.regime import Judgement, judge
-from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, disbelieved, figures
+from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, disbelieved, figures, history
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
@@ -126,7 +126,7 @@ def _trust(run: RunSnapshot) -> dict[str, object]:
         "judged_pairs": images.judged,
         "at_first": figure_values(images.start),
         "now": figure_values(images.now),
-        "history": [_episode(item, run.save_every) for item in images.history],
+        "history": [_episode(item, run.save_every) for item in history(run)],
     }
 
 

@@ -14,7 +14,7 @@ from phone_host.measure.accounts import rung_lines
 from phone_host.measure.doubt_history import saved_pairs
 from phone_host.measure.headline import headline
 from phone_host.measure.regime import Regime, judge
-from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures
+from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures, history
 from phone_host.measure.unused import unused
 from phone_host.model import Processed, Side
 from phone_host.report.cut_words import cut_sentence
@@ -110,7 +110,7 @@ def doubtful_pairs(run: RunSnapshot) -> dict[int, str]:
         run: the run.
     """
     found: dict[int, str] = {}
-    for item in sorted(run.images.history, key=lambda item: item.concern.is_certain):
+    for item in sorted(history(run), key=lambda item: item.concern.is_certain):
         verdict = "wrong" if item.concern.is_certain else "doubtful"
         found |= dict.fromkeys(saved_pairs(item, run.save_every), f"{verdict}: {item.concern.sentence}")
     return found

@@ -12,7 +12,7 @@ from phone_host.measure.doubt_history import history_lines
 from phone_host.measure.headline import headline
 from phone_host.measure.image_doubts import ImageTrust
 from phone_host.measure.regime import judge
-from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
+from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures, history
 from phone_host.measure.unused import unused
 from phone_host.model import DepthAccount, TimeOffset
 from phone_host.report.cut_words import cut_sentence
@@ -115,7 +115,7 @@ def depth_lines(images: ImageTrust) -> list[str]:
 
 def past_lines(run: RunSnapshot) -> list[str]:
     """Say which doubts stood for a while and have gone, and which pairs they concern."""
-    return history_lines(run.images.history, run.processed, run.save_every)
+    return history_lines(history(run), run.processed, run.save_every)
 
 
 def cut_lines(depth: DepthAccount) -> list[str]:

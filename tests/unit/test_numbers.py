@@ -5,6 +5,7 @@ from dataclasses import replace
 from common.camera.image_numbers import ImageNumbers
 from phone_host.measure.numbers import FilmWatch, ImageEvidence, number_concerns, with_cause
 from phone_host.measure.trust import Concern, Doubt
+from phone_host.model import Arrangement
 from phone_host.sync.stills import PairedBy
 
 SERIES = ImageNumbers(count=16, first=3, last=18)
@@ -111,3 +112,6 @@ def test_films_that_drift_apart_are_blamed_and_not_the_cameras() -> None:
     told = number_concerns(by_number)
     assert with_cause(told, (swapped,), by_number) == (told, (swapped,))
     assert with_cause((), (swapped,), by_time) == ((), (swapped,))
+    for arrangement, kept in ((Arrangement.TURNED, True), (Arrangement.BOTH_TURNED, False)):
+        turned = Concern(Doubt.TURNED, "t", "r", arrangement=arrangement)  # one on its head is so at any moment
+        assert bool(with_cause(number_concerns(by_time), (turned,), by_time)[1]) == kept

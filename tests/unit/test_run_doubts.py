@@ -166,6 +166,9 @@ def test_pairs_of_different_images_are_wrong_and_fail_the_run() -> None:
     assert "drift apart" in headline(films).sentence
     assert depth_is_wrong(films)
     assert "exchanged" not in summary(films)
+    past = replace(films, images=judged(GOOD, SWAPPED, SWAPPED, SWAPPED, GOOD, GOOD))
+    assert "exchanged" not in summary(past)
+    assert "films of different length drift apart: about 19 of 91 pairs are wrong" in summary(past)
 
 
 def test_a_run_without_pairs_has_no_doubt_about_its_rig() -> None:
