@@ -116,14 +116,14 @@ def _by_order(board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
 def _by_time(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
     there, here = evidence.first_apart
     if evidence.apart:
-        return (
-            Concern(
-                Doubt.IMAGES_APART if 2 * evidence.apart > evidence.pairs else Doubt.IMAGE_NUMBERS,
-                f"{evidence.apart} of {evidence.pairs} pairs are of different images: first of image {there} of the board"
-                f" and image {here} of this machine, counted from 0",
-                "give both films loop=1; or, for photographs, leave fps=, loop=, phase_ms= and pace= out on both sides",
-            ),
+        found = Concern(
+            Doubt.IMAGE_NUMBERS,
+            f"{evidence.apart} of {evidence.pairs} pairs are of different images: first of image {there} of the board"
+            f" and image {here} of this machine, counted from 0",
+            "give both films loop=1; or, for photographs, leave fps=, loop=, phase_ms= and pace= out on both sides",
         )
+        are_most = 2 * evidence.apart > evidence.pairs
+        return (replace(found, doubt=Doubt.IMAGES_APART) if are_most else found,)
     rates = (evidence.board_period_ns, evidence.own_period_ns)
     if not all(rates) or abs(rates[0] - rates[1]) <= _SAME_RATE * max(rates):
         if board.count == own.count:

@@ -121,7 +121,7 @@ def refuse_rejected(rig: Rig, calibration: str, *, allowed: bool) -> None:
     """
     if rig.is_rejected and not allowed:
         raise DataError(
-            f"{calibration} was rejected by its own calibration (verdict {rig.verdict}): its depth would be wrong",
+            f"{calibration} was rejected by its own calibration (verdict reject): its depth would be wrong",
             "calibrate again, or give --use-rejected-rig",
         )
 
