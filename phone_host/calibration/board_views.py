@@ -5,10 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from common.camera.orientation import UPRIGHT, Flip, Orientation
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.imagesize.head import size_text as px_text
+from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.target import Board, Corners, agree, find_corners
 from phone_host.stereo.images import decode_file, open_image

@@ -28,11 +28,13 @@ from phone_host.calibration.bundle import (
     rms_px,
 )
 from phone_host.calibration.calibrate_alone import (
+    FAR_OFF_PX,
     USUAL_PAIRS,
     Lens,
     LoneCamera,
     calibrate_alone,
     corners_of,
+    off_words,
     own_errors_px,
     require_enough,
     with_poses,
@@ -284,12 +286,15 @@ def _misfit(pair: BoardPair, state: BundleState, points_m: Vector, *, error_px: 
     # If a view fitted alone already has more than half of the error, the fault is in its corners.
     if own[side] > error_px / 2:
         reason = Reason.CORNERS_LEFT if side is Side.LEFT else Reason.CORNERS_RIGHT
-        detail = f"corners in the {side.value} image are off by {own[side]:.2f} px, others by {usual_px:.2f} px"
+        detail = f"corners in the {side.value} image are off {off_words(own[side], usual_px)}"
+        if own[side] > FAR_OFF_PX:
+            detail += ": the two images may not belong together"
     else:
         reason = Reason.MOVED
-        detail = (
-            f"each view fits alone, together they are off by {error_px:.2f} px, others by {usual_px:.2f} px:"
-            " board or cameras moved between the two exposures"
+        detail = f"each view fits alone, together they are off {off_words(error_px, usual_px)}: " + (
+            "the two images do not belong together"
+            if error_px > FAR_OFF_PX
+            else "board or cameras moved between the two exposures"
         )
     return Rejected(pair.name, reason, detail)
 

@@ -1,13 +1,11 @@
-"""Answers the user's question in one sentence: is my depth right, and how far can I trust it? Pure.
-
-A depth z from a disparity with an error of e px is wrong by z^2 * e / (f * b): the derivative of z = f b / (d + doffs).
-"""
+"""Answers the user's question in one sentence: is my depth right, and how far can I trust it? Pure."""
 
 import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
+from phone_host.measure.depth_error import depth_error_m
 from phone_host.measure.doubt_history import past, past_seconds
 from phone_host.measure.gone import GONE
 from phone_host.measure.image_doubts import ImageFigures, figure_doubts
@@ -40,17 +38,6 @@ class Answer:
     sentence: str
 
 
-def depth_error_m(geometry: StereoGeometry, depth_m: float, error_px: float) -> float:
-    """Compute how wrong a depth is, m.
-
-    Args:
-        geometry: of the rectified pair.
-        depth_m: the depth, m.
-        error_px: error of its disparity, px.
-    """
-    return depth_m * depth_m * error_px / (geometry.focal_px * geometry.baseline_m)
-
-
 def answer(
     figures: ImageFigures, found: tuple[Concern, ...], geometry: StereoGeometry | None, error_px: float = math.nan
 ) -> Answer:
@@ -64,8 +51,6 @@ def answer(
     """
     if found:
         return _doubtful(found[0])
-    if doubtful := figure_doubts(figures):
-        return _doubtful(doubtful[0])  # never good words about bad figures
     if math.isnan(figures.density):
         return Answer(Grade.GOOD, "Depth was computed; no pair of this run was judged.")
     parts = [f"{figures.density:.0%} of the pixels have depth"]
@@ -137,7 +122,7 @@ def _of_images(run: RunSnapshot, found: tuple[Concern, ...]) -> Answer:
     if images.judged and not images.is_settled and run.ended == "running":
         why = newest[0].sentence if newest else f"the newest pair is free of this: {images.concerns[0].sentence}"
         return Answer(Grade.WARNING, f"Depth is being judged again: {why}.")
-    said = answer(images.now, found, images.geometry, images.disparity_error_px)
+    said = answer(images.now, found or figure_doubts(images.now), images.geometry, images.disparity_error_px)
     if said.grade is not Grade.GOOD:
         return said
     if newest:

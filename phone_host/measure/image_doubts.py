@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from phone_host.measure.doubt_history import Episode
+from phone_host.measure.file_remedies import FILE_REMEDIES, ImageSource
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement, Evidence, Exposure, StereoGeometry
 
@@ -55,7 +56,7 @@ _LEAST_CONSISTENCY: Final = 0.25
 """Good pairs reach 0.33 and more, the worst of them before white walls."""
 
 _MOST_VERTICAL_PX: Final = 2.0
-"""Matchers correct up to 2 px of common offset; beyond it they lose points."""
+"""Matchers correct up to 2 px of common offset; beyond it they lose points. In px of the images that they match."""
 
 _LOST_VERTICAL_PX: Final = 5.0
 _LOST_DENSITY: Final = 0.4
@@ -76,6 +77,7 @@ class ImageFigures:
         vertical_px: distance of features from their rows, px.
         vertical_offset_px: how far too low the right image lies, px.
         disparity_px: the middle one of the disparities, px.
+        matched_scale: size of the images that were matched, as a share of the full size in whose px all this is.
     """
 
     density: float = math.nan
@@ -83,6 +85,7 @@ class ImageFigures:
     vertical_px: float = math.nan
     vertical_offset_px: float = math.nan
     disparity_px: float = math.nan
+    matched_scale: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,11 +127,12 @@ def gravest_first(found: tuple[Concern, ...]) -> tuple[Concern, ...]:
     return tuple(sorted(found, key=lambda concern: (not concern.doubt.blocks, not concern.is_certain)))
 
 
-def image_doubts(evidence: Evidence) -> tuple[Concern, ...]:
+def image_doubts(evidence: Evidence, source: ImageSource = ImageSource.CAMERAS) -> tuple[Concern, ...]:
     """Say what the images of one pair make doubtful, gravest first; empty if nothing.
 
     Args:
         evidence: of the pair; without supports (an unrectified pair) only brightness is judged.
+        source: where the images come from: remedies name the options of a camera's address, or those for files.
     """
     support = {item.arrangement: item.features for item in evidence.supports}
     sees = max(support.values(), default=0) >= _LEAST_SUPPORT
@@ -139,7 +143,7 @@ def image_doubts(evidence: Evidence) -> tuple[Concern, ...]:
     if not support:
         return dark
     light = (*dark, *_unfocused(evidence.left, evidence.right))
-    mistake = tuple(_with_direction(item, evidence) for item in _arrangement(support))
+    mistake = tuple(_with_direction(item, evidence) for item in _arrangement(support, source))
     if not mistake and not light and _are_strangers(evidence, support):
         mistake = (_OTHER_SCENE,)
     return (*mistake, *light) if mistake else (*light, *_figures(evidence, support))
@@ -265,23 +269,28 @@ _OTHER_SCENE: Final = Concern(
 )
 
 
-def _arrangement(support: dict[Arrangement, int]) -> tuple[Concern, ...]:
+def _named(arrangement: Arrangement, source: ImageSource) -> Concern:
+    concern = _NAMED[arrangement]
+    return concern if source is ImageSource.CAMERAS else replace(concern, remedy=FILE_REMEDIES[arrangement].words)
+
+
+def _arrangement(support: dict[Arrangement, int], source: ImageSource) -> tuple[Concern, ...]:
     """Name the mistake that clearly more features agree with than with the right arrangement."""
     related = max(support[Arrangement.RIGHT], support[Arrangement.TILTED])
     same = support[Arrangement.SAME_PLACE]
     if same >= max(_LEAST_SUPPORT, _SAME_SHARE * related):
-        return (_NAMED[Arrangement.SAME_PLACE],)
+        return (_named(Arrangement.SAME_PLACE, source),)
     # These turn the features themselves: not even tilted rows explain them.
     turned = (Arrangement.TURNED, Arrangement.TURNED_BY_QUARTER, Arrangement.MIRRORED)
     best = max(turned, key=lambda arrangement: support[arrangement])
     if support[best] >= max(_LEAST_SUPPORT, _MARGIN * related):
-        return (_NAMED[best],)
+        return (_named(best, source),)
     best = max(_OF_BOTH, key=lambda arrangement: support[arrangement])
     if support[best] < max(_LEAST_SUPPORT, _MARGIN * support[Arrangement.RIGHT]):
         return ()
     if support[best] < _CLEARLY_MORE * support[Arrangement.SWAPPED]:
         best = Arrangement.SWAPPED  # without a rig the three cannot be told apart; its remedy names them all
-    return (_NAMED[best],)
+    return (_named(best, source),)
 
 
 def _with_direction(concern: Concern, evidence: Evidence) -> Concern:
@@ -311,14 +320,15 @@ def figure_doubts(figures: ImageFigures, *, is_tilted: bool = False) -> tuple[Co
         is_tilted: whether most features share rows only if those are tilted or bent.
     """
     found = []
-    is_off = figures.vertical_px > _MOST_VERTICAL_PX
+    is_off = figures.vertical_px * figures.matched_scale > _MOST_VERTICAL_PX
     if is_tilted or is_off:
         found.append(
             Concern(
                 Doubt.VERTICAL_ERROR,
                 "the rows of the two images do not agree" + (f" by {figures.vertical_px:.1f} px" if is_off else ""),
                 "the calibration does not fit these cameras any more, or never did: calibrate the rig again",
-                is_severe=figures.vertical_px > _LOST_VERTICAL_PX and figures.density < _LOST_DENSITY,
+                is_severe=figures.vertical_px * figures.matched_scale > _LOST_VERTICAL_PX
+                and figures.density < _LOST_DENSITY,
             )
         )
     if figures.density < _LEAST_DENSITY:
@@ -353,4 +363,5 @@ def median_figures(found: Sequence[Evidence]) -> ImageFigures:
         vertical_px=median("vertical_px"),
         vertical_offset_px=median("vertical_offset_px"),
         disparity_px=median("disparity_px"),
+        matched_scale=median("matched_scale") if found else 1.0,
     )

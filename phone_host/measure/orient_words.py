@@ -5,7 +5,7 @@ from dataclasses import replace
 from enum import Enum
 from typing import Final
 
-from common.camera.orientation import UPRIGHT, Flip, Orientation
+from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.measure.trust import Concern
 from phone_host.model import Arrangement
 
@@ -68,7 +68,7 @@ def with_final_options(
     if concern.arrangement not in _TURNS:
         return concern
     is_plain = all(orientation == UPRIGHT for orientation in present)
-    if is_plain and spelling is Spelling.OF_CAMERA and not concern.quarters:
+    if is_plain and (spelling is Spelling.OF_FILES or not concern.quarters):
         return concern  # the options are known by their kind alone
     both = concern.arrangement in _OF_BOTH
     turns = _TURNS[concern.arrangement]

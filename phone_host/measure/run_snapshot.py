@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from common.camera.base import CameraHealth
-from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import NOT_AS_SAID
+from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import DropReason
 from common.words import counted
 from phone_host.measure.absence import Away
@@ -16,13 +16,13 @@ from phone_host.measure.delays import DelayStatistics
 from phone_host.measure.doubt_history import Episode
 from phone_host.measure.gone import gone_concerns
 from phone_host.measure.image_doubts import ImageTrust, gravest_first
+from phone_host.measure.no_depth import no_depth
 from phone_host.measure.numbers import ImageEvidence, blamed, number_concerns, with_cause
 from phone_host.measure.orient_words import with_final_options
 from phone_host.measure.regime import RunFigures
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.spoiled import SpoiledCounts, spoiled_concerns
 from phone_host.measure.trust import (
-    NO_DEPTH,
     NO_DOUBT,
     REJECTED_RIG,
     Concern,
@@ -252,7 +252,7 @@ def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
         return found  # without any pair there is another reason
     if any(concern.doubt.blocks for concern in found):
         return found  # which says why there is none
-    return (NO_DEPTH, *found)
+    return (no_depth(run.depth.cut, run.depth.limits), *found)
 
 
 def depth_is_wrong(run: RunSnapshot) -> bool:

@@ -181,13 +181,6 @@ class Concern:
         return self.doubt.blocks or self.is_severe
 
 
-NO_DEPTH: Final = Concern(
-    Doubt.NO_DEPTH,
-    "no pair has depth",
-    "check that --calibration or --rectified fits the cameras, and that both see the same scene",
-)
-
-
 REJECTED_RIG: Final = Concern(
     Doubt.REJECTED_RIG,
     "the calibration itself was rejected: it does not fit its own images (verdict reject)",

@@ -67,6 +67,7 @@ class Evidence:
         vertical_offset_px: how far too low the right image lies, px.
         supports: how many features agree with each arrangement; empty without a core.
         disparity_px: the middle one of the disparities, px.
+        matched_scale: size of the images that were matched, as a share of the full size in whose px all this is.
     """
 
     left: Exposure
@@ -77,3 +78,4 @@ class Evidence:
     vertical_offset_px: float = float("nan")
     supports: tuple[Support, ...] = ()
     disparity_px: float = float("nan")
+    matched_scale: float = 1.0

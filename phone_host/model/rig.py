@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from common.camera.identity import CameraState
+from common.camera_identity import RememberedCamera
 from phone_host.model.images import Epipolar, StereoGeometry
 
 
@@ -98,8 +98,8 @@ class Rig:
     time_offset: TimeOffset = TimeOffset()
     zero_sigma_px: float = float("nan")
     verdict: str = ""
-    left_camera: CameraState | None = None
-    right_camera: CameraState | None = None
+    left_camera: RememberedCamera | None = None
+    right_camera: RememberedCamera | None = None
 
     @property
     def is_rejected(self) -> bool:

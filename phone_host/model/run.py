@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import Frame
 from common.ledger import BoardMarks, PairLedger, StageTimes
+from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import FrameMessage
 from phone_host.model.images import CloudImage, CutCounts, DepthLimits, Disparity, RectifiedPair, Search, StereoGeometry
 

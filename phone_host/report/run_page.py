@@ -17,7 +17,7 @@ from phone_host.measure.regime import Regime, judge
 from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures, history
 from phone_host.measure.unused import unused
 from phone_host.model import Processed, Side
-from phone_host.report.cut_words import cut_sentence
+from phone_host.report.cut_words import cut_sentence, pixels_text
 from phone_host.report.depth_data import density, photograph
 from phone_host.report.depth_view import cloud_view, depth_view
 from phone_host.report.page_frame import section
@@ -165,7 +165,7 @@ def depth_card(last: Processed | None, board_side: Side, title: str) -> str:
     """
     if last is None or last.disparity is None or not np.isfinite(last.disparity).any():
         return ""
-    words = f"{100 * density(last):.0f} % of the left pixels have a depth."
+    words = f"{100 * density(last):.0f} % {pixels_text(last.cut)} have a depth."
     if last.cut is not None and (cut := cut_sentence(last.cut, last.limits)):
         words += f" Cut: {cut}."
     return section(title, words, depth_view(last, _captions(last, board_side)) + cloud_view(last))

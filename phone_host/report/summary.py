@@ -20,6 +20,9 @@ from phone_host.sync.phase import Alignment, Phase
 from phone_host.sync.stills import PairedBy
 
 _MS: Final = 1e6
+_LONGEST_BEAT_S: Final = 3600.0
+"""A drift that takes longer for one turn changes nothing within a scan, and is hardly measured."""
+
 _DELAY_TABLE: Final = 54
 _LINK_TABLE: Final = 64
 """Widths of the tables, characters."""
@@ -65,6 +68,8 @@ def _delay_table(run: RunSnapshot, width: int) -> list[str]:
         spread = run.delays.spread(name)
         if not spread.count:
             continue  # stills: nothing is counted from an exposure
+        if name == "starvation" and run.timeless and not spread.max_ns:
+            continue  # they come when the processor asks for them
         values = (getattr(spread, f"{column}_ns") / _MS for column in columns)
         lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value:9.3f}" for value in values))
     return lines
@@ -88,7 +93,7 @@ def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
     if phase is not None:
         drift = (
             ""
-            if not math.isfinite(phase.beat_s)
+            if not abs(phase.beat_s) <= _LONGEST_BEAT_S  # never true of NaN
             else f", drifts by {phase.drift * 1e6:+.1f} ppm, one full turn in {phase.beat_s:.0f} s"
         )
         side = "before" if phase.time_skew_ns < 0 else "after"
@@ -195,7 +200,10 @@ def _unused_lines(run: RunSnapshot) -> list[str]:
     parts = [item.told for item in unused(run)]
     lines = [f"not used: {', '.join(parts) or 'nothing'}"]
     if run.unwritten.lines or run.unwritten.pairs:
-        lines.append(
-            f"not written: {counted(run.unwritten.lines, 'line')}, {counted(run.unwritten.pairs, 'pair')} ({run.unwritten.cause})"
+        counts = (
+            (run.unwritten.lines, "line of delays.jsonl", "lines of delays.jsonl"),
+            (run.unwritten.pairs, "pair", "pairs"),
         )
+        parts = [f"{count} {one if count == 1 else many}" for count, one, many in counts if count]
+        lines.append(f"not written: {', '.join(parts)} ({run.unwritten.cause})")
     return lines

@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Protocol
 
-import numpy as np
-
 from common import now
-from common.camera.orientation import UPRIGHT, Orientation
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
+from common.orientation import UPRIGHT, Orientation
 from phone_host.output.atomic import write_text
 from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
@@ -37,6 +35,7 @@ from phone_host.run.stereo_remarks import pair_remarks, turned_remarks
 from phone_host.run.stereo_results import StereoResults
 from phone_host.run.stereo_trust import judge_pair
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.evidence import density
 from phone_host.stereo.images import EncodedFile, decode_files, open_image, require_same_size, size_px
 from phone_host.stereo.view_files import ViewFiles
 
@@ -216,10 +215,9 @@ class _Work:
         ):
             written = write_pair(place, processed, planned, self._job.axes, writers.map)
             watch.lap("write")
-            density = 0.0 if processed.disparity is None else float(np.isfinite(processed.disparity).mean())
             remarks = [
                 *turned_remarks(*opened),
-                *pair_remarks(processed, written, trust, core.wanted.search_from_m),
+                *pair_remarks(processed, trust, core.wanted.search_from_m),
                 *(() if folder else _alone(self._job)),
             ]
             report = PairReport(
@@ -234,7 +232,7 @@ class _Work:
                 geometry=processed.geometry,
                 limits=processed.limits,
                 cut=processed.cut,
-                density=density,
+                density=density(processed),
                 axes=self._job.axes,
                 written=written,
                 stages_ms=watch.times_ms(),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from phone_host.model import Arrangement, Image, Side, Support
 from phone_host.stereo.evidence_points import PointMaps, Points, mirrored, turned_back
 
-_FEATURES: Final = 400
+_FEATURES: Final = 300
 _CONTRAST: Final = 0.02
 """SIFT's own threshold is 0.04; images of plain rooms have too few features above it."""
 

@@ -180,7 +180,7 @@ class Rectifier:
                 raise DataError(
                     f"the {side.value} image is {size_text(found_px)} px, rig.yaml was calibrated for"
                     f" {model.width_px}x{model.height_px}",
-                    "use the resolution of the calibration, or calibrate again at this one",
+                    "use the resolution of the calibration; a crop cannot be told from its size: calibrate at this size",
                 )
 
     def rectify(self, left: Image, right: Image) -> RectifiedPair:

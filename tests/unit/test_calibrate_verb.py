@@ -72,6 +72,21 @@ def test_a_rejected_rig_is_written_as_such_and_a_good_one_is_kept_aside(
         assert "refuse this calibration unless --use-rejected-rig is given" in capsys.readouterr().out
 
 
+def test_a_rig_that_cannot_be_rectified_has_no_column_of_vertical_errors(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Left and right exchanged calibrate, but no rows can be compared: the table shows no `nan`."""
+    folder = _folders(tmp_path, lambda image: encoded(".png", image))
+    for name, other in (("left", "a"), ("right", "left"), ("a", "right")):
+        (folder / name).rename(folder / other)
+    code, report = _calibrate(folder)
+    assert (code, report["verdict"], report["vertical_error_px"]["p95"]) == (4, "reject", None)
+    told = capsys.readouterr().out
+    assert "left px" in told
+    assert "nan" not in told
+    assert "vertical" not in told
+
+
 def test_exif_headers_that_disagree_with_the_rig_are_told_with_the_option_that_helps(tmp_path: Path) -> None:
     """Two phones stand alike, but the right one wrote EXIF 6 when it lay flat: the remedy names the turn, and with it the true baseline comes."""
     folder = _folders(tmp_path, lambda image: oriented(".png", image, 6))

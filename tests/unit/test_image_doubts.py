@@ -1,19 +1,33 @@
 """What is concluded from the evidence: which doubts, when they stand, and the headline that follows."""
 
+import argparse
 import math
+import re
 from dataclasses import replace
 from typing import Any, Final
 
 import pytest
 
-from phone_host.measure.headline import Grade, answer, depth_error_m, headline
+from phone_host.measure.depth_error import depth_error_m
+from phone_host.measure.file_remedies import EXCHANGE, ImageSource, tries_of
+from phone_host.measure.headline import Grade, answer, headline
 from phone_host.measure.image_doubts import ImageFigures, ImageTrust, image_doubts, median_figures
 from phone_host.measure.image_judge import ImageJudge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, depth_is_wrong
 from phone_host.measure.trust import Concern, Doubt
-from phone_host.model import Arrangement, Evidence, Exposure, StereoGeometry, Support
+from phone_host.model import (
+    Arrangement,
+    CutCounts,
+    DepthAccount,
+    DepthLimits,
+    Evidence,
+    Exposure,
+    StereoGeometry,
+    Support,
+)
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
+from phone_host.verbs.orientation_arguments import add_orientation_arguments
 from tests.unit.test_run_report import run
 
 SHARP: Final = Exposure(mean_level=110, bright_level=200, structure=30, blur_px=1.0, features=400)
@@ -68,6 +82,8 @@ BLIND: Final = replace(evidence(right=0, tilted=0), right=COVERED)
         (replace(GOOD, density=0.1), [Doubt.LOW_DENSITY]),
         (replace(GOOD, consistency=0.2), [Doubt.LOW_CONSISTENCY]),
         (replace(GOOD, vertical_px=2.1), [Doubt.VERTICAL_ERROR]),
+        (replace(GOOD, vertical_px=4.2, matched_scale=0.22), []),  # 48 megapixels: 0.9 px where they are matched
+        (replace(GOOD, vertical_px=9.5, matched_scale=0.22), [Doubt.VERTICAL_ERROR]),
         (evidence(right=50), [Doubt.VERTICAL_ERROR]),  # most features are on tilted rows
     ],
 )  # fmt: skip
@@ -75,6 +91,33 @@ def test_a_doubt_needs_clear_evidence(found: Evidence, named: list[Doubt]) -> No
     """Exactly the named doubts follow; each has a sentence and a remedy without NaN."""
     assert doubts(found) == named
     assert all(concern.sentence and concern.remedy and "nan" not in concern.sentence for concern in image_doubts(found))
+
+
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (SWAPPED, "swap LEFT and RIGHT;"),
+        (evidence(right=3, tilted=5, turned=90), "--rotate-left 180 or --rotate-right 180"),
+        (evidence(right=3, tilted=5, turned_by_quarter=90), "with 90 or 270"),
+        (evidence(right=20, swapped=100, both_turned=150), "--rotate-left 180 --rotate-right 180"),
+        (evidence(right=20, swapped=100, both_mirrored=150), "--flip-left h --flip-right h"),
+        (evidence(right=0, both_turned_by_quarter=150), "both with 90 or both with 270"),
+        (evidence(right=3, tilted=5, mirrored=90), "v if top and bottom are"),
+        (evidence(same_place=160), "give the images of two cameras"),
+    ],
+)
+def test_remedies_for_files_name_what_stereo_takes(found: Evidence, words: str) -> None:
+    """No option of a camera's address, no --board-side; every option that is named is one of `stereo`, and so is each try."""
+    [concern] = image_doubts(found, ImageSource.FILES)
+    assert words in concern.remedy
+    assert not re.search(r"rotate=|flip=|board-side|camera's app", concern.remedy)
+    parser = argparse.ArgumentParser()
+    add_orientation_arguments(parser)
+    for given in tries_of(concern.remedy):
+        if given != (EXCHANGE,):
+            parser.parse_args(given)  # ends the test if it takes them not
+    assert set(re.findall(r"--[a-z-]+", concern.remedy)) <= set(parser._option_string_actions)
+    assert tries_of(image_doubts(found)[0].remedy) == ()
 
 
 def test_both_cameras_are_named_together() -> None:
@@ -167,6 +210,32 @@ def test_a_run_that_wanted_depth_and_found_none_has_a_doubt() -> None:
         Doubt.SWAPPED
     ]
     assert concerns(with_images(has_depth=False, wants_depth=False)) == ()
+
+
+GIVEN = DepthLimits(near_m=0.3, far_m=0.002, disparity_error_px=0.25, from_rig=False)
+OF_RIG = DepthLimits(near_m=0.3, far_m=38.0, disparity_error_px=0.25, from_rig=True)
+
+
+@pytest.mark.parametrize(
+    ("cut", "limits", "sentence", "remedy"),
+    [
+        (CutCounts(unmatched=60, too_far=40), GIVEN, "all points lie farther than --far 2 mm", "larger --far"),
+        (CutCounts(too_far=60, too_near=40), GIVEN, "most points lie farther than --far 2 mm", "larger --far"),
+        (CutCounts(too_far=100), OF_RIG, "all points lie farther than 38 m", "farther apart"),
+        (CutCounts(too_near=100, outside=900), OF_RIG, "all points lie nearer than --near 300 mm", "smaller --near"),
+        (CutCounts(at_zero=90, too_far=10), OF_RIG, "noise of zero", "farther apart"),
+        (CutCounts(unmatched=90, too_far=10), OF_RIG, "no pair has depth", "--calibration or --rectified fits"),
+    ],
+)
+def test_what_became_of_the_pixels_says_why_there_is_no_depth(
+    cut: CutCounts, limits: DepthLimits, sentence: str, remedy: str
+) -> None:
+    """The limit that cut the points is named with its option, and the remedy is to move it; where hardly anything was matched, images and calibration do not fit."""
+    none = replace(with_images(has_depth=False), depth=DepthAccount(cut=cut, limits=limits))
+    [concern] = concerns(none)
+    assert concern.doubt is Doubt.NO_DEPTH
+    assert sentence in concern.sentence
+    assert remedy in concern.remedy
 
 
 def test_a_run_without_a_rig_is_answered_about_delays() -> None:

@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 
 from common.camera.base import CameraHealth, CameraState
-from common.camera.orientation import UPRIGHT, Flip, Orientation
+from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.measure.absence import Away
 from phone_host.measure.doubt_history import history_lines, past_seconds
-from phone_host.measure.headline import Answer, Grade, answer, headline
+from phone_host.measure.headline import Answer, Grade, headline
 from phone_host.measure.image_doubts import ImageFigures, ImageTrust, image_doubts
 from phone_host.measure.image_judge import ImageJudge
 from phone_host.measure.numbers import ImageEvidence
@@ -76,7 +76,8 @@ def test_at_the_end_the_last_judgements_decide() -> None:
 )  # fmt: skip
 def test_no_good_words_about_bad_figures(bad: ImageFigures) -> None:
     """Even if no doubt is handed over, rows off by 5.9 px or a density of 14 % are never called right."""
-    assert answer(bad, (), GEOMETRY).grade is Grade.WARNING
+    good = with_judged(GOOD, GOOD)
+    assert headline(replace(good, images=replace(good.images, now=bad))).grade is Grade.WARNING
 
 
 def test_a_cover_that_was_taken_off_is_remembered() -> None:
@@ -250,6 +251,7 @@ def test_a_remedy_names_the_final_option() -> None:
     )
     files = remedy(on_head, UPRIGHT, TURN_90, spelling=Spelling.OF_FILES)
     assert "give --rotate-right 270 in place of --rotate-right 90, or else --rotate-left 180" in files
+    assert remedy(on_head, UPRIGHT, UPRIGHT, spelling=Spelling.OF_FILES) == remedy(on_head, UPRIGHT, UPRIGHT)
     both = evidence(right=20, swapped=100, both_mirrored=150)
     assert "the left camera flip=h and the right camera flip=h" not in remedy(both, UPRIGHT, UPRIGHT)
     assert "the right camera rotate=90&flip=h in place of rotate=90 and the left camera flip=h" in remedy(

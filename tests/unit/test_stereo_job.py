@@ -1,6 +1,7 @@
 """The work of `stereo` on image files: pairs one after another, results in folders, and what goes wrong is named."""
 
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError, UnavailableError
+from phone_host.measure.trust import Doubt
 from phone_host.model import Image, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pfm import read_pfm, read_xyz
@@ -54,11 +56,11 @@ def photos(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def _core(size_px: Size) -> StereoCore:
+def _core(size_px: Size, far_m: float = math.nan) -> StereoCore:
     """A core for rectified images with f b = 10 px m, whose principal point is the middle."""
     centre = (size_px[0] - 1) / 2, (size_px[1] - 1) / 2
     geometry = StereoGeometry(focal_px=100, baseline_m=0.1, cx_px=centre[0], cy_px=centre[1])
-    return StereoCore(MatchSettings(disparities=16), None, geometry, DepthWanted())
+    return StereoCore(MatchSettings(disparities=16), None, geometry, DepthWanted(far_m=far_m))
 
 
 def _job(photos: Path, make_core: Callable[[Size], StereoCore] = _core, axes: Axes = Axes.CAMERA) -> StereoJob:
@@ -179,6 +181,28 @@ def test_points_with_y_up_are_the_same_points_turned_by_half_a_turn_about_x(phot
     folder = photos / "out" / "pair-000007"
     np.testing.assert_array_equal(read_xyz(folder / "xyz.pfm"), camera * np.array([1, -1, -1], np.float32))
     assert "y up, z backward" in json.loads((folder / "report.json").read_text())["axes"]
+
+
+def test_a_white_pair_is_told_once_that_it_needs_texture(tmp_path: Path) -> None:
+    """The remedy speaks of the scene, and that hardly any pixel matched is no second warning."""
+    for side in ("left", "right"):
+        cv2.imwrite(str(tmp_path / f"{side}.png"), np.full((64, 120), 255, np.uint8))
+    files = pair_files(str(tmp_path / "left.png"), str(tmp_path / "right.png"))
+    job = StereoJob(files=files, out=tmp_path / "out", make_core=_core, matcher="sgbm")
+    [pair] = run_stereo(job, _Watch()).computed
+    assert [concern.doubt for concern in pair.trust.concerns] == [Doubt.NO_DEPTH]
+    assert "texture" in pair.trust.answer.sentence
+    assert pair.remarks_beside_headline == ()
+
+
+def test_the_headline_counts_the_pixels_that_have_a_point(photos: Path) -> None:
+    """All of it is matched, but a far limit of 1 m cuts pairs at 10 / 6 and 10 / 9 m: the headline says what the cloud holds."""
+    report = run_stereo(_job(photos, lambda size: _core(size, far_m=1.0)), _Watch())
+    for pair in report.computed:
+        assert pair.density > 0.7
+    sentence = report.computed[2].trust.answer.sentence  # at 0.83 m
+    assert f"{report.computed[2].share:.0%} of the pixels have depth" in sentence
+    assert report.computed[0].share == 0
 
 
 def test_pairs_without_depth_are_not_sound(photos: Path) -> None:

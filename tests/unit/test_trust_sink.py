@@ -13,14 +13,14 @@ import pytest
 from common import now
 from phone_host.measure.headline import Grade, answer
 from phone_host.measure.trust import Doubt
-from phone_host.model import CameraModel, Epipolar, Image, Processed, RectifiedPair, Result, Rig
+from phone_host.model import Epipolar, Image, Processed, RectifiedPair, Result, Rig
 from phone_host.run.sinks import SinkQueue
 from phone_host.run.trust_sink import TrustSink
 from phone_host.scene.scene import demo_scene, render, rig_poses, unlike_rig
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.rectify import Rectifier
-from tests.support.rigs import small_rig
+from tests.support.rigs import small_rig, stacked_rig
 from tests.unit.test_sinks import result
 
 _PATIENCE_S: Final = 60.0
@@ -173,22 +173,10 @@ def test_a_rig_calibrated_at_twice_the_size_promises_no_more(good: Processed, co
     assert said[1][1] == said[0][1]
 
 
-def _stacked_rig(epipolar: Epipolar) -> Rig:
-    """Two equal cameras of 320x240, f = 260 px, the right one 100 mm below (UP) or above (DOWN) the left one."""
-    model = CameraModel(
-        width_px=320,
-        height_px=240,
-        matrix=np.array([[260.0, 0, 159.5], [0, 260.0, 119.5], [0, 0, 1]]),
-        distortion=np.zeros(5),
-    )
-    down_m = 0.1 if epipolar is Epipolar.UP else -0.1
-    return Rig(left=model, right=model, R_right_left=np.eye(3), t_right_left_m=np.array([0.0, -down_m, 0.0]))
-
-
 @pytest.mark.parametrize("epipolar", [Epipolar.UP, Epipolar.DOWN])
 def test_a_run_of_stacked_cameras_is_judged_as_any_other(epipolar: Epipolar) -> None:
     """A good run has no doubt, and its depth looks right."""
-    rig = _stacked_rig(epipolar)
+    rig = stacked_rig(epipolar)
     core = StereoCore(MatchSettings(disparities=48), Rectifier(rig))
     processed = core.compute(*_views(rig), lambda: 0)
     assert processed.pair.epipolar is epipolar

@@ -93,7 +93,7 @@ def _report_failure(files: ViewFiles, views: BoardViews, failure: DataError, opt
     report = report_of_failure(files, views, error) | _write_rig(options.out, None)
     _write_report(options.out, report)
     text = "\n".join([rejections(views.rejected), *unwritten(report, options.out)])
-    print(json_text(report) if options.json else text)
+    print(json_text(report) if options.json else fitted(text))
     raise error
 
 

@@ -1,0 +1,56 @@
+"""Says why no pair has depth, and what helps: what became of the pixels tells. Pure."""
+
+from typing import Final
+
+from common.words import distance_text
+from phone_host.measure.trust import Concern, Doubt
+from phone_host.model import CutCounts, DepthLimits
+
+_ENOUGH: Final = 0.15
+"""If fewer pixels than this share were matched and then cut, the pairs lack depth because their images do not match."""
+
+_UNMATCHED: Final = Concern(
+    Doubt.NO_DEPTH,
+    "no pair has depth",
+    "check that --calibration or --rectified fits the cameras, and that both see the same scene",
+)
+_AT_ZERO: Final = Concern(
+    Doubt.NO_DEPTH,
+    "no pair has depth: no disparity is larger than the noise of zero, as if all points were infinitely far",
+    "move nearer or mount the cameras farther apart; check that --calibration or --rectified fits the cameras",
+)
+
+
+def no_depth(cut: CutCounts | None, limits: DepthLimits | None) -> Concern:
+    """Return the doubt about pairs of which no pixel has depth.
+
+    Args:
+        cut: what became of their pixels; None: not counted.
+        limits: to which their clouds were cut; None without a cloud.
+    """
+    if cut is None:
+        return _UNMATCHED
+    most = max(cut.at_zero, cut.too_far, cut.too_near)
+    if most < _ENOUGH * cut.inside or not most:
+        return _UNMATCHED
+    if most == cut.at_zero or limits is None:
+        return _AT_ZERO
+    found = cut.at_zero + cut.too_far + cut.too_near
+    who = "all points lie" if most == found else "most points lie"
+    if most == cut.too_near:
+        return Concern(
+            Doubt.NO_DEPTH,
+            f"no pair has depth: {who} nearer than --near {distance_text(limits.near_m)}",
+            "give a smaller --near, or move away",
+        )
+    if limits.from_rig:
+        return Concern(
+            Doubt.NO_DEPTH,
+            f"no pair has depth: {who} farther than {distance_text(limits.far_m)}, where these cameras measure too coarsely",
+            "move nearer or mount the cameras farther apart; --far shows farther points all the same",
+        )
+    return Concern(
+        Doubt.NO_DEPTH,
+        f"no pair has depth: {who} farther than --far {distance_text(limits.far_m)}",
+        "give a larger --far",
+    )
