@@ -26,10 +26,13 @@ class Support:
     Attributes:
         arrangement: the arrangement.
         features: features whose positions and directions fit it.
+        quarters: for `turned_by_quarter`: 1 or 3, by how many quarters the right image is turned clockwise against the
+            left one; else 0.
     """
 
     arrangement: Arrangement
     features: int
+    quarters: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,6 +23,10 @@ class Side(Enum):
         return Side.RIGHT if self is Side.LEFT else Side.LEFT
 
 
+REJECTED: Final = "reject"
+"""The verdict of a calibration that found its rig unfit."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CameraModel:
     """How one camera projects: OpenCV's pinhole model with its distortion polynomial.
@@ -96,6 +100,11 @@ class Rig:
     verdict: str = ""
     left_camera: RememberedCamera | None = None
     right_camera: RememberedCamera | None = None
+
+    @property
+    def is_rejected(self) -> bool:
+        """Whether its own calibration found it unfit."""
+        return self.verdict == REJECTED
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,10 +8,11 @@ from common.camera.base import CameraHealth, health_values
 from common.versions import REPORT_FORMAT
 from phone_host.measure.accounts import LinkTally, rung_values
 from phone_host.measure.delays import DELAYS, FROM_EXPOSURE, STAGES, Spread
+from phone_host.measure.doubt_history import Episode, saved_pairs
 from phone_host.measure.headline import headline
 from phone_host.measure.image_doubts import ImageFigures
 from phone_host.measure.regime import Judgement, judge
-from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, disbelieved, figures
+from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, disbelieved, figures, history
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
@@ -33,6 +34,7 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "command": command,
         "ended": run.ended,
         "pairs": run.processed,
+        "pairs_asked": run.asked_pairs or None,
         "pairs_per_second": _number(run.pairs_per_second),
         "paired_by": run.replayed.paired_by.value,
         **_delays(run),
@@ -55,6 +57,7 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "warnings": [
             {"doubt": item.doubt.value, "sentence": item.sentence, "remedy": item.remedy} for item in concerns(run)
         ],
+        "shortfall": run.shortfall or None,
         "pairs_account": _pairs_account(run),
         "unused": [{"place": item.place, "reason": item.reason, "count": item.count} for item in unused(run)],
         "sinks": {sink.name: _sink(sink) for sink in run.sinks},
@@ -151,6 +154,20 @@ def _trust(run: RunSnapshot) -> dict[str, object]:
         "judged_pairs": images.judged,
         "at_first": figure_values(images.start),
         "now": figure_values(images.now),
+        "history": [_episode(item, run.save_every) for item in history(run)],
+    }
+
+
+def _episode(item: Episode, save_every: int) -> dict[str, object]:
+    """Return one while during which a doubt stood, with the numbers of its pairs, counted from 0."""
+    return {
+        **concern_values(item.concern),
+        "from_s": round(item.from_s, 3),
+        "to_s": round(item.to_s, 3),
+        "is_over": item.is_over,
+        "first_pair": item.first_pair,
+        "last_pair": item.last_pair,
+        "saved_pairs": list(saved_pairs(item, save_every)),
     }
 
 

@@ -8,10 +8,11 @@ from common.words import counted, times
 from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import LinkAccount, LinkTally, rung_lines
 from phone_host.measure.delays import DELAYS
+from phone_host.measure.doubt_history import history_lines
 from phone_host.measure.headline import headline
 from phone_host.measure.image_doubts import ImageTrust
 from phone_host.measure.regime import judge
-from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
+from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures, history
 from phone_host.measure.unused import unused
 from phone_host.model import DepthAccount, TimeOffset
 from phone_host.report.cut_words import cut_sentence
@@ -49,7 +50,9 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
     lines += _arrivals(run.camera, run.time_offset)
     lines.append(judge(figures(run)).sentence)
     lines += [f"  {remedy}" for remedy in judge(figures(run)).remedies]
+    lines += [f"warning: {run.shortfall}"] if run.shortfall else []
     lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(run)]
+    lines += [f"warning: {line}" for line in past_lines(run)]
     lines += depth_lines(run.images)
     lines += cut_lines(run.depth)
     lines += camera_troubles(run.camera)
@@ -113,6 +116,11 @@ def depth_lines(images: ImageTrust) -> list[str]:
     if not math.isnan(start.vertical_px + end.vertical_px):
         parts.append(f"vertical error {start.vertical_px:.2f}, {end.vertical_px:.2f} px")
     return [f"depth: {'; '.join(parts)}"]
+
+
+def past_lines(run: RunSnapshot) -> list[str]:
+    """Say which doubts stood for a while and have gone, and which pairs they concern."""
+    return history_lines(history(run), run.processed, run.save_every)
 
 
 def cut_lines(depth: DepthAccount) -> list[str]:

@@ -14,6 +14,7 @@ from common.errors import AbsentBoardError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import PairLedger
 from common.link.base import Link
+from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import Pacing
 from phone_host.measure.absence import away_of
 from phone_host.measure.image_motion import MotionMeter
@@ -147,6 +148,7 @@ class Host:
         self._camera = OwnCamera(camera, self._queue.add_host, demand, self._queue.own_image_missing)
         self._receiver = Receiver(links, now.random_id(), self._queue)
         rig = None if core is None else core.rig
+        self._rig_rejected = rig is not None and rig.is_rejected
         self._cameras = RigCameras(rig, settings.board_side, self._own, self._camera, self._receiver)
         interpolator = Interpolator() if settings.interpolate else None
         pipeline = Pipeline(
@@ -306,6 +308,11 @@ class Host:
             gap_s=books.gap_ns / 1e9,
             images=self._trust.trust,
             depth=books.depth,
+            rig_rejected=self._rig_rejected,
+            asked_pairs=self._settings.pairs,
+            save_every=0 if self._settings.out is None else self._settings.save_every,
+            last_s=max(0, books.last_done_ns - self.started_ns) / 1e9,
+            orientations=self._orientations,
         )
 
     def _is_unneeded(self, account: SinkAccount) -> bool:
@@ -317,6 +324,14 @@ class Host:
         """Whether both cameras' stamps are exact by definition. Those of an absent board are assumed to be."""
         hello = self._receiver.hello
         return self._own.has_exact_stamps and (hello is None or hello.camera.has_exact_stamps)
+
+    @property
+    def _orientations(self) -> tuple[Orientation, Orientation]:
+        """Those of the left and the right camera, as their users stated them."""
+        hello = self._receiver.hello
+        board = UPRIGHT if hello is None else hello.camera.orientation
+        own = self._own.orientation
+        return (board, own) if self._settings.board_side is Side.LEFT else (own, board)
 
     @property
     def _period_ns(self) -> int:

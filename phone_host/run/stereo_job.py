@@ -202,7 +202,7 @@ class _Work:
         processed = core.compute(*images, _StageClock(self._watcher, about))
         watch.take_over(processed.stages)
         self._watcher.say(f"checking{about}")
-        trust = judge_pair(core, processed)
+        trust = judge_pair(core, processed, self._job.mounted)
         watch.lap("judge")
         self._watcher.say(f"writing{about}")
         planned = available(

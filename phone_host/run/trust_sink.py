@@ -6,9 +6,10 @@ from collections.abc import Callable
 from typing import Final
 
 from common import now
-from phone_host.measure.image_doubts import ImageJudge, ImageTrust
+from phone_host.measure.image_doubts import ImageTrust
+from phone_host.measure.image_judge import ImageJudge
 from phone_host.measure.sink_account import SinkAccount
-from phone_host.model import DepthLimits, Processed, Result, StereoGeometry
+from phone_host.model import DepthLimits, Result, StereoGeometry
 from phone_host.run.sinks import SinkQueue
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
@@ -32,8 +33,9 @@ class TrustSink:
         self._core, self._clock = core, clock
         self._judge = ImageJudge()
         self._lock = threading.Lock()
-        self._queue: SinkQueue[Processed] = SinkQueue("trust", self._take, depth=_DEPTH)
+        self._queue: SinkQueue[tuple[Result, int]] = SinkQueue("trust", self._take, depth=_DEPTH)
         self._due_ns = 0
+        self._started_ns = clock()
         self._is_busy = False
         self._has_depth = False
         self._limits: DepthLimits | None = None
@@ -54,7 +56,7 @@ class TrustSink:
             return
         self._due_ns = now_ns + _PERIOD_NS
         self._is_busy = True  # before the offer: the thread may be done with it before this one goes on
-        self._queue.offer(processed)  # refused only if the sink has failed or ends
+        self._queue.offer((result, now_ns))  # refused only if the sink has failed or ends
 
     def finish(self) -> None:
         """See Sink."""
@@ -81,13 +83,17 @@ class TrustSink:
                 start=self._judge.start,
                 now=self._judge.now,
                 concerns=self._judge.concerns,
+                newest=self._judge.newest,
+                history=self._judge.history,
                 geometry=self._geometry,
                 disparity_error_px=math.nan if self._limits is None else self._limits.disparity_error_px,
             )
 
-    def _take(self, processed: Processed) -> None:
+    def _take(self, judged: tuple[Result, int]) -> None:
+        result, done_ns = judged
+        processed = result.processed
         maps = None if self._core is None else maps_of(self._core, processed)
         evidence = measure_evidence(processed, maps)
         with self._lock:
-            self._judge.add(evidence)
+            self._judge.add(evidence, at_s=(done_ns - self._started_ns) / 1e9, pair=result.number)
             self._is_busy = False

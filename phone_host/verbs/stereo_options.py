@@ -22,7 +22,6 @@ from phone_host.stereo.scaled_rig import scaled_geometry
 from phone_host.verbs.stereo_numbers import crop_of, pixels, point_px, scale_of
 from phone_host.verbs.units import baseline_mm, limit_mm
 
-_REJECTED: Final = "reject"
 """`Rig.verdict` of a rig that should not be used (`calibration.verdict`)."""
 
 _KITTI_FOLDER: Final = re.compile(r"image_0?([0-3])")
@@ -124,9 +123,9 @@ def refuse_rejected(rig: Rig, calibration: str, *, allowed: bool) -> None:
     Raises:
         DataError: its verdict is reject, and it is not allowed.
     """
-    if rig.verdict == _REJECTED and not allowed:
+    if rig.is_rejected and not allowed:
         raise DataError(
-            f"{calibration} was rejected by its own calibration (verdict {_REJECTED}): its depth would be wrong",
+            f"{calibration} was rejected by its own calibration (verdict reject): its depth would be wrong",
             "calibrate again, or give --use-rejected-rig",
         )
 

@@ -11,7 +11,8 @@ import pytest
 from phone_host.measure.depth_error import depth_error_m
 from phone_host.measure.file_remedies import EXCHANGE, ImageSource, tries_of
 from phone_host.measure.headline import Grade, answer, headline
-from phone_host.measure.image_doubts import ImageFigures, ImageJudge, ImageTrust, image_doubts, median_figures
+from phone_host.measure.image_doubts import ImageFigures, ImageTrust, image_doubts, median_figures
+from phone_host.measure.image_judge import ImageJudge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, depth_is_wrong
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import (
@@ -131,8 +132,8 @@ def test_a_doubt_stands_while_most_of_the_latest_three_judgements_have_it() -> N
     """One judgement of three is not enough, two are; it goes when two of three are free of it."""
     judge = ImageJudge()
     stands: list[list[Doubt]] = []
-    for found in (GOOD, SWAPPED, GOOD, SWAPPED, SWAPPED, GOOD, GOOD):
-        judge.add(found)
+    for number, found in enumerate((GOOD, SWAPPED, GOOD, SWAPPED, SWAPPED, GOOD, GOOD)):
+        judge.add(found, at_s=number / 2, pair=number)
         stands.append([concern.doubt for concern in judge.concerns])
     named = [Doubt.SWAPPED]
     assert stands == [[], [], [], named, named, named, []]
@@ -142,18 +143,19 @@ def test_a_run_of_one_pair_is_judged_by_it() -> None:
     """The only judgement is most of them."""
     judge = ImageJudge()
     assert judge.judged == 0
-    judge.add(SWAPPED)
+    judge.add(SWAPPED, at_s=0.0, pair=0)
     assert [concern.doubt for concern in judge.concerns] == [Doubt.SWAPPED]
     assert judge.judged == 1
 
 
 def test_figures_move_from_the_start_to_now() -> None:
-    """The first and the latest ten judgements have medians of their own; what was not measured is left out."""
+    """The first ten and the latest three judgements have medians of their own; what was not measured is left out."""
     judge = ImageJudge()
     for number in range(30):
-        judge.add(replace(GOOD, vertical_px=0.1 * number, consistency=math.nan))
-    assert judge.start.vertical_px == pytest.approx(0.45)
-    assert judge.now.vertical_px == pytest.approx(2.45)
+        found = replace(GOOD, vertical_px=0.05 * number, consistency=math.nan)
+        judge.add(found, at_s=number / 2, pair=number)
+    assert judge.start.vertical_px == pytest.approx(0.225)
+    assert judge.now.vertical_px == pytest.approx(1.4)
     assert math.isnan(judge.now.consistency)
 
 
@@ -266,6 +268,6 @@ def test_which_doubts_block() -> None:
     blocking = {doubt.value for doubt in Doubt if doubt.blocks}
     assert blocking == {
         "swapped", "turned", "turned_by_quarter", "mirrored", "same_image", "other_scene", "covered", "no_depth",
-        "no_whole_image",
+        "no_whole_image", "images_apart",
     }  # fmt: skip
     assert not Concern(Doubt.TIME_SKEW, "", "").doubt.blocks

@@ -8,13 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from common.camera.base import CameraHealth
+from common.camera.base import CameraHealth, CameraState
 from common.protocol.message import RefusalReason
 from common.versions import PROTOCOL_VERSION
+from phone_host.measure.absence import Away
+from phone_host.measure.gone import gone_concerns
 from phone_host.measure.image_doubts import image_doubts
 from phone_host.measure.no_depth import no_depth
 from phone_host.measure.regime import RunFigures, judge
 from phone_host.measure.trust import (
+    REJECTED_RIG,
     Concern,
     Timing,
     Unbelieved,
@@ -133,6 +136,8 @@ def image_examples() -> Iterator[Concern]:
         (CutCounts(too_near=9), given),
     ):
         yield no_depth(cut, limits)
+    yield REJECTED_RIG
+    yield from gone_concerns("stopped", (Away(3.0, 7.0, is_over=False),), CameraHealth(CameraState.GONE), 5.2)
 
 
 def told(concern: Concern) -> str:

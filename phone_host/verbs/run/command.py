@@ -94,6 +94,8 @@ def run(options: argparse.Namespace) -> int:
     told = summary(snapshot, columns()) + missing
     text = json.dumps(report) if options.json else headed(told, columns(), rows())
     print(text, flush=host.has_given_up)
+    if options.json and snapshot.shortfall:
+        print(f"phone-host: {snapshot.shortfall}", file=sys.stderr)
     if signals.interrupted and host.has_given_up:
         leave()  # the interpreter's end would wait for native code
     if signals.interrupted:
