@@ -102,7 +102,9 @@ def disparity_picture(disparity: Disparity, geometry: StereoGeometry | None = No
 
 
 def depth_picture(cloud: CloudImage) -> Image:
-    """Colour the depths of a cloud and add a scale in metres.
+    """Colour the depths of a cloud in even steps of 1 / Z, and add a scale in metres.
+
+    Specks far behind the scene would use up the colours of a scale with even steps of Z.
 
     Args:
         cloud: (H, W, 3) float32, m, in the left camera's axes, NaN = none.
@@ -111,14 +113,18 @@ def depth_picture(cloud: CloudImage) -> Image:
         (H, W + scale, 3) BGR; without any depth black and without a scale.
     """
     depth = cloud[..., 2]
+    with np.errstate(divide="ignore"):
+        nearness = np.reciprocal(depth)
     near_m, far_m = depth_range_m(depth)
+    low, high = 1 / far_m, 1 / near_m
+    image = _coloured(np.where(np.isfinite(depth), nearness, np.float32(np.nan)), low, high)
     if not np.isfinite(depth).any():
-        return _coloured(depth, far_m, near_m)
+        return image
 
     def in_metres(pitch: float) -> tuple[Tick, ...]:
-        return ticks(near_m, far_m, lambda z: (far_m - z) / (far_m - near_m), pitch)
+        return ticks(near_m, far_m, lambda z: (1 / z - low) / (high - low), pitch)
 
-    return with_scale(_coloured(depth, far_m, near_m), _scale_colours(), in_metres, "m")
+    return with_scale(image, _scale_colours(), in_metres, "m")
 
 
 def write_png(path: Path, image: Image) -> None:
