@@ -134,6 +134,15 @@ def rejections(rejected: tuple[Rejected, ...]) -> str:
     return "\n".join(f"{each.name:>8}  rejected: {each.reason.value} ({each.detail})" for each in rejected)
 
 
+def pairing_notes(files: ViewFiles) -> list[str]:
+    """Warn if the pairs were guessed from the order of names though the counts differ."""
+    if files.by_number or not (files.left_alone or files.right_alone):
+        return []
+    left, right = (len(files.pairs) + len(alone) for alone in (files.left_alone, files.right_alone))
+    counts = f"{left} left and {right} right pictures"
+    return [f"warning  {counts} were paired in the order of their names, because the names share no numbers"]
+
+
 def unwritten(report: dict[str, Any], out: Path) -> list[str]:
     """Say that there is no new rig, and where the earlier one is."""
     return [f"{out} was not written{_earlier(report)}"]
