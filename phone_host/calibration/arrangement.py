@@ -14,8 +14,8 @@ from typing import Final
 import cv2
 import numpy as np
 
-from common.orientation import Flip, Orientation
 from common.errors import DataError
+from common.orientation import Flip, Orientation
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
 from phone_host.calibration.bundle import Vector
 from phone_host.calibration.calibrate import Sizes, calibrate

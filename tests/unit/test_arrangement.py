@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from common.orientation import UPRIGHT, Flip, Orientation
 from common.errors import DataError
+from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.calibration.arrangement import Misplaced, composed, misplaced, turned_corners
 from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.board_views import BoardViews

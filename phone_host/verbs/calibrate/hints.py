@@ -1,7 +1,7 @@
 """What phone-host calibrate says about images that are turned, mirrored or out of step: the cause and the option that helps."""
 
-from common.orientation import Flip, Orientation
 from common.errors import DataError
+from common.orientation import Flip, Orientation
 from phone_host.calibration.arrangement import Misplaced, composed
 from phone_host.calibration.board_views import BoardViews, Mounted
 from phone_host.calibration.out_of_step import OutOfStep
