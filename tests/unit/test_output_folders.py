@@ -4,14 +4,15 @@ import json
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 
 from phone_host.cli import main
+from phone_host.model import CameraModel, Rig
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.verbs.output_folders import keep_other_report
 from tests.support.planes import noise
-from tests.support.rigs import unlike_rig
 
 CALIB = (
     "cam0=[200 0 60; 0 200 40; 0 0 1]\ncam1=[200 0 60; 0 200 40; 0 0 1]\nbaseline=100\nwidth=320\nheight=96\nndisp=32\n"
@@ -106,12 +107,18 @@ def test_a_strangers_report_names_no_file(tmp_path: Path) -> None:
 def test_pages_offer_the_same_rig_live_only_for_a_rig(tmp_path: Path, sides: list[str]) -> None:
     """A calib.txt is of images that were rectified already, which no live camera gives; a rig.yaml is of two cameras."""
     (tmp_path / "calib.txt").write_text(CALIB)
-    rig = unlike_rig()
+    # Two equal cameras side by side: their images are rectified as they are.
+    model = CameraModel(
+        width_px=320,
+        height_px=96,
+        matrix=np.array([[200.0, 0, 159.5], [0, 200, 47.5], [0, 0, 1]]),
+        distortion=np.zeros(5),
+    )
+    rig = Rig(left=model, right=model, R_right_left=np.eye(3), t_right_left_m=np.array([-0.1, 0, 0]))
     write_rig(tmp_path / "rig.yaml", rig, rectify_rig(rig))
-    cv2.imwrite(str(tmp_path / "l.png"), noise(640, 480))
-    cv2.imwrite(str(tmp_path / "r.png"), noise(1280, 720))
-    main(["stereo", *sides, "--calibration", str(tmp_path / "calib.txt"), "--out", str(tmp_path / "a")])
-    own = [str(tmp_path / name) for name in ("l.png", "r.png")]
-    main(["stereo", *own, "--calibration", str(tmp_path / "rig.yaml"), "--out", str(tmp_path / "b")])
+    for name, calibration in (("a", "calib.txt"), ("b", "rig.yaml")):
+        assert (
+            main(["stereo", *sides, "--calibration", str(tmp_path / calibration), "--out", str(tmp_path / name)]) == 0
+        )
     pages = [(tmp_path / name / "index.html").read_text() for name in "ab"]
     assert [" run --link" in page for page in pages] == [False, True]
