@@ -230,8 +230,8 @@ def test_a_second_chance_brings_no_wrong_pair_back() -> None:
 def _larger(camera: CameraModel, factor: int) -> CameraModel:
     """The same lens before a sensor with pixels so many times smaller."""
     to_larger = np.array([[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1]], np.float64)
-    size = {"width_px": camera.width_px * factor, "height_px": camera.height_px * factor}
-    return replace(camera, matrix=to_larger @ camera.matrix, **size)
+    width_px, height_px = camera.width_px * factor, camera.height_px * factor
+    return replace(camera, matrix=to_larger @ camera.matrix, width_px=width_px, height_px=height_px)
 
 
 @pytest.mark.parametrize(("noise_px", "verdict"), [(0.08, Verdict.GOOD), (0.17, Verdict.USABLE)])
