@@ -7,7 +7,7 @@ import textwrap
 from typing import Final, TextIO
 
 _COMMAND: Final = re.compile(
-    r"\s*(\S+ \S+ {2,})?((?:'[^']*/|\S*/)?(phone-host|board-agent|delay-bench)\b|(python3?|pipx?|sudo|make|\.) )"
+    r"\s*(\S+ \S+ {2,})?((?:'[^']*/|\S*/)?(phone-host|board-agent|delay-bench)\b(?!:)|(python3?|pipx?|sudo|make|\.) )"
 )
 """A line that is a command, maybe behind a label of two words. It stays whole, because it is there to be pasted."""
 

@@ -116,7 +116,9 @@ def test_folders_out_of_step_are_told_before_anything_is_fitted(
         for index, name in enumerate(("ant", "bee", "cat", "dog")):
             (folder / side / f"{index}.png").rename(folder / side / f"{name}.png")
     (folder / "right" / "bee.png").unlink()
-    with pytest.raises(DataError, match=r"missing on the right: the folders are out of step from bee\.png on") as caught:
+    with pytest.raises(
+        DataError, match=r"missing on the right: the folders are out of step from bee\.png on"
+    ) as caught:
         _calibrate(folder)
     assert "delete bee.png on the left" in caught.value.remedy
     assert capsys.readouterr().out.startswith(
