@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from typing import Final
 
 _BEGUN: dict[object, Callable[[], None]] = {}
-_LOCK: Final = threading.Lock()
+_LOCK: Final = threading.RLock()  # what is removed may be replaced by a last file, whose block ends as well
 _PATIENCE_S: Final = 0.2
 """The thread that leaves may have been interrupted while it held the lock itself."""
 
@@ -20,7 +20,7 @@ def unfinished(remove: Callable[[], None]) -> Iterator[None]:
     """Something lies under a temporary name while the block runs.
 
     Args:
-        remove: removes it; called from any thread, and only if the process is about to end.
+        remove: removes it, or writes what is left to say; called from any thread, and only if the process is about to end.
     """
     key = object()
     _BEGUN[key] = remove

@@ -56,6 +56,7 @@ def set_json(report: SetReport) -> dict[str, Any]:
         "paired_by": "number" if report.by_number else "name order",
         "left_alone": list(report.left_alone),
         "right_alone": list(report.right_alone),
+        "interrupted_of": report.interrupted_of or None,
         "computed": len(report.computed),
         "failed": len(report.failed),
         "warnings": [remark.text for remark in report.remarks],

@@ -141,6 +141,7 @@ class SetReport:
         left_alone: left images without a partner.
         right_alone: right images without a partner.
         remarks: what the user must know about all of them.
+        interrupted_of: how many pairs were to be computed when the command was interrupted; 0: it was not.
     """
 
     pairs: tuple[PairReport | FailedPair, ...]
@@ -148,6 +149,7 @@ class SetReport:
     left_alone: tuple[str, ...] = ()
     right_alone: tuple[str, ...] = ()
     remarks: tuple[Remark, ...] = ()
+    interrupted_of: int = 0
 
     @property
     def computed(self) -> tuple[PairReport, ...]:

@@ -4,9 +4,10 @@ A pair that cannot be computed ends the work only if it is the only one; of seve
 Wrong settings and a results folder that cannot be written to end the work at once.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -15,6 +16,7 @@ from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
 from common.orientation import UPRIGHT, Orientation
+from common.unfinished import unfinished
 from phone_host.output.atomic import write_text
 from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
@@ -102,10 +104,11 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
             _, left, right = job.files.pairs[0]
             return _set(job, (work.computed("", left, right),))
         pairs: list[PairReport | FailedPair] = []
-        for number, (name, left, right) in enumerate(job.files.pairs):
-            folder = f"pair-{int(name) if job.files.by_number else number:06d}"
-            pairs.append(work.tried(folder, left, right))
-            watcher()
+        with _kept_if_interrupted(job, results, work, pairs):
+            for number, (name, left, right) in enumerate(job.files.pairs):
+                folder = f"pair-{int(name) if job.files.by_number else number:06d}"
+                pairs.append(work.tried(folder, left, right))
+                watcher()
         report = _set(job, tuple(pairs))
         if not report.computed:
             first = report.failed[0]
@@ -113,9 +116,33 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
                 f"none of the {len(pairs)} pairs can be computed; the first: {first.problem} ({first.remedy})",
                 "mend what this names, then try again",
             )
-        results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
-        results.write_text("index.html", set_page(report, work.thumbnails, job.commands(report.computed)))
+        _write_set(job, results, work, report)
         return report
+
+
+def _write_set(job: StereoJob, results: StereoResults, work: "_Work", report: SetReport) -> None:
+    results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
+    results.write_text("index.html", set_page(report, work.thumbnails, job.commands(report.computed)))
+
+
+@contextmanager
+def _kept_if_interrupted(
+    job: StereoJob, results: StereoResults, work: "_Work", pairs: Sequence[PairReport | FailedPair]
+) -> Iterator[None]:
+    """Write the report and the page of the pairs so far if Ctrl-C ends the block, in Python or out of native code."""
+
+    def write() -> None:
+        report = replace(_set(job, tuple(pairs)), interrupted_of=len(job.files.pairs))
+        if report.computed:
+            _write_set(job, results, work, report)
+
+    try:
+        with unfinished(write):
+            yield
+    except KeyboardInterrupt:
+        with suppress(OSError):
+            write()
+        raise
 
 
 def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...]) -> SetReport:

@@ -214,3 +214,25 @@ def test_pairs_without_depth_are_not_sound(photos: Path) -> None:
     report = run_stereo(_job(photos), _Watch())
     assert not report.failed
     assert not report.is_sound
+
+
+class _Impatient(_Watch):
+    """Somebody who presses Ctrl-C as soon as two pairs are done."""
+
+    def __call__(self, amount: int = 1) -> None:
+        super().__call__(amount)
+        if self.done == 2:
+            raise KeyboardInterrupt
+
+
+def test_the_pairs_before_ctrl_c_have_a_report_and_a_page(photos: Path) -> None:
+    """Two of three pairs are done: their folders are whole, and the report says that it is not of all pairs."""
+    with pytest.raises(KeyboardInterrupt):
+        run_stereo(_job(photos), _Impatient())
+    out = photos / "out"
+    told = json.loads((out / "report.json").read_text())
+    assert (told["interrupted_of"], told["computed"]) == (3, 2)
+    assert told["headline"].startswith("Interrupted after 2 of 3 pairs.")
+    assert [pair["name"] for pair in told["pairs"]] == ["pair-000002", "pair-000007"]
+    assert "Interrupted after 2 of 3 pairs" in (out / "index.html").read_text()
+    assert not list(out.glob("*.part"))
