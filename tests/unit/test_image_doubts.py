@@ -271,3 +271,12 @@ def test_which_doubts_block() -> None:
         "no_whole_image", "images_apart",
     }  # fmt: skip
     assert not Concern(Doubt.TIME_SKEW, "", "").doubt.blocks
+
+
+def test_depth_with_specks_is_not_called_right_without_reserve() -> None:
+    """Boards before bare walls: 43 % of the depth is found again; no doubt stands, but the first line says where to trust it."""
+    said = answer(ImageFigures(density=0.28, consistency=0.43, vertical_px=0.2, disparity_px=50.0), (), GEOMETRY)
+    assert said.grade is Grade.GOOD
+    assert said.sentence.startswith("Depth looks right where the scene has texture, specks elsewhere: 28%")
+    assert "43% are found again" in said.sentence
+    assert "specks" not in answer(ImageFigures(density=0.7, consistency=0.8, vertical_px=0.2), (), GEOMETRY).sentence

@@ -2,6 +2,7 @@
 
 import json
 import math
+import resource
 from collections.abc import Callable
 from pathlib import Path
 
@@ -236,3 +237,17 @@ def test_the_pairs_before_ctrl_c_have_a_report_and_a_page(photos: Path) -> None:
     assert [pair["name"] for pair in told["pairs"]] == ["pair-000002", "pair-000007"]
     assert "Interrupted after 2 of 3 pairs" in (out / "index.html").read_text()
     assert not list(out.glob("*.part"))
+
+
+def test_a_result_that_cannot_be_written_whole_leaves_nothing(photos: Path) -> None:
+    """The system takes no file of more than 20 kB: the pictures that could be written are gone, like the maps that could not."""
+    for name in ("left/l2.png", "left/l7.png"):
+        (photos / name).unlink()
+    _, hard = limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
+    try:
+        with pytest.raises(OSError, match="too large"):
+            run_stereo(_job(photos), _Watch())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [path.name for path in (photos / "out").iterdir()] == [".tandemscan"]
