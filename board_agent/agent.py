@@ -13,8 +13,7 @@ from board_agent.sd_notify import Notifier
 from board_agent.status import StatusLine
 from common import now
 from common.camera.base import Camera, CameraHealth, CameraState, Ended, Skipped, Spoiled, held_locks, lockable
-from common.camera.factory import open_camera
-from common.errors import ProtocolError, UnavailableError
+from common.errors import ProtocolError
 from common.frame import Frame
 from common.link.base import Broken, Garbage, Link, Packet, SendResult
 from common.link.several import SeveralLinks
@@ -48,9 +47,6 @@ _FULL_RETRY_NS: Final = 2_000_000
 
 _LONGEST_WAIT_MS: Final = 1000
 
-_CAMERA_RETRY_MS: Final = 500
-"""A camera that was missing at the start is found within this time, half of the time allowed for recovery. A look at /dev costs a board 7 ms."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
@@ -69,38 +65,6 @@ class Summary:
     garbage: int
     ended: bool
     camera: CameraHealth
-
-
-def wait_for_camera(uri: str, clock: str, wake: socket.socket, notifier: Notifier) -> Camera | None:
-    """Open a camera; wait for it as long as necessary.
-
-    Args:
-        uri: the camera.
-        clock: name of this machine's clock, for the stamps.
-        wake: readable end of a socket that signals write to.
-        notifier: is told what is missing.
-
-    Returns:
-        The open camera; None if a signal came first.
-
-    Raises:
-        SettingsError: the URI makes no sense.
-        DataError: a replay's images are bad.
-    """
-    waiter = Waiter([wake])
-    known = ""
-    while True:
-        now_ns = now.monotonic_ns()
-        try:
-            return open_camera(uri, clock, now_ns)
-        except UnavailableError as error:
-            if error.problem != known:
-                known = error.problem
-                _LOG.warning(event("camera_missing", problem=known))
-            if notifier.due(now_ns):
-                notifier.alive(now_ns, f"waiting for the camera: {known}")
-        if waiter.wait(_CAMERA_RETRY_MS):
-            return None
 
 
 @dataclass(frozen=True, slots=True)

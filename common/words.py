@@ -22,3 +22,8 @@ def times(count: int) -> str:
         count: how often.
     """
     return {1: "once", 2: "twice"}.get(count, f"{count} times")
+
+
+def distance_text(metres: float) -> str:
+    """Write a distance with about three digits: `38 m`, `1.25 m`, `300 mm`."""
+    return f"{metres * 1000:.3g} mm" if metres < 1.0 else f"{metres:.3g} m" if metres < 1000 else f"{metres:.0f} m"

@@ -27,7 +27,7 @@ from common import now
 from common.camera.base import Camera
 from common.errors import SettingsError
 from common.link.base import Link
-from common.link.factory import open_links, parse_link, tell_insecure
+from common.link.factory import LinkUri, open_links, parse_link, tell_insecure
 from common.protocol.message import Pacing
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import open_camera
@@ -104,10 +104,7 @@ def open_scanner(
     """
     given = dict(locals())
     _check_numbers(pairs=pairs, save_every=save_every, tolerance_ms=tolerance_ms, wait_s=wait_s, near_m=near_m)
-    named = [link] if isinstance(link, str) else list(link)
-    if not named:
-        raise SettingsError("no link is given", "give link='tcp://HOST:5555', or several")
-    uris = [parse_link(address, listens_by_default=False) for address in named]
+    uris = _addresses(link)
     known = read_rig(Path(rig)) if isinstance(rig, str | Path) else rig
     if known is not None and geometry is not None:
         raise SettingsError("rig and geometry are both given", "leave geometry out: the rig has its own")
@@ -124,8 +121,6 @@ def open_scanner(
         time_offset=TimeOffset() if known is None else known.time_offset,
         resolved=_shown(given),
     )
-    for uri in uris:
-        tell_insecure(uri)
     with ExitStack() as opened:  # if one part cannot be opened, close those that were
         own = opened.enter_context(closing(open_camera(camera, HOST_CLOCK, now.monotonic_ns())))
         links = open_links(uris, key_folder("" if keys is None else str(keys)))
@@ -134,6 +129,21 @@ def open_scanner(
         scanner = Scanner(settings, own, links, core, lossless=lossless)
         opened.pop_all()
     return scanner
+
+
+def _addresses(link: str | Sequence[str]) -> list[LinkUri]:
+    """Read the links' addresses; warn of those that anybody can listen to.
+
+    Raises:
+        SettingsError: there is none, or one is invalid.
+    """
+    named = [link] if isinstance(link, str) else list(link)
+    if not named:
+        raise SettingsError("no link is given", "give link='tcp://HOST:5555', or several")
+    uris = [parse_link(address, listens_by_default=False) for address in named]
+    for uri in uris:
+        tell_insecure(uri)
+    return uris
 
 
 class Scanner:

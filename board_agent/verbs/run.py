@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from contextlib import ExitStack, closing
 from typing import Final
 
-from board_agent.agent import Agent, Service, Summary, wait_for_camera
+from board_agent.agent import Agent, Service, Summary
+from board_agent.await_camera import wait_for_camera
 from board_agent.rate_control import RateControl, ladder, ways
 from board_agent.sd_notify import Notifier
 from board_agent.settings import BoardSettings, check, key_folder, resolve_settings
@@ -24,6 +25,7 @@ from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level
 from common.program.signals import StopSignals
+from common.program.terminal import fitted
 from common.protocol.message import BoardCounts
 from common.stamp import board_clock
 from common.words import counted
@@ -48,14 +50,12 @@ def run(options: argparse.Namespace) -> int:
         logs.event("stopped", session=session, **counts, **drops_told, garbage=summary.garbage, **_troubles(camera))
     )
     if options.json:
-        account = {"session": session, **counts, "dropped": dropped, "garbage": summary.garbage}
-        print(json.dumps({**account, "ended": summary.ended, "camera": camera}))
+        values = {"session": session, **counts, "dropped": dropped, "garbage": summary.garbage}
+        print(json.dumps({**values, "ended": summary.ended, "camera": camera}))
     else:
         drops = "".join(f", {count} {reason}" for reason, count in dropped.items()) or ", none dropped"
-        print(
-            f"session {session}: {counted(counts['grabbed'], 'frame')} grabbed, {counts['sent']} sent{drops}",
-            file=sys.stderr,
-        )
+        account = f"session {session}: {counted(counts['grabbed'], 'frame')} grabbed, {counts['sent']} sent{drops}"
+        print(fitted(account, sys.stderr), file=sys.stderr)
     return INTERRUPTED if signals.interrupted else 0
 
 

@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Any, Protocol, cast
 
 from common.frame import Frame, FrameFault
+from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import CameraDescription, Locks
 
 
@@ -227,3 +228,10 @@ def held_locks(camera: Camera) -> Locks:
     """Return the controls of any camera that are held now, with their values."""
     holder = lockable(camera)
     return () if holder is None else holder.held_locks
+
+
+def upright_px(camera: Camera) -> tuple[int, int]:
+    """Return width and height of a camera's upright images, px: after what the headers of replayed files say, then after the camera's turn."""
+    description = camera.description
+    stored: Orientation = getattr(camera, "stored", UPRIGHT)  # a replay's alone
+    return description.orientation.turned_size(stored.turned_size((description.width_px, description.height_px)))

@@ -8,14 +8,15 @@ option, and an UnavailableError for a device that cannot be had.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qsl
 
 from common.camera.base import Camera
 from common.camera.options import EXAMPLE
-from common.camera.orientation import ORIENTING, Orientation, orientation_of
 from common.camera.turned import turned
 from common.errors import SettingsError
+from common.orientation import ORIENTING, Orientation, orientation_of
 from common.program.extensions import make_registered, named, registered_names
 
 _CAMERAS: Final = "tandemscan.cameras"
@@ -59,13 +60,18 @@ _KINDS: Final = {
 }
 
 
-def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
+_SERVERS: Final = ("http://", "https://")
+"""What phone-host takes itself."""
+
+
+def open_camera(uri: str, clock: str, now_ns: int, example: str = EXAMPLE) -> Camera:
     """Open the camera that a URI names.
 
     Args:
         uri: see EXAMPLE.
         clock: name of this machine's clock, for the stamps.
         now_ns: CLOCK_MONOTONIC now, ns.
+        example: URIs that the program takes, for an error.
 
     Returns:
         The open camera.
@@ -75,7 +81,7 @@ def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
         UnavailableError: there is no such device or folder.
         DataError: a replay's images are bad.
     """
-    scheme, path, options, orientation = _parts(uri)
+    scheme, path, options, orientation = _parts(uri, example)
     if scheme in _KINDS:
         settings = _read(scheme, uri, path, options, clock)
         camera: Camera = named(_KINDS[scheme].open)(settings, now_ns)
@@ -85,12 +91,13 @@ def open_camera(uri: str, clock: str, now_ns: int) -> Camera:
     return turned(extension, orientation)
 
 
-def parse_camera(uri: str, clock: str) -> object:
+def parse_camera(uri: str, clock: str, example: str = EXAMPLE) -> object:
     """Parse a camera URI without opening anything.
 
     Args:
         uri: see EXAMPLE.
         clock: name of this machine's clock, for the stamps.
+        example: URIs that the program takes, for an error.
 
     Returns:
         The camera's settings: ReplaySettings or V4l2Settings; None for another package's camera, which parses them when it opens.
@@ -98,20 +105,21 @@ def parse_camera(uri: str, clock: str) -> object:
     Raises:
         SettingsError: the URI makes no sense.
     """
-    scheme, path, options, _ = _parts(uri)
+    scheme, path, options, _ = _parts(uri, example)
     return _read(scheme, uri, path, options, clock) if scheme in _KINDS else None
 
 
-def parse_orientation(uri: str) -> Orientation:
+def parse_orientation(uri: str, example: str = EXAMPLE) -> Orientation:
     """Parse how a camera URI says that the camera is mounted.
 
     Args:
         uri: see EXAMPLE.
+        example: URIs that the program takes, for an error.
 
     Raises:
         SettingsError: the URI makes no sense.
     """
-    return _parts(uri)[-1]
+    return _parts(uri, example)[-1]
 
 
 def _read(scheme: str, uri: str, path: str, options: dict[str, str], clock: str) -> object:
@@ -119,15 +127,33 @@ def _read(scheme: str, uri: str, path: str, options: dict[str, str], clock: str)
     return settings
 
 
-def _parts(uri: str) -> tuple[str, str, dict[str, str], Orientation]:
+def _parts(uri: str, example: str) -> tuple[str, str, dict[str, str], Orientation]:
     """Split scheme, path, options and orientation; check that the scheme is known."""
     scheme, found, rest = uri.partition(":")
     known = found and (scheme in _KINDS or scheme in registered_names(_CAMERAS))
     if not known or (scheme == "replay" and not rest):
-        raise SettingsError(f"camera {uri!r} is of an unknown kind", f"give {EXAMPLE}")
+        raise _unknown(uri, example)
     path, options = _split(uri, rest)
     others = {name: value for name, value in options.items() if name not in ORIENTING}
     return scheme, path, others, orientation_of(options, uri)
+
+
+def _unknown(uri: str, example: str) -> SettingsError:
+    """Return the error for a URI of an unknown kind. A server's address stays out of it, because it may hold a password."""
+    if uri.lower().startswith(_SERVERS):
+        return SettingsError(
+            f"camera {uri.partition('//')[0]}//... is of a kind that only phone-host takes",
+            f"give it to phone-host run --camera, and here {example}",
+        )
+    path = uri.partition("?")[0]
+    try:
+        is_there = bool(path) and Path(path).exists()
+    except (OSError, ValueError):
+        is_there = False
+    if is_there:
+        kind = "v4l2" if Path(path).is_char_device() else "replay"
+        return SettingsError(f"camera {uri!r} does not say of which kind it is", f"give '{kind}:{uri}'")
+    return SettingsError(f"camera {uri!r} is of an unknown kind", f"give {example}")
 
 
 def _split(uri: str, rest: str) -> tuple[str, dict[str, str]]:

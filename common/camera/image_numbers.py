@@ -67,8 +67,10 @@ class ShowsFiles(Protocol):
 def numbers_of(stems: Sequence[str]) -> tuple[int, ...]:
     """Read the number of each image from its file name.
 
-    A name may hold more than one number (`cam0_0012`, `0012_cam1`). The one that counts is the last one that is different
-    in all names. `calibrate` sees both sides and takes the place that pairs most; a camera sees only its own.
+    A name may hold more than one number (`cam0_0012`, `0012_cam1`, `cam0_0012_120530`). The one that counts the images is
+    different in all names, and of several such numbers it runs through the fewest values: a time of day leaves more out
+    than a counter does. Of two alike it is the last one. `stereo` and `calibrate` see both sides and take the place that
+    pairs most, which is the same place unless the two sides are numbered in different ways; a camera sees only its own.
 
     Args:
         stems: file names without suffix, of different images.
@@ -79,14 +81,19 @@ def numbers_of(stems: Sequence[str]) -> tuple[int, ...]:
     if len(stems) < 2:
         return ()
     found = [_DIGITS.findall(stem) for stem in stems]
+    best: tuple[int, ...] = ()
     for place in range(1, 1 + min(map(len, found))):
         texts = [digits[-place] for digits in found]
         if any(len(text.lstrip("0")) > _MOST_DIGITS for text in texts):
             continue
         numbers = tuple(int(text) for text in texts)
-        if len(set(numbers)) == len(numbers) and max(numbers) - min(numbers) < MOST_SPAN:
-            return numbers
-    return ()
+        if len(set(numbers)) == len(numbers) and _span(numbers) < (_span(best) if best else MOST_SPAN):
+            best = numbers
+    return best
+
+
+def _span(numbers: Sequence[int]) -> int:
+    return max(numbers) - min(numbers)
 
 
 def with_numbers(name: str, images: ImageNumbers) -> str:

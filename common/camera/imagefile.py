@@ -12,6 +12,7 @@ from common.files import read_whole
 from common.frame import PixelFormat, SpoiledImageError
 from common.imagesize.head import ImageHead, ImageKind
 from common.imagesize.read import read_head
+from common.orientation import UPRIGHT, Orientation
 from common.protocol.wire import MAX_PAYLOAD_BYTES
 from common.protocol.wire_fields import MAX_SIZE_PX
 
@@ -25,12 +26,14 @@ class ImageFile:
         width_px: width, px.
         height_px: height, px.
         payload: JPEG and PNG files untouched, others as lossless PNG.
+        orientation: how the file's own header says that it becomes upright.
     """
 
     pixel_format: PixelFormat
     width_px: int
     height_px: int
     payload: bytes
+    orientation: Orientation = UPRIGHT
 
 
 _REMEDY = "use JPEG, PNG or binary PGM/PPM files, or remove it from the folder"
@@ -97,13 +100,13 @@ def _parse(path: Path, data: bytes) -> ImageFile:
     except SpoiledImageError as error:
         raise DataError(error.problem, _REMEDY) from None
     match head.kind:
-        case ImageKind.JPEG:
+        case ImageKind.JPEG | ImageKind.PNG:
             return ImageFile(
-                pixel_format=PixelFormat.MJPEG, width_px=head.width_px, height_px=head.height_px, payload=data
-            )
-        case ImageKind.PNG:
-            return ImageFile(
-                pixel_format=PixelFormat.PNG, width_px=head.width_px, height_px=head.height_px, payload=data
+                pixel_format=PixelFormat.MJPEG if head.kind is ImageKind.JPEG else PixelFormat.PNG,
+                width_px=head.width_px,
+                height_px=head.height_px,
+                payload=data,
+                orientation=head.orientation,
             )
         case ImageKind.PNM if data[1:2] in b"56":
             return _from_pnm(path, head, data)

@@ -119,6 +119,7 @@ class ReplayCamera:
     Attributes:
         images: what its description tells of them.
         numbers: the numbers in their names, in the order of showing; empty if the names do not number them.
+        stored: how the first image becomes upright by its own header.
 
     Args:
         settings: what to show.
@@ -143,6 +144,7 @@ class ReplayCamera:
         # Image k is exposed k * _step / _rate ns after the start. Integers, because a Fraction costs 0.1 ms a frame where caches are cold.
         self._step, self._rate = settings.fps.denominator * 1_000_000_000, settings.fps.numerator
         first = self._check_alike()
+        self.stored = first.orientation
         self._period_ns = self._step // self._rate
         name = Path(settings.path).name
         steering = Steering.GRID if settings.pacing is Pacing.CLOCK else Steering.NONE

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any, cast
 
 from common.camera.base import Camera
-from common.camera.orientation import UPRIGHT, Orientation
+from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import CameraDescription
 
 

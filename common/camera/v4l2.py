@@ -10,16 +10,15 @@ import contextlib
 import errno
 import logging
 from dataclasses import replace
-from pathlib import Path
 from typing import Final
 
 from common.camera.base import CameraHealth, Grab, Mode, Offers
 from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Step, Unwanted
 from common.camera.v4l2_controls import to_axis, to_locks
-from common.camera.v4l2_device import capture_nodes, lasting_name
+from common.camera.v4l2_device import find_camera
 from common.camera.v4l2_formats import Wanted
+from common.camera.v4l2_rate import RateWatch
 from common.camera.v4l2_ring import RING_BUFFERS
-from common.camera.v4l2_stamps import rate_remedy
 from common.camera.v4l2_stream import Stream, V4l2Settings
 from common.camera.v4l2_tally import Tally
 from common.errors import TandemError, UnavailableError
@@ -71,7 +70,7 @@ class V4l2Camera:
     """
 
     def __init__(self, settings: V4l2Settings, now_ns: int) -> None:
-        self._path = _find(settings.path)
+        self._path = find_camera(settings.path)
         self._settings = settings
         self._wishes = settings.wishes
         self._tally = Tally()
@@ -81,7 +80,8 @@ class V4l2Camera:
         self._locked = not settings.wishes.lock
         self._exposure_due_ns = NEVER_NS
         self._known_problem = ""
-        self._rate_is_off = self._is_told_lost = False
+        self._rate = RateWatch()
+        self._is_told_lost = False
         self._latency_ns: int | None = None
         self._exposed_ns = 0
         try:
@@ -312,7 +312,8 @@ class V4l2Camera:
             self._life.heard(now_ns, stream.period_ns)
             self._note_back()
             self._settle(stream, now_ns)
-            self._watch_rate()
+            if self._tally.grabs % 32 == 0:
+                self._rate.watch(self._tally.rate, self.description.period_ns, stream.controls.exposure_ns)
         return grabs
 
     def _note_back(self) -> None:
@@ -330,20 +331,6 @@ class V4l2Camera:
         elif now_ns >= self._settle_ns:
             self._wishes = self._wishes.with_found(stream.controls.lock(self._wishes))
             self._locked, self._settle_ns = True, None
-
-    def _watch_rate(self) -> None:
-        """Report once when the camera's rate differs from the nominal one (dim light, a full bus), and once when it no longer does."""
-        nominal_ns = self.description.period_ns
-        if self._tally.grabs % 32 or self._tally.rate.differs_from(nominal_ns) is self._rate_is_off:
-            return
-        self._rate_is_off = not self._rate_is_off
-        period_ns = self._tally.rate.period_ns or 1
-        figures = {"period_ms": round(period_ns / 1e6, 2), "nominal_ms": round(nominal_ns / 1e6, 2)}
-        if self._rate_is_off and self._stream is not None:
-            remedy = rate_remedy(period_ns, nominal_ns, self._stream.controls.exposure_ns)
-            _LOG.warning(event("rate_differs", **figures, remedy=remedy))
-        else:
-            _LOG.info(event("rate_nominal", **figures))
 
     def _lose(self, error: OSError, now_ns: int) -> None:
         if error.errno in {errno.ENODEV, errno.ENXIO}:
@@ -389,13 +376,3 @@ class V4l2Camera:
             self._known_problem = ""
             self._life.opened(now_ns, stream.period_ns)
             self._note_back()
-
-
-def _find(path: str) -> Path:
-    """The requested camera, by a name that survives unplugging."""
-    if path:
-        return lasting_name(Path(path))
-    nodes = capture_nodes()
-    if not nodes:
-        raise UnavailableError("no camera was found", "plug one in, or check that the user is in the group video")
-    return lasting_name(nodes[0])

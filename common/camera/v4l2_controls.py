@@ -9,7 +9,7 @@ from enum import Enum
 from typing import Final
 
 from common.camera import v4l2_abi as abi
-from common.camera.identity import LARGEST_LOCK, Lock
+from common.camera_identity import LARGEST_LOCK, Lock
 
 
 class PowerLine(Enum):

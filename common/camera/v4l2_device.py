@@ -107,6 +107,20 @@ def lasting_name(path: Path) -> Path:
     return path
 
 
+def find_camera(path: str) -> Path:
+    """The requested camera, or the first one if none is, by a name that survives unplugging.
+
+    Raises:
+        UnavailableError: this machine has no camera.
+    """
+    if path:
+        return lasting_name(Path(path))
+    nodes = capture_nodes()
+    if not nodes:
+        raise UnavailableError("no camera was found", "plug one in, or check that the user is in the group video")
+    return lasting_name(nodes[0])
+
+
 def _listed(folder: Path, prefix: str = "") -> list[Path]:
     """The entries of a folder in name order; none if it does not exist. A board that waits for its camera asks four times a second."""
     try:

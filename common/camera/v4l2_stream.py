@@ -11,7 +11,6 @@ from typing import Final
 from common import now
 from common.camera import v4l2_abi as abi
 from common.camera.base import Grab, Skipped, Spoiled
-from common.camera.identity import CameraIdentity, identity_of
 from common.camera.v4l2_controls import ControlWishes
 from common.camera.v4l2_device import Device, PixelFormatSet, taken
 from common.camera.v4l2_formats import (
@@ -38,6 +37,7 @@ from common.camera.v4l2_stamps import (
     stamp_source,
 )
 from common.camera.v4l2_tally import Tally
+from common.camera_identity import CameraIdentity, identity_of
 from common.errors import UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat, find_fault
 from common.program.logs import event

@@ -8,7 +8,6 @@ from typing import Final
 
 from common import now
 from common.camera.factory import open_camera, parse_camera, parse_orientation
-from common.camera.orientation import UPRIGHT, Orientation
 from common.camera.v4l2_device import Device, capture_nodes, lasting_name, video_nodes
 from common.camera.v4l2_formats import Wanted, choose
 from common.camera.v4l2_serial import serial_number
@@ -30,6 +29,7 @@ from common.doctor.finding import Finding, Grade, fail, ok
 from common.doctor.unit_check import Unit
 from common.errors import TakenError, TandemError
 from common.frame import Frame
+from common.orientation import UPRIGHT, Orientation
 
 _SAMPLE_NS: Final = 1_000_000_000
 """How long frames are taken, starting with the first one."""

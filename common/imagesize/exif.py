@@ -3,8 +3,8 @@
 import struct
 from typing import Final
 
-from common.camera.orientation import UPRIGHT, Flip, Orientation
 from common.frame import FrameFault, SpoiledImageError
+from common.orientation import UPRIGHT, Flip, Orientation
 
 EXIF_START: Final = b"Exif\0\0"
 """What stands before the small TIFF in a JPEG's APP1 segment and in some WebP chunks (4.7.2)."""

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
+from common.orientation import UPRIGHT, Orientation
 
 MEGAPIXEL: Final = 2**20
 """A megabyte here is 2^20 bytes as well. So the phones' "64 MP" (9248x6936) lie within 64 of these."""

@@ -5,10 +5,10 @@ import struct
 from collections.abc import Iterator
 from typing import Final
 
-from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import FrameFault, SpoiledImageError
 from common.imagesize.exif import EXIF_START, exif_orientation
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind, check_length
+from common.orientation import UPRIGHT, Orientation
 
 SOI: Final = b"\xff\xd8"
 """The first bytes of every JPEG."""

@@ -3,10 +3,10 @@
 import struct
 from typing import Final
 
-from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import FrameFault, SpoiledImageError
 from common.imagesize.exif import exif_orientation
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind, check_length, size_text
+from common.orientation import UPRIGHT, Orientation
 
 PNG_START: Final = b"\x89PNG\r\n\x1a\n"
 """The first bytes of every PNG."""

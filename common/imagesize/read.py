@@ -3,13 +3,13 @@
 import struct
 from typing import Final
 
-from common.camera.orientation import UPRIGHT
 from common.frame import FrameFault, SpoiledImageError
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind, size_text
 from common.imagesize.jpeg import SOI, check_scans, jpeg_head
 from common.imagesize.png import PNG_START, pixel_chunks, png_head
 from common.imagesize.short_heads import PNM_HEADER, bmp_head, pnm_head, webp_head
 from common.imagesize.tiff import TIFF_KINDS, as_stored, tiff_head
+from common.orientation import UPRIGHT
 
 _KNOWN: Final = "give a PNG, JPEG, TIFF, BMP, PGM, PPM or WebP image"
 

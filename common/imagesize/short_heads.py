@@ -4,10 +4,10 @@ import re
 import struct
 from typing import Final
 
-from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import FrameFault, SpoiledImageError
 from common.imagesize.exif import EXIF_START, exif_orientation
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind
+from common.orientation import UPRIGHT, Orientation
 
 PNM_HEADER: Final = re.compile(rb"P([1-6])(?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})")
 """Magic, width, height (netpbm's pbm(5), pgm(5), ppm(5)).

@@ -27,11 +27,17 @@ _UNAVAILABLE: Final = 3
 _WRITE_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
 
 
+_MISSING: Final = "the following arguments are required: "  # argparse's words
+
+
 class ExamplesFirstParser(argparse.ArgumentParser):
     """A parser whose help shows its description (the examples) first and unchanged, save that programs are named as the shell finds them.
 
     Its sub-parsers are of the same class.
     """
+
+    _words: tuple[str, ...] = ()
+    """What is being parsed."""
 
     def add_argument(self, *names: str, **options: Any) -> argparse.Action:  # noqa: ANN401 - argparse's own
         """Declare an argument. A path must not be empty: to Path, that would be the current folder."""
@@ -61,6 +67,7 @@ class ExamplesFirstParser(argparse.ArgumentParser):
         words = list(sys.argv[1:] if args is None else args)
         if words[:1] == ["help"] and self._subparsers is not None:
             words = [*words[1:2], "--help"]
+        self._words = tuple(words)
         options, rest = super().parse_known_args(words, namespace)
         if rest:
             self.error(self._unknown(rest))
@@ -73,8 +80,20 @@ class ExamplesFirstParser(argparse.ArgumentParser):
             return f"unknown option {options[0]}{_guess(options[0], self._option_string_actions)}"
         return f"nothing takes {' '.join(rest[:3])}{' ...' if rest[3:] else ''} (put patterns such as 'left*.jpg' in quotes)"
 
+    def _is_unknown(self, word: str) -> bool:
+        """Return whether a word is an option that this parser does not have, not even by its beginning."""
+        if not re.match(r"--?[A-Za-z]", word):  # a value, such as -1
+            return False
+        name, known = word.partition("=")[0], self._option_string_actions
+        return word[:2] not in known and not any(option.startswith(name) for option in known)
+
     def error(self, message: str) -> NoReturn:
-        """Print the problem as one line on stderr, without the usage, and exit with code 2."""
+        """Print the problem as one line on stderr, without the usage, and exit with code 2.
+
+        An unknown option goes before what is missing: the one may be the other, misspelt.
+        """
+        if message.startswith(_MISSING) and (unknown := [word for word in self._words if self._is_unknown(word)]):
+            message = self._unknown(unknown)
         one_line = _plain(" ".join(message.split()))
         self.exit(2, f"{self.prog}: error: {one_line}: see {self.prog} --help\n")
 
@@ -100,13 +119,14 @@ def _plain(message: str) -> str:
         verbs = re.findall(r"[\w-]+", found[2])
         listed = f" (the verbs are {', '.join(verbs)})"
         return f"unknown verb {found[1]}{_guess(found[1], verbs) or listed}"
-    if found := re.fullmatch(r"argument (\S+): invalid (?:float|int) value: (.*)", message):
-        return f"{found[1]} is {found[2]}, which is not a number (leave units out)"
+    if found := re.fullmatch(r"argument (\S+): invalid (float|int) value: (.*)", message):
+        kind = "a whole number, such as 30" if found[2] == "int" else "a number without a unit, such as 1.5"
+        return f"{found[1]} is {found[3]}, but must be {kind}"
     if found := re.fullmatch(r"argument (\S+): expected (?:one|at least one|\d+) arguments?", message):
         return f"{found[1]} needs a value"
     if found := re.fullmatch(r"argument (\S+): (is empty .*)", message):
         return f"{found[1]} {found[2]}"
-    if found := re.fullmatch(r"the following arguments are required: (.*)", message):
+    if found := re.fullmatch(rf"{_MISSING}(.*)", message):
         return f"missing: {found[1]}"
     return message
 
@@ -179,6 +199,8 @@ def _ran(
         _say(f"{parser.prog}: error: {error}")
         return error.exit_code
     except KeyboardInterrupt:
+        if not interrupts.is_heard():
+            interrupts.leave()  # saying so would block, and the interpreter's end too
         _say(f"{parser.prog}: interrupted")
         return INTERRUPTED
 

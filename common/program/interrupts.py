@@ -9,15 +9,21 @@ Commands that end in their own way (StopSignals) replace the handler while they 
 """
 
 import os
+import select
 import signal
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Final, NoReturn
 
 INTERRUPTED: Final = 130
 """128 + SIGINT, as shells report it."""
+
+_STDERR: Final = 2
+
+_CLEAR_LINE: Final = b"\r\x1b[K\x1b[?25h"
+"""Empties the line of a progress bar and shows the cursor, which a bar hides (ECMA-48: EL; DEC private mode 25)."""
 
 _GRACE_S: Final = 0.5
 """Python code ends within milliseconds of a signal; the other half of the second is for a busy machine."""
@@ -58,13 +64,27 @@ def leave() -> NoReturn:
     from common.unfinished import remove_unfinished  # noqa: PLC0415 - a start does not pay for it
 
     remove_unfinished()
-    os.write(2, b"interrupted\n")
+    _say_so()
     os._exit(INTERRUPTED)
+
+
+def is_heard() -> bool:
+    """Whether stderr takes a line now. A pipe that nobody empties, or a terminal that is held, would block for ever."""
+    with suppress(OSError, ValueError):
+        return bool(select.select([], [_STDERR], [], 0)[1])
+    return True  # closed: writing to it fails at once
+
+
+def _say_so() -> None:
+    """Write the one line, in a terminal in place of a progress bar."""
+    if is_heard():
+        with suppress(OSError):  # closed: the exit code must suffice
+            os.write(_STDERR, _CLEAR_LINE * os.isatty(_STDERR) + b"interrupted\n")
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
     del number, frame
-    os.write(2, b"interrupted\n")
+    _say_so()
     os._exit(INTERRUPTED)
 
 

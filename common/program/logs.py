@@ -2,6 +2,8 @@
 
 import logging
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 
 def set_up(level: int = logging.INFO) -> None:
@@ -11,6 +13,49 @@ def set_up(level: int = logging.INFO) -> None:
     root = logging.getLogger()
     root.handlers[:] = [handler]
     root.setLevel(level)
+
+
+class _Written(logging.Handler):
+    """Gives each line of the log to a function.
+
+    Args:
+        write: takes the line, without its end.
+    """
+
+    def __init__(self, write: Callable[[str], None]) -> None:
+        super().__init__()
+        self._write = write
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """See logging.Handler."""
+        try:
+            self._write(self.format(record))
+        except Exception:  # noqa: BLE001 - as logging's own handlers: a log line must not end the program
+            self.handleError(record)
+
+
+@contextmanager
+def written_by(write: Callable[[str], None]) -> Iterator[None]:
+    """Give the log's lines to a function instead of stderr while a block runs: a terminal's picture must know of them.
+
+    Args:
+        write: takes one line without its end; called by any thread.
+    """
+    root = logging.getLogger()
+    before = root.handlers[:]
+    root.handlers[:] = [_instead(handler, write) for handler in before]
+    try:
+        yield
+    finally:
+        root.handlers[:] = before
+
+
+def _instead(handler: logging.Handler, write: Callable[[str], None]) -> logging.Handler:
+    if not isinstance(handler, logging.StreamHandler) or handler.stream is not sys.stderr:
+        return handler
+    written = _Written(write)
+    written.setFormatter(handler.formatter)
+    return written
 
 
 def event(name: str, **fields: object) -> str:

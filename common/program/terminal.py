@@ -7,9 +7,10 @@ import textwrap
 from typing import Final, TextIO
 
 _COMMAND: Final = re.compile(
-    r"\s*(\S+ \S+ {2,})?((?:'[^']*/|\S*/)?(phone-host|board-agent|delay-bench)\b|(python3?|pipx?|sudo|make|\.) )"
+    r"\s*(\S+ \S+ {2,})?((?:'[^']*/|\S*/)?(phone-host|board-agent|delay-bench)(?!\S)|(python3?|pipx?|sudo|make|\.) )"
 )
-"""A line that is a command, maybe behind a label of two words. It stays whole, because it is there to be pasted."""
+"""A line that is a command, maybe behind a label of two words. It stays whole, because it is there to be pasted.
+An error begins with a command's name too, but with a colon behind it."""
 
 _COLUMN: Final = re.compile(r"\S( {2,})(?=\S)")
 _FARTHEST: Final = 0.45
@@ -27,6 +28,34 @@ def columns(stream: TextIO | None = None) -> int:
         return os.get_terminal_size(stream.fileno()).columns
     except (OSError, ValueError):  # no terminal, or no file at all
         return 0
+
+
+def rows(stream: TextIO | None = None) -> int:
+    """Return the height of the terminal that a stream writes to, in lines; 0 if it is no terminal.
+
+    Args:
+        stream: standard output if left out.
+    """
+    stream = stream or sys.stdout
+    try:
+        return os.get_terminal_size(stream.fileno()).lines
+    except (OSError, ValueError):
+        return 0
+
+
+def headed(text: str, width: int, height: int) -> str:
+    """Fold text; where it is higher than the terminal, so that its first line is out of sight, say that line again at the end.
+
+    Args:
+        text: lines, the most important one first.
+        width: of the terminal; 0: no limit.
+        height: of the terminal; 0: no limit.
+    """
+    whole = folded(text, width)
+    # The prompt that follows takes one more line.
+    if not height or whole.count("\n") + 2 <= height:
+        return whole
+    return f"{whole}\n\n{folded(text.partition(chr(10))[0], width)}"
 
 
 def fitted(text: str, stream: TextIO | None = None) -> str:

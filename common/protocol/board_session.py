@@ -8,9 +8,9 @@ come from anywhere. Any frame that this answer counts and that has not come is t
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from common.camera.orientation import UPRIGHT
 from common.frame import Frame
 from common.ledger import BoardMarks
+from common.orientation import UPRIGHT
 from common.protocol.absence import Presence
 from common.protocol.message import (
     BoardCounts,

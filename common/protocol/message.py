@@ -8,10 +8,10 @@ granting twice is harmless and every gap is a loss.
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from common.camera.identity import UNKNOWN_CAMERA, CameraIdentity, Lock
-from common.camera.orientation import UPRIGHT, Orientation
+from common.camera_identity import UNKNOWN_CAMERA, CameraIdentity, Lock
 from common.frame import Buffer, PixelFormat
 from common.ledger import BoardMarks
+from common.orientation import UPRIGHT, Orientation
 
 
 class Lane(Enum):

@@ -4,10 +4,10 @@ from dataclasses import replace
 from enum import Enum
 from typing import Any, Final, TypeVar
 
-from common.camera.identity import LARGEST_LOCK, MOST_LETTERS, CameraIdentity, Lock
-from common.camera.orientation import Flip, Orientation
+from common.camera_identity import LARGEST_LOCK, MOST_LETTERS, CameraIdentity, Lock
 from common.errors import ProtocolError
 from common.frame import PixelFormat
+from common.orientation import Flip, Orientation
 from common.protocol.message import BoardCounts, CameraDescription, DropReason, Locks, Pacing, Rung, Steering
 
 MAX_SIZE_PX: Final = 16384

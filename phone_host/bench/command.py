@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -140,7 +141,6 @@ def _write(out: Path, files: dict[str, str]) -> None:
 
 def _print(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> None:
     """Print a table for each kind of images, stage by stage, with the interfaces below each other."""
-    console = Console(highlight=False)
     print(fitted(f"{under.machine}, {under.date}, matcher {under.matcher}"))
     if sentence := result_sentence(most_compared(results)):
         print(fitted(sentence))
@@ -152,11 +152,10 @@ def _print(results: Sequence[CaseResult], under: Conditions, analysis: Analysis)
             table.add_column(name, justify="right")
         for row in rows(group):
             table.add_row(*row)
-        whole = console.measure(table, options=console.options.update(width=1000)).maximum
-        if console.is_terminal and whole > console.width:
-            _print_narrow(console, group)
+        if _fits(table):
+            _print_whole(table)
         else:
-            console.print(table)
+            _print_narrow(group)
         for result in group:
             print(fitted(f"{result.case.interface}: {summary_line(result)}"))
             for line in regime_lines(result, under.fifo):
@@ -166,13 +165,31 @@ def _print(results: Sequence[CaseResult], under: Conditions, analysis: Analysis)
         print(fitted(line))
 
 
-def _print_narrow(console: Console, group: Sequence[CaseResult]) -> None:
+def _print_narrow(group: Sequence[CaseResult]) -> None:
     """Print a table for each interface, without lines, so that a terminal of 50 columns cuts no number."""
     print(fitted(f"{group[0].case.images}, delays in ms"))
     for result in group:
-        table = Table(title=str(result.case.interface), title_justify="left", box=None, padding=(0, 2, 0, 0))
+        table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
         for name in ("stage", "p50", "p95", "max"):
             table.add_column(name, justify="left" if name == "stage" else "right", no_wrap=True)
         for row in narrow_rows(result):
             table.add_row(*row)
-        console.print(table)
+        print(fitted(str(result.case.interface)))
+        _print_whole(table)
+
+
+def _fits(table: Table) -> bool:
+    """Whether a table fits where stdout goes. A pipe or a file has no width, unless COLUMNS gives it one."""
+    console = Console()
+    has_width = console.is_terminal or bool(os.environ.get("COLUMNS"))
+    return not has_width or _width(table) <= console.width
+
+
+def _width(table: Table) -> int:
+    console = Console(width=1000)
+    return console.measure(table).maximum
+
+
+def _print_whole(table: Table) -> None:
+    """Print a table in its own width: rich would cut its cells to what it takes for the width of the terminal."""
+    Console(highlight=False, width=_width(table)).print(table)

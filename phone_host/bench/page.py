@@ -8,7 +8,7 @@ from typing import Final
 from common.words import counted
 from phone_host.bench.analysis import Analysis, InterfaceFit, typical_and_slow
 from phone_host.bench.prediction import Figures, values_of
-from phone_host.bench.report import Conditions, grouped, most_compared
+from phone_host.bench.report import Conditions, few_pairs_words, grouped, most_compared
 from phone_host.bench.runs import WARM_UP_S, CaseResult
 from phone_host.bench.tables import (
     FIT_COLUMNS,
@@ -63,7 +63,8 @@ def page(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -
     )
     first = most_compared(results)
     sentence = result_sentence(first)
-    verdict = Headline.GOOD if sentence else Headline.BAD
+    few = few_pairs_words(first)
+    verdict = Headline.BAD if not sentence else Headline.WARNING if few else Headline.GOOD
     head = heading("Delays of every interface and stage", sub, verdict, sentence or "No pair was processed.")
     cards = [
         _card(group, under)

@@ -1,5 +1,6 @@
 """The delay benchmark's measurements as a JSON object. Every key names its number's unit."""
 
+import math
 import os
 import platform
 from collections.abc import Sequence
@@ -9,6 +10,7 @@ from typing import Final
 import zmq
 
 from common import now
+from common.words import counted
 from phone_host.bench.analysis import Analysis, Checked, Errors, InterfaceFit, WhatIf, regime_of, statistics_of
 from phone_host.bench.cases import BOARD_SETS, Interface
 from phone_host.bench.prediction import Figures, Unknown
@@ -18,6 +20,9 @@ from phone_host.measure.delays import DELAYS, STAGES, Spread
 from phone_host.sync.fifo import FifoSettings
 
 PERCENTILES: Final = ("p50", "p95", "p99", "max")
+
+ENOUGH_PAIRS: Final = 50
+"""With fewer pairs, a run's 95th percentile rests on its slowest two, and its median on what the machine did in that moment."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +69,7 @@ def as_json(results: Sequence[CaseResult], under: Conditions, analysis: Analysis
         analysis: conclusions from the results.
     """
     return {
+        "command": "delay-bench",
         "machine": under.machine,
         "date": under.date,
         "matcher": under.matcher,
@@ -105,6 +111,24 @@ def most_compared(results: Sequence[CaseResult]) -> list[CaseResult]:
     """Return the runs of those images that were measured over the most interfaces; the first ones of several."""
     groups = grouped(results)
     return max(groups, key=lambda group: sum(bool(result.ledgers) for result in group)) if groups else []
+
+
+def few_pairs_words(results: Sequence[CaseResult]) -> str:
+    """Say that a run is too short to compare by; empty if each has enough pairs, or none at all.
+
+    Args:
+        results: the runs.
+    """
+    measured = [result for result in results if result.ledgers]
+    if not measured:
+        return ""
+    least = min(measured, key=lambda result: len(result.ledgers))
+    pairs = len(least.ledgers)
+    if pairs >= ENOUGH_PAIRS:
+        return ""
+    # Whole tens of seconds; a rate that was never reached is no use for telling the time.
+    seconds = math.ceil(ENOUGH_PAIRS / least.pairs_per_second / 10) * 10 if least.pairs_per_second > 0 else 60
+    return f"{least.case.interface} from only {counted(pairs, 'pair')}: run it longer (--seconds {seconds})"
 
 
 def _run(result: CaseResult, fifo: FifoSettings) -> dict[str, object]:

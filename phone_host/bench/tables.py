@@ -8,7 +8,7 @@ from typing import Final
 from common.words import counted
 from phone_host.bench.analysis import Analysis, regime_of, statistics_of
 from phone_host.bench.prediction import Figures, Unknown
-from phone_host.bench.report import PERCENTILES, losses, percentiles
+from phone_host.bench.report import PERCENTILES, few_pairs_words, losses, percentiles
 from phone_host.bench.runs import CaseResult
 from phone_host.measure.delay_fit import DelayFit
 from phone_host.measure.delays import DELAYS, IDLE_STAGE_NS, STAGES, DelayStatistics
@@ -90,7 +90,7 @@ def narrow_rows(result: CaseResult) -> list[tuple[str, ...]]:
 
 
 def result_sentence(results: Sequence[CaseResult]) -> str:
-    """Say in one sentence which interface is the fastest, how long it takes from exposure to depth, and what takes longest.
+    """Say in one sentence which interface is the fastest, how long it takes from exposure to depth, what takes longest, and if a run is too short to say so.
 
     Args:
         results: runs over several interfaces with the same images.
@@ -106,6 +106,8 @@ def result_sentence(results: Sequence[CaseResult]) -> str:
     typical_ns = statistics.spread("end_to_end").p50_ns
     name, part = str(fastest.case.interface), _largest_part(statistics)
     takes = f"{duration_text(typical_ns)} from exposure to depth at the median, with {fastest.case.images}"
+    few = few_pairs_words(results)
+    part += f"; {few}" if few else ""
     if len(measured) == 1:
         return f"{name} takes {takes}; the largest part is {part}."
     equal = [

@@ -28,6 +28,9 @@ its door only now."""
 
 _AGAIN_S: Final = 0.2
 
+_PROBE_S: Final = 2.0
+"""Time limit for a connection that only shows whether anybody is there; a board in a room answers within milliseconds."""
+
 
 class PairingCall:
     """One attempt to be trusted.
@@ -35,10 +38,14 @@ class PairingCall:
     Args:
         door: host and port of the board's door.
         keys: this host's keys. The board's key is added once the board has proved the code.
+        link: the board's address, `tcp://HOST:PORT`, as the user knows it.
+        say: is told in one line what takes long.
     """
 
-    def __init__(self, door: tuple[str, int], keys: KeyFolder) -> None:
-        self._door, self._keys = door, keys
+    def __init__(
+        self, door: tuple[str, int], keys: KeyFolder, link: str = "", say: Callable[[str], None] = lambda _: None
+    ) -> None:
+        self._door, self._keys, self._link, self._say = door, keys, link, say
         me = Identity(z85.decode(keys.own().public.encode()), clean_name(socket.gethostname()))
         self._asking = Asking(me, os.urandom)
 
@@ -50,6 +57,7 @@ class PairingCall:
             DataError: the answer is not from a board.
         """
         deadline_ns = now.monotonic_ns() + round(_ANSWER_S * 1e9)
+        has_said = False
         while True:
             try:
                 with self._line() as line:
@@ -58,6 +66,9 @@ class PairingCall:
             except _HungUpError:
                 if now.monotonic_ns() >= deadline_ns:
                     raise
+                if not has_said:
+                    has_said = True
+                    self._say(f"waiting {_ANSWER_S:.0f} s for {self._name} to take in a new host")
                 threading.Event().wait(_AGAIN_S)
             else:
                 break
@@ -101,22 +112,46 @@ class PairingCall:
             Peer(name=board.name, key=z85.encode(board.key).decode(), added=now.wall_time(), address=link)
         )
 
+    @property
+    def _name(self) -> str:
+        """The board's address and its door, for people."""
+        door = f"tcp://{self._door[0]}:{self._door[1]}"
+        return f"{self._link} (pairing port {self._door[1]})" if self._link else door
+
     @contextmanager
     def _line(self) -> "Iterator[_Line]":
-        where = f"tcp://{self._door[0]}:{self._door[1]}"
         try:
             connected = socket.create_connection(self._door, _ANSWER_S)
         except OSError as error:
-            problem = f"{where} does not take in a new host ({error.strerror or error})"
-            if is_this_machine(self._door[0]):
-                raise _HungUpError(
-                    problem,
-                    "for a board-agent that listens on 127.0.0.1 no pairing is needed, `phone-host run` connects;"
-                    " for one with a link such as tcp://*:5555 run `sudo board-agent pair`",
-                ) from None
-            raise _HungUpError(problem, "start board-agent there, and run sudo board-agent pair") from None
+            raise self._closed(error.strerror or str(error)) from None
         with connected:
-            yield _Line(connected, where)
+            yield _Line(connected, self._name)
+
+    def _closed(self, cause: str) -> "_HungUpError":
+        """Return the error for a door that is closed: nobody listens at all, or a board that takes in no host now."""
+        if self._link and not _is_open(self._link):
+            return _HungUpError(
+                f"nobody listens at {self._link}, nor at its pairing port {self._door[1]} ({cause})",
+                "check --link, and that board-agent runs there with a link such as tcp://*:5555",
+            )
+        problem = f"{self._name} does not take in a new host ({cause})"
+        if is_this_machine(self._door[0]):
+            return _HungUpError(
+                problem,
+                "for a board-agent that listens on 127.0.0.1 no pairing is needed, `phone-host run` connects;"
+                " for one with a link such as tcp://*:5555 run `sudo board-agent pair`",
+            )
+        return _HungUpError(problem, "start board-agent there, and run sudo board-agent pair")
+
+
+def _is_open(link: str) -> bool:
+    """Whether somebody listens at a link's address."""
+    host, _, port = link.removeprefix("tcp://").rpartition(":")
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), _PROBE_S).close()
+    except (OSError, ValueError):
+        return False
+    return True
 
 
 class _HungUpError(UnavailableError):

@@ -5,11 +5,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from common.camera.orientation import UPRIGHT, Flip, Orientation
+import numpy as np
+
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.imagesize.head import size_text as px_text
+from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
+from phone_host.calibration.out_of_step import FileCorners
 from phone_host.calibration.target import Board, Corners, agree, find_corners
 from phone_host.stereo.images import decode_file, open_image
 from phone_host.stereo.view_files import ViewFiles
@@ -28,12 +31,14 @@ class BoardViews:
         rejected: all others.
         sizes_px: width and height of the upright left and right images.
         turned: by which turn and mirroring the left and the right images became upright, as their EXIF headers say.
+        in_order: the corners in all pictures of both sides, where they were paired by order and the counts differ.
     """
 
     pairs: tuple[BoardPair, ...]
     rejected: tuple[Rejected, ...]
     sizes_px: tuple[Size, Size]
     turned: Mounted = (UPRIGHT, UPRIGHT)
+    in_order: tuple[tuple[FileCorners, ...], tuple[FileCorners, ...]] = ((), ())
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -84,6 +89,7 @@ def look_for_boards(
         else:
             seen.append((name, one, other))
         advance()
+    every = _every_file(files, seen, lambda path, index: _look(path, board, most_pixels, mounted[index]))
     if not seen:
         raise first_problem or DataError(
             "no image has a partner on the other side", "give both images of a pair the same number"
@@ -97,8 +103,30 @@ def look_for_boards(
         else:
             rejected.append(problem)
     return BoardViews(
-        tuple(pairs), tuple(rejected), (usual[0].size_px, usual[1].size_px), (usual[0].turned, usual[1].turned)
+        tuple(pairs), tuple(rejected), (usual[0].size_px, usual[1].size_px), (usual[0].turned, usual[1].turned), every
     )
+
+
+def _every_file(
+    files: ViewFiles, seen: list[tuple[str, _Seen, _Seen]], look: Callable[[Path, int], _Seen]
+) -> tuple[tuple[FileCorners, ...], tuple[FileCorners, ...]]:
+    """Return the corners of all files of both sides, if they were paired by order and the counts differ; else nothing."""
+    alone = files.left_alone, files.right_alone
+    if files.by_number or not any(alone):
+        return (), ()
+    nothing = np.empty((0, 2))
+    sides = []
+    for index, side_alone in enumerate(alone):
+        known = {each[index].file: each[index].corners for each in ((left, right) for _, left, right in seen)}
+        paired = [(left, right)[index] for _, left, right in files.pairs]
+        found = [FileCorners(path.name, known.get(path.name, nothing)) for path in paired]
+        for path in side_alone:
+            try:
+                found.append(FileCorners(path.name, look(path, index).corners))
+            except DataError:  # it cannot be read: nothing is known of it
+                found.append(FileCorners(path.name, nothing))
+        sides.append(tuple(found))
+    return sides[0], sides[1]
 
 
 def _look(path: Path, board: Board, most_pixels: int, mounted: Orientation) -> _Seen:

@@ -24,19 +24,21 @@ from phone_host.calibration.bundle import (
     adjust,
     camera_arrays,
     globals_of,
-    project_view,
     rms_px,
 )
 from phone_host.calibration.calibrate_alone import (
+    FAR_OFF_PX,
     USUAL_PAIRS,
     Lens,
     LoneCamera,
     calibrate_alone,
     corners_of,
+    off_words,
     own_errors_px,
     require_enough,
     with_poses,
 )
+from phone_host.calibration.relative_pose import prediction_errors_px, states_of
 from phone_host.calibration.target import Board, Corners
 from phone_host.calibration.zero_sigma import zero_sigma_px
 from phone_host.model import CameraModel, Rectification, Rig, Side
@@ -157,20 +159,8 @@ def _agreed_start(
     Each pair gives a relative pose on its own. It is judged by how well it predicts the right corners of all pairs from
     their left poses. The median over the pairs ignores how large the outliers are.
     """
-    candidates = [_relative(a, b) for a, b in zip(left.poses, right.poses, strict=True)]
-    states = [
-        BundleState(left=left.parameters, right=right.parameters, rotation=r, translation_m=t, poses=left.poses)
-        for r, t in candidates
-    ]
-    errors = np.array(
-        [
-            [
-                rms_px(pair.right_px - project_view(state, pose, points_m)[1])
-                for pair, pose in zip(pairs, left.poses, strict=True)
-            ]
-            for state in states
-        ]
-    )
+    states = states_of(left, right)
+    errors = prediction_errors_px(states, [pair.right_px for pair in pairs], points_m)
     best = int(np.median(errors, axis=1).argmin())
     usual = float(np.median(errors[best]))
     inside = errors[best] <= max(_MOVED_FACTOR * usual, _MOVED_FLOOR_PX)
@@ -187,13 +177,6 @@ def _agreed_start(
     kept = [pair for pair, good in zip(pairs, inside, strict=True) if good]
     require_enough(kept, rejected)
     return replace(states[best], poses=left.poses[inside]), kept, rejected
-
-
-def _relative(left: Vector, right: Vector) -> tuple[Vector, Vector]:
-    """Return the rotation vector and translation, right from left, from two poses of one board."""
-    inverse = np.asarray(cv2.Rodrigues(left[:3])[0]).T
-    rotation = np.asarray(cv2.Rodrigues(right[:3])[0]) @ inverse
-    return np.ravel(cv2.Rodrigues(rotation)[0]).astype(np.float64), right[3:] - rotation @ left[3:]
 
 
 def _adjust_robustly(
@@ -284,12 +267,15 @@ def _misfit(pair: BoardPair, state: BundleState, points_m: Vector, *, error_px: 
     # If a view fitted alone already has more than half of the error, the fault is in its corners.
     if own[side] > error_px / 2:
         reason = Reason.CORNERS_LEFT if side is Side.LEFT else Reason.CORNERS_RIGHT
-        detail = f"corners in the {side.value} image are off by {own[side]:.2f} px, others by {usual_px:.2f} px"
+        detail = f"corners in the {side.value} image are off {off_words(own[side], usual_px)}"
+        if own[side] > FAR_OFF_PX:
+            detail += ": the two images may not belong together"
     else:
         reason = Reason.MOVED
-        detail = (
-            f"each view fits alone, together they are off by {error_px:.2f} px, others by {usual_px:.2f} px:"
-            " board or cameras moved between the two exposures"
+        detail = f"each view fits alone, together they are off {off_words(error_px, usual_px)}: " + (
+            "the two images do not belong together"
+            if error_px > FAR_OFF_PX
+            else "board or cameras moved between the two exposures"
         )
     return Rejected(pair.name, reason, detail)
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Final
 
 import cv2
 import numpy as np
@@ -41,6 +42,10 @@ _STEPS = {
 """OpenCV's own limit is 30 steps. With k3 that leaves views of a wide lens off by 10 px, which then look wrong."""
 
 
+FAR_OFF_PX: Final = 1000
+"""Corners of the right board in a whole photograph are never so far off: the fit has diverged, and its number means nothing."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LoneCamera:
     """One camera calibrated alone: its parameters, and the poses (V, 6) of the boards in its axes."""
@@ -63,10 +68,16 @@ def require_enough(pairs: list[BoardPair], rejected: list[Rejected]) -> None:
     """
     if len(pairs) < LEAST_PAIRS:
         why = f" ({len(rejected)} rejected: {rejected[0].name}: {rejected[0].detail}, ...)" if rejected else ""
+        check = "check that the two images of each pair belong together, and " if _misfits(rejected) else ""
         raise DataError(
             f"only {len(pairs)} of at least {LEAST_PAIRS} pairs can be used{why}",
-            "take 15 or more pairs with the whole board sharp in both images",
+            f"{check}take 15 or more pairs with the whole board sharp in both images",
         )
+
+
+def _misfits(rejected: list[Rejected]) -> bool:
+    """Whether a pair was rejected because it does not fit the others."""
+    return any(each.reason in {Reason.MOVED, Reason.CORNERS_LEFT, Reason.CORNERS_RIGHT} for each in rejected)
 
 
 def calibrate_alone(
@@ -100,10 +111,24 @@ def calibrate_alone(
             Rejected(
                 pairs[worst].name,
                 reason,
-                f"corners in the {side.value} image are off by {errors[worst]:.2f} px, others by {np.median(errors):.2f} px",
+                f"corners in the {side.value} image are off {off_words(float(errors[worst]), float(np.median(errors)))}",
             )
         )
         pairs = [pair for index, pair in enumerate(pairs) if index != worst]
+
+
+def off_words(error_px: float, usual_px: float) -> str:
+    """Say how far corners are off, as in `by 3.21 px, others by 0.30 px`; beyond a thousand pixels a number means nothing.
+
+    Args:
+        error_px: root mean square error of the pair's corners, px.
+        usual_px: the same, of the usual pair.
+    """
+    error, usual = (
+        f"by {value:.2f} px" if value <= FAR_OFF_PX else f"by more than {FAR_OFF_PX} px"
+        for value in (error_px, usual_px)
+    )
+    return f"{error}, others {usual}"
 
 
 def _opencv_camera(

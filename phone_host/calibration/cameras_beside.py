@@ -4,17 +4,17 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
-from common.camera.identity import UNKNOWN_CAMERA, CameraState
-from common.camera.orientation import UPRIGHT, Orientation
+from common.camera_identity import UNKNOWN_CAMERA, RememberedCamera
 from common.errors import DataError, SettingsError
 from common.imagesize.head import MOST_PIXELS, size_text
+from common.orientation import UPRIGHT, Orientation
 from phone_host.model import Rig
 from phone_host.output.cameras_json import CAMERAS_NAME, read_cameras
 from phone_host.stereo.images import open_image
 from phone_host.stereo.view_files import ViewFiles
 
 Size = tuple[int, int]
-Cameras = tuple[CameraState, CameraState]
+Cameras = tuple[RememberedCamera, RememberedCamera]
 
 
 def cameras_beside(files: ViewFiles, mounted: tuple[Orientation, Orientation]) -> tuple[Path, Cameras] | None:
@@ -82,7 +82,7 @@ def with_cameras(rig: Rig, cameras: Cameras | None, mounted: tuple[Orientation, 
     states = []
     for model, turn in zip((rig.left, rig.right), mounted, strict=True):
         width_px, height_px = turn.turned_size((model.width_px, model.height_px))
-        states.append(None if turn == UPRIGHT else CameraState(UNKNOWN_CAMERA, width_px, height_px, turn))
+        states.append(None if turn == UPRIGHT else RememberedCamera(UNKNOWN_CAMERA, width_px, height_px, turn))
     return replace(rig, left_camera=states[0], right_camera=states[1])
 
 

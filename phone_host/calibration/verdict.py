@@ -12,11 +12,16 @@ import numpy as np
 
 from common.words import counted
 from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
+from phone_host.model import Rig
 
 GOOD_PX, USABLE_PX = 0.25, 0.5
-"""Limits of the 95th percentile of the vertical error."""
+"""Limits of the 95th percentile of the vertical error, for images of up to `REFERENCE_PX`."""
 
-# Real rigs fit to 0.15 to 0.4 px. Beyond this no tuning helps; something basic is wrong.
+REFERENCE_PX = 1280
+"""The longer side of the images for which the limits hold. Larger ones are matched smaller, at about this width, and a
+lens's blur covers more of their pixels: limits grow with their size."""
+
+# Real rigs fit to 0.15 to 0.4 px. Beyond this no tuning helps; something basic is wrong. Grows with the size too.
 _CONTRADICTION_PX = 1.0
 # A baseline known to 1 % gives depth known to 1 %; at 5 % there is practically no scale.
 _BASELINE_GOOD, _BASELINE_USABLE = 0.01, 0.05
@@ -55,6 +60,12 @@ def vertical_p95_px(calibration: Calibration) -> float:
     return float(np.percentile(calibration.vertical_px, 95))
 
 
+def size_factor(rig: Rig) -> float:
+    """Return by which factor limits in px are wider for this rig's images; at least 1. Rectified images are as coarse as the coarser camera's."""
+    longest = min(max(model.width_px, model.height_px) for model in (rig.left, rig.right))
+    return max(1.0, longest / REFERENCE_PX)
+
+
 def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Assessment:
     """Judge a calibration.
 
@@ -66,7 +77,8 @@ def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Assessmen
         The verdict with remedies.
     """
     contradictions = []
-    if calibration.rig.rms_stereo_px > _CONTRADICTION_PX:
+    factor = size_factor(calibration.rig)
+    if calibration.rig.rms_stereo_px > _CONTRADICTION_PX * factor:
         contradictions.append(
             f"the views contradict each other by {calibration.rig.rms_stereo_px:.1f} px: check --board (inner corners), that"
             " each LEFT image belongs to its RIGHT one, and that neither camera mirrors its image"
@@ -79,14 +91,14 @@ def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Assessmen
     open_share = calibration.baseline_sigma_m / baseline_m
     pairs = len(calibration.used)
     rejects, limits, hints = contradictions, list[str](), list[str]()
-    if p95_px > USABLE_PX:
+    if p95_px > USABLE_PX * factor:
         rejects.append(
             f"rows of the two views differ by {p95_px:.2f} px (95 %): fix focus and zoom, hold board and cameras still in each"
             " pair, glue the print to a flat plate, check --board, and take new pairs"
         )
-    elif p95_px > GOOD_PX:
+    elif p95_px > GOOD_PX * factor:
         limits.append(
-            f"rows of the two views differ by {p95_px:.2f} px (95 %), {GOOD_PX} px is good: hold the board still, flat, sharp and"
+            f"rows of the two views differ by {p95_px:.2f} px (95 %), {GOOD_PX * factor:.2f} px is good: hold the board still, flat, sharp and"
             " larger in the image"
         )
     if open_share > _BASELINE_USABLE:

@@ -4,11 +4,12 @@ from typing import Final
 
 from common.camera import factory as common_factory
 from common.camera.base import Camera
-from common.camera.orientation import Orientation
 from common.camera.turned import turned
 from common.frame import ImageSizeError
 from common.imagesize.head import MOST_PIXELS, require_pixels
+from common.orientation import Orientation
 from common.program.extensions import named
+from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.http_uri import http_settings, is_http, without_orientation
 
 _HTTP: Final = "phone_host.camera.mjpeg_http:HttpCamera"
@@ -44,7 +45,7 @@ def open_camera(uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXEL
 
 def _open(uri: str, clock: str, now_ns: int) -> Camera:
     if not is_http(uri):
-        return common_factory.open_camera(uri, clock, now_ns)
+        return common_factory.open_camera(uri, clock, now_ns, EXAMPLE)
     address, orientation = without_orientation(uri)
     camera: Camera = named(_HTTP)(http_settings(address, clock))
     return turned(camera, orientation)
@@ -59,7 +60,7 @@ def check_camera(uri: str) -> None:
     if is_http(uri):
         http_settings(without_orientation(uri)[0], "")
     else:
-        common_factory.parse_camera(uri, "")
+        common_factory.parse_camera(uri, "", EXAMPLE)
 
 
 def camera_orientation(uri: str) -> Orientation:
@@ -68,4 +69,4 @@ def camera_orientation(uri: str) -> Orientation:
     Raises:
         SettingsError: the URI is invalid.
     """
-    return without_orientation(uri)[1] if is_http(uri) else common_factory.parse_orientation(uri)
+    return without_orientation(uri)[1] if is_http(uri) else common_factory.parse_orientation(uri, EXAMPLE)

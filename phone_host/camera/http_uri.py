@@ -9,8 +9,8 @@ from typing import Final
 from urllib.parse import parse_qsl, unquote, urlencode, urlsplit
 
 from common.camera.options import milliseconds
-from common.camera.orientation import ORIENTING, Orientation, orientation_of
 from common.errors import SettingsError
+from common.orientation import ORIENTING, Orientation, orientation_of
 
 EXAMPLE: Final = "http://PHONE:8080/video[?latency_ms=120&latency_uncertainty_ms=20]"
 

@@ -127,6 +127,13 @@ class LinkAccount:
     absences: tuple[Absence, ...] = ()
     left: int = 0
 
+    @property
+    def current(self) -> SessionAccount:
+        """The newest session's account; one without a name before the first session."""
+        if not self.sessions:
+            self.sessions.append(SessionAccount("", BoardCounts(), BoardCounts()))
+        return self.sessions[-1]
+
     def board_left(self, now_ns: int) -> None:
         """Take note that the board has gone although it had not shown its last image."""
         self.left += 1

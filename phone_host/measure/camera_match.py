@@ -7,7 +7,7 @@ not state is not compared: a rig without cameras, a camera without a serial numb
 
 from dataclasses import dataclass
 
-from common.camera.identity import CameraIdentity, CameraState
+from common.camera_identity import CameraIdentity, RememberedCamera
 from common.errors import DataError
 from common.protocol.message import CameraDescription, Locks
 from phone_host.measure.trust import Concern, Doubt
@@ -31,7 +31,7 @@ class LockMiss:
     present: int | None
 
 
-def state_of(camera: CameraDescription, held: Locks) -> CameraState:
+def state_of(camera: CameraDescription, held: Locks) -> RememberedCamera:
     """Return what is to be remembered of a camera.
 
     Args:
@@ -39,10 +39,12 @@ def state_of(camera: CameraDescription, held: Locks) -> CameraState:
         held: the controls that it is held at.
     """
     locks = tuple((lock.value, value) for lock, value in held)
-    return CameraState(camera.identity, camera.width_px, camera.height_px, camera.orientation, locks)
+    return RememberedCamera(camera.identity, camera.width_px, camera.height_px, camera.orientation, locks)
 
 
-def require_camera(side: Side, whose: str, rig: CameraState, present: CameraDescription, other: CameraIdentity) -> None:
+def require_camera(
+    side: Side, whose: str, rig: RememberedCamera, present: CameraDescription, other: CameraIdentity
+) -> None:
     """Check that a camera is the rig's and is mounted as it was.
 
     Args:
@@ -73,7 +75,7 @@ def require_camera(side: Side, whose: str, rig: CameraState, present: CameraDesc
         )
 
 
-def misses(side: Side, rig: CameraState, held: Locks) -> tuple[LockMiss, ...]:
+def misses(side: Side, rig: RememberedCamera, held: Locks) -> tuple[LockMiss, ...]:
     """Return the rig's locks that a camera does not have.
 
     Args:

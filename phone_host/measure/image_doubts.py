@@ -6,13 +6,14 @@ with the right arrangement; where the images hold too little, nothing is named. 
 """
 
 import math
-from collections import Counter, deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
+from phone_host.measure.doubt_history import Episode
+from phone_host.measure.file_remedies import FILE_REMEDIES, ImageSource
 from phone_host.measure.search_doubts import ambiguous, is_pattern, too_short
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement, Evidence, Exposure, StereoGeometry
@@ -56,23 +57,24 @@ _LEAST_CONSISTENCY: Final = 0.25
 """Good pairs reach 0.33 and more, the worst of them before white walls."""
 
 _MOST_VERTICAL_PX: Final = 2.0
-"""Matchers correct up to 2 px of common offset; beyond it they lose points."""
+"""Matchers correct up to 2 px of common offset; beyond it they lose points. In px of the images that they match."""
+
+_LOST_VERTICAL_PX: Final = 5.0
+_LOST_DENSITY: Final = 0.4
+"""With rows off by more and less depth than this, depth is wrong: of 13 given pairs whose right image was lowered by 5 px,
+SGBM found 3 to 22 % of the former depth again, except on two of 463 px of width and less, which kept a density of half and more."""
 
 _MOST_SKEW_PX: Final = 0.8
 """Given pairs measure 0.62 px (KITTI) and less; a camera rolled by half a degree 0.95 px on 350 px of width."""
+
+_MOVED: Final = "the calibration does not fit these cameras any more, or never did: calibrate the rig again"
+_NOT_RECTIFIED: Final = "these images are not rectified: calibrate your cameras and give --calibration rig.yaml"
 
 _EDGE_TO_EDGE: Final = 3.5
 """The full height of a ramp relative to its root mean square."""
 
 _TILTED_SHARE: Final = 0.3
 """If fewer of the related features than this share their rows, the rectification does not fit the cameras."""
-
-_LAST: Final = 3
-"""A doubt stands while it holds in most of the latest three judgements: two a second make that a second."""
-
-_START: Final = 10
-_NOW: Final = 10
-"""Figures at the start and now are medians over this many judgements, five seconds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +87,7 @@ class ImageFigures:
         vertical_px: distance of features from their rows, px.
         vertical_offset_px: how far too low the right image lies, px.
         disparity_px: the middle one of the disparities, px.
+        matched_scale: size of the images that were matched, as a share of the full size in whose px all this is.
     """
 
     density: float = math.nan
@@ -92,6 +95,7 @@ class ImageFigures:
     vertical_px: float = math.nan
     vertical_offset_px: float = math.nan
     disparity_px: float = math.nan
+    matched_scale: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,8 +107,10 @@ class ImageTrust:
         wants_depth: whether a rig or rectified images were given.
         has_depth: whether any pair had depth.
         start: figures over the first judgements.
-        now: figures over the latest ones.
+        now: figures over those of the latest ones that have exactly the standing doubts.
         concerns: the standing doubts, gravest first.
+        newest: the doubts of the newest judged pair, gravest first.
+        history: what stood for a while, and what stands.
         geometry: converts disparity to metres; None if it is not known.
         disparity_error_px: error of a disparity, px; NaN if the core states none.
     """
@@ -115,61 +121,28 @@ class ImageTrust:
     start: ImageFigures = ImageFigures()
     now: ImageFigures = ImageFigures()
     concerns: tuple[Concern, ...] = ()
+    newest: tuple[Concern, ...] = ()
+    history: tuple[Episode, ...] = ()
     geometry: StereoGeometry | None = None
     disparity_error_px: float = math.nan
 
-
-class ImageJudge:
-    """Judges a run's evidence as it comes. One thread adds; the caller guards against others."""
-
-    def __init__(self) -> None:
-        self._judged = 0
-        self._first: list[Evidence] = []
-        self._latest: deque[Evidence] = deque(maxlen=_NOW)
-        self._doubts: deque[tuple[Concern, ...]] = deque(maxlen=_LAST)
-
-    def add(self, evidence: Evidence) -> None:
-        """Take the evidence of one pair."""
-        self._judged += 1
-        if len(self._first) < _START:
-            self._first.append(evidence)
-        self._latest.append(evidence)
-        self._doubts.append(image_doubts(evidence))
-
     @property
-    def judged(self) -> int:
-        """Number of judged pairs."""
-        return self._judged
-
-    @property
-    def start(self) -> ImageFigures:
-        """Figures over the first judgements."""
-        return median_figures(self._first)
-
-    @property
-    def now(self) -> ImageFigures:
-        """Figures over the latest judgements."""
-        return median_figures(list(self._latest))
-
-    @property
-    def concerns(self) -> tuple[Concern, ...]:
-        """The doubts that hold in most of the latest judgements, with their latest figures, gravest first."""
-        counts = Counter(concern.doubt for found in self._doubts for concern in found)
-        standing = {doubt for doubt, count in counts.items() if 2 * count > len(self._doubts)}
-        latest = {concern.doubt: concern for found in self._doubts for concern in found}
-        return gravest_first(tuple(latest[doubt] for doubt in Doubt if doubt in standing))
+    def is_settled(self) -> bool:
+        """Whether the newest judged pair has exactly the standing doubts."""
+        return {concern.doubt for concern in self.newest} == {concern.doubt for concern in self.concerns}
 
 
 def gravest_first(found: tuple[Concern, ...]) -> tuple[Concern, ...]:
-    """Sort concerns: blocking ones first, else in their order."""
-    return tuple(sorted(found, key=lambda concern: not concern.doubt.blocks))
+    """Sort concerns: blocking ones first, then the others that are certain, else in their order."""
+    return tuple(sorted(found, key=lambda concern: (not concern.doubt.blocks, not concern.is_certain)))
 
 
-def image_doubts(evidence: Evidence) -> tuple[Concern, ...]:
+def image_doubts(evidence: Evidence, source: ImageSource = ImageSource.CAMERAS) -> tuple[Concern, ...]:
     """Say what the images of one pair make doubtful, gravest first; empty if nothing.
 
     Args:
         evidence: of the pair; without supports (an unrectified pair) only brightness is judged.
+        source: where the images come from: remedies name the options of a camera's address, or those for files.
     """
     support = {item.arrangement: item.features for item in evidence.supports}
     sees = max(support.values(), default=0) >= _LEAST_SUPPORT
@@ -180,12 +153,9 @@ def image_doubts(evidence: Evidence) -> tuple[Concern, ...]:
     if not support:
         return dark
     light = (*dark, *_unfocused(evidence.left, evidence.right))
-    mistake = _arrangement(support)
-    if is_pattern(evidence) and _NAMED[Arrangement.SAME_PLACE] not in mistake:
-        return (
-            *light,
-            *ambiguous(evidence),
-        )  # features of a pattern match any repeat: what they say of mistakes is chance
+    mistake = tuple(_with_direction(item, evidence) for item in _arrangement(support, source))
+    if is_pattern(evidence) and not any(item.doubt is Doubt.SAME_IMAGE for item in mistake):
+        return *light, *ambiguous(evidence)  # features of a pattern match any repeat: mistakes they show are chance
     if not mistake and not light and _are_strangers(evidence, support):
         mistake = (_OTHER_SCENE,)
     return (*mistake, *light) if mistake else (*light, *_figures(evidence, support))
@@ -258,31 +228,37 @@ _NAMED: Final = {
         Doubt.TURNED,
         "one camera is on its head: the two images are turned by 180 degrees to each other",
         "mount it upright, or give that camera rotate=180",
+        arrangement=Arrangement.TURNED,
     ),
     Arrangement.TURNED_BY_QUARTER: Concern(
         Doubt.TURNED_BY_QUARTER,
         "one camera lies on its side: the two images are turned by 90 degrees to each other",
         "mount it upright, or give that camera rotate=90 or rotate=270",
+        arrangement=Arrangement.TURNED_BY_QUARTER,
     ),
     Arrangement.BOTH_TURNED: Concern(
         Doubt.TURNED,
         "both cameras are on their heads: only turned by 180 degrees do their images fit the calibration",
         "mount them upright, or give both cameras rotate=180",
+        arrangement=Arrangement.BOTH_TURNED,
     ),
     Arrangement.BOTH_MIRRORED: Concern(
         Doubt.MIRRORED,
         "both images are mirror images: only mirrored do they fit the calibration",
         "switch mirroring off in both cameras, or give both flip=h",
+        arrangement=Arrangement.BOTH_MIRRORED,
     ),
     Arrangement.BOTH_TURNED_BY_QUARTER: Concern(
         Doubt.TURNED_BY_QUARTER,
         "both cameras lie on their sides: the scene moves up or down from one image to the other",
         "mount them upright, or give both cameras rotate=90 or rotate=270",
+        arrangement=Arrangement.BOTH_TURNED_BY_QUARTER,
     ),
     Arrangement.MIRRORED: Concern(
         Doubt.MIRRORED,
         "one of the two images is a mirror image",
         "switch mirroring off in the camera's app, or give that camera flip=h",
+        arrangement=Arrangement.MIRRORED,
     ),
     Arrangement.SAME_PLACE: Concern(
         Doubt.SAME_IMAGE,
@@ -305,23 +281,35 @@ _OTHER_SCENE: Final = Concern(
 )
 
 
-def _arrangement(support: dict[Arrangement, int]) -> tuple[Concern, ...]:
+def _named(arrangement: Arrangement, source: ImageSource) -> Concern:
+    concern = _NAMED[arrangement]
+    return concern if source is ImageSource.CAMERAS else replace(concern, remedy=FILE_REMEDIES[arrangement].words)
+
+
+def _arrangement(support: dict[Arrangement, int], source: ImageSource) -> tuple[Concern, ...]:
     """Name the mistake that clearly more features agree with than with the right arrangement."""
     related = max(support[Arrangement.RIGHT], support[Arrangement.TILTED])
     same = support[Arrangement.SAME_PLACE]
     if same >= max(_LEAST_SUPPORT, _SAME_SHARE * related):
-        return (_NAMED[Arrangement.SAME_PLACE],)
+        return (_named(Arrangement.SAME_PLACE, source),)
     # These turn the features themselves: not even tilted rows explain them.
     turned = (Arrangement.TURNED, Arrangement.TURNED_BY_QUARTER, Arrangement.MIRRORED)
     best = max(turned, key=lambda arrangement: support[arrangement])
     if support[best] >= max(_LEAST_SUPPORT, _MARGIN * related):
-        return (_NAMED[best],)
+        return (_named(best, source),)
     best = max(_OF_BOTH, key=lambda arrangement: support[arrangement])
     if support[best] < max(_LEAST_SUPPORT, _MARGIN * support[Arrangement.RIGHT]):
         return ()
     if support[best] < _CLEARLY_MORE * support[Arrangement.SWAPPED]:
         best = Arrangement.SWAPPED  # without a rig the three cannot be told apart; its remedy names them all
-    return (_NAMED[best],)
+    return (_named(best, source),)
+
+
+def _with_direction(concern: Concern, evidence: Evidence) -> Concern:
+    """Add by how many quarters one camera is turned against the other, if that is the mistake."""
+    if concern.arrangement is not Arrangement.TURNED_BY_QUARTER:
+        return concern
+    return replace(concern, quarters=max(item.quarters for item in evidence.supports))
 
 
 def _are_strangers(evidence: Evidence, support: dict[Arrangement, int]) -> bool:
@@ -331,45 +319,57 @@ def _are_strangers(evidence: Evidence, support: dict[Arrangement, int]) -> bool:
 
 
 def _figures(evidence: Evidence, support: dict[Arrangement, int]) -> tuple[Concern, ...]:
-    short, unsure = too_short(evidence), ambiguous(evidence)
-    return (*_vertical(evidence, support), *short, *unsure, *(() if short or unsure else _sparse(evidence)))
-
-
-def _vertical(evidence: Evidence, support: dict[Arrangement, int]) -> tuple[Concern, ...]:
     related, right = support[Arrangement.TILTED], support[Arrangement.RIGHT]
     is_tilted = related >= 2 * _LEAST_SUPPORT and right < _TILTED_SHARE * related
-    off, skewed = evidence.vertical_px > _MOST_VERTICAL_PX, evidence.skew_px > _MOST_SKEW_PX
-    if not (is_tilted or off or skewed):
+    plain = figure_doubts(median_figures((evidence,)), is_tilted=is_tilted)
+    rows = tuple(item for item in plain if item.doubt is Doubt.VERTICAL_ERROR) or _skewed(evidence)
+    if not evidence.from_rig:
+        rows = tuple(replace(item, remedy=_NOT_RECTIFIED) for item in rows)
+    short, unsure = too_short(evidence), ambiguous(evidence)
+    sparse = (item for item in plain if item.doubt is not Doubt.VERTICAL_ERROR)
+    return (*rows, *short, *unsure, *(() if short or unsure else sparse))
+
+
+def _skewed(evidence: Evidence) -> tuple[Concern, ...]:
+    if not evidence.skew_px > _MOST_SKEW_PX:
         return ()
-    how_much = f" (by {evidence.vertical_px:.1f} px)" if off else ""
-    if skewed and not off:
-        how_much = f" (one edge is off against the other by {_EDGE_TO_EDGE * evidence.skew_px:.1f} px)"
-    return (
-        Concern(
-            Doubt.VERTICAL_ERROR,
-            f"the rows of the two images do not agree{how_much}",
-            "the calibration does not fit these cameras any more, or never did: calibrate the rig again"
-            if evidence.from_rig
-            else "these images are not rectified: calibrate your cameras and give --calibration rig.yaml",
-        ),
-    )
+    off_px = _EDGE_TO_EDGE * evidence.skew_px
+    sentence = f"the rows of the two images do not agree (one edge is off against the other by {off_px:.1f} px)"
+    return (Concern(Doubt.VERTICAL_ERROR, sentence, _MOVED),)
 
 
-def _sparse(evidence: Evidence) -> tuple[Concern, ...]:
+def figure_doubts(figures: ImageFigures, *, is_tilted: bool = False) -> tuple[Concern, ...]:
+    """Say which figures are not those of right depth; empty if all may be.
+
+    Args:
+        figures: of one judgement or of some that agree.
+        is_tilted: whether most features share rows only if those are tilted or bent.
+    """
     found = []
-    if evidence.density < _LEAST_DENSITY:
+    is_off = figures.vertical_px * figures.matched_scale > _MOST_VERTICAL_PX
+    if is_tilted or is_off:
+        found.append(
+            Concern(
+                Doubt.VERTICAL_ERROR,
+                "the rows of the two images do not agree" + (f" by {figures.vertical_px:.1f} px" if is_off else ""),
+                _MOVED,
+                is_severe=figures.vertical_px * figures.matched_scale > _LOST_VERTICAL_PX
+                and figures.density < _LOST_DENSITY,
+            )
+        )
+    if figures.density < _LEAST_DENSITY:
         found.append(
             Concern(
                 Doubt.LOW_DENSITY,
-                f"only {evidence.density:.0%} of the pixels have depth",
+                f"only {figures.density:.0%} of the pixels have depth",
                 "check that --calibration or --rectified fits the images, that the scene has texture, and that it is not nearer than --near",
             )
         )
-    elif evidence.consistency < _LEAST_CONSISTENCY:
+    elif figures.consistency < _LEAST_CONSISTENCY:
         found.append(
             Concern(
                 Doubt.LOW_CONSISTENCY,
-                f"only {evidence.consistency:.0%} of the depth is found again from right to left",
+                f"only {figures.consistency:.0%} of the depth is found again from right to left",
                 "light the scene well, and give it texture; plain and repeated surfaces deceive the matcher",
             )
         )
@@ -389,4 +389,5 @@ def median_figures(found: Sequence[Evidence]) -> ImageFigures:
         vertical_px=median("vertical_px"),
         vertical_offset_px=median("vertical_offset_px"),
         disparity_px=median("disparity_px"),
+        matched_scale=median("matched_scale") if found else 1.0,
     )

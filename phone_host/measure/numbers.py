@@ -4,12 +4,16 @@ Two folders that belong together hold the same numbers. If they do not, images w
 or one side began earlier; then pairs may be of different moments, and their depth is wrong without looking wrong.
 """
 
-from dataclasses import dataclass
-from typing import assert_never
+from dataclasses import dataclass, replace
+from typing import Final, assert_never
 
 from common.camera.image_numbers import ImageNumbers
 from phone_host.measure.trust import Concern, Doubt
+from phone_host.model import Arrangement
 from phone_host.sync.stills import PairedBy
+
+_SAME_RATE: Final = 0.01
+"""Rates that differ by less are the same one, rounded."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,6 +29,8 @@ class ImageEvidence:
         own_alone: images of this machine of whose number the board has shown none.
         apart: pairs whose two images are at different places in their films.
         first_apart: the places of the first of them, board and host, from 0.
+        board_period_ns: time between the board's images, ns; 0: not known, or images come on demand.
+        own_period_ns: time between this machine's.
     """
 
     paired_by: PairedBy = PairedBy.TIME
@@ -35,6 +41,8 @@ class ImageEvidence:
     own_alone: int = 0
     apart: int = 0
     first_apart: tuple[int, int] = (0, 0)
+    board_period_ns: int = 0
+    own_period_ns: int = 0
 
 
 class FilmWatch:
@@ -108,20 +116,70 @@ def _by_order(board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
 def _by_time(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
     there, here = evidence.first_apart
     if evidence.apart:
+        found = Concern(
+            Doubt.IMAGE_NUMBERS,
+            f"{evidence.apart} of {evidence.pairs} pairs are of different images: first of image {there} of the board"
+            f" and image {here} of this machine, counted from 0",
+            "give both films loop=1; or, for photographs, leave fps=, loop=, phase_ms= and pace= out on both sides",
+        )
+        are_most = 2 * evidence.apart > evidence.pairs
+        return (replace(found, doubt=Doubt.IMAGES_APART) if are_most else found,)
+    rates = (evidence.board_period_ns, evidence.own_period_ns)
+    if not all(rates) or abs(rates[0] - rates[1]) <= _SAME_RATE * max(rates):
+        if board.count == own.count:
+            return ()
         return (
             Concern(
                 Doubt.IMAGE_NUMBERS,
-                f"{evidence.apart} of {evidence.pairs} pairs are of different images: first of image {there} of the board"
-                f" and image {here} of this machine, counted from 0",
-                "give both films loop=1; or, for photographs, leave fps=, loop=, phase_ms= and pace= out on both sides",
+                f"the board shows {board.words}, this machine {own.words}: films of different length drift apart",
+                "give two films of one recording, with as many images",
             ),
         )
-    if board.count == own.count:
-        return ()
+    if abs(board.count * rates[0] - own.count * rates[1]) <= max(rates):
+        return ()  # the same seconds, filmed at two rates
+    shown = [f"{numbers.words} at {1e9 / rate:.3g} /s" for numbers, rate in zip((board, own), rates, strict=True)]
     return (
         Concern(
             Doubt.IMAGE_NUMBERS,
-            f"the board shows {board.words}, this machine {own.words}: films of different length drift apart",
-            "give two films of one recording, with as many images",
+            f"the board shows {shown[0]}, this machine {shown[1]}: films of different rate drift apart",
+            "give both films the fps= that they were recorded with",
         ),
     )
+
+
+_CONSEQUENCES: Final = frozenset({Doubt.SWAPPED, Doubt.OTHER_SCENE})
+_OF_BOTH: Final = frozenset({Arrangement.BOTH_TURNED, Arrangement.BOTH_MIRRORED, Arrangement.BOTH_TURNED_BY_QUARTER})
+"""What two images of different moments may look like. One camera turned or mirrored looks so at any moment."""
+
+
+def with_cause(
+    numbers: tuple[Concern, ...], images: tuple[Concern, ...], evidence: ImageEvidence
+) -> tuple[tuple[Concern, ...], tuple[Concern, ...]]:
+    """Blame how two films are paired, and not the cameras, for what pairs of different moments look like.
+
+    Args:
+        numbers: the concerns about the images' numbers.
+        images: the concerns about what the images show.
+        evidence: of the numbers.
+
+    Returns:
+        Both, with the cause of depth that cannot be right in the first.
+    """
+    kept = tuple(concern for concern in images if blamed(concern, numbers, evidence) is concern)
+    if len(kept) == len(images):
+        return numbers, images
+    return tuple(replace(concern, doubt=Doubt.IMAGES_APART) for concern in numbers), kept
+
+
+def blamed(concern: Concern, numbers: tuple[Concern, ...], evidence: ImageEvidence) -> Concern:
+    """Return the cause of what an image shows: the concern itself, or that the pairs are of different moments.
+
+    Args:
+        concern: about what the images show.
+        numbers: the concerns about the images' numbers.
+        evidence: of the numbers. Images paired by their numbers are of one moment, and show what they show.
+    """
+    may_be = concern.doubt in _CONSEQUENCES or concern.arrangement in _OF_BOTH
+    if not may_be or not numbers or evidence.paired_by is PairedBy.NUMBER:
+        return concern
+    return replace(numbers[0], doubt=Doubt.IMAGES_APART)

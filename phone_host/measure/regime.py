@@ -178,7 +178,7 @@ def _room(figures: RunFigures) -> tuple[str, ...]:
     factor = figures.arrival_ns / figures.processing_ns
     if factor < 1.5:
         return ()
-    return (f"nothing is wrong; there is time for {factor:.1f} times as much work on each pair",)
+    return (f"the processor has time to spare: it could do {factor:.1f} times as much on each pair",)
 
 
 def _fitting_scale(figures: RunFigures, arrival_ns: float) -> float:

@@ -6,19 +6,25 @@ from typing import Final
 
 from common.camera.base import CameraHealth
 from common.frame import NOT_AS_SAID
+from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import DropReason
+from common.words import counted
 from phone_host.measure.absence import Away
 from phone_host.measure.accounts import LinkAccount
 from phone_host.measure.camera_match import LockMiss, settings_concerns
 from phone_host.measure.delays import DelayStatistics
+from phone_host.measure.doubt_history import Episode
+from phone_host.measure.gone import gone_concerns
 from phone_host.measure.image_doubts import ImageTrust, gravest_first
-from phone_host.measure.numbers import ImageEvidence, number_concerns
+from phone_host.measure.no_depth import no_depth
+from phone_host.measure.numbers import ImageEvidence, blamed, number_concerns, with_cause
+from phone_host.measure.orient_words import with_final_options
 from phone_host.measure.regime import RunFigures
-from phone_host.measure.search_doubts import no_depth
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.spoiled import SpoiledCounts, spoiled_concerns
 from phone_host.measure.trust import (
     NO_DOUBT,
+    REJECTED_RIG,
     Concern,
     Timing,
     Unbelieved,
@@ -59,6 +65,11 @@ class RunSnapshot:
         missed_locks: controls of the rig's cameras that could not be restored.
         images: what the images say about the depth.
         depth: what became of the pixels of all pairs.
+        rig_rejected: whether the rig's own calibration rejected it.
+        asked_pairs: number of pairs after which the run was to end; 0: no limit.
+        save_every: every Nth pair was saved, beginning with the first; 0: none.
+        last_s: when the last pair was done, counted from the start of the run, s.
+        orientations: what the left and the right camera have been given to be upright.
     """
 
     ended: str
@@ -96,6 +107,18 @@ class RunSnapshot:
     gap_s: float = 0.0
     images: ImageTrust = field(default_factory=ImageTrust)
     depth: DepthAccount = field(default_factory=DepthAccount)
+    rig_rejected: bool = False
+    asked_pairs: int = 0
+    save_every: int = 0
+    last_s: float = 0.0
+    orientations: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
+
+    @property
+    def shortfall(self) -> str:
+        """Says that fewer pairs came than were asked for; empty if all came, or a person ended the run."""
+        if self.processed >= self.asked_pairs or self.ended not in _SHORT:
+            return ""
+        return f"only {self.processed} of {counted(self.asked_pairs, 'pair')} came before {_SHORT[self.ended]}"
 
     @property
     def stopped(self) -> int:
@@ -118,6 +141,8 @@ class RunSnapshot:
             decoded=sum(count for _, count in self.spoiled_images),
         )
 
+
+_SHORT: Final = {"stream_ended": "the stream ended", "seconds_over": "the time was over"}
 
 TIMELESS: Final = "images shown on demand have no moment of exposure: their stamps only count them"
 """Why a run of stills has no figures that start at an exposure."""
@@ -206,24 +231,35 @@ def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
         received=sum(account.received + account.disbelieved[Disbelief.CREDIT] for account in link.sessions),
         spoiled_images=spoiled(run),
     )
-    told = (*spoiled_concerns(run.spoiled_counts), *number_concerns(run.replayed), *settings_concerns(run.missed_locks))
+    numbers, images = with_cause(number_concerns(run.replayed), image_concerns(run), run.replayed)
+    rejected = (REJECTED_RIG,) if run.rig_rejected else ()
+    gone = gone_concerns(run.ended, run.away, run.camera, run.last_s) if run.processed else ()
+    told = (*spoiled_concerns(run.spoiled_counts), *settings_concerns(run.missed_locks))
     timing = unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
-    return gravest_first((*image_concerns(run), *told, *timing))
+    return gravest_first((*rejected, *numbers, *images, *told, *gone, *timing))
+
+
+def history(run: RunSnapshot) -> tuple[Episode, ...]:
+    """Return which doubts about the images stood during a run, and when, in order of beginning."""
+    numbers = number_concerns(run.replayed)
+    return tuple(replace(item, concern=blamed(item.concern, numbers, run.replayed)) for item in run.images.history)
 
 
 def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
     """Return what the images of a run make doubtful, gravest first. While it runs, pairs without depth may yet get some."""
-    found = run.images.concerns
-    if run.ended == "running" or not lacks_depth(run):
-        return found
+    found = tuple(with_final_options(concern, run.orientations) for concern in run.images.concerns)
+    if run.ended == "running" or not lacks_depth(run) or not run.processed:
+        return found  # without any pair there is another reason
     if any(concern.doubt.blocks for concern in found):
         return found  # which says why there is none
-    return (no_depth(found), *found)
+    return (no_depth(run.depth.cut, run.depth.limits, found), *found)
 
 
 def depth_is_wrong(run: RunSnapshot) -> bool:
     """Tell whether depth was wanted and cannot be right: a blocking doubt stands, or no pair has depth."""
-    return run.images.wants_depth and any(concern.doubt.blocks for concern in image_concerns(run))
+    return run.images.wants_depth and (
+        not run.images.has_depth or any(concern.doubt.blocks for concern in concerns(run))
+    )
 
 
 def lacks_depth(run: RunSnapshot) -> bool:

@@ -3,7 +3,7 @@
 import math
 from typing import Final
 
-from phone_host.measure.trust import NO_DEPTH, Concern, Doubt
+from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Evidence
 
 _BEYOND_SHARE: Final = 0.05
@@ -43,19 +43,9 @@ def too_short(evidence: Evidence) -> tuple[Concern, ...]:
             Doubt.SEARCH_TOO_SHORT,
             f"{share:.0%} of the scene is nearer than was searched, and what is nearer gets a wrong depth",
             remedy,
-            is_certain=share > _MOSTLY_BEYOND,
+            is_severe=share > _MOSTLY_BEYOND,
         ),
     )
-
-
-def no_depth(found: tuple[Concern, ...]) -> Concern:
-    """Say that no pair has depth, and what helps: a wider search if that is why.
-
-    Args:
-        found: the other concerns.
-    """
-    short = [concern for concern in found if concern.doubt is Doubt.SEARCH_TOO_SHORT]
-    return Concern(Doubt.NO_DEPTH, f"{NO_DEPTH.sentence}: {short[0].sentence}", short[0].remedy) if short else NO_DEPTH
 
 
 def _rounded_down(depth_m: float) -> str:

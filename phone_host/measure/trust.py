@@ -15,7 +15,7 @@ from typing import Final
 
 from common.camera.base import CameraHealth
 from common.words import counted, times
-from phone_host.model import TimeOffset
+from phone_host.model import Arrangement, TimeOffset
 
 MOST_ERROR_PX: Final = 0.5
 """DESIGN's limit of time skew x image motion. The matchers' own median error on real images is a third of it."""
@@ -39,6 +39,10 @@ class Doubt(Enum):
     SPOILED_IMAGES = "spoiled_images"
     CAMERA_SETTINGS = "camera_settings"
     IMAGE_NUMBERS = "image_numbers"
+    IMAGES_APART = "images_apart"
+    REJECTED_RIG = "rejected_rig"
+    BOARD_GONE = "board_gone"
+    CAMERA_GONE = "camera_gone"
     NO_WHOLE_IMAGE = "no_whole_image"
     SWAPPED = "swapped"
     TURNED = "turned"
@@ -71,6 +75,7 @@ _BLOCKING: Final = frozenset(
         Doubt.SAME_IMAGE,
         Doubt.OTHER_SCENE,
         Doubt.COVERED,
+        Doubt.IMAGES_APART,
         Doubt.NO_DEPTH,
         Doubt.NO_WHOLE_IMAGE,
     }
@@ -160,20 +165,30 @@ class Concern:
         doubt: the kind of reason.
         sentence: the reason in words, with figures.
         remedy: what helps.
-        is_certain: whether most of the depth is wrong, though the doubt does not block.
+        is_severe: whether the figures leave no hope, though the kind of reason alone would.
+        arrangement: how the images lie to each other, if that is the reason.
+        quarters: by how many quarters the right image is turned clockwise against the left one; 0: not known.
     """
 
     doubt: Doubt
     sentence: str
     remedy: str
-    is_certain: bool = False
+    is_severe: bool = False
+    arrangement: Arrangement | None = None
+    quarters: int = 0
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether depth cannot be right."""
+        return self.doubt.blocks or self.is_severe
 
 
-NO_DEPTH: Final = Concern(
-    Doubt.NO_DEPTH,
-    "no pair has depth",
-    "check that --calibration or --rectified fits the cameras, and that both see the same scene",
+REJECTED_RIG: Final = Concern(
+    Doubt.REJECTED_RIG,
+    "the calibration itself was rejected: it does not fit its own images (verdict reject)",
+    "calibrate again; its report says what was wrong with the images",
 )
+"""For a rig that is used because the user insists."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,6 +27,7 @@ _MOST_BYTES: Final = 64 << 10
 
 _LINE: Final = re.compile(r"\s*([A-Za-z]\w{0,31})\s*[=:]\s*(\S.*?)\s*")
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?", re.ASCII)
+_DECIMAL_COMMA: Final = re.compile(r"[+-]?\d{1,9},\d{1,9}", re.ASCII)
 _KITTI_KEY: Final = re.compile(r"P(?:_rect_0)?([0-3])")
 _BARE_KITTI_LINES: Final = (2, 4)
 _PROJECTION_NUMBERS: Final = 12
@@ -35,8 +36,8 @@ _FOCAL_PX: Final = (1.0, 1e6)
 _POINT_PX: Final = 1e6
 """Cropped images may have their principal point outside, but not farther than any sensor is wide."""
 
-_BASELINE_M: Final = (1e-4, 100.0)
-"""The widest published stereo rigs for ranges of kilometres are some metres wide; below a tenth of a millimetre a unit is wrong."""
+_BASELINE_M: Final = (1e-3, 100.0)
+"""The widest published stereo rigs for ranges of kilometres are some metres wide; below a millimetre a unit is wrong."""
 
 _SIZE_PX: Final = (1.0, 100_000.0)
 _SAME_PX: Final = 0.01
@@ -44,6 +45,9 @@ _SAME_PX: Final = 0.01
 
 _DOFFS_PX: Final = 1.0
 """By how much doffs may differ from the two principal points: smaller copies of a scene have them rounded."""
+
+_MIDDLEBURY_KEYS: Final = frozenset({"cam0", "cam1", "doffs", "baseline", "ndisp"})
+_ENCODING: Final = "utf-8-sig"  # Windows' Notepad writes a byte order mark first
 
 _REMEDY: Final = "give calib.txt as Middlebury, ETH3D or KITTI publish it, or --focal and --baseline"
 
@@ -75,11 +79,16 @@ class CalibTxt:
 def is_calib_txt(path: Path) -> bool:
     """Return whether a file holds lines like a calib.txt's. False also for a file that cannot be read."""
     try:
-        text = read_whole(path, _MOST_BYTES).decode("utf-8")
-        values = _values(text, path)
+        text = read_whole(path, _MOST_BYTES).decode(_ENCODING)
     except (OSError, UnicodeDecodeError, DataError):
         return False
-    return "cam0" in values or any(_KITTI_KEY.fullmatch(key) for key in values)
+    if text.lstrip().startswith("%YAML"):
+        return False
+    try:
+        values = _values(text, path)
+    except DataError:  # a key is there twice; who reads it says so
+        return True
+    return not _MIDDLEBURY_KEYS.isdisjoint(values) or any(_KITTI_KEY.fullmatch(key) for key in values)
 
 
 def read_calib_txt(path: Path, prefer: KittiCameras = KittiCameras.GREY) -> CalibTxt:
@@ -93,17 +102,17 @@ def read_calib_txt(path: Path, prefer: KittiCameras = KittiCameras.GREY) -> Cali
         DataError: the file cannot be read, or a key is missing or not valid; names file and key.
     """
     try:
-        text = read_whole(path, _MOST_BYTES).decode("utf-8")
+        text = read_whole(path, _MOST_BYTES).decode(_ENCODING)
     except OSError as error:
         raise DataError(f"{path} cannot be read ({error.strerror})", _REMEDY) from error
     except UnicodeDecodeError as error:
         raise DataError(f"{path} is no text", _REMEDY) from error
     values = _values(text, path)
-    if "cam0" in values:
-        return _middlebury(path, values)
     projections = {int(found[1]): key for key in values if (found := _KITTI_KEY.fullmatch(key))}
     if projections:
         return _kitti(path, values, projections, prefer)
+    if not _MIDDLEBURY_KEYS.isdisjoint(values):
+        return _middlebury(path, values)
     raise DataError(f"{path} has neither cam0= nor P0: or P_rect_00:", _REMEDY)
 
 
@@ -134,11 +143,11 @@ def _middlebury(path: Path, values: Mapping[str, str]) -> CalibTxt:
         _require_same(path, "cam0 and cam1", what, (a, b))
     doffs_px = right[1] - left[1]
     if "doffs" in values:
-        stated_px = _number(path, values, "doffs", (-_POINT_PX, _POINT_PX))
+        stated_px = _number(path, values, "doffs", (-_POINT_PX, _POINT_PX), "px")
         if abs(stated_px - doffs_px) > _DOFFS_PX:
             raise DataError(f"{path}: doffs is {stated_px:g}, cam0 and cam1 say {doffs_px:g}", _REMEDY)
         doffs_px = stated_px
-    baseline_mm = _number(path, values, "baseline", (_BASELINE_M[0] * 1e3, _BASELINE_M[1] * 1e3))
+    baseline_mm = _number(path, values, "baseline", (_BASELINE_M[0] * 1e3, _BASELINE_M[1] * 1e3), "mm")
     size_px = None
     if "width" in values or "height" in values:
         size_px = _whole(path, values, "width"), _whole(path, values, "height")
@@ -232,11 +241,16 @@ def _text(path: Path, values: Mapping[str, str], key: str) -> str:
     return values[key]
 
 
-def _number(path: Path, values: Mapping[str, str], key: str, limits: tuple[float, float]) -> float:
+def _number(path: Path, values: Mapping[str, str], key: str, limits: tuple[float, float], unit: str) -> float:
     text = _text(path, values, key)
     value = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not limits[0] <= value <= limits[1]:
-        raise DataError(f"{path}: {key} is {_short(text)}", f"it must lie between {limits[0]:g} and {limits[1]:g}")
+        remedy = f"it must be a number in {unit}, from {limits[0]:g} to {limits[1]:g}"
+        if _DECIMAL_COMMA.fullmatch(text):
+            remedy += f", with a decimal point: {text.replace(',', '.')}"
+        elif 0 < value < limits[0] and unit == "mm":
+            remedy += f"; {value:g} m are {value * 1e3:g} mm"
+        raise DataError(f"{path}: {key} is {_short(text)}", remedy)
     return value
 
 

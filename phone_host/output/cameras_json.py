@@ -8,10 +8,10 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-from common.camera.identity import LARGEST_LOCK, CameraIdentity, CameraState
-from common.camera.orientation import Flip, Orientation
+from common.camera_identity import LARGEST_LOCK, CameraIdentity, RememberedCamera
 from common.errors import DataError
 from common.files import read_whole
+from common.orientation import Flip, Orientation
 from common.versions import CAMERAS_FORMAT
 from phone_host.output.atomic import write_text
 
@@ -27,7 +27,7 @@ _LARGEST_IMAGE_PX: Final = 100_000
 _REMEDY: Final = "delete the file, or save it again with `phone-host run --out`"
 
 
-def cameras_text(left: CameraState, right: CameraState) -> str:
+def cameras_text(left: RememberedCamera, right: RememberedCamera) -> str:
     """Return the content of cameras.json.
 
     Args:
@@ -38,7 +38,7 @@ def cameras_text(left: CameraState, right: CameraState) -> str:
     return json.dumps(cameras, indent=1) + "\n"
 
 
-def write_cameras(path: Path, left: CameraState, right: CameraState) -> None:
+def write_cameras(path: Path, left: RememberedCamera, right: RememberedCamera) -> None:
     """Write cameras.json, whole or not at all.
 
     Args:
@@ -52,7 +52,7 @@ def write_cameras(path: Path, left: CameraState, right: CameraState) -> None:
     write_text(path, cameras_text(left, right))
 
 
-def read_cameras(path: Path) -> tuple[CameraState, CameraState]:
+def read_cameras(path: Path) -> tuple[RememberedCamera, RememberedCamera]:
     """Read cameras.json and check it.
 
     Args:
@@ -78,7 +78,7 @@ def read_cameras(path: Path) -> tuple[CameraState, CameraState]:
     return _camera(reader.inner("left")), _camera(reader.inner("right"))
 
 
-def _values(camera: CameraState) -> dict[str, Any]:
+def _values(camera: RememberedCamera) -> dict[str, Any]:
     return {
         "driver": camera.identity.driver,
         "name": camera.identity.name,
@@ -91,13 +91,13 @@ def _values(camera: CameraState) -> dict[str, Any]:
     }
 
 
-def _camera(reader: "_Reader") -> CameraState:
+def _camera(reader: "_Reader") -> RememberedCamera:
     rotate_deg, flip = reader.whole("rotate_deg", 0, 270), reader.text("flip")
     if rotate_deg % 90:
         raise reader.problem("rotate_deg", "is none of 0, 90, 180 and 270")
     if flip not in {choice.value for choice in Flip}:
         raise reader.problem("flip", "is none of none, h and v")
-    return CameraState(
+    return RememberedCamera(
         identity=CameraIdentity(reader.text("driver"), reader.text("name"), reader.text("serial")),
         width_px=reader.whole("width_px", 1, _LARGEST_IMAGE_PX),
         height_px=reader.whole("height_px", 1, _LARGEST_IMAGE_PX),

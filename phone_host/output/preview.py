@@ -45,11 +45,11 @@ def depth_range_m(depth: NDArray[np.float32]) -> tuple[float, float]:
         depth: (H, W) float32, m, NaN = none.
 
     Returns:
-        Near and far, m; (0, 1) if there is no value at all.
+        Near and far, m; (1, 2) if there is no value at all.
     """
     values = _sample(depth)
     if values.size == 0:
-        return 0.0, 1.0
+        return 1.0, 2.0
     near, far = np.percentile(values, (_LOW_PERCENT, _HIGH_PERCENT))
     return float(near), float(max(far, near * (1 + _LEAST_DEPTH_SHARE)))
 
@@ -68,20 +68,6 @@ def colour_disparity(disparity: Disparity, low_px: float, high_px: float) -> Ima
     return _coloured(disparity, low_px, high_px)
 
 
-def colour_depth(depth: NDArray[np.float32], near_m: float, far_m: float) -> Image:
-    """Colour depths.
-
-    Args:
-        depth: (H, W) float32, m, NaN = none.
-        near_m: depth of the brightest colour.
-        far_m: depth of the darkest colour, beyond `near_m`.
-
-    Returns:
-        (H, W, 3) BGR; black where there is no value.
-    """
-    return _coloured(depth, far_m, near_m)
-
-
 def disparity_picture(disparity: Disparity, geometry: StereoGeometry | None = None) -> Image:
     """Colour a disparity map and add its scale.
 
@@ -90,22 +76,23 @@ def disparity_picture(disparity: Disparity, geometry: StereoGeometry | None = No
         geometry: its scale is in metres; None: in px.
 
     Returns:
-        (H, W + scale, 3) BGR.
+        (H, W + scale, 3) BGR; without any value black and without a scale.
     """
     low_px, high_px = colour_range_px(disparity)
-    is_empty = not np.isfinite(disparity).any()
     image = _coloured(disparity, low_px, high_px)
+    if not np.isfinite(disparity).any():
+        return image
     span_px = high_px - low_px
     if geometry is None:
 
         def in_px(pitch: float) -> tuple[Tick, ...]:
-            return () if is_empty else ticks(low_px, high_px, lambda d: (d - low_px) / span_px, pitch)
+            return ticks(low_px, high_px, lambda d: (d - low_px) / span_px, pitch)
 
         return with_scale(image, _scale_colours(), in_px, "px")
     product, doffs_px = geometry.focal_px * geometry.baseline_m, geometry.doffs_px
 
     def in_metres(pitch: float) -> tuple[Tick, ...]:
-        if is_empty or high_px + doffs_px <= 0:  # nothing, or everything is behind infinity
+        if high_px + doffs_px <= 0:  # everything is behind infinity
             return ()
         far_m = product / (low_px + doffs_px) if low_px + doffs_px > 0 else float("inf")
         near_m = product / (high_px + doffs_px)
@@ -115,22 +102,29 @@ def disparity_picture(disparity: Disparity, geometry: StereoGeometry | None = No
 
 
 def depth_picture(cloud: CloudImage) -> Image:
-    """Colour the depths of a cloud and add a scale in metres.
+    """Colour the depths of a cloud in even steps of 1 / Z, and add a scale in metres.
+
+    Specks far behind the scene would use up the colours of a scale with even steps of Z.
 
     Args:
         cloud: (H, W, 3) float32, m, in the left camera's axes, NaN = none.
 
     Returns:
-        (H, W + scale, 3) BGR.
+        (H, W + scale, 3) BGR; without any depth black and without a scale.
     """
     depth = cloud[..., 2]
+    with np.errstate(divide="ignore"):
+        nearness = np.reciprocal(depth)
     near_m, far_m = depth_range_m(depth)
-    is_empty = not np.isfinite(depth).any()
+    low, high = 1 / far_m, 1 / near_m
+    image = _coloured(np.where(np.isfinite(depth), nearness, np.float32(np.nan)), low, high)
+    if not np.isfinite(depth).any():
+        return image
 
     def in_metres(pitch: float) -> tuple[Tick, ...]:
-        return () if is_empty else ticks(near_m, far_m, lambda z: (far_m - z) / (far_m - near_m), pitch)
+        return ticks(near_m, far_m, lambda z: (1 / z - low) / (high - low), pitch)
 
-    return with_scale(_coloured(depth, far_m, near_m), _scale_colours(), in_metres, "m")
+    return with_scale(image, _scale_colours(), in_metres, "m")
 
 
 def write_png(path: Path, image: Image) -> None:

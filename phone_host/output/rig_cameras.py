@@ -9,9 +9,9 @@ from typing import Final
 
 import cv2
 
-from common.camera.identity import LARGEST_LOCK, CameraIdentity, CameraState
-from common.camera.orientation import Flip, Orientation
+from common.camera_identity import LARGEST_LOCK, CameraIdentity, RememberedCamera
 from common.errors import DataError
+from common.orientation import Flip, Orientation
 
 Problem = Callable[[str, str, str], DataError]
 """Makes the error of a key, from what is wrong with it and the remedy."""
@@ -21,7 +21,7 @@ _MOST_LOCKS: Final = 32
 _TURNS: Final = (0, 90, 180, 270)
 
 
-def write_camera(storage: cv2.FileStorage, key: str, camera: CameraState) -> None:
+def write_camera(storage: cv2.FileStorage, key: str, camera: RememberedCamera) -> None:
     """Write what is known of a camera.
 
     Args:
@@ -46,7 +46,7 @@ def write_camera(storage: cv2.FileStorage, key: str, camera: CameraState) -> Non
     storage.endWriteStruct()
 
 
-def read_camera(node: cv2.FileNode, key: str, upright_px: tuple[int, int], problem: Problem) -> CameraState | None:
+def read_camera(node: cv2.FileNode, key: str, upright_px: tuple[int, int], problem: Problem) -> RememberedCamera | None:
     """Read what is known of a camera, and check it.
 
     Args:
@@ -68,7 +68,7 @@ def read_camera(node: cv2.FileNode, key: str, upright_px: tuple[int, int], probl
     reader = _CameraReader(node, key, problem)
     orientation = Orientation(reader.turn(), reader.flip())
     width_px, height_px = orientation.turned_size(upright_px)  # the same turn leads back
-    return CameraState(
+    return RememberedCamera(
         identity=CameraIdentity(reader.text("driver"), reader.text("name"), reader.text("serial")),
         width_px=width_px,
         height_px=height_px,

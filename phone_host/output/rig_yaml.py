@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from common.camera.identity import CameraState
+from common.camera_identity import RememberedCamera
 from common.errors import DataError
 from common.files import read_whole
 from common.versions import RIG_FORMAT
@@ -180,7 +180,10 @@ class _Reader:
             raise self._no_storage()
 
     def _no_storage(self) -> DataError:
-        return DataError(f"{self._path} is not a calibration file", "give the rig.yaml of `phone-host calibrate`")
+        return DataError(
+            f"{self._path} is not a calibration file",
+            "give the rig.yaml of `phone-host calibrate`, or a calib.txt of Middlebury, ETH3D or KITTI",
+        )
 
     def problem(self, key: str, what: str, remedy: str) -> DataError:
         return DataError(f"{self._path}: {key} {what}", remedy)
@@ -301,7 +304,7 @@ class _Reader:
             raise self.problem("verdict", f"is {value!r}", f"write {', '.join(VERDICTS[:-1])} or {VERDICTS[-1]}")
         return value
 
-    def camera(self, key: str, model: CameraModel) -> CameraState | None:
+    def camera(self, key: str, model: CameraModel) -> RememberedCamera | None:
         """Read which camera one of the two was; None if it is missing."""
         return read_camera(self._storage.getNode(key), key, (model.width_px, model.height_px), self.problem)
 

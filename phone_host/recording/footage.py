@@ -14,11 +14,11 @@ from urllib.parse import parse_qsl
 from common import now
 from common.camera.base import Camera
 from common.camera.imagefile import SUFFIXES, load
-from common.camera.orientation import UPRIGHT, Orientation, orientation_of
 from common.errors import DataError, SettingsError
 from common.files import read_whole
 from common.frame import Frame, PixelFormat
 from common.link.base import Link
+from common.orientation import UPRIGHT, Orientation, orientation_of
 from common.protocol.message import CameraDescription, FrameMessage
 from phone_host.calibration.timing.shots import Shot
 from phone_host.model import BoardFrame

@@ -1,6 +1,9 @@
 """Says what became of a left image's pixels: how many have a point, and why the others have none. Pure."""
 
-from phone_host.model import CutCounts, DepthLimits
+import math
+
+from common.words import distance_text
+from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 
 
 def cut_rows(cut: CutCounts, limits: DepthLimits | None) -> tuple[tuple[str, int], ...]:
@@ -40,6 +43,15 @@ def cut_sentence(cut: CutCounts, limits: DepthLimits | None) -> str:
     )
 
 
+def pixels_text(cut: CutCounts | None) -> str:
+    """Say of which pixels a density is the share: `of the pixels`, `of the pixels inside the crop`.
+
+    Args:
+        cut: the counts; None: not counted.
+    """
+    return "of the pixels inside the crop" if cut is not None and cut.outside else "of the pixels"
+
+
 def share_text(count: int, total: int) -> str:
     """Write a share in percent; a small one is never called 0 %."""
     percent = 100.0 * count / max(1, total)
@@ -48,6 +60,14 @@ def share_text(count: int, total: int) -> str:
     return f"{percent:.1f} %" if percent < 10.0 else f"{percent:.0f} %"
 
 
-def distance_text(metres: float) -> str:
-    """Write a distance with about three digits: `38 m`, `1.25 m`, `300 mm`."""
-    return f"{metres * 1000:.3g} mm" if metres < 1.0 else f"{metres:.3g} m" if metres < 1000 else f"{metres:.0f} m"
+def searched_from_m(geometry: StereoGeometry | None, search: Search | None) -> float:
+    """Return the depth from which a pair was searched, m: that of the largest disparity, N - 1; NaN: not known.
+
+    Args:
+        geometry: of the rectified pair; None: not known.
+        search: how it was matched; None: not known.
+    """
+    if geometry is None or search is None or not search.disparities:
+        return math.nan
+    largest_px = search.disparities - 1 + geometry.doffs_px
+    return geometry.focal_px * geometry.baseline_m / largest_px if largest_px > 0 else math.nan

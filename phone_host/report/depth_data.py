@@ -138,22 +138,6 @@ def points(cloud: CloudImage, left: Image, limits: DepthLimits | None) -> Points
     )
 
 
-def depth_range_m(depth: NDArray[np.float32]) -> tuple[float, float]:
-    """Return the depths to show as brightest and darkest: the 1st and 99th percentile, as single wrong matches must not use up the colours.
-
-    Args:
-        depth: (H, W) float32, m, NaN = none.
-
-    Returns:
-        Near and far, m; (1, 2) if there is no depth.
-    """
-    values = depth[np.isfinite(depth)]
-    if not values.size:
-        return 1.0, 2.0
-    near, far = (float(value) for value in np.percentile(values, (1.0, 99.0)))
-    return near, max(far, near * 1.02)
-
-
 def depth_picture(depth: NDArray[np.float32], near_m: float, far_m: float) -> Image:
     """Colour depth, even steps of its logarithm; near is bright, black is none.
 
@@ -208,11 +192,15 @@ def text_of(values: NDArray[np.uint16] | NDArray[np.uint8]) -> str:
 
 
 def density(processed: Processed) -> float:
-    """Return the share of the left pixels that have a depth (a disparity, where there is no geometry); NaN without a core."""
+    """Return the share of the left pixels that have a depth (a disparity, where there is no geometry); NaN without a core.
+
+    Pixels outside a crop are not counted.
+    """
     if processed.disparity is None:
         return float("nan")
     measured = processed.disparity if processed.cloud is None else processed.cloud[..., 2]
-    return float(np.isfinite(measured).mean())
+    inside = measured.size if processed.cut is None else processed.cut.inside
+    return int(np.count_nonzero(np.isfinite(measured))) / max(1, inside)
 
 
 def _small_size(width: int, height: int, most_px: int = MOST_PICTURE_PX) -> tuple[int, int]:

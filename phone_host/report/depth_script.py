@@ -42,7 +42,7 @@ function readDepth(root) {
     readout.textContent = text;
     for (const side of sides) {
       const dot = side.querySelector('i'), right = side.dataset.side === 'right';
-      const px = right && !m.stacked ? x - d : x, py = right && m.stacked ? y - d : y;
+      const [toX, toY] = right ? m.way : [0, 0], px = toX ? x + toX * d : x, py = toY ? y + toY * d : y;
       dot.hidden = !(px >= 0 && py >= 0 && px < m.width && py < m.height);
       dot.style.left = (px + .5) / m.width * 100 + '%'; dot.style.top = (py + .5) / m.height * 100 + '%';
     }

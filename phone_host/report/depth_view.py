@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 
 from common.words import counted
-from phone_host.model import Processed, StereoGeometry
-from phone_host.output.preview import colour_disparity, colour_range_px
+from phone_host.model import Epipolar, Processed
+from phone_host.output.preview import colour_disparity, colour_range_px, depth_range_m
 from phone_host.report import depth_data
 from phone_host.report.depth_data import Grid, Points
 from phone_host.svg.plot_scale import ticks
@@ -44,29 +44,32 @@ color:var(--ink2);border-radius:8px;border:1px solid var(--line)}
 .clouds canvas:active{cursor:grabbing}.clouds canvas:focus-visible,.view:focus-visible{outline:2px solid var(--c5);outline-offset:2px}
 button{font:inherit;font-size:.85rem;color:var(--ink);background:var(--bg);border:1px solid var(--line);border-radius:6px;padding:.35rem .8rem;cursor:pointer}
 .buttons{display:flex;flex-wrap:wrap;gap:.5rem;margin:.6rem 0 0}
-@media (max-width:700px){.views.maps{grid-template-columns:1fr}.clouds canvas{height:56vh}.readout{font-size:.9rem}}
+@media (max-width:700px){.views.maps{grid-template-columns:1fr}.clouds canvas{height:min(56vh,120vw)}.readout{font-size:.9rem}}
 """
 
 THIN: Final = "\u202f"
 """The space between groups of three digits."""
 
+_WAY: Final = {Epipolar.LEFT: (-1, 0), Epipolar.UP: (0, -1), Epipolar.DOWN: (0, 1)}
+"""Where a point lies in the right picture, in disparities right and down of its place in the left one."""
+
 _RAMP_STEPS: Final = 12
 _MOST_TICKS: Final = 6
 
 
-def depth_view(processed: Processed, captions: tuple[str, str], *, stacked: bool = False) -> str:
+def depth_view(processed: Processed, captions: tuple[str, str]) -> str:
     """Make the four pictures of a pair. The script shows the depth at the pointer, and the same point in all four.
 
     Args:
         processed: a pair with its disparity.
         captions: what the left and right pictures are, plain text.
-        stacked: whether the epipolar lines run along columns: one camera is above the other.
 
     Returns:
         HTML.
     """
     assert processed.disparity is not None
     small = depth_data.grid(processed.disparity, processed.cloud if processed.geometry is not None else None)
+    stacked = processed.pair.epipolar.is_vertical
     kind = "stack" if stacked else "rows"
     views = "".join(
         _figure(depth_data.photograph(image), caption, side, lines=True)
@@ -77,7 +80,7 @@ def depth_view(processed: Processed, captions: tuple[str, str], *, stacked: bool
     )
     words = "column" if stacked else "row"
     return (
-        f'<div class="depthview" data-view="{escape(json.dumps(_view(processed, small, stacked=stacked)))}" '
+        f'<div class="depthview" data-view="{escape(json.dumps(_view(processed, small)))}" '
         f'data-grid="{depth_data.text_of(small.cells)}">'
         f'<output class="readout">{escape(_hint(processed))}</output>'
         f'<div class="views {kind}">{views}</div>'
@@ -120,18 +123,7 @@ def cloud_view(processed: Processed) -> str:
     )
 
 
-def uncertainty_m(geometry: StereoGeometry, depth_m: float, disparity_error_px: float) -> float:
-    """Return how wrong a depth is if its disparity is wrong by so much: dz = z^2 / (f b) * dd.
-
-    Args:
-        geometry: converts disparity to metres.
-        depth_m: the depth, m.
-        disparity_error_px: error of the disparity, px.
-    """
-    return depth_m**2 / (geometry.focal_px * geometry.baseline_m) * disparity_error_px
-
-
-def _view(processed: Processed, small: Grid, *, stacked: bool) -> dict[str, object]:
+def _view(processed: Processed, small: Grid) -> dict[str, object]:
     """Return what the script needs to know, as a JSON object."""
     height, width = processed.pair.left.shape[:2]
     geometry, limits = processed.geometry, processed.limits
@@ -145,7 +137,7 @@ def _view(processed: Processed, small: Grid, *, stacked: bool) -> dict[str, obje
         "low": small.low,
         "high": small.high,
         "metric": small.metric,
-        "stacked": stacked,
+        "way": _WAY[processed.pair.epipolar],
     }
     if geometry is not None:
         values |= {
@@ -213,19 +205,21 @@ def _disparity_figure(processed: Processed) -> str:
         marks = [(product / z - geometry.doffs_px, f"{z:g} m") for z in _round_depths(near, far)]
         caption = f"disparity, {low:.1f} to {high:.1f} px: bright is near, black is none; the scale is in metres"
     places = [((value - low) / (high - low), words) for value, words in marks]
-    return _figure(depth_data.drawing(picture), caption, "left", below=_scale(places))
+    below = _scale(places) if np.isfinite(processed.disparity).any() else ""
+    return _figure(depth_data.drawing(picture), caption, "left", below=below)
 
 
 def _depth_figure(processed: Processed) -> str:
     if processed.cloud is None or processed.geometry is None:
         return ""
     depth = processed.cloud[..., 2]
-    near, far = depth_data.depth_range_m(depth)
+    near, far = depth_range_m(depth)
     picture = depth_data.depth_picture(depth, near, far)
     span = math.log(far / near)
     places = [(math.log(far / z) / span, f"{z:g} m") for z in _round_depths(near, far)]
     caption = "depth Z, metres along the left camera's axis: bright is near, black is none or cut"
-    return _figure(depth_data.drawing(picture), caption, "left", below=_scale(places))
+    below = _scale(places) if np.isfinite(depth).any() else ""
+    return _figure(depth_data.drawing(picture), caption, "left", below=below)
 
 
 def _round_depths(near_m: float, far_m: float) -> list[float]:

@@ -8,10 +8,11 @@ from common.camera.base import CameraHealth, health_values
 from common.versions import REPORT_FORMAT
 from phone_host.measure.accounts import LinkTally, rung_values
 from phone_host.measure.delays import DELAYS, FROM_EXPOSURE, STAGES, Spread
+from phone_host.measure.doubt_history import Episode, saved_pairs
 from phone_host.measure.headline import headline
 from phone_host.measure.image_doubts import ImageFigures
 from phone_host.measure.regime import Judgement, judge
-from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, disbelieved, figures
+from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, disbelieved, figures, history
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
@@ -21,18 +22,52 @@ from phone_host.sync.fifo import Overflow
 _MS: Final = 1e6
 
 
-def build(run: RunSnapshot) -> dict[str, object]:
+def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
     """Make the report.json object; times in ms, None where nothing was measured.
 
     Args:
         run: the run.
+        command: whose report it is.
     """
     return {
         "format_version": REPORT_FORMAT,
+        "command": command,
         "ended": run.ended,
         "pairs": run.processed,
+        "pairs_asked": run.asked_pairs or None,
         "pairs_per_second": _number(run.pairs_per_second),
         "paired_by": run.replayed.paired_by.value,
+        **_delays(run),
+        "clock": _clock(run),
+        "phase": _phase(run),
+        "time_offset_ms": _time_offset(run.time_offset),
+        "fifo": {"depth": run.fifo.depth, "overflow": run.fifo.overflow.value, "age_bound": age_bound(run)},
+        "tolerance_ms": run.tolerance_ns / _MS,
+        "sessions": [_session(run, index) for index in range(len(run.link.sessions))],
+        "links": [_link(tally, timeless=run.timeless) for tally in run.link.links],
+        "switches": run.link.switches,
+        "connects": run.link.connects,
+        "garbage": run.link.garbage,
+        "frames": _frames(run),
+        "host_frames": _host_frames(run),
+        "depth": _depth(run.depth),
+        "regime": _regime(judge(figures(run))),
+        "image_motion_px_per_s": _number(run.motion_px_s),
+        "trust": _trust(run),
+        "warnings": [
+            {"doubt": item.doubt.value, "sentence": item.sentence, "remedy": item.remedy} for item in concerns(run)
+        ],
+        "shortfall": run.shortfall or None,
+        "pairs_account": _pairs_account(run),
+        "unused": [{"place": item.place, "reason": item.reason, "count": item.count} for item in unused(run)],
+        "sinks": {sink.name: _sink(sink) for sink in run.sinks},
+        "unwritten": asdict(run.unwritten),
+    }
+
+
+def _delays(run: RunSnapshot) -> dict[str, object]:
+    """Return what took how long, when the board was away, and what of it was not measured."""
+    return {
         "not_measured": dict.fromkeys(FROM_EXPOSURE, TIMELESS) if run.timeless else {},
         "board_away": [
             {"at_s": round(item.at_s, 3), "seconds": round(item.seconds, 3), "came_back": item.is_over}
@@ -41,56 +76,52 @@ def build(run: RunSnapshot) -> dict[str, object]:
         "delays_ms": {name: None if _is_untold(run, name) else spread_ms(run.delays.spread(name)) for name in DELAYS},
         "stages_ms": {name: spread_ms(run.delays.spread(name)) for name in STAGES},
         "time_skew_ms": None if run.timeless else spread_ms(run.delays.spread("time_skew")),
-        "clock": _clock(run),
-        "phase": _phase(run),
-        "time_offset_ms": {
-            "applied": run.time_offset.offset_ns / _MS,
-            "uncertainty": run.time_offset.uncertainty_ns / _MS,
-            "measured": run.time_offset != TimeOffset(),
-        },
-        "fifo": {"depth": run.fifo.depth, "overflow": run.fifo.overflow.value, "age_bound": age_bound(run)},
-        "tolerance_ms": run.tolerance_ns / _MS,
-        "sessions": [_session(run, index) for index in range(len(run.link.sessions))],
-        "links": [_link(tally, timeless=run.timeless) for tally in run.link.links],
-        "switches": run.link.switches,
-        "connects": run.link.connects,
-        "garbage": run.link.garbage,
-        "frames": {
-            "received": run.counts.received,
-            "paired": run.counts.paired,
-            "held": run.counts.held_board,
-            "orphaned": dict(run.counts.board_orphans),
-            "before_clock": run.link.no_clock,
-            "disbelieved": disbelieved(run),
-        },
-        "host_frames": {
-            "grabbed": run.counts.host_frames + run.spoiled + run.skipped + run.own_future,
-            "spoiled": run.spoiled,
-            "skipped": run.skipped,
-            "from_the_future": run.own_future,
-            "paired": run.counts.paired,
-            "held": run.counts.held_host,
-            "orphaned": dict(run.counts.host_orphans),
-            "camera": _camera(run.camera),
-        },
-        "depth": _depth(run.depth),
-        "regime": _regime(judge(figures(run))),
-        "image_motion_px_per_s": _number(run.motion_px_s),
-        "trust": _trust(run),
-        "warnings": [
-            {"doubt": item.doubt.value, "sentence": item.sentence, "remedy": item.remedy} for item in concerns(run)
-        ],
-        "pairs_account": {
-            "paired": run.counts.paired,
-            "processed": run.processed,
-            "undecodable": run.undecodable,
-            "spoiled_images": dict(run.spoiled_images),
-            "dropped_fifo": run.counts.dropped,
-            "stopped": run.stopped,
-        },
-        "unused": [{"place": item.place, "reason": item.reason, "count": item.count} for item in unused(run)],
-        "sinks": {sink.name: _sink(sink) for sink in run.sinks},
-        "unwritten": asdict(run.unwritten),
+    }
+
+
+def _time_offset(offset: TimeOffset) -> dict[str, object]:
+    return {
+        "applied": offset.offset_ns / _MS,
+        "uncertainty": offset.uncertainty_ns / _MS,
+        "measured": offset != TimeOffset(),
+    }
+
+
+def _frames(run: RunSnapshot) -> dict[str, object]:
+    """Account for the board's frames."""
+    return {
+        "received": run.counts.received,
+        "paired": run.counts.paired,
+        "held": run.counts.held_board,
+        "orphaned": dict(run.counts.board_orphans),
+        "before_clock": run.link.no_clock,
+        "disbelieved": disbelieved(run),
+    }
+
+
+def _host_frames(run: RunSnapshot) -> dict[str, object]:
+    """Account for the own camera's frames."""
+    return {
+        "grabbed": run.counts.host_frames + run.spoiled + run.skipped + run.own_future,
+        "spoiled": run.spoiled,
+        "skipped": run.skipped,
+        "from_the_future": run.own_future,
+        "paired": run.counts.paired,
+        "held": run.counts.held_host,
+        "orphaned": dict(run.counts.host_orphans),
+        "camera": _camera(run.camera),
+    }
+
+
+def _pairs_account(run: RunSnapshot) -> dict[str, object]:
+    """Account for the pairs."""
+    return {
+        "paired": run.counts.paired,
+        "processed": run.processed,
+        "undecodable": run.undecodable,
+        "spoiled_images": dict(run.spoiled_images),
+        "dropped_fifo": run.counts.dropped,
+        "stopped": run.stopped,
     }
 
 
@@ -123,6 +154,20 @@ def _trust(run: RunSnapshot) -> dict[str, object]:
         "judged_pairs": images.judged,
         "at_first": figure_values(images.start),
         "now": figure_values(images.now),
+        "history": [_episode(item, run.save_every) for item in history(run)],
+    }
+
+
+def _episode(item: Episode, save_every: int) -> dict[str, object]:
+    """Return one while during which a doubt stood, with the numbers of its pairs, counted from 0."""
+    return {
+        **concern_values(item.concern),
+        "from_s": round(item.from_s, 3),
+        "to_s": round(item.to_s, 3),
+        "is_over": item.is_over,
+        "first_pair": item.first_pair,
+        "last_pair": item.last_pair,
+        "saved_pairs": list(saved_pairs(item, save_every)),
     }
 
 

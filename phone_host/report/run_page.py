@@ -1,6 +1,6 @@
 """A run's page: the last pair, every delay, who waits for whom, how the own camera fared. The demo's page uses parts of it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -11,18 +11,19 @@ from common.ledger import PairLedger
 from common.words import counted, times
 from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import rung_lines
+from phone_host.measure.doubt_history import saved_pairs
 from phone_host.measure.headline import headline
 from phone_host.measure.regime import Regime, judge
-from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures
+from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures, history
 from phone_host.measure.unused import unused
 from phone_host.model import Processed, Side
-from phone_host.report.cut_words import cut_sentence
+from phone_host.report.cut_words import cut_sentence, pixels_text
 from phone_host.report.depth_data import density, photograph
 from phone_host.report.depth_view import cloud_view, depth_view
 from phone_host.report.page_frame import section
 from phone_host.report.page_links import FileLink
 from phone_host.report.report_page import Figure, Headline, PageData, Picture, Table, delay_series, page
-from phone_host.report.summary import phase_lines
+from phone_host.report.summary import past_lines, phase_lines
 
 _FINE: Final = frozenset({Regime.STARVED_BY_CAMERAS, Regime.UNKNOWN})
 """Regimes in which nothing has to be done."""
@@ -66,7 +67,7 @@ def run_page(
             tables=(*links_tables(run), unused_table(run), camera_table(run.camera)),
             steps=steps(run),
             notes=notes(run),
-            files=files(saved),
+            files=files(saved, doubtful_pairs(run)),
         )
     )
 
@@ -84,7 +85,9 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
         f"Queue: {judgement.sentence}.",
         *([f"Not measured: when results were exposed: {TIMELESS}."] if run.timeless else []),
         *(_sentence(remark) for remark in judgement.remedies if judgement.regime in _FINE),
+        *([f"Warning: {run.shortfall}."] if run.shortfall else []),
         *(f"Warning: {item.sentence}." for item in concerns(run)),
+        *(f"Warning: {line}." for line in past_lines(run)),
         *(_sentence(line) for line in (*phase_lines(run.phase, run.alignment), *rung_lines(run.link))),
     )
 
@@ -100,13 +103,33 @@ def _sentence(words: str) -> str:
     return f"{words[:1].upper()}{words[1:]}."
 
 
-def files(saved: Sequence[str]) -> tuple[FileLink, ...]:
+def doubtful_pairs(run: RunSnapshot) -> dict[int, str]:
+    """Return why saved pairs are wrong or doubtful, by their number: what stood while they were taken.
+
+    Args:
+        run: the run.
+    """
+    found: dict[int, str] = {}
+    for item in sorted(history(run), key=lambda item: item.concern.is_certain):
+        verdict = "wrong" if item.concern.is_certain else "doubtful"
+        found |= dict.fromkeys(saved_pairs(item, run.save_every), f"{verdict}: {item.concern.sentence}")
+    return found
+
+
+def files(saved: Sequence[str], doubtful: Mapping[int, str] | None = None) -> tuple[FileLink, ...]:
     """List the files of a run that lie beside its page.
 
     Args:
         saved: of saved pairs, relative to the page, in order.
+        doubtful: why some of them are wrong or doubtful, by the number of the pair.
     """
-    links = [FileLink(name, "" if number else _saved_words(name)) for number, name in enumerate(saved[:_MOST_LINKS])]
+    known = doubtful or {}
+    links = [
+        FileLink(
+            name, "; ".join(filter(None, ("" if number else _saved_words(name), known.get(_pair_number(name), ""))))
+        )
+        for number, name in enumerate(saved[:_MOST_LINKS])
+    ]
     if len(saved) > _MOST_LINKS:
         first = saved[_MOST_LINKS].partition("/")[0]
         links.append(FileLink(f"{first}/", f"and {len(saved) - _MOST_LINKS} more, from this folder on"))
@@ -115,6 +138,12 @@ def files(saved: Sequence[str]) -> tuple[FileLink, ...]:
         FileLink("report.json", "everything that this page says, for programs"),
         FileLink("delays.jsonl", "every delay of every pair, one line each, ns"),
     )
+
+
+def _pair_number(name: str) -> int:
+    """Return the number of a saved file's pair, such as 30 of `pair-000030/cloud.ply`; -1 if it has none."""
+    digits = name.partition("/")[0].removeprefix("pair-")
+    return int(digits) if digits.isdigit() else -1
 
 
 def _saved_words(name: str) -> str:
@@ -136,7 +165,7 @@ def depth_card(last: Processed | None, board_side: Side, title: str) -> str:
     """
     if last is None or last.disparity is None or not np.isfinite(last.disparity).any():
         return ""
-    words = f"{100 * density(last):.0f} % of the left pixels have a depth."
+    words = f"{100 * density(last):.0f} % {pixels_text(last.cut)} have a depth."
     if last.cut is not None and (cut := cut_sentence(last.cut, last.limits)):
         words += f" Cut: {cut}."
     return section(title, words, depth_view(last, _captions(last, board_side)) + cloud_view(last))

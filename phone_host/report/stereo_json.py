@@ -3,6 +3,7 @@
 One pair's object is the same whether it was computed alone or as one of several.
 """
 
+import math
 from dataclasses import asdict
 from typing import Any
 
@@ -19,6 +20,7 @@ def pair_json(report: PairReport) -> dict[str, Any]:
     verdict, sentence = pair_verdict(report)
     return {
         "format_version": REPORT_FORMAT,
+        "command": "stereo",
         "verdict": verdict.value,
         "headline": sentence,
         "left": {"file": report.left, "size": size_text(report.left_px)},
@@ -26,6 +28,7 @@ def pair_json(report: PairReport) -> dict[str, Any]:
         "size": size_text(report.rectified_px),
         "matcher": report.matcher,
         "disparities": search.disparities or None if search else None,
+        "searched_from_m": None if math.isnan(report.searched_from_m) else round(report.searched_from_m, 4),
         "scale": round(search.scale, 4) if search else None,
         "geometry": None if report.geometry is None else asdict(report.geometry),
         "limits": None if report.limits is None else asdict(report.limits),
@@ -47,11 +50,13 @@ def set_json(report: SetReport) -> dict[str, Any]:
     verdict, sentence = set_verdict(report)
     return {
         "format_version": REPORT_FORMAT,
+        "command": "stereo",
         "verdict": verdict.value,
         "headline": sentence,
         "paired_by": "number" if report.by_number else "name order",
         "left_alone": list(report.left_alone),
         "right_alone": list(report.right_alone),
+        "interrupted_of": report.interrupted_of or None,
         "computed": len(report.computed),
         "failed": len(report.failed),
         "warnings": [remark.text for remark in report.remarks],

@@ -1,9 +1,20 @@
-"""What `stereo` says on a terminal: first whether the depth is right. Pure."""
+"""What `stereo` says on a terminal: of a pair first whether its depth is right, of several pairs last. Pure."""
+
+import math
 
 from common.imagesize.head import size_text
-from common.words import counted
-from phone_host.report.cut_words import distance_text, share_text
-from phone_host.report.stereo_report import ALWAYS, FailedPair, PairReport, SetReport
+from common.words import counted, distance_text
+from phone_host.report.cut_words import pixels_text, share_text
+from phone_host.report.stereo_report import (
+    ALWAYS,
+    FailedPair,
+    PairReport,
+    SetReport,
+    SharedRemark,
+    depth_png_words,
+    shared_remarks,
+    told_name,
+)
 from phone_host.report.stereo_verdict import pair_verdict, set_verdict
 
 
@@ -20,18 +31,21 @@ def pair_lines(report: PairReport, out: str) -> list[str]:
         how.append(counted(search.disparities, "disparity", "disparities"))
     if search is not None and search.scale < 1:
         how.append(f"matched at {search.scale:.0%} of the size")
+    if not math.isnan(report.searched_from_m):
+        how.append(f"searched from {distance_text(report.searched_from_m)}")
     lines = [
         pair_verdict(report)[1],
-        f"{', '.join(how)}: {report.density:.1%} of the pixels have one ({total_ms:.0f} ms)",
+        f"{', '.join(how)}: {report.density:.1%} {pixels_text(report.cut)} matched ({total_ms:.0f} ms)",
     ]
     if report.geometry is not None and written.points is not None:
-        share = written.points / (report.rectified_px[0] * report.rectified_px[1])
         lines += [
-            f"{counted(written.points, 'point')}, {share:.1%} of the pixels; {report.axes.text}, in metres",
+            f"{counted(written.points, 'point')}, {report.share:.1%} {pixels_text(report.cut)}; {report.axes.text}, in metres",
             f"f = {report.geometry.focal_px:.1f} px, b = {report.geometry.baseline_m * 1e3:.2f} mm",
             *cut_lines(report),
         ]
-    lines += [f"warning: {remark.text}" for remark in report.remarks]
+    lines += [f"warning: {remark.text}" for remark in report.remarks_beside_headline]
+    if missing := depth_png_words(written.not_in_depth_png):
+        lines.append(f"note: {missing}")
     return [*lines, f"written to {out}: {', '.join([*written.files, *ALWAYS])}"]
 
 
@@ -42,20 +56,28 @@ def set_lines(report: SetReport, out: str) -> list[str]:
         report: all pairs.
         out: the results folder, as the user named it.
     """
-    lines = [set_verdict(report)[1]]
-    for pair in report.pairs:
-        if isinstance(pair, FailedPair):
-            lines.append(f"{pair.name}  failed: {pair.problem}: {pair.remedy}")
-            continue
-        points = "" if pair.written.points is None else f", {counted(pair.written.points, 'point')}"
-        lines.append(f"{pair.name}  density {pair.density:.1%}{points}")
-        lines += [f"  warning: {remark.problem}" for remark in pair.remarks]
-    remedies = dict.fromkeys(remark.remedy for pair in report.computed for remark in pair.remarks if remark.remedy)
-    lines += [f"remedy: {remedy}" for remedy in remedies]
+    lines = [_pair_line(pair, by_number=report.by_number) for pair in report.pairs]
+    lines += [f"warning: {_shared_words(shared, report)}" for shared in shared_remarks(report)]
     lines += [f"warning: {remark.text}" for remark in report.remarks]
     told = f"{len(report.computed)} of {counted(len(report.pairs), 'pair')} computed"
     failed = f", {len(report.failed)} failed" if report.failed else ""
-    return [*lines, f"{told}{failed}; written to {out}: one folder per pair, report.json and index.html"]
+    lines.append(f"{told}{failed}; written to {out}: one folder per pair, report.json and index.html")
+    # Last, where it is still on the screen: the list of the pairs may be longer.
+    return [*lines, set_verdict(report)[1]]
+
+
+def _pair_line(pair: PairReport | FailedPair, *, by_number: bool) -> str:
+    name = told_name(pair, by_number=by_number)
+    if isinstance(pair, FailedPair):
+        return f"{name}  failed: {pair.problem}: {pair.remedy}"
+    points = "matched" if pair.written.points is None else f"have depth, {counted(pair.written.points, 'point')}"
+    return f"{name}  {pair_verdict(pair)[0].value}, {pair.share:.0%} {points}"
+
+
+def _shared_words(shared: SharedRemark, report: SetReport) -> str:
+    """Say how many pairs a remark is about, then the remark."""
+    such = "" if shared.alike else f", such as {shared.first}"
+    return f"in {shared.pairs} of {len(report.pairs)} pairs{such}: {shared.remark.text}"
 
 
 def cut_lines(report: PairReport) -> list[str]:

@@ -11,12 +11,13 @@ from typing import Final
 
 import numpy as np
 
-from common.words import counted
+from common.words import counted, distance_text
+from phone_host.measure.depth_error import depth_error_m
 from phone_host.model import Processed
 from phone_host.output.preview import colour_disparity, colour_range_px
 from phone_host.report import depth_data
-from phone_host.report.cut_words import cut_rows, distance_text, share_text
-from phone_host.report.depth_view import THIN, cloud_view, depth_view, uncertainty_m
+from phone_host.report.cut_words import cut_rows, pixels_text, searched_from_m, share_text
+from phone_host.report.depth_view import THIN, cloud_view, depth_view
 from phone_host.report.page_frame import document, section, table
 from phone_host.report.page_links import FileLink, NextCommand, address, files_section, list_section, next_section
 from phone_host.report.report_page import Figure, Headline, Picture, figures_row, heading, picture_uri
@@ -42,7 +43,6 @@ class StereoPageData:
         files: beside the page.
         commands: what to do next.
         notes: warnings and advice, one sentence each.
-        stacked: whether the epipolar lines run along columns.
         back: relative link to the page of all pairs; empty: none.
     """
 
@@ -57,7 +57,6 @@ class StereoPageData:
     files: tuple[FileLink, ...] = ()
     commands: tuple[NextCommand, ...] = ()
     notes: tuple[str, ...] = ()
-    stacked: bool = False
     back: str = ""
 
 
@@ -116,7 +115,7 @@ def stereo_page(data: StereoPageData) -> str:
     """
     back = f'<p class="sub"><a href="{address(data.back)}">all pairs</a></p>' if data.back else ""
     cloud = cloud_view(data.processed)
-    shown = "" if data.processed.disparity is None else depth_view(data.processed, data.captions, stacked=data.stacked)
+    shown = "" if data.processed.disparity is None else depth_view(data.processed, data.captions)
     parts = [
         back,
         heading(data.title, data.subtitle, data.verdict, data.sentence),
@@ -170,7 +169,9 @@ def _figures(processed: Processed) -> tuple[Figure, ...]:
     figures = []
     if not math.isnan(share):
         what = "have a depth" if processed.cloud is not None else "have a disparity"
-        figures.append(Figure(label="density", value=f"{100 * share:.0f}", unit="%", note=f"of the left pixels {what}"))
+        figures.append(
+            Figure(label="density", value=f"{100 * share:.0f}", unit="%", note=f"{pixels_text(processed.cut)} {what}")
+        )
     if processed.cloud is None or processed.geometry is None:
         return tuple(figures)
     depth = processed.cloud[..., 2]
@@ -188,18 +189,19 @@ def _figures(processed: Processed) -> tuple[Figure, ...]:
         )
     )
     if processed.limits is not None and processed.limits.disparity_error_px > 0:
-        wrong = uncertainty_m(processed.geometry, middle, processed.limits.disparity_error_px)
+        wrong = depth_error_m(processed.geometry, middle, processed.limits.disparity_error_px)
         at = f"at {distance_text(middle)}, if a disparity is wrong by {processed.limits.disparity_error_px:.2g} px"
         figures.append(Figure(label="uncertainty", value=f"± {distance_text(wrong)}", note=at))
     return tuple(figures)
 
 
 def _uncertainty_words(processed: Processed) -> str:
+    from_m = searched_from_m(processed.geometry, processed.search)
+    words = "" if math.isnan(from_m) else f"Searched from {distance_text(from_m)}: nothing nearer can be found. "
     if processed.limits is None or processed.geometry is None:
-        return ""
-    return (
-        f"Behind ± is what an error of {processed.limits.disparity_error_px:.2g} px of disparity changes in the depth."
-    )
+        return words
+    error_px = processed.limits.disparity_error_px
+    return f"{words}Behind ± is what an error of {error_px:.2g} px of disparity changes in the depth."
 
 
 def _pixels(processed: Processed) -> str:

@@ -3,6 +3,7 @@
 `stereo_json`, `stereo_lines` and `stereo_page` tell it to programs, on a terminal and on a page.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -11,12 +12,14 @@ from common.words import counted
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
+from phone_host.report.cut_words import searched_from_m
 from phone_host.report.stereo_trust import PairTrust
 
 ALWAYS: Final = ("report.json", "index.html")
 """Files that lie in every folder of results."""
 
 _MOST_NAMES: Final = 5
+_FIGURE: Final = re.compile(r"\d+(?:\.\d+)?")
 
 Size = tuple[int, int]
 """Width and height, px."""
@@ -85,6 +88,25 @@ class PairReport:
     remarks: tuple[Remark, ...] = ()
 
     @property
+    def share(self) -> float:
+        """Share of the pixels inside the crop that have a point; without a geometry, a disparity."""
+        if self.written.points is None:
+            return self.density
+        outside = 0 if self.cut is None else self.cut.outside
+        return self.written.points / max(1, self.rectified_px[0] * self.rectified_px[1] - outside)
+
+    @property
+    def searched_from_m(self) -> float:
+        """Nothing nearer could be found, m; NaN: not known."""
+        return searched_from_m(self.geometry, self.search)
+
+    @property
+    def remarks_beside_headline(self) -> tuple[Remark, ...]:
+        """The remarks without the one that the headline tells with its remedy."""
+        told = {concern.sentence for concern in self.trust.concerns[:1]}
+        return tuple(remark for remark in self.remarks if remark.problem not in told)
+
+    @property
     def has_depth(self) -> bool:
         """Whether any pixel has a depth; without a geometry, a disparity."""
         return self.density > 0 if self.written.points is None else self.written.points > 0
@@ -119,6 +141,7 @@ class SetReport:
         left_alone: left images without a partner.
         right_alone: right images without a partner.
         remarks: what the user must know about all of them.
+        interrupted_of: how many pairs were to be computed when the command was interrupted; 0: it was not.
     """
 
     pairs: tuple[PairReport | FailedPair, ...]
@@ -126,6 +149,7 @@ class SetReport:
     left_alone: tuple[str, ...] = ()
     right_alone: tuple[str, ...] = ()
     remarks: tuple[Remark, ...] = ()
+    interrupted_of: int = 0
 
     @property
     def computed(self) -> tuple[PairReport, ...]:
@@ -143,6 +167,63 @@ class SetReport:
         remarks = [*self.remarks, *(remark for pair in self.computed for remark in pair.remarks)]
         any_depth = any(pair.has_depth for pair in self.computed)
         return any_depth and not self.failed and not any(remark.is_blocking for remark in remarks)
+
+
+@dataclass(frozen=True, slots=True)
+class SharedRemark:
+    """A remark that several pairs share, but perhaps for its figures.
+
+    Attributes:
+        remark: as the first of them has it.
+        pairs: how many have it.
+        first: the first one's name.
+        alike: whether all have it word for word.
+    """
+
+    remark: Remark
+    pairs: int
+    first: str
+    alike: bool
+
+
+def shared_remarks(report: SetReport) -> tuple[SharedRemark, ...]:
+    """Gather what is said of the computed pairs, each thing once, in the order of the pairs.
+
+    Args:
+        report: of all pairs.
+    """
+    kinds: dict[tuple[str, str], list[tuple[PairReport, Remark]]] = {}
+    for pair in report.computed:
+        for remark in pair.remarks:
+            kinds.setdefault((_FIGURE.sub("0", remark.problem), remark.remedy), []).append((pair, remark))
+    return tuple(
+        SharedRemark(
+            remark=found[0][1],
+            pairs=len({pair.name for pair, _ in found}),
+            first=told_name(found[0][0], by_number=report.by_number),
+            alike=len({remark.problem for _, remark in found}) == 1,
+        )
+        for found in kinds.values()
+    )
+
+
+def depth_png_words(missing: int) -> str:
+    """Say that depth.png does not hold all depths; empty if it does.
+
+    Args:
+        missing: how many it cannot hold.
+    """
+    return f"{counted(missing, 'depth')} beyond 65.5 m (or below 1 mm) only in xyz.pfm" if missing else ""
+
+
+def told_name(pair: PairReport | FailedPair, *, by_number: bool) -> str:
+    """Return a pair's name on a terminal: its folder, with its left file where that is no number of the user's.
+
+    Args:
+        pair: of several.
+        by_number: whether the files were paired by the numbers in their names.
+    """
+    return pair.name if by_number else f"{pair.name} {pair.left.rpartition('/')[2]}"
 
 
 def alone_remarks(left: Sequence[str], right: Sequence[str], *, by_number: bool, pairs: int) -> tuple[Remark, ...]:

@@ -1,5 +1,8 @@
 """Answers for a result of `stereo`: is my depth right, and how far can I trust it? Pure."""
 
+from dataclasses import replace
+
+from common.words import counted
 from phone_host.report.report_page import Headline
 from phone_host.report.stereo_report import PairReport, SetReport
 
@@ -23,6 +26,12 @@ def set_verdict(report: SetReport) -> tuple[Headline, str]:
     Returns:
         The verdict, and one sentence.
     """
+    if report.interrupted_of:
+        verdict, sentence = set_verdict(replace(report, interrupted_of=0))
+        stopped = f"Interrupted after {len(report.pairs)} of {counted(report.interrupted_of, 'pair')}. Of these: "
+        return (
+            Headline.WARNING if verdict is Headline.GOOD else verdict
+        ), f"{stopped}{sentence[:1].lower()}{sentence[1:]}"
     verdicts = [pair_verdict(pair)[0] for pair in report.computed]
     count, good = len(report.pairs), verdicts.count(Headline.GOOD)
     bad = verdicts.count(Headline.BAD) + len(report.failed)

@@ -8,10 +8,11 @@ from common.words import counted, times
 from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import LinkAccount, LinkTally, rung_lines
 from phone_host.measure.delays import DELAYS
+from phone_host.measure.doubt_history import history_lines
 from phone_host.measure.headline import headline
 from phone_host.measure.image_doubts import ImageTrust
 from phone_host.measure.regime import judge
-from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
+from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures, history
 from phone_host.measure.unused import unused
 from phone_host.model import DepthAccount, TimeOffset
 from phone_host.report.cut_words import cut_sentence
@@ -19,6 +20,9 @@ from phone_host.sync.phase import Alignment, Phase
 from phone_host.sync.stills import PairedBy
 
 _MS: Final = 1e6
+_LONGEST_BEAT_S: Final = 3600.0
+"""A drift that takes longer for one turn changes nothing within a scan, and is hardly measured."""
+
 _DELAY_TABLE: Final = 54
 _LINK_TABLE: Final = 64
 """Widths of the tables, characters."""
@@ -46,7 +50,9 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
     lines += _arrivals(run.camera, run.time_offset)
     lines.append(judge(figures(run)).sentence)
     lines += [f"  {remedy}" for remedy in judge(figures(run)).remedies]
+    lines += [f"warning: {run.shortfall}"] if run.shortfall else []
     lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(run)]
+    lines += [f"warning: {line}" for line in past_lines(run)]
     lines += depth_lines(run.images)
     lines += cut_lines(run.depth)
     lines += camera_troubles(run.camera)
@@ -62,6 +68,8 @@ def _delay_table(run: RunSnapshot, width: int) -> list[str]:
         spread = run.delays.spread(name)
         if not spread.count:
             continue  # stills: nothing is counted from an exposure
+        if name == "starvation" and run.timeless and not spread.max_ns:
+            continue  # they come when the processor asks for them
         values = (getattr(spread, f"{column}_ns") / _MS for column in columns)
         lines.append(f"{name.replace('_', '-'):14} " + " ".join(f"{value:9.3f}" for value in values))
     return lines
@@ -85,7 +93,7 @@ def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:
     if phase is not None:
         drift = (
             ""
-            if not math.isfinite(phase.beat_s)
+            if not abs(phase.beat_s) <= _LONGEST_BEAT_S  # never true of NaN
             else f", drifts by {phase.drift * 1e6:+.1f} ppm, one full turn in {phase.beat_s:.0f} s"
         )
         side = "before" if phase.time_skew_ns < 0 else "after"
@@ -108,6 +116,11 @@ def depth_lines(images: ImageTrust) -> list[str]:
     if not math.isnan(start.vertical_px + end.vertical_px):
         parts.append(f"vertical error {start.vertical_px:.2f}, {end.vertical_px:.2f} px")
     return [f"depth: {'; '.join(parts)}"]
+
+
+def past_lines(run: RunSnapshot) -> list[str]:
+    """Say which doubts stood for a while and have gone, and which pairs they concern."""
+    return history_lines(history(run), run.processed, run.save_every)
 
 
 def cut_lines(depth: DepthAccount) -> list[str]:
@@ -187,7 +200,10 @@ def _unused_lines(run: RunSnapshot) -> list[str]:
     parts = [item.told for item in unused(run)]
     lines = [f"not used: {', '.join(parts) or 'nothing'}"]
     if run.unwritten.lines or run.unwritten.pairs:
-        lines.append(
-            f"not written: {counted(run.unwritten.lines, 'line')}, {counted(run.unwritten.pairs, 'pair')} ({run.unwritten.cause})"
+        counts = (
+            (run.unwritten.lines, "line of delays.jsonl", "lines of delays.jsonl"),
+            (run.unwritten.pairs, "pair", "pairs"),
         )
+        parts = [f"{count} {one if count == 1 else many}" for count, one, many in counts if count]
+        lines.append(f"not written: {', '.join(parts)} ({run.unwritten.cause})")
     return lines

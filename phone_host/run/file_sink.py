@@ -153,6 +153,7 @@ class FileSink:
     ) -> None:
         self._save_every, self._axes = save_every, axes
         self._unsaved_pairs = self._lost_lines = 0
+        self._missing: tuple[str, ...] = ()
         self._own: ListedFolder | None = None
         self._file = -1
         if folder is None:
@@ -214,6 +215,11 @@ class FileSink:
         return self._file < 0 or not (self.unwritten.lines or self.unwritten.pairs or self._of_report.now)
 
     @property
+    def missing(self) -> str:
+        """The files of the run's end that could not be written, and why, in words; empty: none."""
+        return f"{', '.join(self._missing)} ({self._of_report.last})" if self._missing else ""
+
+    @property
     def unwritten(self) -> Unwritten:
         """What could not be written so far."""
         if self._file < 0:
@@ -234,24 +240,45 @@ class FileSink:
         """
         if self._own is None:
             return
-        writing = "delays.jsonl"
+        texts = {
+            "report.json": json.dumps(report, indent=1) + "\n",
+            "index.html": page,
+            CAMERAS_NAME: cameras,
+        }
         try:
             self.finish()
-            os.fsync(self._file)
-            writing = "report.json"
-            self._own.write_text("report.json", json.dumps(report, indent=1) + "\n")
-            if page:
-                writing = "index.html"
-                self._own.add("index.html")
-                self._own.write_text("index.html", page)
-            if cameras:
-                self._own.add(CAMERAS_NAME)
-                self._own.write_text(CAMERAS_NAME, cameras)
-            self._own.sync()
-        except OSError as error:
-            self._of_report.begins(error, writing, "make room and run again")
+            troubles = self._write_last({name: text for name, text in texts.items() if text})
         finally:
             self._let_go()
+        if troubles:
+            self._missing = tuple(troubles)
+            error = next(iter(troubles.values()))
+            self._of_report.begins(error, ",".join(troubles), "make room and run again")
+
+    def _write_last(self, texts: Mapping[str, str]) -> dict[str, OSError]:
+        """Write the files of the run's end. One for which there is no room does not keep the others from being written.
+
+        Returns:
+            The files that could not be written, each with its error.
+        """
+        assert self._own is not None
+        troubles: dict[str, OSError] = {}
+        try:
+            os.fsync(self._file)
+        except OSError as error:
+            troubles["delays.jsonl"] = error
+        for name, text in texts.items():
+            try:
+                if name != "report.json":
+                    self._own.add(name)
+                self._own.write_text(name, text)
+            except OSError as error:
+                troubles[name] = error
+        try:
+            self._own.sync()
+        except OSError as error:
+            troubles.setdefault("report.json", error)
+        return troubles
 
     def _let_go(self) -> None:
         if self._own is None:

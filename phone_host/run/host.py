@@ -1,6 +1,5 @@
 """The host's composition root: receiver and host camera -> pair queue -> worker -> sinks, each in its own thread."""
 
-import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
@@ -15,21 +14,22 @@ from common.errors import AbsentBoardError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import PairLedger
 from common.link.base import Link
-from common.program.logs import event
+from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import Pacing
 from phone_host.measure.absence import away_of
 from phone_host.measure.image_motion import MotionMeter
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.sink_account import SinkAccount
-from phone_host.measure.trust import Doubt
 from phone_host.model import Processed, Result, Side, TimeOffset
 from phone_host.output.axes import Axes
+from phone_host.run.doubt_log import DoubtLog
 from phone_host.run.file_sink import FileSink
 from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.phase_steering import PhaseSteering
 from phone_host.run.pipeline import Pipeline
 from phone_host.run.rig_cameras import RigCameras
 from phone_host.run.sinks import FunctionSink, Sink
+from phone_host.run.time_limit import TimeLimit
 from phone_host.run.trust_sink import TrustSink
 from phone_host.run.worker import Worker
 from phone_host.stereo.core import StereoCore
@@ -44,8 +44,6 @@ from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
 from phone_host.sync.stills import Stills
 
-_LOG = logging.getLogger(__name__)
-
 _STEP_S: Final = 0.05
 _MOTION: Final = "motion"
 _LAST_PARTNER_NS: Final = 1_000_000_000
@@ -54,12 +52,8 @@ _LAST_PARTNER_NS: Final = 1_000_000_000
 _STOP_S: Final = 0.4
 """A stopped run gives its current pair this long: Ctrl-C ends within a second, and the goodbye takes 0.3 s of it."""
 
-_FIRST_PAIR_NS: Final = 10_000_000_000
-"""A limited run allows this much for the first pair: learning the clock takes a second, the first use of OpenCV another."""
-
-_TRUST_NS: Final = 1_000_000_000
 _RECENT: Final = 60
-"""Once a second the latest 60 pairs are judged: two seconds at 30 pairs per second."""
+"""While it runs, the latest 60 pairs are judged: two seconds at 30 pairs per second."""
 
 
 class EndReason(Enum):
@@ -154,6 +148,7 @@ class Host:
         self._camera = OwnCamera(camera, self._queue.add_host, demand, self._queue.own_image_missing)
         self._receiver = Receiver(links, now.random_id(), self._queue)
         rig = None if core is None else core.rig
+        self._rig_rejected = rig is not None and rig.is_rejected
         self._cameras = RigCameras(rig, settings.board_side, self._own, self._camera, self._receiver)
         interpolator = Interpolator() if settings.interpolate else None
         pipeline = Pipeline(
@@ -173,10 +168,10 @@ class Host:
             most_pairs=settings.pairs,
             taken=self._receiver.wake,
         )
-        self._known_doubts: frozenset[Doubt] = frozenset()
-        self._trust_due_ns = 0
+        self._doubts = DoubtLog(lambda: concerns(self.snapshot()))
+        self._time_limit = TimeLimit(settings.seconds_ns)
         self._steering = PhaseSteering(settings.steered, self._receiver, self._camera, self._queue)
-        self._ended_ns = self._met_ns = 0
+        self._ended_ns = 0
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
         """Run until the number of pairs is reached, a stream ends or `stop` returns True.
@@ -247,6 +242,11 @@ class Host:
         return self._files.complete
 
     @property
+    def missing_files(self) -> str:
+        """The files that `write_report` could not write, and why, in words; empty: none."""
+        return self._files.missing
+
+    @property
     def last(self) -> Processed | None:
         """The newest pair's images and depth."""
         return self._ledgerer.last
@@ -308,6 +308,11 @@ class Host:
             gap_s=books.gap_ns / 1e9,
             images=self._trust.trust,
             depth=books.depth,
+            rig_rejected=self._rig_rejected,
+            asked_pairs=self._settings.pairs,
+            save_every=0 if self._settings.out is None else self._settings.save_every,
+            last_s=max(0, books.last_done_ns - self.started_ns) / 1e9,
+            orientations=self._orientations,
         )
 
     def _is_unneeded(self, account: SinkAccount) -> bool:
@@ -319,6 +324,14 @@ class Host:
         """Whether both cameras' stamps are exact by definition. Those of an absent board are assumed to be."""
         hello = self._receiver.hello
         return self._own.has_exact_stamps and (hello is None or hello.camera.has_exact_stamps)
+
+    @property
+    def _orientations(self) -> tuple[Orientation, Orientation]:
+        """Those of the left and the right camera, as their users stated them."""
+        hello = self._receiver.hello
+        board = UPRIGHT if hello is None else hello.camera.orientation
+        own = self._own.orientation
+        return (board, own) if self._settings.board_side is Side.LEFT else (own, board)
 
     @property
     def _period_ns(self) -> int:
@@ -333,19 +346,6 @@ class Host:
         seen = result.processed.pair.right if self._settings.board_side is Side.LEFT else result.processed.pair.left
         self._motion.add(seen, result.ledger.host.exposed_ns, result.ledger.done_ns)
 
-    def _watch_trust(self, now_ns: int) -> None:
-        """Log each reason not to trust the depth when it appears and when it has gone."""
-        if now_ns < self._trust_due_ns:
-            return
-        self._trust_due_ns = now_ns + _TRUST_NS
-        found = {concern.doubt: concern for concern in concerns(self.snapshot())}
-        for doubt in found.keys() - self._known_doubts:
-            concern = found[doubt]
-            _LOG.warning(event("depth_doubtful", doubt=doubt.value, problem=concern.sentence, remedy=concern.remedy))
-        for doubt in self._known_doubts - found.keys():
-            _LOG.info(event("depth_trusted", doubt=doubt.value))
-        self._known_doubts = frozenset(found)
-
     def _watch(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
         patience = BoardPatience(self._settings.wait_ns, now.monotonic_ns())
         ending_since_ns: int | None = None
@@ -355,14 +355,14 @@ class Host:
             self._check_kinds()
             self._cameras.look()
             self._steering.update(now_ns)
-            self._watch_trust(now_ns)
+            self._doubts.look(now_ns)
             if watch is not None:
                 watch()
             if stop():
                 return EndReason.STOPPED
             present = self._receiver.connected or self._receiver.ended
             patience.look(now_ns, self._receiver.refused, present=present)
-            if self._is_time_over(now_ns):
+            if self._time_limit.is_over(now_ns, has_met_board=self.has_met_board, begun_ns=self.first_done_ns):
                 return self._drain(stop, watch, EndReason.SECONDS_OVER)
             if self._receiver.ended or self._camera.ended:
                 ending_since_ns = now_ns if ending_since_ns is None else ending_since_ns
@@ -392,15 +392,6 @@ class Host:
                 "no board came before this machine's camera had shown its last image",
                 "start board-agent first, or give loop=1 in --camera",
             )
-
-    def _is_time_over(self, now_ns: int) -> bool:
-        """Whether the time given for the run has passed since its first pair, or no pair came for long after the board had."""
-        limit_ns, begun_ns = self._settings.seconds_ns, self._ledgerer.first_done_ns
-        if not self._met_ns and self._receiver.hello is not None:
-            self._met_ns = now_ns
-        if not begun_ns and self._met_ns:
-            begun_ns = self._met_ns + _FIRST_PAIR_NS
-        return bool(limit_ns and begun_ns) and now_ns - begun_ns >= limit_ns
 
     def _drain(self, stop: Callable[[], bool], watch: Callable[[], None] | None, ended: EndReason) -> EndReason:
         """Let the worker finish the waiting pairs. No frame will follow."""

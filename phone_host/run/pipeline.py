@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
-from common.camera.orientation import UPRIGHT, Orientation
 from common.errors import DataError
 from common.frame import Frame
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
+from common.orientation import UPRIGHT, Orientation
 from phone_host.model import BoardFrame, FramePair, Image, Processed, RectifiedPair, Side
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import LARGEST_FRACTION, Interpolator

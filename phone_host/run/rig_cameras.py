@@ -2,7 +2,7 @@
 
 import logging
 
-from common.camera.identity import UNKNOWN_CAMERA, CameraState, Lock
+from common.camera_identity import UNKNOWN_CAMERA, Lock, RememberedCamera
 from common.program.logs import event
 from common.protocol.message import BoardHello, CameraDescription, Locks
 from phone_host.measure.camera_match import LockMiss, misses, require_camera, state_of
@@ -86,7 +86,7 @@ class RigCameras:
             _LOG.warning(event("board_camera_unchecked", camera=hello.camera.name, remedy=remedy))
 
 
-def _known(camera: CameraState) -> tuple[tuple[str, int], ...]:
+def _known(camera: RememberedCamera) -> tuple[tuple[str, int], ...]:
     """Return the locks that this version can restore."""
     names = {lock.value for lock in Lock}
     return tuple((name, value) for name, value in camera.locks if name in names)

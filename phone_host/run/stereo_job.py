@@ -4,19 +4,19 @@ A pair that cannot be computed ends the work only if it is the only one; of seve
 Wrong settings and a results folder that cannot be written to end the work at once.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Protocol
 
-import numpy as np
-
 from common import now
-from common.camera.orientation import UPRIGHT, Orientation
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
+from common.orientation import UPRIGHT, Orientation
+from common.unfinished import unfinished
 from phone_host.output.atomic import write_text
 from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
@@ -37,6 +37,7 @@ from phone_host.run.stereo_remarks import geometry_remarks, pair_remarks, turned
 from phone_host.run.stereo_results import StereoResults
 from phone_host.run.stereo_trust import judge_pair
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.evidence import density
 from phone_host.stereo.images import EncodedFile, decode_files, open_image, require_same_size, size_px
 from phone_host.stereo.view_files import ViewFiles
 
@@ -68,7 +69,7 @@ class StereoJob:
         axes: of cloud.ply and xyz.pfm.
         most_pixels: an image that claims more is refused.
         mounted: by which turns the left and the right images become upright, after what their EXIF headers say.
-        commands: what to do next, for the pages.
+        commands: returns what to do next, for the page of these pairs.
     """
 
     files: ViewFiles
@@ -78,7 +79,7 @@ class StereoJob:
     axes: Axes = Axes.CAMERA
     most_pixels: int = MOST_PIXELS
     mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
-    commands: tuple[NextCommand, ...] = ()
+    commands: Callable[[Sequence[PairReport]], tuple[NextCommand, ...]] = lambda _: ()
 
 
 def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
@@ -103,10 +104,11 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
             _, left, right = job.files.pairs[0]
             return _set(job, (work.computed("", left, right),))
         pairs: list[PairReport | FailedPair] = []
-        for number, (name, left, right) in enumerate(job.files.pairs):
-            folder = f"pair-{int(name) if job.files.by_number else number:06d}"
-            pairs.append(work.tried(folder, left, right))
-            watcher()
+        with _kept_if_interrupted(job, results, work, pairs):
+            for number, (name, left, right) in enumerate(job.files.pairs):
+                folder = f"pair-{int(name) if job.files.by_number else number:06d}"
+                pairs.append(work.tried(folder, left, right))
+                watcher()
         report = _set(job, tuple(pairs))
         if not report.computed:
             first = report.failed[0]
@@ -114,9 +116,33 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
                 f"none of the {len(pairs)} pairs can be computed; the first: {first.problem} ({first.remedy})",
                 "mend what this names, then try again",
             )
-        results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
-        results.write_text("index.html", set_page(report, work.thumbnails, job.commands))
+        _write_set(job, results, work, report)
         return report
+
+
+def _write_set(job: StereoJob, results: StereoResults, work: "_Work", report: SetReport) -> None:
+    results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
+    results.write_text("index.html", set_page(report, work.thumbnails, job.commands(report.computed)))
+
+
+@contextmanager
+def _kept_if_interrupted(
+    job: StereoJob, results: StereoResults, work: "_Work", pairs: Sequence[PairReport | FailedPair]
+) -> Iterator[None]:
+    """Write the report and the page of the pairs so far if Ctrl-C ends the block, in Python or out of native code."""
+
+    def write() -> None:
+        report = replace(_set(job, tuple(pairs)), interrupted_of=len(job.files.pairs))
+        if report.computed:
+            _write_set(job, results, work, report)
+
+    try:
+        with unfinished(write):
+            yield
+    except KeyboardInterrupt:
+        with suppress(OSError):
+            write()
+        raise
 
 
 def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...]) -> SetReport:
@@ -203,7 +229,7 @@ class _Work:
         processed = core.compute(*images, _StageClock(self._watcher, about))
         watch.take_over(processed.stages)
         self._watcher.say(f"checking{about}")
-        trust = judge_pair(core, processed)
+        trust = judge_pair(core, processed, self._job.mounted)
         watch.lap("judge")
         self._watcher.say(f"writing{about}")
         planned = available(
@@ -216,10 +242,9 @@ class _Work:
         ):
             written = write_pair(place, processed, planned, self._job.axes, writers.map)
             watch.lap("write")
-            density = 0.0 if processed.disparity is None else float(np.isfinite(processed.disparity).mean())
             remarks = [
                 *turned_remarks(*opened),
-                *pair_remarks(processed, written, trust, core.wanted.search_from_m),
+                *pair_remarks(processed, trust, core.wanted.search_from_m),
                 *(geometry_remarks(processed) if core.rig is None else ()),
                 *(() if folder else _alone(self._job)),
             ]
@@ -235,7 +260,7 @@ class _Work:
                 geometry=processed.geometry,
                 limits=processed.limits,
                 cut=processed.cut,
-                density=density,
+                density=density(processed),
                 axes=self._job.axes,
                 written=written,
                 stages_ms=watch.times_ms(),
@@ -243,7 +268,7 @@ class _Work:
                 trust=trust,
             )
             write_text(place / "report.json", json_text(pair_json(report), indent=2) + "\n")
-            write_text(place / "index.html", pair_page(report, processed, self._job.commands))
+            write_text(place / "index.html", pair_page(report, processed, self._job.commands((report,))))
         if folder and (picture := pair_thumbnail(processed)) is not None:
             self.thumbnails[folder] = picture
         return report

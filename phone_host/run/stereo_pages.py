@@ -1,10 +1,12 @@
 """Makes the pages of `stereo` from its reports: one for each pair, and one that leads to several."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Final
 
 from common.imagesize.head import size_text
+from common.words import distance_text
 from phone_host.model import Processed
 from phone_host.report.page_links import FileLink, NextCommand
 from phone_host.report.report_page import Headline, Picture
@@ -16,7 +18,7 @@ from phone_host.report.stereo_page import (
     stereo_page,
     thumbnail,
 )
-from phone_host.report.stereo_report import FailedPair, PairReport, SetReport
+from phone_host.report.stereo_report import FailedPair, PairReport, SetReport, depth_png_words
 from phone_host.report.stereo_verdict import pair_verdict, set_verdict
 
 _WORDS: Final = {
@@ -51,10 +53,11 @@ def pair_page(report: PairReport, processed: Processed, commands: Sequence[NextC
         processed=processed,
         settings=_settings(report),
         times=tuple((stage, round(ms * 1e6)) for stage, ms in report.stages_ms),
-        files=_files([*report.written.files, "report.json"], report.axes.text),
+        files=_files(
+            [*report.written.files, "report.json"], report.axes.text, depth_png_words(report.written.not_in_depth_png)
+        ),
         commands=tuple(commands),
-        notes=tuple(remark.text for remark in report.remarks),
-        stacked=processed.pair.epipolar.is_vertical,
+        notes=tuple(remark.text for remark in report.remarks_beside_headline),
         back="../index.html" if report.name else "",
     )
     return stereo_page(data)
@@ -99,12 +102,15 @@ def _entry(pair: PairReport | FailedPair, picture: Picture | None) -> PairEntry:
         )
     verdict, sentence = pair_verdict(pair)
     return PairEntry(
-        folder=pair.name, name=both, thumbnail=picture, density=pair.density, verdict=verdict, sentence=sentence
+        folder=pair.name, name=both, thumbnail=picture, density=pair.share, verdict=verdict, sentence=sentence
     )
 
 
-def _files(names: Sequence[str], axes: str) -> tuple[FileLink, ...]:
-    return tuple(FileLink(name, _WORDS[name].format(axes=axes)) for name in names)
+def _files(names: Sequence[str], axes: str, not_in_depth_png: str = "") -> tuple[FileLink, ...]:
+    words = {name: _WORDS[name].format(axes=axes) for name in names}
+    if not_in_depth_png and "depth.png" in words:
+        words["depth.png"] += f"; {not_in_depth_png}"
+    return tuple(FileLink(name, said) for name, said in words.items())
 
 
 def _settings(report: PairReport) -> tuple[tuple[str, str], ...]:
@@ -112,6 +118,8 @@ def _settings(report: PairReport) -> tuple[tuple[str, str], ...]:
     if report.search is not None:
         if report.search.disparities:
             rows.append(("disparities", f"0 to {report.search.disparities - 1} px"))
+        if not math.isnan(report.searched_from_m):
+            rows.append(("searched from", distance_text(report.searched_from_m)))
         rows.append(("matched at", f"{report.search.scale:.0%} of the size"))
     if report.geometry is not None:
         rows += [

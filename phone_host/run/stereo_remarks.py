@@ -1,11 +1,10 @@
 """What the user of `stereo` must know about a pair's result. Doubts that are found in the images belong here, too."""
 
-import math
-
-from common.camera.orientation import UPRIGHT
+from common.orientation import UPRIGHT
+from common.words import distance_text
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed
-from phone_host.output.pair_files import WrittenPair
+from phone_host.report.cut_words import searched_from_m
 from phone_host.report.stereo_report import Remark
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.stereo.images import EncodedFile
@@ -13,12 +12,11 @@ from phone_host.stereo.plausible import is_off_the_middle
 from phone_host.stereo.reproject import nearest_depth_m
 
 
-def pair_remarks(processed: Processed, written: WrittenPair, trust: PairTrust, near_m: float) -> tuple[Remark, ...]:
+def pair_remarks(processed: Processed, trust: PairTrust, near_m: float) -> tuple[Remark, ...]:
     """Find what must be said about a pair.
 
     Args:
         processed: the pair.
-        written: its files.
         trust: how its images were judged.
         near_m: nearest depth that was looked for, m; NaN: the search was given in px.
 
@@ -35,20 +33,13 @@ def pair_remarks(processed: Processed, written: WrittenPair, trust: PairTrust, n
         for concern in trust.concerns
     ]
     geometry, search = processed.geometry, processed.search
-    if geometry is not None and search is not None and search.disparities and not math.isnan(near_m):
-        nearest_m = nearest_depth_m(geometry, search.disparities)
-        if nearest_m > near_m:
-            remarks.append(
-                Remark(
-                    f"nothing nearer than {nearest_m * 1e3:.0f} mm is found: at {near_m * 1e3:g} mm the two views of this rig share"
-                    " less than half of their width"
-                )
-            )
-    if written.not_in_depth_png:
+    from_m = searched_from_m(geometry, search)
+    # N is rounded up to what reaches near_m, unless the images' width bounds it. NaN is never greater.
+    if geometry and search and search.disparities and nearest_depth_m(geometry, search.disparities) > near_m:
         remarks.append(
             Remark(
-                f"{written.not_in_depth_png} depths are missing in depth.png, which holds 1 mm to 65.5 m",
-                "take them from xyz.pfm",
+                f"nothing nearer than {distance_text(from_m)} is found: at {distance_text(near_m)} the two views of this rig share"
+                " less than half of their width"
             )
         )
     if geometry is None:

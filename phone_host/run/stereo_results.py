@@ -7,7 +7,7 @@ nothing.
 import errno
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
@@ -55,7 +55,8 @@ class StereoResults:
         """Give a pair a place for its files. The folder is open.
 
         Args:
-            name: of its own folder, which appears when the block ends; empty: its files go into the results folder.
+            name: of its own folder, which appears when the block ends; empty: its files go into the results folder. If
+                the block fails, nothing of them stays.
             files: names of its files.
             run_all: see `ListedFolder.new_folder`.
 
@@ -71,7 +72,13 @@ class StereoResults:
                 yield folder
         else:
             self._own.add(*files)
-            yield self._path
+            try:
+                yield self._path
+            except BaseException:  # a cloud without its report could be taken for a whole result
+                for file in files:
+                    with suppress(OSError):
+                        (self._path / file).unlink()
+                raise
 
     def write_text(self, name: str, text: str) -> None:
         """Write a file of all pairs together.

@@ -1,25 +1,49 @@
 """Judges one processed pair of images from files: its doubts, and the answer to whether its depth is right."""
 
+from dataclasses import replace
+from typing import Final
+
+from common.orientation import UPRIGHT, Orientation
+from phone_host.measure.file_remedies import ImageSource
 from phone_host.measure.headline import answer
 from phone_host.measure.image_doubts import gravest_first, image_doubts, median_figures
-from phone_host.measure.search_doubts import no_depth
+from phone_host.measure.no_depth import no_depth
+from phone_host.measure.orient_words import Spelling, with_final_options
+from phone_host.measure.trust import REJECTED_RIG, Doubt
 from phone_host.model import Processed
+from phone_host.report.depth_data import density
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
 
+_UNMATCHED: Final = no_depth(None, None)
+_OF_FILES: Final = "check that the scene has texture, and that --calibration or --rectified fits the images"
 
-def judge_pair(core: StereoCore, processed: Processed) -> PairTrust:
+
+def judge_pair(
+    core: StereoCore, processed: Processed, mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
+) -> PairTrust:
     """Judge one pair.
 
     Args:
         core: the core that processed it.
         processed: its result.
+        mounted: what the user gave to make the left and the right image upright.
     """
     evidence = measure_evidence(processed, maps_of(core, processed))
-    found = image_doubts(evidence)
+    seen = image_doubts(evidence, ImageSource.FILES)
+    found = tuple(with_final_options(concern, mounted, Spelling.OF_FILES) for concern in seen)
     if not has_depth(processed) and not any(concern.doubt.blocks for concern in found):
-        found = gravest_first((no_depth(found), *found))
+        # That there are few disparities, too, says nothing more.
+        further = (concern for concern in found if concern.doubt is not Doubt.LOW_DENSITY)
+        why = no_depth(processed.cut, processed.limits, found)
+        remedy = _OF_FILES if why == _UNMATCHED else why.remedy
+        sentence = why.sentence.replace("no pair has", "no pixel has", 1)  # it may be the only pair
+        found = gravest_first((replace(why, sentence=sentence, remedy=remedy), *further))
+    if core.rig is not None and core.rig.is_rejected:
+        found = gravest_first((REJECTED_RIG, *found))
     figures = median_figures((evidence,))
     error_px = float("nan") if processed.limits is None else processed.limits.disparity_error_px
-    return PairTrust(figures, found, answer(figures, found, processed.geometry, error_px))
+    # The headline counts what the files hold: the pixels that have a point, where metres are known.
+    shown = replace(figures, density=density(processed))
+    return PairTrust(figures, found, answer(shown, found, processed.geometry, error_px))

@@ -1,16 +1,21 @@
-"""The live table that a terminal shows during a run."""
+"""The live table that a terminal shows during a run. Log lines go above it, and it is never higher than the terminal."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from threading import RLock
 from types import TracebackType
 from typing import Final, Self
 
-from rich.console import Console, Group
+from rich.console import Console, RenderableType
 from rich.live import Live
 from rich.progress import BarColumn, Progress, TextColumn
+from rich.segment import Segment, Segments
 from rich.table import Table
 from rich.text import Text
 
 from common import now
+from common.program import logs
 from common.words import counted
 from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import rung_lines
@@ -27,6 +32,19 @@ _WIDE: Final = 64
 
 _RECENT: Final = 300
 """Percentiles cover this many newest pairs: ten seconds at 30 pairs per second."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A part of the view.
+
+    Attributes:
+        rank: parts of a lower rank get room first.
+        shown: its content.
+    """
+
+    rank: int
+    shown: RenderableType
 
 
 class LiveTable:
@@ -49,6 +67,9 @@ class LiveTable:
     ) -> None:
         self._snapshot = snapshot
         self._live = Live(console=console or Console(stderr=True), auto_refresh=False, transient=True)
+        # Two threads that draw at once would each move the cursor from where the other one had left it.
+        self._drawing = RLock()
+        self._ending = ExitStack()
         self._seconds = seconds
         self._started_s = now.monotonic_ns() / 1e9
         self._shown_s = 0.0
@@ -61,13 +82,18 @@ class LiveTable:
         self._task = self._progress.add_task("seconds" if seconds else "pairs", total=total) if total else None
 
     def __enter__(self) -> Self:
-        self._live.start()
+        with ExitStack() as begun:
+            begun.enter_context(logs.written_by(self._say))
+            self._live.start()
+            begun.callback(self._live.stop)
+            self._ending = begun.pop_all()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._live.stop()
+        with self._drawing:
+            self._ending.close()
 
     def refresh(self) -> None:
         """Show the present state, at most a few times a second."""
@@ -82,12 +108,43 @@ class LiveTable:
             self._last = (run.processed, now_s)
         if self._task is not None:
             self._progress.update(self._task, completed=now_s - self._started_s if self._seconds else run.processed)
-        bar = [self._progress] if self._task is not None else []
-        # Problems come first, because a small terminal cuts off the bottom.
-        shown = Group(
-            *_judgement(run), _table(run, self._rate, self._live.console.width), _stages(run), _state(run), *bar
+        with self._drawing:
+            console = self._live.console
+            self._live.update(_fitted(self._parts(run, console.width), console), refresh=True)
+
+    def _parts(self, run: RunSnapshot, width: int) -> Sequence[_Part]:
+        """Return the view from top to bottom; on a low terminal warnings, bar and table are what stays."""
+        bar = [_Part(1, self._progress)] if self._task is not None else []
+        return (
+            *(_Part(0, line) for line in _warnings(run)),
+            *(_Part(3, line) for line in _cameras(run)),
+            *(_Part(5, Text(line)) for line in depth_lines(run.images)),
+            _Part(2, _table(run, self._rate, width)),
+            _Part(6, _stages(run)),
+            _Part(7, Text(judge(figures(run)).sentence, style="dim")),
+            _Part(4, _state(run)),
+            *bar,
         )
-        self._live.update(shown, refresh=True)
+
+    def _say(self, line: str) -> None:
+        """Write a line of the log above the view."""
+        with self._drawing:
+            self._live.console.print(Text(line, overflow="fold"))
+
+
+def _fitted(parts: Sequence[_Part], console: Console) -> Segments:
+    """Draw parts below each other in the rows of a terminal; the last parts to get room are cut or left out.
+
+    One row stays free: a view as high as the terminal would scroll when it ends, and its top could not be removed.
+    """
+    room = console.height - 1
+    drawn: dict[int, list[list[Segment]]] = {}
+    for place in sorted(range(len(parts)), key=lambda each: (parts[each].rank, each)):
+        drawn[place] = console.render_lines(parts[place].shown, pad=False)[: max(room, 0)]
+        room -= len(drawn[place])
+    lines = [line for place in range(len(parts)) for line in drawn[place]]
+    ended = [[*line, Segment.line()] for line in lines[:-1]]
+    return Segments([segment for line in (*ended, *lines[-1:]) for segment in line])
 
 
 def _table(run: RunSnapshot, rate: float, width: int) -> Table:
@@ -116,16 +173,19 @@ def _stages(run: RunSnapshot) -> Text:
     return Text(f"processing, p50 in ms: {', '.join(shares) or 'not yet'}", style="dim")
 
 
-def _judgement(run: RunSnapshot) -> list[Text]:
-    """Return the regime, how the depth fares, the two cameras' troubles and the concerns."""
+def _warnings(run: RunSnapshot) -> list[Text]:
+    """Return the concerns; without any, how the depth fares."""
     warnings = [Text(f"warning: {item.sentence}: {item.remedy}", style="bold red") for item in concerns(run)]
-    lines = (*camera_troubles(run.camera), *rung_lines(run.link))
-    away = away_words(run.away)
-    camera = [Text(line, style="yellow") for line in (*lines, *([away] if away else []))]
-    depth = [Text(line) for line in depth_lines(run.images)]
     if run.images.wants_depth and run.images.judged and not warnings:
-        depth.insert(0, Text(headline(run).sentence, style="bold"))
-    return [Text(judge(figures(run)).sentence, style="dim"), *depth, *camera, *warnings]
+        return [Text(headline(run).sentence, style="bold")]
+    return warnings
+
+
+def _cameras(run: RunSnapshot) -> list[Text]:
+    """Return the two cameras' troubles."""
+    away = away_words(run.away)
+    lines = (*camera_troubles(run.camera), *rung_lines(run.link), *([away] if away else []))
+    return [Text(line, style="yellow") for line in lines]
 
 
 def _state(run: RunSnapshot) -> Text:

@@ -6,15 +6,19 @@ from collections.abc import Callable
 from typing import Final
 
 from common import now
-from phone_host.measure.image_doubts import ImageJudge, ImageTrust
+from phone_host.measure.image_doubts import ImageTrust
+from phone_host.measure.image_judge import ImageJudge
 from phone_host.measure.sink_account import SinkAccount
-from phone_host.model import DepthLimits, Processed, Result
+from phone_host.model import DepthLimits, Result, StereoGeometry
 from phone_host.run.sinks import SinkQueue
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
 
 _PERIOD_NS: Final = 500_000_000
 """A mistake must be named within 2 s. Two of three judgements name it: 1 s, and at most one period until the first."""
+
+_DEPTH: Final = 2
+"""A judged pair may still hold its place in the queue when the next one comes. Never more than one waits to be judged."""
 
 
 class TrustSink:
@@ -29,11 +33,13 @@ class TrustSink:
         self._core, self._clock = core, clock
         self._judge = ImageJudge()
         self._lock = threading.Lock()
-        self._queue: SinkQueue[Processed] = SinkQueue("trust", self._take, depth=1)
+        self._queue: SinkQueue[tuple[Result, int]] = SinkQueue("trust", self._take, depth=_DEPTH)
         self._due_ns = 0
+        self._started_ns = clock()
         self._is_busy = False
         self._has_depth = False
         self._limits: DepthLimits | None = None
+        self._geometry: StereoGeometry | None = None
 
     def await_place(self, number: int) -> None:
         """See Sink."""
@@ -43,12 +49,14 @@ class TrustSink:
         """See Sink."""
         processed = result.processed
         self._has_depth = self._has_depth or has_depth(processed)
-        self._limits = processed.limits or self._limits
+        # Not the core's: images of another size than the calibration's have another geometry.
+        self._limits, self._geometry = processed.limits or self._limits, processed.geometry or self._geometry
         now_ns = self._clock()
         if now_ns < self._due_ns or self._is_busy:
             return
         self._due_ns = now_ns + _PERIOD_NS
-        self._is_busy = self._queue.offer(processed)
+        self._is_busy = True  # before the offer: the thread may be done with it before this one goes on
+        self._queue.offer((result, now_ns))  # refused only if the sink has failed or ends
 
     def finish(self) -> None:
         """See Sink."""
@@ -75,13 +83,17 @@ class TrustSink:
                 start=self._judge.start,
                 now=self._judge.now,
                 concerns=self._judge.concerns,
-                geometry=None if self._core is None else self._core.geometry,
+                newest=self._judge.newest,
+                history=self._judge.history,
+                geometry=self._geometry,
                 disparity_error_px=math.nan if self._limits is None else self._limits.disparity_error_px,
             )
 
-    def _take(self, processed: Processed) -> None:
+    def _take(self, judged: tuple[Result, int]) -> None:
+        result, done_ns = judged
+        processed = result.processed
         maps = None if self._core is None else maps_of(self._core, processed)
         evidence = measure_evidence(processed, maps)
         with self._lock:
-            self._judge.add(evidence)
-        self._is_busy = False
+            self._judge.add(evidence, at_s=(done_ns - self._started_ns) / 1e9, pair=result.number)
+            self._is_busy = False

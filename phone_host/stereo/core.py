@@ -206,7 +206,7 @@ class StereoCore:
         if not isinstance(self._matcher, MatchSettings):
             return 0
         if geometry is None or math.isnan(self.wanted.search_from_m):
-            return self._matcher.disparities
+            return min(self._matcher.disparities, along_px)  # no point lies farther left than the image's edge
         return disparities_for_near(geometry, self.wanted.search_from_m, along_px)
 
     def _matcher_for(self, disparities: int) -> Matcher:

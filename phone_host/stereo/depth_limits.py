@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.model import CloudImage, Crop, CutCounts, DepthLimits, Disparity, StereoGeometry
@@ -82,21 +81,6 @@ def depth_limits(
     given = not math.isnan(wanted.far_m)
     far_m = wanted.far_m if given else geometry.focal_px * geometry.baseline_m * share / error_px
     return DepthLimits(near_m=wanted.near_m, far_m=far_m, disparity_error_px=error_px, from_rig=not given)
-
-
-def depth_sigma_m(depth_m: NDArray[np.floating], geometry: StereoGeometry, limits: DepthLimits) -> NDArray[np.floating]:
-    """Return the uncertainty of depths, z^2 delta / (f b).
-
-    Args:
-        depth_m: z, m, any shape, NaN = none.
-        geometry: of the rectified pair.
-        limits: of the same result.
-
-    Returns:
-        m, the same shape.
-    """
-    of_1_m = limits.disparity_error_px / (geometry.focal_px * geometry.baseline_m)
-    return np.asarray(np.square(depth_m) * np.float32(of_1_m), np.float32)
 
 
 def above_zero(disparity: Disparity, doffs_px: float, error_px: float) -> tuple[Disparity, int]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from phone_host.model import Arrangement, Image, Side, Support
 from phone_host.stereo.evidence_points import PointMaps, Points, mirrored, turned_back
 
-_FEATURES: Final = 400
+_FEATURES: Final = 300
 _CONTRAST: Final = 0.02
 """SIFT's own threshold is 0.04; images of plain rooms have too few features above it."""
 
@@ -252,6 +252,8 @@ def supports(
     related = on_common_rows(upright.left_px, upright.right_px, height_px)
     same = on_same_rows(upright.left_px, upright.right_px, height_px)
     in_order = _in_order(upright.left_px, upright.right_px, size_px[0], -_LOST_ZERO)
+    by_quarters = {quarters: max(back.right(plain, quarters), back.left(plain, 4 - quarters)) for quarters in (1, 3)}
+    quarters = max(by_quarters, key=lambda turn: by_quarters[turn])
     counts: dict[Arrangement, int] = {
         Arrangement.RIGHT: int((same & in_order).sum()),
         Arrangement.TILTED: int(related.sum()),
@@ -259,14 +261,15 @@ def supports(
         Arrangement.BOTH_TURNED: back.both_on_heads(upright),
         Arrangement.BOTH_MIRRORED: back.both_mirrored(upright),
         Arrangement.TURNED: back.right(plain, 2),
-        Arrangement.TURNED_BY_QUARTER: max(
-            back.right(plain, 1), back.right(plain, 3), back.left(plain, 1), back.left(plain, 3)
-        ),
+        Arrangement.TURNED_BY_QUARTER: by_quarters[quarters],
         Arrangement.BOTH_TURNED_BY_QUARTER: back.both_by_quarter(upright),
         Arrangement.MIRRORED: max(back.mirrored(turned_over, 0), back.mirrored(turned_over, 2)),
         Arrangement.SAME_PLACE: _unmoved(upright, maps),
     }
-    return tuple(Support(arrangement, count) for arrangement, count in counts.items())
+    return tuple(
+        Support(arrangement, count, quarters if arrangement is Arrangement.TURNED_BY_QUARTER else 0)
+        for arrangement, count in counts.items()
+    )
 
 
 def _in_order(left_px: Points, right_px: Points, width_px: int, least: float) -> NDArray[np.bool_]:

@@ -7,35 +7,32 @@ Rules:
 - an image is upright as soon as it is decoded: what its EXIF header says is applied, then what the user says of its
   camera. A rig belongs to upright images (decision 0032);
 - images deeper than 8 bit: both images of a pair get the same scale, or the matcher would see two brightnesses (see
-  `to_8_bit`).
+  `eight_bit.py`).
 """
 
 import logging
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from common.camera.orientation import UPRIGHT, Orientation
 from common.errors import DataError
 from common.files import read_whole
 from common.frame import FrameFault, ImageSizeError, SpoiledImageError
 from common.imagesize.head import MOST_PIXELS, ImageHead, ImageKind, require_believable
 from common.imagesize.head import size_text as px_text
 from common.imagesize.read import read_head, whole_image
+from common.orientation import UPRIGHT, Orientation
 from common.program.logs import event
 from phone_host.model import Image
+from phone_host.stereo.eight_bit import AnyImage, to_8_bit
 from phone_host.stereo.orient import upright
 from phone_host.stereo.overheard import overhear
 
 _LOG = logging.getLogger(__name__)
-
-AnyImage = NDArray[Any]
-"""(H, W) or (H, W, 3) BGR, any depth."""
 
 _REPLACE: Final = "copy or record the image again"
 
@@ -57,14 +54,6 @@ _HARMLESS_BEFORE_END: Final = 48
 """Webcams are known to leave 1 to 10 bytes before restart markers (pupil-labs/pupil, issue 1816) and padding before the
 end. In 1500 images with one flipped bit each, the decoder was left with 64 bytes or more before the end, and with at
 most 8 before restart markers in 1 of 23 (decision 0021)."""
-
-# 16-bit files hold sensor values of 10, 12 and 14 bit with the upper bits 0 about as often as shifted up.
-_SENSOR_BITS = (8, 10, 12, 14, 16)
-# Hot pixels must not set the scale: 1 per mille is left out at each end.
-_LOW_PERCENT, _HIGH_PERCENT = 0.1, 99.9
-# If an image uses less than this share of the range (about 5 of 8 bits), plain scaling leaves too few levels: stretch
-# it instead (thermal cameras).
-_NARROW_SHARE = 1 / 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,23 +190,6 @@ def read_image(path: Path, most_pixels: int = MOST_PIXELS, mounted: Orientation 
     return decode_file(open_image(path, most_pixels, mounted))
 
 
-def read_pair(left: Path, right: Path, most_pixels: int = MOST_PIXELS) -> tuple[Image, Image]:
-    """Read the two image files of a pair, with one common scale where they are deeper than 8 bit.
-
-    Args:
-        left: the left image's file.
-        right: the right image's file.
-        most_pixels: an image that claims more is refused.
-
-    Returns:
-        Left and right, each (H, W) grey or (H, W, 3) BGR, uint8.
-
-    Raises:
-        DataError: a file is missing, empty, spoiled, of no known kind or beyond the limit.
-    """
-    return decode_files(open_image(left, most_pixels), open_image(right, most_pixels))
-
-
 def require_same_size(left_px: tuple[int, int], right_px: tuple[int, int], left_name: str, right_name: str) -> None:
     """Check that two images can be a rectified pair.
 
@@ -263,53 +235,6 @@ def to_grey(image: Image) -> Image:
     if image.ndim == 2:
         return image
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-
-
-def to_8_bit(images: tuple[AnyImage, ...]) -> tuple[Image, ...]:
-    """Convert images of any depth to 8 bit with one common scale.
-
-    8-bit images pass unchanged. For 16-bit images, take the smallest usual sensor depth (8, 10, 12, 14 or 16 bit) that
-    holds 99.9 % of the values of all of them together; its range becomes 0..255. So an 8-bit picture stored as 16 bit
-    (times 257) comes back exactly, and brightness does not jump between frames. Images that use less than an eighth of
-    that range, and images of other types (float, signed), are stretched between their common 0.1 % and 99.9 % values
-    instead.
-
-    Args:
-        images: each (H, W) or (H, W, 3), any depth.
-
-    Returns:
-        The same images as uint8, in the same order.
-    """
-    deep = [image for image in images if image.dtype != np.uint8]
-    if not deep:
-        return images
-    values = np.concatenate([image.ravel() for image in deep], dtype=np.float32, casting="unsafe")
-    if any(image.dtype.kind == "f" for image in deep):
-        values = values[np.isfinite(values)]
-    low, high = _ends(values) if values.size else (0.0, 1.0)
-    if all(image.dtype == np.uint16 for image in deep):
-        full = next(2**bits - 1 for bits in _SENSOR_BITS if high <= 2**bits - 1)
-        if high - low >= full * _NARROW_SHARE or high <= 255:
-            low, high = 0.0, float(full)
-    scale = 255.0 / (high - low) if high > low else 0.0
-    return tuple(image if image.dtype == np.uint8 else _scaled(image, low, scale) for image in images)
-
-
-def _ends(values: NDArray[np.float32]) -> tuple[float, float]:
-    """Return the values beyond which hot pixels lie, dark and bright; reorders `values`."""
-    low, high = np.percentile(values, (_LOW_PERCENT, _HIGH_PERCENT), overwrite_input=True)
-    return float(low), float(high)
-
-
-def _scaled(image: AnyImage, low: float, scale: float) -> Image:
-    # In place: a copy at each step would take five times the memory of the image.
-    values = image.astype(np.float32)
-    np.nan_to_num(values, copy=False, nan=low)
-    values -= low
-    values *= scale
-    np.rint(values, out=values)
-    levels: Image = np.clip(values, 0, 255, out=values).astype(np.uint8)
-    return levels
 
 
 def _decoded(image: EncodedFile) -> AnyImage:

@@ -5,7 +5,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from common.camera.orientation import UPRIGHT, Flip, Orientation
+from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.model import Image
 
 _TURNS: Final = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}

@@ -7,9 +7,9 @@ from typing import Final
 import cv2
 import numpy as np
 
-from common.camera.orientation import UPRIGHT, Orientation
 from common.frame import FrameFault, ImageSizeError, PixelFormat, SpoiledImageError, raw_bytes
 from common.imagesize.head import MOST_PIXELS, ImageKind, require_pixels, size_text
+from common.orientation import UPRIGHT, Orientation
 from phone_host.model import Image
 from phone_host.stereo.images import EncodedFile, decode_file, decode_files, enlarged, examine, require_same_shape
 from phone_host.stereo.orient import upright

@@ -180,7 +180,7 @@ class Rectifier:
                 raise DataError(
                     f"the {side.value} image is {size_text(found_px)} px, rig.yaml was calibrated for"
                     f" {model.width_px}x{model.height_px}",
-                    "use the resolution of the calibration, or calibrate again at this one",
+                    "use the resolution of the calibration; a crop cannot be told from its size: calibrate at this size",
                 )
 
     def rectify(self, left: Image, right: Image) -> RectifiedPair:
@@ -273,7 +273,8 @@ def _rotations(rig: Rig) -> tuple[Matrix, Matrix, float, Epipolar]:
     else:
         raise DataError(
             f"the right camera stands to the left of the left one (by {-x * baseline_m * 1e3:.1f} mm)",
-            "swap LEFT and RIGHT",
+            "swap LEFT and RIGHT; if each is where it should be, both mirror their images (--flip-left h --flip-right h) or both"
+            " stand on their heads (--rotate-left 180 --rotate-right 180)",
         )
     turn = _shortest_turn(np.array([x, y, z]), _TO_RIGHT[epipolar])
     return turn @ left_to_middle, turn @ right_to_middle, baseline_m, epipolar

@@ -82,7 +82,10 @@ def _scaled(model: CameraModel, size_px: tuple[int, int], side: Side) -> CameraM
                 f"{differ}: it lies on its side",
                 f"turn it upright: --rotate-{side.value} 90 or 270; for a camera, rotate=90 or 270 in its address",
             )
-        raise DataError(differ, "use a resolution of the calibration's aspect ratio, or calibrate again at this one")
+        raise DataError(
+            differ,
+            "use a resolution of the calibration's aspect ratio; a crop cannot be told from its size: calibrate at this size",
+        )
     scale_x, scale_y = (new / old for new, old in zip(size_px, own_px, strict=True))
     # Pixel centres are integers, so an image begins at -0.5: x' + 0.5 = (x + 0.5) s.
     to_scaled = np.array([[scale_x, 0, (scale_x - 1) / 2], [0, scale_y, (scale_y - 1) / 2], [0, 0, 1]], np.float64)

@@ -13,7 +13,7 @@ SUFFIXES: Final = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".pnm", ".
 _UNREAD: Final = frozenset({".heic", ".heif", ".avif"})
 """Photographs of phones that are not read."""
 
-_REMEDY: Final = "give a folder of images or a quoted glob such as 'left*.png'"
+_REMEDY: Final = "give an image, a folder of images or a quoted glob such as 'left*.png'"
 _MOST_KINDS: Final = 4  # enough to recognise a folder by; the line stays short
 _NUMBER = re.compile(r"\d+")
 

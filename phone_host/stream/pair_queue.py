@@ -73,6 +73,7 @@ class PairQueue:
         self._tolerance_ns = tolerance_ns
         self._host_period_ns = host_period_ns
         self._board_period_ns = 0
+        self._film_period_ns = 0  # as the board's hello has it: a board that leaves images out shows the same film
         self._pairing: Pairing[BoardFrame, Frame] | StillsPairing[BoardFrame, Frame] | None = None
         self._changed = threading.Condition()
         self._closed = False
@@ -132,6 +133,8 @@ class PairQueue:
                 own_alone=self._own_alone,
                 apart=self._films.apart,
                 first_apart=self._films.first_apart,
+                board_period_ns=0 if self._demand.is_timeless else self._film_period_ns,
+                own_period_ns=0 if self._demand.is_timeless else self._host_period_ns,
             )
 
     @property
@@ -178,6 +181,7 @@ class PairQueue:
         with self._changed:
             self._meter = PhaseMeter(board_period_ns, self._host_period_ns)
             self._board_images = told
+            self._film_period_ns = board_period_ns
             self._films.begin(told, self._own_images, by_time=not self._demand.is_timeless)
             if self._pairing is not None:
                 self._settle(self._pairing.restart(OrphanReason.STREAM_ENDED))

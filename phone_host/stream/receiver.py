@@ -16,8 +16,9 @@ from common.protocol.session import Outgoing, connection_name
 from common.protocol.wire import VersionError, decode, encode_stamped
 from phone_host.measure.accounts import LinkAccount
 from phone_host.stream.corrections import Corrections
-from phone_host.stream.frame_sink import FrameSink
-from phone_host.stream.reception import BoardListener, LinkFacts, Reception
+from phone_host.stream.frame_sink import BoardListener, FrameSink
+from phone_host.stream.link_facts import LinkFacts
+from phone_host.stream.reception import Reception
 from phone_host.stream.refusals import BoardRefusal
 from phone_host.sync.clock import ClockEstimate
 

@@ -6,17 +6,14 @@ time: messages and `now_ns` come in, and outgoing messages go to `send`.
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import replace
 
 from common.errors import UnavailableError
 from common.program.logs import event
 from common.protocol.host_session import HostSession
 from common.protocol.message import (
-    BoardCounts,
     BoardHello,
     FrameMessage,
-    Lane,
     Locks,
     LockState,
     Message,
@@ -43,8 +40,10 @@ from common.protocol.session import (
 )
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount, link_names
 from phone_host.model import BoardFrame
+from phone_host.stream.board_news import tell_found, tell_refused, tell_stepped
 from phone_host.stream.border import Arrival, Border
-from phone_host.stream.frame_sink import FrameSink
+from phone_host.stream.frame_sink import BoardListener, FrameSink
+from phone_host.stream.link_facts import LinkFacts
 from phone_host.stream.lock_asking import LockAsking
 from phone_host.stream.refusals import BoardRefusal, Refusals, refusal_text
 from phone_host.sync.choice import LinkChoice
@@ -52,31 +51,6 @@ from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.flow import Flow
 
 _LOG = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True)
-class LinkFacts:
-    """What the reception must know of a link.
-
-    Attributes:
-        kind: the transport's name.
-        dialled: the connections that this side opened, with names unique over all links; empty if the board dials.
-        self_paced: whether the link itself holds the next frame back until the previous one has left.
-    """
-
-    kind: str
-    dialled: dict[Lane, bytes]
-    self_paced: bool
-
-
-class BoardListener(Protocol):
-    """Is told of the board's sessions and frames by the receiver's thread."""
-
-    def session_began(self) -> None:
-        """Take note that a board session has begun. Nothing of the previous one will follow."""
-
-    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """Take note of a frame that the sink took: its exposure on the host's clock, and its number in the session."""
 
 
 class Reception:
@@ -229,7 +203,7 @@ class Reception:
 
     def lose_tail(self) -> None:
         """Take note that the last account did not come: what the board sent since the newest account is unknown."""
-        self._current.vanished = True
+        self.account.current.vanished = True
 
     def count_garbage(self, problem: str) -> None:
         """Count something that is not a message of ours."""
@@ -259,7 +233,7 @@ class Reception:
                 case Echo() | ClockVoid():
                     self._note_clock(output, now_ns)
                 case Stale(_, reason):
-                    self._current.count_stale(reason)
+                    self.account.current.count_stale(reason)
                 case Accepted():
                     self._begin(output, now_ns)
                 case LinkUp() | LinkDown() | OtherBoard():
@@ -287,7 +261,7 @@ class Reception:
     def _note_account(self, counted: Counted, now_ns: int) -> None:
         """Take note of the board's account of the present session."""
         self.tail_known |= counted.last  # an older account may still follow on the other lane
-        account = self._current
+        account = self.account.current
         account.lost += counted.lost
         account.latest = max(counted.counts, account.latest, key=lambda counts: (counts.grabbed, counts.sent))
         account.ended |= counted.ended
@@ -308,19 +282,18 @@ class Reception:
 
     def _tell_refusal(self, link: int, refusal: BoardRefusal) -> None:
         if self._refusals.is_news(link):
-            problem, remedy = refusal_text(refusal)
-            _LOG.warning(event("link_refused", link=self.account.links[link].name, problem=problem, remedy=remedy))
+            tell_refused(self.account.links[link].name, refusal)
 
     def _note_gone(self, *, orderly: bool, now_ns: int) -> None:
         """Take note that the board has gone from all links."""
         self._border.close()
-        self._current.vanished = not orderly
-        if not self._current.ended:
+        self.account.current.vanished = not orderly
+        if not self.account.current.ended:
             self.account.board_left(now_ns)
         for number, tally in enumerate(self.account.links):
             self._choice.down(number, now_ns)
             tally.is_up = False
-        _LOG.info(event("board_gone", session=self._current.session, orderly=orderly))
+        _LOG.info(event("board_gone", session=self.account.current.session, orderly=orderly))
 
     def _note_link(self, news: LinkUp | LinkDown | OtherBoard, now_ns: int) -> None:
         """Take note of a link that came up, went down, or leads to a different board."""
@@ -353,12 +326,6 @@ class Reception:
                     "give --link only addresses of the same board",
                 )
 
-    @property
-    def _current(self) -> SessionAccount:
-        if not self.account.sessions:
-            self.account.sessions.append(SessionAccount("", BoardCounts(), BoardCounts()))
-        return self.account.sessions[-1]
-
     def _begin(self, accepted: Accepted, now_ns: int) -> None:
         hello, link = accepted.hello, accepted.link
         self._refusals.accepted()
@@ -370,15 +337,15 @@ class Reception:
         tally, before = self.account.links[link], self._streamed_over
         self._streamed_over = link
         if accepted.resumed:
-            self._current.lost += accepted.lost
-            self._current.vanished = False
+            self.account.current.lost += accepted.lost
+            self.account.current.vanished = False
         else:
             self.account.sessions.append(SessionAccount(hello.session, hello.counts, hello.counts))
             self._locks.begin()
             if self._listener is not None:
                 self._listener.session_began()
             self._sink.begin(hello.camera)
-        self._current.rung = hello.rung
+        self.account.current.rung = hello.rung
         self._sink.change_period(hello.camera.period_ns)
         if link != before:
             tally.carried += 1
@@ -388,23 +355,19 @@ class Reception:
             _LOG.info(event("link_switched", source=names[before].name, target=tally.name, lost=accepted.lost))
             return
         self.account.connects += 1
-        camera = hello.camera
-        size = f"{camera.width_px}x{camera.height_px}"
-        found = {"session": hello.session, "resumed": accepted.resumed, "link": tally.name}
-        _LOG.info(event("board_found", **found, camera=camera.name, size=size))
+        tell_found(hello, tally.name, resumed=accepted.resumed)
 
     def _note_rung(self, rung: Rung) -> None:
         """Adopt the new rung of the board's camera."""
         assert self._hello is not None
         self._hello = replace(self._hello, camera=replace(self._hello.camera, period_ns=rung.period_ns), rung=rung)
-        self._current.rung = rung
+        self.account.current.rung = rung
         self._sink.change_period(rung.period_ns)
-        fps = round(1e9 / rung.period_ns, 2)
-        _LOG.info(event("board_camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality))
+        tell_stepped(rung)
 
     def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
         """Count a frame of the present session and give it to the border."""
-        account, tally = self._current, self.account.links[link]
+        account, tally = self.account.current, self.account.links[link]
         account.received += 1
         account.lost += lost
         tally.frames += 1
@@ -419,7 +382,7 @@ class Reception:
         """Pass a believed frame to the sink, if the sink wants it."""
         assert self._hello is not None
         if (objection := self._sink.objection(frame)) is not None:
-            self._current.disbelieved[objection] += 1
+            self.account.current.disbelieved[objection] += 1
             return
         message, marks = frame.message, frame.marks
         transit_ns = frame.received_ns - marks.sent_ns

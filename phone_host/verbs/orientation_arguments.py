@@ -2,7 +2,7 @@
 
 import argparse
 
-from common.camera.orientation import Flip, Orientation
+from common.orientation import Flip, Orientation
 
 _TURNS = (90, 180, 270)
 

@@ -19,14 +19,21 @@ _REPLACED: Final = (REPORT, "index.html")
 _MOST_REPORT_BYTES: Final = 16 << 20
 """A longer file is no report of ours."""
 
+_COMMAND: Final = "command"
+"""The key under which a report names the verb that wrote it."""
+
 _OWN_KEYS: Final = (
     ("truth", "demo"),
     ("ended", "run"),
+    ("matcher", "stereo"),
+    ("left_alone", "stereo"),
     ("verdict", "calibrate"),
     ("time_offset_ns", "calibrate-time"),
-    ("matcher", "stereo"),
 )
-"""A key that only this verb's report has, or only with one of those before it."""
+"""For reports before that key: one that only this verb's report has, or only with one of those before it."""
+
+_VERBS: Final = frozenset(verb for _, verb in _OWN_KEYS)
+"""No other name in a report becomes part of a file's name."""
 
 
 def require_folder(out: Path) -> None:
@@ -109,8 +116,12 @@ def _owner_of(report: Path) -> str:
         content = json.loads(read_whole(report, _MOST_REPORT_BYTES))
     except (OSError, DataError, ValueError):
         return ""
-    keys = content.keys() if isinstance(content, dict) else set()
-    return next((command for key, command in _OWN_KEYS if key in keys), "")
+    if not isinstance(content, dict):
+        return ""
+    named = content.get(_COMMAND)
+    if named is not None:
+        return named if isinstance(named, str) and named in _VERBS else ""
+    return next((command for key, command in _OWN_KEYS if key in content), "")
 
 
 def require_file(out: Path, option: str = "--out") -> None:

@@ -1,25 +1,12 @@
-"""Reads the numbers among the options of the stereo core: lengths, pixels, a crop, a scale."""
+"""Reads the numbers among the options of the stereo core: pixels, a crop, a scale."""
 
 import math
 
 from common.errors import SettingsError
 from phone_host.model import Crop
-from phone_host.verbs.units import length_mm
 
 _LEAST_SCALE = 0.1
 """At a tenth of the size a disparity is known ten times worse: the smallest scale that still shows something."""
-
-
-def length_m(text: str, option: str, example: str) -> float:
-    """Read a length as `units.length_mm` does.
-
-    Returns:
-        m, above 0.
-
-    Raises:
-        SettingsError: it is no length, or not above 0.
-    """
-    return length_mm(text, option, example) / 1000
 
 
 def pixels(text: str, option: str) -> float:

@@ -20,12 +20,13 @@ from phone_host.stereo.matcher_names import AnyMatcher, matcher_named
 from phone_host.stereo.plausible import require_plausible
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.scaled_rig import scaled_geometry
-from phone_host.verbs.stereo_numbers import crop_of, length_m, pixels, point_px, scale_of
+from phone_host.verbs.stereo_numbers import crop_of, pixels, point_px, scale_of
+from phone_host.verbs.units import baseline_mm, limit_mm
 
-_REJECTED: Final = "reject"
 """`Rig.verdict` of a rig that should not be used (`calibration.verdict`)."""
 
-_KITTI_COLOUR: Final = re.compile(r"\bimage_0?2\b")
+_KITTI_FOLDER: Final = re.compile(r"image_0?([0-3])")
+"""KITTI's folders of images are called by the camera: 0 and 1 are grey, 2 and 3 colour, each left before right."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +46,7 @@ def output_options(options: argparse.Namespace) -> OutputOptions:
 
 
 def build_core(
-    options: argparse.Namespace, calibration: str, matcher: str, size_px: tuple[int, int]
+    options: argparse.Namespace, calibration: str, matcher: str, size_px: tuple[int, int], images: Path | None = None
 ) -> tuple[StereoCore | None, Side | None]:
     """Build the stereo core from the options.
 
@@ -54,6 +55,8 @@ def build_core(
         calibration: path of rig.yaml or calib.txt; empty for none.
         matcher: name of the matcher.
         size_px: width and height of images that arrive rectified, px.
+        images: an image file of either side, or its folder; None: not from files. KITTI's calib.txt holds two pairs of
+            cameras, and only the folder's name tells which of them took the images.
 
     Returns: The core (None if neither a rig nor rectified images are given), and the side of the board's camera in the
         rig (None without a rig).
@@ -69,7 +72,7 @@ def build_core(
         raise SettingsError("--calibration and --rectified contradict each other", "give only one of the two")
     _refuse_idle_geometry(options, calibration)
     if of_rectified:
-        return _by_calib_txt(options, Path(calibration), chosen, wanted, size_px), None
+        return _by_calib_txt(options, Path(calibration), chosen, wanted, size_px, cameras=_kitti_cameras(images)), None
     if calibration:
         rig = read_rig(Path(calibration))
         refuse_rejected(rig, calibration, allowed=options.use_rejected_rig)
@@ -93,8 +96,8 @@ def depth_wanted(options: argparse.Namespace) -> DepthWanted:
     Raises:
         SettingsError: one of them is invalid, or nothing is left between the two limits.
     """
-    near_m = 0.0 if options.near is None else length_m(options.near, "--near", "300mm")
-    far_m = math.nan if options.far is None else length_m(options.far, "--far", "5m")
+    near_m = 0.0 if options.near is None else limit_mm(options.near, "--near", "300mm") / 1000
+    far_m = math.nan if options.far is None else limit_mm(options.far, "--far", "5m") / 1000
     if near_m >= far_m:
         raise SettingsError(f"--near {options.near} is not nearer than --far {options.far}", "give a larger --far")
     return DepthWanted(
@@ -121,20 +124,31 @@ def refuse_rejected(rig: Rig, calibration: str, *, allowed: bool) -> None:
     Raises:
         DataError: its verdict is reject, and it is not allowed.
     """
-    if rig.verdict == _REJECTED and not allowed:
+    if rig.is_rejected and not allowed:
         raise DataError(
-            f"{calibration} was rejected by its own calibration (verdict {_REJECTED}): its depth would be wrong",
+            f"{calibration} was rejected by its own calibration (verdict reject): its depth would be wrong",
             "calibrate again, or give --use-rejected-rig",
         )
 
 
+def _kitti_cameras(images: Path | None) -> KittiCameras:
+    """Tell by the innermost folder that is called as KITTI calls them which pair of cameras is meant; grey if there is none."""
+    parts = () if images is None else reversed(images.absolute().parts)
+    camera = next((found[1] for part in parts if (found := _KITTI_FOLDER.fullmatch(part))), "0")
+    return KittiCameras.COLOUR if camera in "23" else KittiCameras.GREY
+
+
 def _by_calib_txt(
-    options: argparse.Namespace, path: Path, chosen: AnyMatcher, wanted: DepthWanted, size_px: tuple[int, int]
+    options: argparse.Namespace,
+    path: Path,
+    chosen: AnyMatcher,
+    wanted: DepthWanted,
+    size_px: tuple[int, int],
+    *,
+    cameras: KittiCameras,
 ) -> StereoCore:
     """Build the core for rectified images from the file that their publisher gave; N is ndisp unless the user says otherwise."""
-    # KITTI's two pairs of cameras have other baselines. Its folders image_2 and image_02 hold the left colour images.
-    colour = _KITTI_COLOUR.search(str(getattr(options, "left", "")))
-    found = read_calib_txt(path, KittiCameras.COLOUR if colour else KittiCameras.GREY)
+    found = read_calib_txt(path, cameras)
     geometry, disparities = found.geometry, options.disparities
     if found.size_px is not None and found.size_px != size_px:
         geometry = scaled_geometry(geometry, found.size_px, size_px, str(path))
@@ -179,7 +193,7 @@ def rectified_geometry(options: argparse.Namespace, size_px: tuple[int, int]) ->
     cx_px, cy_px = ((n - 1) / 2 for n in size_px) if options.center is None else point_px(options.center, "--center")
     geometry = StereoGeometry(
         focal_px=focal_px,
-        baseline_m=length_m(options.baseline, "--baseline", "60mm"),
+        baseline_m=baseline_mm(options.baseline) / 1000,
         cx_px=cx_px,
         cy_px=cy_px,
         doffs_px=0.0 if options.doffs is None else pixels(options.doffs, "--doffs"),

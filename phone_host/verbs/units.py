@@ -33,8 +33,14 @@ def length_mm(text: str, option: str, example: str) -> float:
     return value
 
 
-_LEAST_BARE_MM: Final = 0.5
-"""No chessboard has smaller squares. A smaller number without a unit is a length in metres."""
+_LEAST_BARE_SQUARE_MM: Final = 0.5
+_LEAST_BARE_BASELINE_MM: Final = 1.0
+_LEAST_BARE_LIMIT_MM: Final = 10.0
+"""No chessboard has smaller squares, no two cameras are nearer to each other, no stereo camera sees what is nearer. A
+smaller number without a unit is a length in metres."""
+
+_MOST_BASELINE_MM: Final = 10_000.0
+"""As in rig.yaml and calib.txt. A longer one is given in micrometres."""
 
 
 def square_mm(text: str) -> float:
@@ -49,9 +55,52 @@ def square_mm(text: str) -> float:
     Raises:
         SettingsError: it is no length, or a number without a unit that can only mean metres.
     """
-    value = length_mm(text, "--square", "25mm")
+    return _not_metres(text, "--square", "25mm", _LEAST_BARE_SQUARE_MM)
+
+
+def baseline_mm(text: str) -> float:
+    """Read --baseline, the distance of two cameras, like `length_mm`.
+
+    Args:
+        text: what the user wrote.
+
+    Returns:
+        mm, above 0, up to 10 m.
+
+    Raises:
+        SettingsError: it is no length, a number without a unit that can only mean metres, or more than 10 m.
+    """
+    value = _not_metres(text, "--baseline", "60mm", _LEAST_BARE_BASELINE_MM)
+    if value > _MOST_BASELINE_MM:
+        said = f"--baseline {text.strip()} is {value / 1000:g} m"
+        raise SettingsError(said, f"give the distance of the two cameras, at most {_MOST_BASELINE_MM / 1000:g}m")
+    return value
+
+
+def limit_mm(text: str, option: str, example: str) -> float:
+    """Read --near or --far, a limit of the depth, like `length_mm`.
+
+    Args:
+        text: what the user wrote.
+        option: the option, for errors.
+        example: a value that would be right, for errors.
+
+    Returns:
+        mm, above 0.
+
+    Raises:
+        SettingsError: it is no length, or a number without a unit that can only mean metres.
+    """
+    return _not_metres(text, option, example, _LEAST_BARE_LIMIT_MM)
+
+
+def _not_metres(text: str, option: str, example: str, least_mm: float) -> float:
+    """Read a length; refuse a number without a unit that is too small to mean millimetres."""
+    value = length_mm(text, option, example)
     found = _LENGTH.fullmatch(text)
-    if found is not None and not found[2] and value < _LEAST_BARE_MM:
-        in_metres = f"{value * 1000:g}mm or {value:g}m"
-        raise SettingsError(f"--square {text.strip()} has no unit, and a number alone means mm", f"write {in_metres}")
+    if found is not None and not found[2] and value < least_mm:
+        raise SettingsError(
+            f"{option} {text.strip()} has no unit, and a number alone means mm",
+            f"write {value * 1000:g}mm or {value:g}m; {value:g}mm if you mean that",
+        )
     return value

@@ -1,6 +1,6 @@
 """Where the figures of docs/figures.md come from: a command line for each, and how its JSON becomes rows.
 
-The arguments keep `make figures` within about twelve minutes on two cores. Where a reference measurement exists, it
+The arguments keep `make figures` within about fifteen minutes on two cores. Where a reference measurement exists, it
 comes from the same run; otherwise its origin is stated.
 """
 
@@ -112,6 +112,16 @@ def _demo(data: Data) -> Iterator[Figure]:
     for name in ("propagation", "queuing", "processing", "end_to_end"):
         both = f"{_number(delays[name]['p50'])} / {_number(delays[name]['p95'])} ms"
         yield Figure(f"{name.replace('_', '-')} delay of a pair, p50 / p95", both)
+
+
+def _sizes(data: Data) -> Iterator[Figure]:
+    yield from _verdicts(data)
+    for row in data["rows"]:
+        what = (
+            f"{row['size']}: time; CPU time; peak memory; pixels with a value; values off by more than 2 % of the depth"
+        )
+        times = f"{_number(row['seconds'])} s; {_number(row['cpu_seconds'])} s; {row['megabytes']:.0f} MB"
+        yield Figure(what, f"{times}; {row['density']:.1f} %; {row['wrong']:.2f} %")
 
 
 _PUBLISHED_RIG: Final = "published with the images"
@@ -257,6 +267,7 @@ _BENCH: Final = "python -m tests.bench."
 SOURCES: Final = (
     Source("depth", Topic.DEPTH, "Real pairs with ground truth, clean and as cheap cameras give them. bad2: values that are off by more than 2 px. fill2: the same, each gap filled from its row. density: pixels with a value.", f"{_BENCH}bench_depth --json", _depth, 20),
     Source("demo", Topic.DEPTH, "The demo: a rendered scene of known depth, both programs live.", "phone-host demo --out out/figures/demo --json", _demo, 40),
+    Source("sizes", Topic.DEPTH, "Photographs of a rendered scene through `phone-host stereo` and a rig, from start to exit. Time counts other jobs of the machine, CPU time does not.", f"{_BENCH}bench_sizes --quick --json", _sizes, 150),
     Source("rig1", Topic.CALIBRATION, "A published rig, 1280x720.", _CALIBRATE.format(left="simplestereo_rig1/calib/*_L.png", right="simplestereo_rig1/calib/*_R.png", board="7x6", square="60.5mm", name="rig1"), _published, 20),
     Source("opencv", Topic.CALIBRATION, "OpenCV's example images, 640x480. The side of the squares is unknown.", _CALIBRATE.format(left="opencv_stereo_calib/left*.jpg", right="opencv_stereo_calib/right*.jpg", board="9x6", square="25mm", name="opencv"), _opencv_images, 10),
     Source("link", Topic.LINKS, "640x480 JPEGs at 30 per second between two processes, all transports in turns.", f"{_BENCH}bench_link --runs 2 --seconds 4 --payloads jpeg --transports {' '.join(_TRANSPORTS)} --json", _link, 130),

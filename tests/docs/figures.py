@@ -2,12 +2,14 @@
 
 Runs each source (tests/docs/figure_sources.py) once and keeps its output in out/figures/NAME.json with its command,
 date, exit code and machine. A source with a stored result of the same command runs again only with --again. The page is
-generated from all these files, never by hand. Exit 4 when a figure is missed, 1 when a source failed.
+generated from all these files, never by hand. A source without a file keeps the section that an earlier run wrote into the
+page, on this machine or another. Exit 4 when a figure is missed, 1 when a source failed.
 """
 
 import argparse
 import json
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -34,10 +36,15 @@ _END_S: Final = 20
 _STEP_S: Final = 0.5
 _NOT_YET: Final = "nobody has run it yet: `make figures` does"
 
+_REACHED_WORD: Final = "reached"
+_MISSED_WORD: Final = "**missed**"
+_JUDGED: Final = re.compile(r"^\| (.*?) \| (.*?) \| (.*?): (reached|\*\*missed\*\*)(?:; .*)? \|$", re.MULTILINE)
+"""A row of a figure that has a limit: what, figure, limit, verdict."""
+
 _INTRO: Final = """# Figures
 
 How fast, how exact, measured how? `make figures` runs the command under each table and writes this page; nobody edits it by hand. The full results stay
-in `out/figures`. Runs are short, so that all of them together take about twelve minutes; without their arguments the benchmarks measure longer. p50 is
+in `out/figures`. Runs are short, so that all of them together take about fifteen minutes; without their arguments the benchmarks measure longer. p50 is
 the median, p95 and p99 are the 95th and 99th percentile.
 """
 
@@ -89,7 +96,8 @@ def main() -> int:
             outcome = _run(source, lambda share_s: progress.advance(task, share_s))
             (_RESULTS / f"{source.name}.json").write_text(json.dumps(asdict(outcome), indent=1) + "\n", "utf-8")
             outcomes[source.name] = outcome
-    PAGE.write_text(page(outcomes), encoding="utf-8")
+    before = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
+    PAGE.write_text(page(outcomes, before), encoding="utf-8")
     print(f"look at {PAGE.relative_to(_ROOT)}")
     failed = [name for name, outcome in outcomes.items() if outcome.reason and outcome.exit != _CANNOT]
     for name, outcome in outcomes.items():
@@ -201,24 +209,40 @@ def _judged(outcomes: Mapping[str, Outcome]) -> Iterator[tuple[Source, Figure]]:
             yield from ((source, figure) for figure in figures(source, outcome) if figure.limit)
 
 
-def page(outcomes: Mapping[str, Outcome]) -> str:
+def page(outcomes: Mapping[str, Outcome], before: str = "") -> str:
     """The page's text.
 
     Args:
-        outcomes: by name of the source; a source without one has not been run.
+        outcomes: by name of the source; a source without one has not been run here.
+        before: the page as an earlier run wrote it; it gives the sections of the sources that have not been run here.
     """
-    judged = list(_judged(outcomes))
+    sections = {
+        source.name: (source.name not in outcomes and _kept(source, before))
+        or _section(source, outcomes.get(source.name))
+        for source in SOURCES
+    }
+    judged = [(source, row) for source in SOURCES for row in _JUDGED.findall(sections[source.name])]
     missed = [
-        f"- {source.topic.value}: {_cell(f'{figure.what}: {figure.figure} (to reach: {figure.limit})')}\n"
-        for source, figure in judged
-        if not figure.reached
+        f"- {source.topic.value}: {what}: {figure} (to reach: {limit})\n"
+        for source, (what, figure, limit, verdict) in judged
+        if verdict == _MISSED_WORD
     ]
     summary = f"\nOf {len(judged)} figures that are to be reached, {len(judged) - len(missed)} were."
     parts = [_INTRO, summary, *([" **Missed:**\n\n", *missed] if missed else ["\n"])]
     for topic in Topic:
         parts.append(f"\n## {topic.value}\n")
-        parts += [_section(source, outcomes.get(source.name)) for source in SOURCES if source.topic is topic]
+        parts += [sections[source.name] for source in SOURCES if source.topic is topic]
     return "".join(parts)
+
+
+def _kept(source: Source, before: str) -> str:
+    """The section of a source on an earlier page; empty if there is none of the same command."""
+    head = f"\n{source.title}\n\n"
+    begin = before.find(head)
+    origin = before.find("\n`", begin)
+    end = before.find("\n", origin + 1) + 1
+    is_kept = begin >= 0 and before.startswith(f"\n`{source.command}`", origin)
+    return before[begin:end] if is_kept else ""
 
 
 def _section(source: Source, outcome: Outcome | None) -> str:
@@ -237,7 +261,7 @@ def _section(source: Source, outcome: Outcome | None) -> str:
 def _verdict(figure: Figure) -> str:
     if not figure.limit:
         return ""
-    return f"{_cell(figure.limit)}: {'reached' if figure.reached else '**missed**'}"
+    return f"{_cell(figure.limit)}: {_REACHED_WORD if figure.reached else _MISSED_WORD}"
 
 
 def _origin(*parts: str) -> str:

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import msgpack
 
-from common.camera.identity import CameraIdentity, Lock
-from common.camera.orientation import Flip, Orientation
+from common.camera_identity import CameraIdentity, Lock
 from common.errors import ProtocolError
 from common.frame import PixelFormat
 from common.ledger import BoardMarks
 from common.link.sdp import channel_in
+from common.orientation import Flip, Orientation
 from common.protocol.board_session import BoardSession
 from common.protocol.chunking import Whole
 from common.protocol.duplex import GAP_NS, Duplex

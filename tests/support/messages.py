@@ -5,10 +5,10 @@ from dataclasses import replace
 
 from hypothesis import strategies as st
 
-from common.camera.identity import LARGEST_LOCK, CameraIdentity, Lock
-from common.camera.orientation import Flip, Orientation
+from common.camera_identity import LARGEST_LOCK, CameraIdentity, Lock
 from common.frame import PixelFormat
 from common.ledger import BoardMarks
+from common.orientation import Flip, Orientation
 from common.protocol.message import (
     BoardCounts,
     BoardHello,

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import CameraModel, Rig
+from phone_host.model import CameraModel, Epipolar, Rig
 from phone_host.scene.scene import unlike_rig as scene_rig
 
 
@@ -76,3 +76,15 @@ def small_rig() -> Rig:
 
     whole = scene_rig()
     return replace(whole, left=small(whole.left), right=small(whole.right))
+
+
+def stacked_rig(epipolar: Epipolar) -> Rig:
+    """Two equal cameras of 320x240, f = 260 px, the right one 100 mm below (UP) or above (DOWN) the left one."""
+    model = CameraModel(
+        width_px=320,
+        height_px=240,
+        matrix=np.array([[260.0, 0, 159.5], [0, 260.0, 119.5], [0, 0, 1]]),
+        distortion=np.zeros(5),
+    )
+    down_m = 0.1 if epipolar is Epipolar.UP else -0.1
+    return Rig(left=model, right=model, R_right_left=np.eye(3), t_right_left_m=np.array([0.0, -down_m, 0.0]))

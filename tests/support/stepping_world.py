@@ -25,8 +25,9 @@ from common.protocol.message import (
 )
 from common.protocol.session import MS, Outgoing, connection_name
 from common.stamp import HOST_CLOCK, Stamp
+from phone_host.stream.link_facts import LinkFacts
 from phone_host.stream.pair_queue import PairQueue
-from phone_host.stream.reception import LinkFacts, Reception
+from phone_host.stream.reception import Reception
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.quarantine import Disbelief
 from tests.support.witness import PERIOD_NS, Witness, WrongPair

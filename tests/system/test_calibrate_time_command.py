@@ -111,6 +111,7 @@ def test_a_lamp_filmed_by_two_streams(tmp_path: Path) -> None:
         with host(arguments, tmp_path) as running:
             assert running.wait() == 0, running.stderr
             report = running.json()
+    assert report["command"] == "calibrate-time"
     assert report["samples"] > 15
     assert report["stored_in"] is None
     assert abs(report["time_offset_ns"] / 1e6 - late_ms) <= report["uncertainty_ns"] / 1e6 < 30

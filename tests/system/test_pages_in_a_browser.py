@@ -1,13 +1,16 @@
 """Pages in a real browser: the script runs under its policy, a pointer reads metres, the cloud turns, nothing is wider than a phone."""
 
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from phone_host.model import Epipolar
 from phone_host.report.page_links import NextCommand
 from phone_host.report.stereo_page import stereo_page
 from tests.support.browser import Browser, browser, needs_chromium
-from tests.support.stereo_pages import page_data
+from tests.support.stereo_pages import page_data, processed
 
 pytestmark = needs_chromium
 
@@ -40,6 +43,24 @@ def test_a_pointer_reads_metres_and_where_there_are_none(shown: tuple[Browser, s
     assert read(5, 60) == "no depth here, x 5, y 60 px"
     assert read(100, 5) == "cut: outside the depth limits, x 100, y 5 px"
     assert page.complaints == []
+
+
+@pytest.mark.parametrize(("epipolar", "row"), [(Epipolar.UP, 20), (Epipolar.DOWN, 100)])
+def test_the_match_of_stacked_cameras_is_in_the_same_column(
+    shown: tuple[Browser, str], tmp_path: Path, epipolar: Epipolar, row: int
+) -> None:
+    """A point of the box, 40 px of disparity, lies 40 px higher in the image of a camera below, and 40 px lower in that of one above."""
+    made = processed()
+    path = tmp_path / "index.html"
+    path.write_text(stereo_page(page_data(processed=replace(made, pair=replace(made.pair, epipolar=epipolar)))))
+    page, _ = shown
+    page.open(path.as_uri())
+    page.wait("document.documentElement.dataset.ready === 'yes'")
+    left, top, width, height = box(page, "[data-side=left]")
+    page.move(left + width * 80.5 / 160, top + height * 60.5 / 120)
+    style = "document.querySelector('[data-side=right] i').style"
+    assert page.ask(f"parseFloat({style}.left)") == pytest.approx(80.5 / 160 * 100, abs=1e-3)
+    assert page.ask(f"parseFloat({style}.top)") == pytest.approx((row + 0.5) / 120 * 100, abs=1e-3)
 
 
 def test_mouse_and_fingers_turn_and_zoom_the_cloud(shown: tuple[Browser, str]) -> None:

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from common import now
-from common.camera.identity import CameraIdentity, CameraState, Lock
-from common.camera.orientation import Orientation
 from common.camera.replay import ReplayCamera, ReplaySettings
 from common.camera.turned import turned
+from common.camera_identity import CameraIdentity, Lock, RememberedCamera
 from common.errors import DataError
 from common.link.factory import open_link, parse_link
+from common.orientation import Orientation
 from common.protocol.message import Locks
 from phone_host.measure.run_snapshot import concerns
 from phone_host.measure.trust import Doubt
@@ -97,7 +97,7 @@ class StudioCamera(ReplayCamera):
         )
 
 
-def calibrated(left: CameraState, right: CameraState) -> StereoCore:
+def calibrated(left: RememberedCamera, right: RememberedCamera) -> StereoCore:
     """A core whose rig states its cameras."""
     rig = replace(level_rig(WIDTH_PX, HEIGHT_PX), left_camera=left, right_camera=right)
     return StereoCore(create_matcher(MatchSettings(MatcherName.BLOCK, 16)), Rectifier(rig))
@@ -118,9 +118,9 @@ def studio_run(tmp_path: Path, core: StereoCore, until: Callable[[Host], bool]) 
     return running, ended
 
 
-def state(identity: CameraIdentity, orientation: Orientation = Orientation(), **locks: int) -> CameraState:  # noqa: B008
+def state(identity: CameraIdentity, orientation: Orientation = Orientation(), **locks: int) -> RememberedCamera:  # noqa: B008
     """A camera of the rig."""
-    return CameraState(identity, WIDTH_PX, HEIGHT_PX, orientation, tuple(locks.items()))
+    return RememberedCamera(identity, WIDTH_PX, HEIGHT_PX, orientation, tuple(locks.items()))
 
 
 def test_a_run_restores_what_the_rig_was_calibrated_with(tmp_path: Path) -> None:
@@ -148,7 +148,7 @@ def test_a_run_restores_what_the_rig_was_calibrated_with(tmp_path: Path) -> None
         (state(LEFT, Orientation(180)), state(LEFT), "this machine's camera is USB Camera"),
     ],
 )
-def test_other_cameras_end_the_run(left: CameraState, right: CameraState, said: str, tmp_path: Path) -> None:
+def test_other_cameras_end_the_run(left: RememberedCamera, right: RememberedCamera, said: str, tmp_path: Path) -> None:
     """Another serial number, another mounting, or another camera of this machine: bad data, said in one line."""
     with pytest.raises(DataError) as caught:
         studio_run(tmp_path, calibrated(left, right), lambda _: False)

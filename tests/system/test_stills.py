@@ -76,6 +76,7 @@ def test_seconds_end_a_run_and_another_commands_report_is_kept(tmp_path: Path) -
     with board(["run", "--camera", camera, "--link", link], tmp_path), host(limited, tmp_path) as receiver:
         assert receiver.wait() == 0
     report = receiver.json()
+    assert report["command"] == "run"
     assert report["ended"] == "seconds_over"
     assert report["pairs"] > 1
     boards = tmp_path / "boards"

@@ -264,6 +264,17 @@ def test_one_sentence_says_which_link_is_fastest_and_what_takes_longest() -> Non
     assert not result_sentence([result(pairs=0)])
 
 
+def test_a_run_of_few_pairs_is_doubted_and_says_how_long_to_run() -> None:
+    """16 pairs at 30.3 per second: 10 s are enough for 50; the page then has no green tick. 50 pairs are enough."""
+    short = dataclasses.replace(result(), ledgers=result().ledgers[:16], measured_s=0.528)
+    sentence = result_sentence([result(link="ipc"), short])
+    assert "from only 16 pairs: run it longer (--seconds 10)" in sentence
+    text = page([short], UNDER, analysed(short))
+    assert 'class="verdict warning"' in text
+    assert 'class="verdict good"' in page([result()], UNDER, analysed(result()))
+    assert "run it longer" not in result_sentence([dataclasses.replace(result(), ledgers=result().ledgers[:50])])
+
+
 def test_the_page_begins_with_the_result_and_ends_with_the_fits() -> None:
     """Sentence, stacked bars, then how it was measured, the model and the fits; what was not measured has no card."""
     results = [result(), slower("ipc", 2.0)]

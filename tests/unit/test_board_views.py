@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.camera.orientation import UPRIGHT, Orientation
 from common.errors import DataError
+from common.orientation import UPRIGHT, Orientation
 from phone_host.calibration.board_pairs import Reason
 from phone_host.calibration.board_views import BoardViews, look_for_boards
 from phone_host.calibration.target import find_corners

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from common.errors import DataError
 from phone_host.output.calib_txt import KittiCameras, is_calib_txt, read_calib_txt
+from phone_host.output.rig_yaml import read_rig
 
 # Middlebury 2014, Motorcycle at quarter size (its own calib.txt).
 MOTORCYCLE = """cam0=[994.978 0 311.193; 0 994.978 254.877; 0 0 1]
@@ -105,6 +106,17 @@ def test_kittis_raw_data_states_its_size(tmp_path: Path) -> None:
         (MOTORCYCLE.replace("width=741", "width=" + "9" * 5000), "width is '999"),
         (MOTORCYCLE.replace("ndisp=70", "ndisp=7.5"), "ndisp is '7.5'"),
         (MOTORCYCLE + MOTORCYCLE, "cam0 is there twice"),
+        (MOTORCYCLE.replace("=193.001", "=abc"), "baseline is 'abc': it must be a number in mm, from 1 to 100000"),
+        (MOTORCYCLE.replace("=193.001", "=193,001"), "in mm, from 1 to 100000, with a decimal point: 193.001"),
+        (
+            MOTORCYCLE.replace("=193.001", "=0.193001"),
+            "baseline is '0.193001': it must be a number in mm, from 1 to 100000; 0.193001 m are 193.001 mm",
+        ),
+        (
+            MOTORCYCLE.replace("doffs=31.086", "doffs=31,086"),
+            "a number in px, from -1e+06 to 1e+06, with a decimal point: 31.086",
+        ),
+        (MOTORCYCLE.partition("\n")[2], "cam0 is missing: give calib.txt as"),
         (KITTI.partition("\n")[0], "has only P0"),
         (KITTI.replace("-386.1448", "386.1448"), "m apart"),
         (KITTI.replace("P1: 718.856 0", "P1: 1e999 0"), "P1 is no camera"),
@@ -130,6 +142,26 @@ def test_bytes_and_missing_files_are_no_calib_txt(tmp_path: Path) -> None:
         assert not is_calib_txt(each)
         with pytest.raises(DataError):
             read_calib_txt(each)
+
+
+def test_a_byte_order_mark_changes_nothing(tmp_path: Path) -> None:
+    """Windows' Notepad writes one, and ends lines with CR and LF."""
+    path = tmp_path / "calib.txt"
+    path.write_bytes(b"\xef\xbb\xbf" + MOTORCYCLE.replace("\n", "\r\n").encode())
+    assert is_calib_txt(path)
+    assert read_calib_txt(path) == read_calib_txt(_file(tmp_path, MOTORCYCLE))
+
+
+def test_what_is_neither_rig_nor_calib_txt_is_told_what_to_give(tmp_path: Path) -> None:
+    """A text, bytes and an empty file: whoever has a calib.txt learns that it is taken; a calib.txt without cam0 is read as one."""
+    path = tmp_path / "calib.txt"
+    for content in (b"hello", b"\x89PNG\r\n\x1a\n\xff\xfe", b""):
+        path.write_bytes(content)
+        assert not is_calib_txt(path)
+        with pytest.raises(DataError, match=r"or a calib\.txt of Middlebury, ETH3D or KITTI"):
+            read_rig(path)
+    assert is_calib_txt(_file(tmp_path, MOTORCYCLE.partition("\n")[2]))
+    assert is_calib_txt(_file(tmp_path, MOTORCYCLE + MOTORCYCLE))
 
 
 def test_a_rig_is_no_calib_txt(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Calibration against rigs whose every number is known."""
 
+import re
 from dataclasses import replace
 
 import cv2
@@ -11,7 +12,8 @@ from hypothesis import strategies as st
 from common.errors import DataError
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
 from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.verdict import Assessment, Verdict, judge, vertical_p95_px
+from phone_host.calibration.calibrate_alone import off_words
+from phone_host.calibration.verdict import Assessment, Verdict, judge, size_factor, vertical_p95_px
 from phone_host.model import CameraModel, Rig
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import project_points, unlike_rig
@@ -88,6 +90,26 @@ def test_a_pair_of_two_moments_is_rejected(shift_m: float) -> None:
     later[4] += shift_m
     found = calibrate(_changed(pairs, 4, exact_pairs(rig, later[np.newaxis])[0].right_px), BOARD, _SIZES)
     assert [(each.name, each.reason) for each in found.rejected] == [("4", Reason.MOVED)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_exchanged_pairs_are_told_with_numbers_that_mean_something(seed: int) -> None:
+    """Five pairs whose right images went to their neighbours: no error above 1000 px is printed, and an error says to check the pairs."""
+    pairs = exact_pairs(_rig(), poses(5, seed=seed), noise_px=0.1, seed=seed)
+    shuffled = [BoardPair(a.name, a.left_px, b.right_px) for a, b in zip(pairs, [*pairs[1:], pairs[0]], strict=True)]
+    try:
+        text = " ".join(each.detail for each in calibrate(shuffled, BOARD, _SIZES).rejected)
+    except DataError as error:
+        text = str(error)
+    assert not re.search(r"[0-9]{4,}\.", text)
+    assert "only " not in text or "check that the two images of each pair belong together" in text
+
+
+def test_how_far_corners_are_off_is_told_up_to_a_thousand_pixels() -> None:
+    """A fit that has diverged gives errors of millions of pixels; they are told as more than 1000."""
+    assert off_words(3.214, 0.3) == "by 3.21 px, others by 0.30 px"
+    assert off_words(114029453.03, 59.94) == "by more than 1000 px, others by 59.94 px"
+    assert off_words(float("nan"), 0.3) == "by more than 1000 px, others by 0.30 px"
 
 
 def test_swapped_sides_are_told_with_the_remedy() -> None:
@@ -225,3 +247,35 @@ def test_a_second_chance_brings_no_wrong_pair_back() -> None:
     pairs[4] = replace(pairs[4], right_px=pairs[4].right_px + np.array([0.0, 3.0]))
     found = calibrate(pairs, BOARD, ((640, 480), (640, 480)))
     assert [each.name for each in found.rejected] == ["4"]
+
+
+def _larger(camera: CameraModel, factor: int) -> CameraModel:
+    """The same lens before a sensor with pixels so many times smaller."""
+    to_larger = np.array([[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1]], np.float64)
+    width_px, height_px = camera.width_px * factor, camera.height_px * factor
+    return replace(camera, width_px=width_px, height_px=height_px, matrix=to_larger @ camera.matrix)
+
+
+@pytest.mark.parametrize(("noise_px", "verdict"), [(0.08, Verdict.GOOD), (0.17, Verdict.USABLE)])
+def test_enlarged_pictures_have_the_verdict_of_the_small_ones(noise_px: float, verdict: Verdict) -> None:
+    """Corners of 1280x960 and 1280x720 images, and the same four times as large with four times the error: one verdict. Remedies name the limit that holds."""
+    rig = _rig()
+    rig = replace(rig, left=_larger(rig.left, 2))
+    large = replace(rig, left=_larger(rig.left, 4), right=_larger(rig.right, 4))
+    judged = []
+    for each, noise, factor in ((rig, noise_px, 1), (large, 4 * noise_px, 4)):
+        sizes = tuple((camera.width_px, camera.height_px) for camera in (each.left, each.right))
+        found = calibrate(exact_pairs(each, poses(12, seed=8), noise_px=noise, seed=8), BOARD, (sizes[0], sizes[1]))
+        assert size_factor(found.rig) == factor
+        judged.append(judge(found, ()))
+    assert [each.verdict for each in judged] == [verdict, verdict]
+    if verdict is Verdict.USABLE:
+        assert "1.00 px is good" in judged[1].remedies[0]
+
+
+def test_small_pictures_have_no_narrower_limits() -> None:
+    """Below 1280 px the limits stay; of two cameras the coarser one counts."""
+    rig = _rig()
+    assert size_factor(rig) == 1.0
+    assert size_factor(replace(rig, right=_larger(rig.right, 4))) == 1.0
+    assert size_factor(replace(rig, left=_larger(rig.left, 3), right=_larger(rig.right, 4))) == 1.5

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from common.errors import SettingsError
+from common.errors import DataError, SettingsError
 from phone_host.model import Image
 from phone_host.output.rig_yaml import read_rig
 from phone_host.verbs.calibrate.arguments import add_arguments
@@ -72,6 +72,21 @@ def test_a_rejected_rig_is_written_as_such_and_a_good_one_is_kept_aside(
         assert "refuse this calibration unless --use-rejected-rig is given" in capsys.readouterr().out
 
 
+def test_a_rig_that_cannot_be_rectified_has_no_column_of_vertical_errors(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Left and right exchanged calibrate, but no rows can be compared: the table shows no `nan`."""
+    folder = _folders(tmp_path, lambda image: encoded(".png", image))
+    for name, other in (("left", "a"), ("right", "left"), ("a", "right")):
+        (folder / name).rename(folder / other)
+    code, report = _calibrate(folder)
+    assert (code, report["verdict"], report["vertical_error_px"]["p95"]) == (4, "reject", None)
+    told = capsys.readouterr().out
+    assert "left px" in told
+    assert "nan" not in told
+    assert "vertical" not in told
+
+
 def test_exif_headers_that_disagree_with_the_rig_are_told_with_the_option_that_helps(tmp_path: Path) -> None:
     """Two phones stand alike, but the right one wrote EXIF 6 when it lay flat: the remedy names the turn, and with it the true baseline comes."""
     folder = _folders(tmp_path, lambda image: oriented(".png", image, 6))
@@ -86,6 +101,45 @@ def test_exif_headers_that_disagree_with_the_rig_are_told_with_the_option_that_h
     camera = read_rig(folder / "rig.yaml").right_camera
     assert camera is not None
     assert camera.orientation.rotate_deg == 270
+
+
+def test_mirrored_pictures_are_told_with_the_option_that_helps(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The right images are mirrored: exit 4 and --flip-right h as the only remedy; with it the true baseline comes."""
+    folder = _folders(tmp_path, lambda image: encoded(".png", image[:, ::-1].copy()))
+    try:
+        code, report = _calibrate(folder)
+    except DataError as error:  # too few pairs fit each other at all
+        code, report = error.exit_code, json.loads((folder / "report.json").read_text())
+    assert (code, report["verdict"]) == (4, "reject")
+    assert report["remedy"].endswith(
+        "mirrored against the left ones: switch mirroring off in that camera, or add --flip-right h"
+    )
+    capsys.readouterr()
+    code, report = _calibrate(folder, "--flip-right", "h")
+    assert code == 0
+    assert report["baseline_mm"] == pytest.approx(float(np.linalg.norm(small_rig().t_right_left_m)) * 1e3, rel=0.02)
+
+
+def test_folders_out_of_step_are_told_before_anything_is_fitted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Names without numbers and the second right picture missing: a warning that order was guessed, and the left picture to delete."""
+    folder = _folders(tmp_path, lambda image: encoded(".png", image))
+    for side in ("left", "right"):
+        for index, name in enumerate(("ant", "bee", "cat", "dog")):
+            (folder / side / f"{index}.png").rename(folder / side / f"{name}.png")
+    (folder / "right" / "bee.png").unlink()
+    with pytest.raises(
+        DataError, match=r"missing on the right: the folders are out of step from bee\.png on"
+    ) as caught:
+        _calibrate(folder)
+    assert "delete bee.png on the left" in caught.value.remedy
+    assert capsys.readouterr().out.startswith(
+        "warning  4 left and 3 right pictures were paired in the order of their names"
+    )
+    assert json.loads((folder / "report.json").read_text())["problem"] == caught.value.problem
 
 
 @pytest.mark.parametrize("square", ["0.025", "0.3"])

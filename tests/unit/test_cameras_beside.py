@@ -5,17 +5,17 @@ from pathlib import Path
 
 import pytest
 
-from common.camera.identity import CameraIdentity, CameraState
-from common.camera.orientation import UPRIGHT, Orientation
+from common.camera_identity import CameraIdentity, RememberedCamera
 from common.errors import DataError, SettingsError
+from common.orientation import UPRIGHT, Orientation
 from phone_host.calibration.cameras_beside import cameras_beside, with_cameras
 from phone_host.output.cameras_json import write_cameras
 from phone_host.stereo.view_files import pair_files
 from tests.support.pictures import encoded, picture
 from tests.support.rigs import unlike_rig
 
-_LEFT = CameraState(CameraIdentity("uvcvideo", "Left", "1"), 24, 32, Orientation(90), (("focus", 20),))
-_RIGHT = CameraState(CameraIdentity("uvcvideo", "Right", "2"), 32, 24)
+_LEFT = RememberedCamera(CameraIdentity("uvcvideo", "Left", "1"), 24, 32, Orientation(90), (("focus", 20),))
+_RIGHT = RememberedCamera(CameraIdentity("uvcvideo", "Right", "2"), 32, 24)
 _AS_GIVEN = (UPRIGHT, UPRIGHT)
 
 
@@ -53,7 +53,7 @@ def test_without_one_a_rig_states_how_the_user_says_its_cameras_are_mounted(tmp_
     mounted = Orientation(90), UPRIGHT
     assert cameras_beside(pair_files(str(tmp_path / "left"), str(tmp_path / "right")), mounted) is None
     rig = with_cameras(unlike_rig(), None, mounted)
-    assert rig.left_camera == CameraState(CameraIdentity(), 480, 640, Orientation(90))
+    assert rig.left_camera == RememberedCamera(CameraIdentity(), 480, 640, Orientation(90))
     assert rig.right_camera is None
 
 

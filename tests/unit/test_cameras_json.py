@@ -8,19 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.camera.identity import LARGEST_LOCK, CameraIdentity, CameraState, Lock
-from common.camera.orientation import Flip, Orientation
+from common.camera_identity import LARGEST_LOCK, CameraIdentity, Lock, RememberedCamera
 from common.errors import DataError
+from common.orientation import Flip, Orientation
 from common.versions import CAMERAS_FORMAT
 from phone_host.output.cameras_json import cameras_text, read_cameras, write_cameras
 
-LEFT = CameraState(
+LEFT = RememberedCamera(
     CameraIdentity("uvcvideo", "HD Pro Webcam C920", "A1B2"), 640, 480, Orientation(180), (("focus", 20), ("zoom", 100))
 )
-RIGHT = CameraState(CameraIdentity(), 1280, 720)
+RIGHT = RememberedCamera(CameraIdentity(), 1280, 720)
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=48)
 CAMERAS = st.builds(
-    CameraState,
+    RememberedCamera,
     st.builds(CameraIdentity, TEXTS, TEXTS, TEXTS),
     st.integers(1, 16384),
     st.integers(1, 16384),
@@ -34,7 +34,7 @@ CAMERAS = st.builds(
 
 @given(CAMERAS, CAMERAS)
 def test_both_cameras_come_back_as_they_were(
-    tmp_path_factory: pytest.TempPathFactory, left: CameraState, right: CameraState
+    tmp_path_factory: pytest.TempPathFactory, left: RememberedCamera, right: RememberedCamera
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "cameras.json"
     write_cameras(path, left, right)

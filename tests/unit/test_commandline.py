@@ -100,11 +100,13 @@ def test_an_error_that_is_not_stdouts_is_not_called_so() -> None:
     [
         (["ron"], "unknown verb ron (did you mean run?)"),
         (["walk"], "unknown verb walk (the verbs are run)"),
-        (["run", "--cuont", "3"], "missing: --count"),
+        (["run"], "missing: --count"),
+        (["run", "--cuont", "3"], "unknown option --cuont (did you mean --count?)"),
+        (["--spede"], "unknown option --spede"),
         (["run", "--count"], "--count needs a value"),
         (["run", "--count", "3", "--knid", "a"], "unknown option --knid (did you mean --kind?)"),
         (["run", "--count", "3", "left2.jpg"], "nothing takes left2.jpg (put patterns such as 'left*.jpg' in quotes)"),
-        (["run", "--count", "3mm"], "--count is '3mm', which is not a number (leave units out)"),
+        (["run", "--count", "3mm"], "--count is '3mm', but must be a whole number, such as 30"),
     ],
 )
 def test_a_mistake_of_typing_is_named(arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:

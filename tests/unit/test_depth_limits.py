@@ -16,7 +16,6 @@ from phone_host.stereo.depth_limits import (
     crop_inside,
     cut_cloud,
     depth_limits,
-    depth_sigma_m,
     disparity_error_px,
 )
 from phone_host.stereo.reproject import reproject
@@ -110,13 +109,6 @@ def test_too_far_and_too_near_are_told_apart() -> None:
     counts = cut_cloud(cloud, GEOMETRY, depth_limits(GEOMETRY, 0.25, DepthWanted(near_m=0.3)))
     assert (counts.kept, counts.too_far, counts.too_near) == (1, 1, 1)
     assert cloud[0, 1, 2] == pytest.approx(5.0)
-
-
-def test_uncertainty_grows_with_the_square_of_depth() -> None:
-    """z^2 delta / (f b): 2 m are known to 4 x 0.25 / 50 = 20 mm."""
-    limits = depth_limits(GEOMETRY, 0.25, DepthWanted())
-    found = depth_sigma_m(np.array([2.0, 4.0, np.nan], np.float32), GEOMETRY, limits)
-    np.testing.assert_allclose(found, [0.02, 0.08, np.nan], rtol=1e-6)
 
 
 def test_a_crop_is_cut_to_the_image_and_refused_outside() -> None:

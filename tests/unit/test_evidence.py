@@ -1,5 +1,6 @@
 """Mistakes made on a rendered pair are named rightly; good pairs, also behind a rig, raise no doubt."""
 
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
@@ -10,17 +11,34 @@ import pytest
 
 from common import now
 from common.ledger import StageTimes
+from phone_host.measure.headline import Grade
 from phone_host.measure.image_doubts import image_doubts
 from phone_host.measure.trust import Doubt
-from phone_host.model import Arrangement, CameraModel, CutCounts, Evidence, Image, Processed, RectifiedPair, Rig, Side
+from phone_host.model import (
+    Arrangement,
+    CameraModel,
+    Crop,
+    CutCounts,
+    Epipolar,
+    Evidence,
+    Image,
+    Processed,
+    RectifiedPair,
+    Rig,
+    Side,
+    StereoGeometry,
+)
+from phone_host.report import depth_data
+from phone_host.run.stereo_trust import judge_pair
 from phone_host.scene.scene import Look, demo_scene, render, rig_poses
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
-from phone_host.stereo.evidence_points import ThroughRig, turned_back
+from phone_host.stereo.depth_limits import DepthWanted
+from phone_host.stereo.evidence import density, has_depth, maps_of, measure_evidence
+from phone_host.stereo.evidence_points import ThroughRig, Unmoved, turned_back
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectify import Rectifier
-from tests.support.rigs import points_seen_by_both, unlike_rig
+from tests.support.rigs import points_seen_by_both, stacked_rig, unlike_rig
 
 Pair = tuple[Image, Image]
 
@@ -237,6 +255,62 @@ def test_depth_is_what_is_left_after_the_cut() -> None:
     assert not has_depth(replace(known, disparity=some * np.float32(np.nan)))
     assert not has_depth(replace(known, cut=CutCounts(kept=0, too_far=16)))
     assert not has_depth(Processed(pair, None, None, StageTimes()))
+
+
+def test_a_crop_raises_no_doubt(good: Pair) -> None:
+    """Density is the share of the pixels inside the crop: 120x80 of 320x240 px are an eighth of the image, and yet as dense as all of it."""
+    geometry = StereoGeometry(focal_px=260.0, baseline_m=0.1, cx_px=159.5, cy_px=119.5)
+    wanted = DepthWanted(crop=Crop(x_px=100, y_px=80, width_px=120, height_px=80))
+    core = StereoCore(MatchSettings(MatcherName.SGBM, 48), geometry=geometry, wanted=wanted)
+    processed = core.compute(*good, lambda: 0)
+    assert processed.disparity is not None
+    known = int(np.isfinite(processed.disparity).sum())
+    assert density(processed) == pytest.approx(known / (120 * 80))
+    assert density(replace(processed, cut=None)) == pytest.approx(known / (320 * 240))
+    trust = judge_pair(core, processed)
+    assert trust.concerns == ()
+    assert trust.figures.density > 0.7
+    assert trust.figures.consistency > 0.6
+    assert depth_data.density(processed) == pytest.approx(trust.figures.density, abs=0.05)
+
+
+@pytest.mark.parametrize("epipolar", [Epipolar.UP, Epipolar.DOWN])
+def test_stacked_cameras_are_judged_along_their_columns(epipolar: Epipolar) -> None:
+    """A good pair of cameras one above the other has no doubt, and is not taken for an exchanged one, whichever is above; its columns agree to a fraction of a pixel."""
+    rig = stacked_rig(epipolar)
+    core = StereoCore(SGBM, Rectifier(rig))
+    processed = core.compute(*_render(rig), lambda: 0)
+    assert processed.pair.epipolar is epipolar
+    trust = judge_pair(core, processed)
+    assert trust.concerns == ()
+    assert trust.answer.grade is Grade.GOOD
+    assert trust.figures.vertical_px < 1
+    assert trust.figures.density > 0.5
+    evidence = measure_evidence(processed, maps_of(core, processed))
+    features = {support.arrangement: support.features for support in evidence.supports}
+    assert features[Arrangement.RIGHT] > 50 > features[Arrangement.SWAPPED]
+
+
+@pytest.mark.parametrize("epipolar", [Epipolar.UP, Epipolar.DOWN])
+def test_exchanged_stacked_cameras_are_named(epipolar: Epipolar) -> None:
+    """Upper and lower images exchanged are as wrong as left and right ones."""
+    rig = stacked_rig(epipolar)
+    assert _doubts(StereoCore(SGBM, Rectifier(rig)), *_render(rig)[::-1])[0] is Doubt.SWAPPED
+
+
+def test_evidence_of_a_photograph_takes_less_memory_than_its_disparities() -> None:
+    """Of 12 megapixels, 48 MB of disparities, a regular sample is looked at, not the places of all, 192 MB."""
+    image = np.tile(_texture((300, 400)), (10, 10))
+    disparity = np.full(image.shape, 8.0, np.float32)
+    processed = Processed(RectifiedPair(image, np.roll(image, -8, axis=1)), disparity, None, StageTimes())
+    tracemalloc.start()
+    try:
+        evidence = measure_evidence(processed, Unmoved(4000, 3000))
+        peak_bytes = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak_bytes < disparity.nbytes
+    assert evidence.consistency > 0.6
 
 
 def test_every_arrangement_is_counted_once(good: Pair) -> None:

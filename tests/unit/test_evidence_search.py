@@ -11,7 +11,7 @@ import pytest
 from common import now
 from phone_host.measure.headline import Grade, answer
 from phone_host.measure.image_doubts import image_doubts, median_figures
-from phone_host.measure.search_doubts import no_depth
+from phone_host.measure.no_depth import no_depth
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import CameraModel, Crop, Evidence, Image, Rig, StereoGeometry
 from phone_host.scene.scene import Look, demo_scene, render, rig_poses
@@ -137,8 +137,8 @@ def test_without_a_known_search_nothing_is_said_about_it() -> None:
 def test_no_depth_because_of_a_short_search_is_told_with_its_remedy() -> None:
     """The remedy of missing depth is that of the search."""
     short = Concern(Doubt.SEARCH_TOO_SHORT, "all of the scene is nearer", "give --near 1m")
-    assert no_depth((short,)).remedy == "give --near 1m"
-    assert no_depth(()).doubt is Doubt.NO_DEPTH
+    assert no_depth(None, None, (short,)).remedy == "give --near 1m"
+    assert no_depth(None, None).doubt is Doubt.NO_DEPTH
 
 
 def _pattern(kind: str, shift_px: int) -> Image:

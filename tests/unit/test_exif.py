@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.camera.orientation import UPRIGHT, Flip, Orientation
 from common.errors import DataError
 from common.frame import PixelFormat, SpoiledImageError
 from common.imagesize.exif import exif_orientation
 from common.imagesize.read import read_head
+from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.model import Image
 from phone_host.stereo.images import decode, open_image, read_image
 from phone_host.stereo.raw_images import EncodedImage, decode_frames

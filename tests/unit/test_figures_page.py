@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -103,3 +103,15 @@ def test_readme_quotes_at_most_eight_figures_and_each_stands_on_the_page() -> No
     for row in rows:
         for quantity in _QUANTITY.findall(" ".join(row)):
             assert re.search(rf"(?<![\d.]){re.escape(quantity)}(?!\d|\.\d)", text), f"{quantity} of{row[0]}"
+
+
+def test_one_source_measured_anew_leaves_the_sections_of_the_others() -> None:
+    """On a machine without the others' results their sections stay as they were, and the head counts and names their figures, too."""
+    before = PAGE.read_text(encoding="utf-8")
+    age = replace(_outcome(_age(12.5)), command=_BY_NAME["age"].command)
+    assert page({}, before) == before
+    text = page({"age": age}, before)
+    for topic in (Topic.DEPTH, Topic.CLOCK, Topic.BOARD):
+        assert _section(text, topic) == _section(before, topic)
+    assert "| age at the link | 12.5 ms | 35.0 ms: reached |" in _section(text, Topic.AGE)
+    assert "- Links: one-way p50 / bare pyzmq's: " in text.partition("\n## ")[0]

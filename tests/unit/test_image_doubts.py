@@ -1,18 +1,33 @@
 """What is concluded from the evidence: which doubts, when they stand, and the headline that follows."""
 
+import argparse
 import math
+import re
 from dataclasses import replace
 from typing import Any, Final
 
 import pytest
 
-from phone_host.measure.headline import Grade, answer, depth_error_m, headline
-from phone_host.measure.image_doubts import ImageFigures, ImageJudge, ImageTrust, image_doubts, median_figures
+from phone_host.measure.depth_error import depth_error_m
+from phone_host.measure.file_remedies import EXCHANGE, ImageSource, tries_of
+from phone_host.measure.headline import Grade, answer, headline
+from phone_host.measure.image_doubts import ImageFigures, ImageTrust, image_doubts, median_figures
+from phone_host.measure.image_judge import ImageJudge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, depth_is_wrong
 from phone_host.measure.trust import Concern, Doubt
-from phone_host.model import Arrangement, Evidence, Exposure, StereoGeometry, Support
+from phone_host.model import (
+    Arrangement,
+    CutCounts,
+    DepthAccount,
+    DepthLimits,
+    Evidence,
+    Exposure,
+    StereoGeometry,
+    Support,
+)
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
+from phone_host.verbs.orientation_arguments import add_orientation_arguments
 from tests.unit.test_run_report import run
 
 SHARP: Final = Exposure(mean_level=110, bright_level=200, structure=30, blur_px=1.0, features=400)
@@ -76,6 +91,8 @@ BLIND: Final = replace(evidence(right=0, tilted=0), right=COVERED)
         (replace(GOOD, density=0.1), [Doubt.LOW_DENSITY]),
         (replace(GOOD, consistency=0.2), [Doubt.LOW_CONSISTENCY]),
         (replace(GOOD, vertical_px=2.1), [Doubt.VERTICAL_ERROR]),
+        (replace(GOOD, vertical_px=4.2, matched_scale=0.22), []),  # 48 megapixels: 0.9 px where they are matched
+        (replace(GOOD, vertical_px=9.5, matched_scale=0.22), [Doubt.VERTICAL_ERROR]),
         (evidence(right=50), [Doubt.VERTICAL_ERROR]),  # most features are on tilted rows
     ],
 )  # fmt: skip
@@ -83,6 +100,33 @@ def test_a_doubt_needs_clear_evidence(found: Evidence, named: list[Doubt]) -> No
     """Exactly the named doubts follow; each has a sentence and a remedy without NaN."""
     assert doubts(found) == named
     assert all(concern.sentence and concern.remedy and "nan" not in concern.sentence for concern in image_doubts(found))
+
+
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (SWAPPED, "swap LEFT and RIGHT;"),
+        (evidence(right=3, tilted=5, turned=90), "--rotate-left 180 or --rotate-right 180"),
+        (evidence(right=3, tilted=5, turned_by_quarter=90), "with 90 or 270"),
+        (evidence(right=20, swapped=100, both_turned=150), "--rotate-left 180 --rotate-right 180"),
+        (evidence(right=20, swapped=100, both_mirrored=150), "--flip-left h --flip-right h"),
+        (evidence(right=0, both_turned_by_quarter=150), "both with 90 or both with 270"),
+        (evidence(right=3, tilted=5, mirrored=90), "v if top and bottom are"),
+        (evidence(same_place=160), "give the images of two cameras"),
+    ],
+)
+def test_remedies_for_files_name_what_stereo_takes(found: Evidence, words: str) -> None:
+    """No option of a camera's address, no --board-side; every option that is named is one of `stereo`, and so is each try."""
+    [concern] = image_doubts(found, ImageSource.FILES)
+    assert words in concern.remedy
+    assert not re.search(r"rotate=|flip=|board-side|camera's app", concern.remedy)
+    parser = argparse.ArgumentParser()
+    add_orientation_arguments(parser)
+    for given in tries_of(concern.remedy):
+        if given != (EXCHANGE,):
+            parser.parse_args(given)  # ends the test if it takes them not
+    assert set(re.findall(r"--[a-z-]+", concern.remedy)) <= set(parser._option_string_actions)
+    assert tries_of(image_doubts(found)[0].remedy) == ()
 
 
 def test_both_cameras_are_named_together() -> None:
@@ -97,8 +141,8 @@ def test_a_doubt_stands_while_most_of_the_latest_three_judgements_have_it() -> N
     """One judgement of three is not enough, two are; it goes when two of three are free of it."""
     judge = ImageJudge()
     stands: list[list[Doubt]] = []
-    for found in (GOOD, SWAPPED, GOOD, SWAPPED, SWAPPED, GOOD, GOOD):
-        judge.add(found)
+    for number, found in enumerate((GOOD, SWAPPED, GOOD, SWAPPED, SWAPPED, GOOD, GOOD)):
+        judge.add(found, at_s=number / 2, pair=number)
         stands.append([concern.doubt for concern in judge.concerns])
     named = [Doubt.SWAPPED]
     assert stands == [[], [], [], named, named, named, []]
@@ -108,18 +152,19 @@ def test_a_run_of_one_pair_is_judged_by_it() -> None:
     """The only judgement is most of them."""
     judge = ImageJudge()
     assert judge.judged == 0
-    judge.add(SWAPPED)
+    judge.add(SWAPPED, at_s=0.0, pair=0)
     assert [concern.doubt for concern in judge.concerns] == [Doubt.SWAPPED]
     assert judge.judged == 1
 
 
 def test_figures_move_from_the_start_to_now() -> None:
-    """The first and the latest ten judgements have medians of their own; what was not measured is left out."""
+    """The first ten and the latest three judgements have medians of their own; what was not measured is left out."""
     judge = ImageJudge()
     for number in range(30):
-        judge.add(replace(GOOD, vertical_px=0.1 * number, consistency=math.nan))
-    assert judge.start.vertical_px == pytest.approx(0.45)
-    assert judge.now.vertical_px == pytest.approx(2.45)
+        found = replace(GOOD, vertical_px=0.05 * number, consistency=math.nan)
+        judge.add(found, at_s=number / 2, pair=number)
+    assert judge.start.vertical_px == pytest.approx(0.225)
+    assert judge.now.vertical_px == pytest.approx(1.4)
     assert math.isnan(judge.now.consistency)
 
 
@@ -176,6 +221,32 @@ def test_a_run_that_wanted_depth_and_found_none_has_a_doubt() -> None:
     assert concerns(with_images(has_depth=False, wants_depth=False)) == ()
 
 
+GIVEN = DepthLimits(near_m=0.3, far_m=0.002, disparity_error_px=0.25, from_rig=False)
+OF_RIG = DepthLimits(near_m=0.3, far_m=38.0, disparity_error_px=0.25, from_rig=True)
+
+
+@pytest.mark.parametrize(
+    ("cut", "limits", "sentence", "remedy"),
+    [
+        (CutCounts(unmatched=60, too_far=40), GIVEN, "all points lie farther than --far 2 mm", "larger --far"),
+        (CutCounts(too_far=60, too_near=40), GIVEN, "most points lie farther than --far 2 mm", "larger --far"),
+        (CutCounts(too_far=100), OF_RIG, "all points lie farther than 38 m", "farther apart"),
+        (CutCounts(too_near=100, outside=900), OF_RIG, "all points lie nearer than --near 300 mm", "smaller --near"),
+        (CutCounts(at_zero=90, too_far=10), OF_RIG, "noise of zero", "farther apart"),
+        (CutCounts(unmatched=90, too_far=10), OF_RIG, "no pair has depth", "--calibration or --rectified fits"),
+    ],
+)
+def test_what_became_of_the_pixels_says_why_there_is_no_depth(
+    cut: CutCounts, limits: DepthLimits, sentence: str, remedy: str
+) -> None:
+    """The limit that cut the points is named with its option, and the remedy is to move it; where hardly anything was matched, images and calibration do not fit."""
+    none = replace(with_images(has_depth=False), depth=DepthAccount(cut=cut, limits=limits))
+    [concern] = concerns(none)
+    assert concern.doubt is Doubt.NO_DEPTH
+    assert sentence in concern.sentence
+    assert remedy in concern.remedy
+
+
 def test_a_run_without_a_rig_is_answered_about_delays() -> None:
     """It measured delays only and says so; a covered camera is told all the same; no pairs are no success."""
     plain = run(30)
@@ -206,6 +277,15 @@ def test_which_doubts_block() -> None:
     blocking = {doubt.value for doubt in Doubt if doubt.blocks}
     assert blocking == {
         "swapped", "turned", "turned_by_quarter", "mirrored", "same_image", "other_scene", "covered", "no_depth",
-        "no_whole_image",
+        "no_whole_image", "images_apart",
     }  # fmt: skip
     assert not Concern(Doubt.TIME_SKEW, "", "").doubt.blocks
+
+
+def test_depth_with_specks_is_not_called_right_without_reserve() -> None:
+    """Boards before bare walls: 43 % of the depth is found again; no doubt stands, but the first line says where to trust it."""
+    said = answer(ImageFigures(density=0.28, consistency=0.43, vertical_px=0.2, disparity_px=50.0), (), GEOMETRY)
+    assert said.grade is Grade.GOOD
+    assert said.sentence.startswith("Depth looks right where the scene has texture, specks elsewhere: 28%")
+    assert "43% are found again" in said.sentence
+    assert "specks" not in answer(ImageFigures(density=0.7, consistency=0.8, vertical_px=0.2), (), GEOMETRY).sentence

@@ -10,7 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
-from phone_host.stereo.images import decode, decode_pair, read_image, read_pair, require_same_size, to_8_bit
+from phone_host.stereo.eight_bit import to_8_bit
+from phone_host.stereo.images import (
+    decode,
+    decode_files,
+    decode_pair,
+    open_image,
+    read_image,
+    require_same_size,
+)
 
 _RAMP = np.arange(256, dtype=np.uint8).reshape(16, 16)
 _COLOUR = np.dstack([_RAMP, _RAMP.T, 255 - _RAMP])
@@ -48,7 +56,7 @@ def test_a_16_bit_copy_of_an_8_bit_pair_gives_the_same_images(tmp_path: Path) ->
     left, right = tmp_path / "l.png", tmp_path / "r.png"
     left.write_bytes(_png(_RAMP.astype(np.uint16) * 257))
     right.write_bytes(_png(_COLOUR.astype(np.uint16) * 257))
-    first, second = read_pair(left, right)
+    first, second = decode_files(open_image(left), open_image(right))
     np.testing.assert_array_equal(first, _RAMP)
     np.testing.assert_array_equal(second, _COLOUR)
 

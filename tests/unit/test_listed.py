@@ -17,6 +17,8 @@ from phone_host.output.listed import LIST, ListedFolder, claim
 from phone_host.output.pair_files import PAIR_NAMES
 from phone_host.run.file_sink import NAMES, FileSink
 from phone_host.verbs.output_folders import spare_inputs
+from phone_host.verbs.run.command import spare
+from tests.unit.test_replay import fill
 
 FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
 
@@ -264,3 +266,14 @@ def test_a_file_without_end_is_not_read(tmp_path: Path) -> None:
     assert read_whole(tmp_path / "link", 7) == b"content"
     with pytest.raises(DataError, match="has 7 bytes, 6 are the most"):
         read_whole(tmp_path / "link", 6)
+
+
+@pytest.mark.parametrize("replay", ["photos", "photos/*.jpg", "photos/a1.jpg"])
+def test_a_run_does_not_write_among_the_photographs_it_replays(tmp_path: Path, replay: str) -> None:
+    """The folder of a replay, or of what its glob names, is refused as --out; a folder in it or beside it is not."""
+    fill(tmp_path / "photos", "a1.jpg", "a2.jpg")
+    for out in (tmp_path / "photos", tmp_path / "photos" / "x" / ".."):
+        with pytest.raises(SettingsError, match="is the folder of the photographs of --camera"):
+            spare(out, str(tmp_path / replay), "")
+    spare(tmp_path / "photos" / "scan", str(tmp_path / replay), "")
+    spare(tmp_path, str(tmp_path / replay), "")

@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 from common.camera.image_numbers import ImageNumbers
-from phone_host.measure.numbers import FilmWatch, ImageEvidence, number_concerns
-from phone_host.measure.trust import Doubt
+from phone_host.measure.numbers import FilmWatch, ImageEvidence, number_concerns, with_cause
+from phone_host.measure.trust import Concern, Doubt
+from phone_host.model import Arrangement
 from phone_host.sync.stills import PairedBy
 
 SERIES = ImageNumbers(count=16, first=3, last=18)
@@ -15,7 +16,8 @@ SHORT = ImageNumbers(count=10)
 def said(evidence: ImageEvidence) -> str:
     """The one doubt's sentence; empty if there is none."""
     found = number_concerns(evidence)
-    assert all(concern.doubt is Doubt.IMAGE_NUMBERS and concern.remedy for concern in found)
+    of_numbers = {Doubt.IMAGE_NUMBERS, Doubt.IMAGES_APART}
+    assert all(concern.doubt in of_numbers and concern.remedy for concern in found)
     return "".join(concern.sentence for concern in found)
 
 
@@ -80,3 +82,36 @@ def test_where_the_place_in_a_film_is_not_known_nothing_is_compared() -> None:
     watch.lowered()
     watch.pair(0, 10)
     assert watch.apart == 0
+
+
+def test_most_pairs_apart_make_depth_impossible_a_few_make_it_doubtful() -> None:
+    """18 of 35 pairs of different images block, 17 of 35 warn."""
+    for apart, doubt in ((18, Doubt.IMAGES_APART), (17, Doubt.IMAGE_NUMBERS)):
+        evidence = ImageEvidence(board=SERIES, own=SERIES, pairs=35, apart=apart)
+        assert [concern.doubt for concern in number_concerns(evidence)] == [doubt]
+
+
+def test_films_of_different_rate_drift_apart_unless_they_last_equally_long() -> None:
+    """16 images at 5 /s last 3.2 s and at 8 /s 2 s; 16 at 5 /s last as long as 32 at 10 /s, whatever their numbers."""
+    slow, fast, faster = 200_000_000, 125_000_000, 100_000_000
+    same = ImageEvidence(board=SERIES, own=SERIES, pairs=1, board_period_ns=slow, own_period_ns=fast)
+    assert "at 5 /s, this machine 16 images, 3 to 18 at 8 /s: films of different rate drift apart" in said(same)
+    long = ImageNumbers(count=32)
+    assert not said(replace(same, own=long, own_period_ns=faster))
+    assert "different length" in said(replace(same, own=long, own_period_ns=slow))
+
+
+def test_films_that_drift_apart_are_blamed_and_not_the_cameras() -> None:
+    """What pairs of two moments look like is left out, and the cause blocks in its place; images paired by number are believed."""
+    swapped, covered = Concern(Doubt.SWAPPED, "s", "r"), Concern(Doubt.COVERED, "c", "r")
+    by_time = ImageEvidence(board=SERIES, own=SHORT, pairs=5)
+    numbers, images = with_cause(number_concerns(by_time), (swapped, covered), by_time)
+    assert [concern.doubt for concern in (*numbers, *images)] == [Doubt.IMAGES_APART, Doubt.COVERED]
+    assert "drift apart" in numbers[0].sentence
+    by_number = replace(by_time, paired_by=PairedBy.NUMBER)
+    told = number_concerns(by_number)
+    assert with_cause(told, (swapped,), by_number) == (told, (swapped,))
+    assert with_cause((), (swapped,), by_time) == ((), (swapped,))
+    for arrangement, kept in ((Arrangement.TURNED, True), (Arrangement.BOTH_TURNED, False)):
+        turned = Concern(Doubt.TURNED, "t", "r", arrangement=arrangement)  # one on its head is so at any moment
+        assert bool(with_cause(number_concerns(by_time), (turned,), by_time)[1]) == kept

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from common.camera.orientation import UPRIGHT, Flip, Orientation, orientation_of
 from common.errors import SettingsError
+from common.orientation import UPRIGHT, Flip, Orientation, orientation_of
 from phone_host.stereo.orient import upright
 
 IMAGE = np.array([[1, 2, 3], [4, 5, 6]], np.uint8)

@@ -6,7 +6,6 @@ import pytest
 
 from phone_host.model import StereoGeometry
 from phone_host.output.preview import (
-    colour_depth,
     colour_disparity,
     colour_range_px,
     depth_picture,
@@ -33,21 +32,22 @@ def test_disparity_is_black_without_value_and_brighter_when_nearer() -> None:
 def test_depth_is_brighter_when_nearer_and_infinite_depth_is_black() -> None:
     """Depth has the same colours the other way round."""
     depth = np.array([[1, 2, 3, np.nan, np.inf]], dtype=np.float32)
-    colours = colour_depth(depth, 1, 3)
-    lightness = colours[0] @ _LUMA
+    picture = depth_picture(np.dstack([depth, depth, depth]))[:, :5]
+    lightness = picture[0] @ _LUMA
     assert lightness[0] > lightness[1] > lightness[2] > 20
-    assert not colours[0, 3:].any()
+    assert not picture[0, 3:].any()
 
 
 @pytest.mark.parametrize("geometry", [None, StereoGeometry(focal_px=100, baseline_m=0.1, cx_px=2, cy_px=2)])
-def test_a_map_without_values_is_black_and_its_scale_has_no_numbers(geometry: StereoGeometry | None) -> None:
-    """Nothing is made up where nothing was found: the strip holds the colours and one unit only."""
+def test_a_map_without_values_is_black_and_has_no_scale(geometry: StereoGeometry | None) -> None:
+    """Nothing is made up where nothing was found: the pictures are black and as large as the map."""
     nothing = np.full((40, 50), np.nan, dtype=np.float32)
     picture = disparity_picture(nothing, geometry)
-    assert not picture[:, :50].any()
+    assert picture.shape == (40, 50, 3)
+    assert not picture.any()
     assert colour_range_px(nothing) == (0, 1)
-    assert not depth_picture(np.full((40, 50, 3), np.nan, dtype=np.float32))[:, :50].any()
-    assert depth_range_m(nothing) == (0, 1)
+    assert np.array_equal(depth_picture(np.full((40, 50, 3), np.nan, dtype=np.float32)), picture)
+    assert depth_range_m(nothing) == (1, 2)
 
 
 def test_the_scale_stands_beside_the_picture_and_hides_none_of_it() -> None:

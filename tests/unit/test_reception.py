@@ -33,7 +33,8 @@ from common.protocol.session import (
 )
 from phone_host.model import BoardFrame
 from phone_host.stream.frame_sink import FrameSink, NoFrames
-from phone_host.stream.reception import LinkFacts, Reception
+from phone_host.stream.link_facts import LinkFacts
+from phone_host.stream.reception import Reception
 from phone_host.stream.refusals import BoardRefusal, refusal_text
 from phone_host.sync.quarantine import Disbelief
 from tests.support.session_world import CAMERA

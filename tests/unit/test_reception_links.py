@@ -5,7 +5,8 @@ from dataclasses import replace
 from common.protocol.board_session import BoardSession
 from common.protocol.message import BoardCounts, Lane, Ping
 from common.protocol.session import MS, Outgoing, connection_name
-from phone_host.stream.reception import LinkFacts, Reception
+from phone_host.stream.link_facts import LinkFacts
+from phone_host.stream.reception import Reception
 from tests.support.session_world import CAMERA
 from tests.support.unkept import Unkept
 

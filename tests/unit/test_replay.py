@@ -1,5 +1,6 @@
 """Replay's own rules: order of names, globs, the image of a moment, options of the URI."""
 
+import re
 from fractions import Fraction
 from pathlib import Path
 
@@ -8,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.camera.base import Skipped
-from common.camera.factory import open_camera
+from common.camera.factory import open_camera, parse_camera
 from common.camera.replay import ReplayCamera, ReplaySettings, find_images, name_order
 from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import Frame
 from common.protocol.message import Pacing
+from phone_host.camera.factory import check_camera
 from tests.support.pictures import jpeg
 
 NAMES = st.text(st.sampled_from("ab019_.²٣é"), min_size=1, max_size=8)
@@ -151,6 +153,42 @@ def test_bad_camera_uris_are_refused(tmp_path: Path, uri: str) -> None:
     with pytest.raises(SettingsError) as caught:
         open_camera(uri.format(tmp_path), "host", 0)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ("fps=5fps", "has fps=5fps: give images per second from 0.01 to 1000"),
+        ("fps=1001", "has fps=1001: give images per second from 0.01 to 1000"),
+        ("loop=yes", "has loop=yes: give loop=1"),
+        ("pace=slow", "has pace=slow: give pace=clock for a film, or pace=demand"),
+        ("phase_ms=1e999999999", "has phase_ms=1e999999999: give a delay in ms"),
+        ("fsp=30", "an unknown option 'fsp': the options are fps, loop, pace, phase_ms, rotate, flip"),
+    ],
+)
+def test_a_bad_option_is_named_with_what_it_may_be(options: str, named: str) -> None:
+    """The error names the option, its value and the values that it can have."""
+    with pytest.raises(SettingsError, match=re.escape(named)):
+        parse_camera(f"replay:film?{options}", "host")
+
+
+def test_a_path_without_a_kind_is_given_back_with_one(tmp_path: Path) -> None:
+    """For a folder or a device that exists, the URI that was meant is the remedy; what does not exist gets the examples of the program."""
+    for path, kind in ((tmp_path, "replay"), (Path("/dev/null"), "v4l2")):
+        with pytest.raises(SettingsError, match=f"give '{kind}:{path}\\?fps=3'"):
+            parse_camera(f"{path}?fps=3", "host")
+        with pytest.raises(SettingsError, match=f"give '{kind}:{path}'"):
+            check_camera(str(path))
+    with pytest.raises(SettingsError, match=r"unknown kind.*http://"):
+        check_camera(f"{tmp_path}/missing")
+
+
+def test_a_board_says_that_only_the_host_takes_servers() -> None:
+    """A server's address given to the board is told as the host's kind of camera, without the password in it."""
+    with pytest.raises(SettingsError, match=r"camera http://\.\.\. is of a kind that only phone-host takes") as caught:
+        parse_camera("http://user:secret@phone:8080/video", "board")
+    assert "secret" not in str(caught.value)
+    assert "v4l2:" in caught.value.remedy
 
 
 def test_options_reach_the_camera(tmp_path: Path) -> None:

@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
-from common.camera.identity import CameraIdentity, CameraState
-from common.camera.orientation import Flip, Orientation
+from common.camera_identity import CameraIdentity, RememberedCamera
 from common.errors import DataError
+from common.orientation import Flip, Orientation
 from phone_host.model import UNMEASURED_NS, Rig, Side, TimeOffset
 from phone_host.output.rig_yaml import read_rig, write_rig, write_time_offset
 from phone_host.stereo.rectify import rectify_rig
@@ -157,7 +157,7 @@ def test_noise_of_zero_and_verdict_come_back(tmp_path: Path) -> None:
     assert (back.left_camera, back.right_camera) == (None, None)
 
 
-_CAMERA = CameraState(
+_CAMERA = RememberedCamera(
     identity=CameraIdentity("uvcvideo", 'HD "Pro": C920 ü', "0123"),
     width_px=480,
     height_px=640,
@@ -171,11 +171,11 @@ _CAMERA = CameraState(
     "camera",
     [
         _CAMERA,
-        CameraState(CameraIdentity(), 640, 480),
-        CameraState(CameraIdentity(name="phone"), 640, 480, Orientation(180)),
+        RememberedCamera(CameraIdentity(), 640, 480),
+        RememberedCamera(CameraIdentity(name="phone"), 640, 480, Orientation(180)),
     ],
 )
-def test_cameras_come_back(tmp_path: Path, camera: CameraState) -> None:
+def test_cameras_come_back(tmp_path: Path, camera: RememberedCamera) -> None:
     """What is known of a camera is read as it was written; what is not known stays away; a time offset put in later changes nothing."""
     path = _written(tmp_path, left_camera=camera)
     write_time_offset(path, TimeOffset(1, 2))

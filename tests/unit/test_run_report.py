@@ -87,6 +87,29 @@ def test_a_rate_needs_two_pairs() -> None:
     assert summary(run(31)).splitlines()[1] == "31 pairs in 1.5 s (20.0 /s), ended: stopped"
 
 
+def test_a_drift_that_takes_hours_is_not_told() -> None:
+    """A turn of 50 ms at 13.9 ppm takes 3597 s and is told; at 13.8 ppm it takes 3623 s and is not."""
+    told, untold = (
+        phase_lines(Phase(time_skew_ns=0.0, period_ns=50 * MS, drift=drift, first_ns=0), None)[0]
+        for drift in (13.9e-6, -13.8e-6)
+    )
+    assert told.endswith("one full turn in 3597 s")
+    assert untold == "phase: the board exposes 0.0 of 50.0 ms after the host"
+
+
+def test_what_could_not_be_written_is_told_without_zeros() -> None:
+    """Only what is missing is listed: lines, pairs or both."""
+    ends = [
+        summary(replace(run(31), unwritten=Unwritten(lines, pairs, "disk full"))).splitlines()[-1]
+        for lines, pairs in ((0, 13), (1, 0), (4, 6))
+    ]
+    assert ends == [
+        "not written: 13 pairs (disk full)",
+        "not written: 1 line of delays.jsonl (disk full)",
+        "not written: 4 lines of delays.jsonl, 6 pairs (disk full)",
+    ]
+
+
 def test_the_phase_is_told_with_its_side() -> None:
     """A board that exposes 5 ms earlier is shown as before the host, and a phase without drift has no beat."""
     assert phase_lines(Phase(time_skew_ns=-5.0 * MS, period_ns=50 * MS, drift=0.0, first_ns=0), None) == [
@@ -198,7 +221,7 @@ def test_everything_that_a_run_knows_is_told() -> None:
         "back 5 times", "1 frame missed", "6 stamps not believed", "7 controls refused", "8 frames no end",
         "5 frames dropped on the board: replaced", "9 board frames without partner: no partner",
         "3 pairs dropped from a full FIFO", "2 pairs that could not be processed",
-        "4 pairs still waiting at the end", "4 lines, 6 pairs (disk full)",
+        "4 pairs still waiting at the end", "4 lines of delays.jsonl, 6 pairs (disk full)",
     ):  # fmt: skip
         assert words in text
     [head, ipc, tcp] = text[text.index("link  ") :].splitlines()[:3]
@@ -305,7 +328,7 @@ def test_a_runs_page_shows_the_last_pair_and_leads_to_the_saved_ones() -> None:
     page = Page(run_page(run(31), processed(), Side.RIGHT, (), saved))
     assert not page.open
     share = 100 * np.isfinite(processed().cloud[..., 2]).mean()  # type: ignore[index]
-    for words in ("number 30 of this run", f"{share:.0f} % of the left pixels have a depth", "15 % farther than 4 m"):
+    for words in ("number 30 of this run", f"{share:.0f} % of the pixels have a depth", "15 % farther than 4 m"):
         assert words in page.words
     assert "left: the host's camera, rectified" in page.words
     links = [one["href"] for one in page.every("a")]
@@ -340,6 +363,12 @@ def test_stills_have_no_figures_from_an_exposure() -> None:
     assert set(report["not_measured"]) == {"capture", "end_to_end", "time_skew"}
     lines = summary(seen).splitlines()
     assert not any(line.startswith(("capture", "end-to-end")) for line in lines)
+    starved = DelayStatistics()
+    starved.add(replace(LEDGER, queued_ns=3 * MS), timeless=True)
+    assert not any(line.startswith("starvation") for line in lines)
+    assert any(
+        line.startswith("starvation") for line in summary(replace(seen, delays=starved, processed=1)).splitlines()
+    )
     assert any(line.startswith("processing") for line in lines)
     page = run_page(seen, None, Side.LEFT, [LEDGER] * 12)
     assert "Time skew of the pairs" not in page

@@ -53,6 +53,7 @@ def test_another_shape_is_refused_with_both_sizes(size: tuple[int, int]) -> None
     with pytest.raises(DataError, match=rf"left image is {size[0]}x{size[1]} px, .*640x480") as caught:
         scaled_rig(unlike_rig(), size, (1280, 720))
     assert "aspect ratio" in caught.value.remedy
+    assert "a crop cannot be told from its size: calibrate at this size" in caught.value.remedy
     with pytest.raises(DataError, match=r"right image is 640x480 px, .*1280x720"):
         scaled_rig(unlike_rig(), (640, 480), (640, 480))
 

@@ -8,13 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from common.camera.base import CameraHealth
+from common.camera.base import CameraHealth, CameraState
 from common.protocol.message import RefusalReason
 from common.versions import PROTOCOL_VERSION
+from phone_host.measure.absence import Away
+from phone_host.measure.gone import gone_concerns
 from phone_host.measure.image_doubts import image_doubts
+from phone_host.measure.no_depth import no_depth
 from phone_host.measure.regime import RunFigures, judge
 from phone_host.measure.trust import (
-    NO_DEPTH,
+    REJECTED_RIG,
     Concern,
     Timing,
     Unbelieved,
@@ -22,7 +25,7 @@ from phone_host.measure.trust import (
     timing_concerns,
     unbelieved_concerns,
 )
-from phone_host.model import Arrangement, Evidence, Exposure, Support, TimeOffset
+from phone_host.model import Arrangement, CutCounts, DepthLimits, Evidence, Exposure, Support, TimeOffset
 from phone_host.stream.refusals import BoardRefusal, refusal_text
 from phone_host.sync.fifo import Overflow
 
@@ -124,7 +127,17 @@ def image_examples() -> Iterator[Concern]:
     yield from image_doubts(replace(good, density=0.1))
     yield from image_doubts(replace(good, consistency=0.1))
     yield from image_doubts(replace(good, vertical_px=3.1))
-    yield NO_DEPTH
+    given = DepthLimits(near_m=0.3, far_m=0.002, disparity_error_px=0.25, from_rig=False)
+    for cut, limits in (
+        (None, None),
+        (CutCounts(at_zero=9), None),
+        (CutCounts(too_far=9), given),
+        (CutCounts(too_far=9, at_zero=1), replace(given, far_m=38.0, from_rig=True)),
+        (CutCounts(too_near=9), given),
+    ):
+        yield no_depth(cut, limits)
+    yield REJECTED_RIG
+    yield from gone_concerns("stopped", (Away(3.0, 7.0, is_over=False),), CameraHealth(CameraState.GONE), 5.2)
 
 
 def told(concern: Concern) -> str:

@@ -6,9 +6,9 @@ from typing import Any
 import msgpack
 import pytest
 
-from common.camera.identity import CameraIdentity, Lock
-from common.camera.orientation import Flip, Orientation
+from common.camera_identity import CameraIdentity, Lock
 from common.errors import ProtocolError
+from common.orientation import Flip, Orientation
 from common.protocol.board_session import LOCK_REST_NS, BoardSession
 from common.protocol.host_session import HostSession
 from common.protocol.message import (

@@ -259,18 +259,20 @@ def test_a_full_disk_is_told_once_and_counted(tmp_path: Path, caplog: pytest.Log
 
 
 def test_a_page_that_has_no_room_is_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """If only index.html does not fit, the one line names it, and the run counts as incomplete."""
+    """If only index.html does not fit, the one line names it, the run counts as incomplete, and the other files are there."""
     sink = FileSink(tmp_path, 0)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (200, hard))
     try:
-        sink.close({"pairs": 0}, "<p>" * 100)
+        sink.close({"pairs": 0}, "<p>" * 100, "{}")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         signal.signal(signal.SIGXFSZ, before)
     assert not sink.complete
+    assert sink.missing == "index.html (File too large)"
     assert (tmp_path / "report.json").is_file()
+    assert (tmp_path / "cameras.json").read_text() == "{}"
     (told,) = [record.getMessage() for record in caplog.records if "results_not_written" in record.getMessage()]
     assert "what=index.html" in told
 

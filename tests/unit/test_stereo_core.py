@@ -226,3 +226,15 @@ def test_a_range_of_nothing_is_refused() -> None:
     """A matcher without any disparity to search is a mistake in the settings."""
     with pytest.raises(SettingsError):
         MatchSettings(disparities=0)
+
+
+def test_no_more_disparities_are_searched_than_an_image_is_wide() -> None:
+    """Nothing lies farther left than the edge: of 5000 disparities in 64 px of width 64 are searched, and 64 are reported, with the same result."""
+    left, right = shifted(10)
+    many, all_there_are = (
+        StereoCore(MatchSettings(disparities=count)).compute(left, right, lambda: 0) for count in (5000, 64)
+    )
+    assert many.search == Search(scale=1.0, disparities=64)
+    assert many.disparity is not None
+    assert all_there_are.disparity is not None
+    np.testing.assert_array_equal(many.disparity, all_there_are.disparity)

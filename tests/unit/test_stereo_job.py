@@ -1,6 +1,8 @@
 """The work of `stereo` on image files: pairs one after another, results in folders, and what goes wrong is named."""
 
 import json
+import math
+import resource
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError, UnavailableError
+from phone_host.measure.trust import Doubt
 from phone_host.model import Image, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pfm import read_pfm, read_xyz
@@ -54,11 +57,11 @@ def photos(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def _core(size_px: Size) -> StereoCore:
+def _core(size_px: Size, far_m: float = math.nan) -> StereoCore:
     """A core for rectified images with f b = 10 px m, whose principal point is the middle."""
     centre = (size_px[0] - 1) / 2, (size_px[1] - 1) / 2
     geometry = StereoGeometry(focal_px=100, baseline_m=0.1, cx_px=centre[0], cy_px=centre[1])
-    return StereoCore(MatchSettings(disparities=16), None, geometry, DepthWanted())
+    return StereoCore(MatchSettings(disparities=16), None, geometry, DepthWanted(far_m=far_m))
 
 
 def _job(photos: Path, make_core: Callable[[Size], StereoCore] = _core, axes: Axes = Axes.CAMERA) -> StereoJob:
@@ -181,6 +184,28 @@ def test_points_with_y_up_are_the_same_points_turned_by_half_a_turn_about_x(phot
     assert "y up, z backward" in json.loads((folder / "report.json").read_text())["axes"]
 
 
+def test_a_white_pair_is_told_once_that_it_needs_texture(tmp_path: Path) -> None:
+    """The remedy speaks of the scene, and that hardly any pixel matched is no second warning."""
+    for side in ("left", "right"):
+        cv2.imwrite(str(tmp_path / f"{side}.png"), np.full((64, 120), 255, np.uint8))
+    files = pair_files(str(tmp_path / "left.png"), str(tmp_path / "right.png"))
+    job = StereoJob(files=files, out=tmp_path / "out", make_core=_core, matcher="sgbm")
+    [pair] = run_stereo(job, _Watch()).computed
+    assert [concern.doubt for concern in pair.trust.concerns] == [Doubt.NO_DEPTH]
+    assert "texture" in pair.trust.answer.sentence
+    assert pair.remarks_beside_headline == ()
+
+
+def test_the_headline_counts_the_pixels_that_have_a_point(photos: Path) -> None:
+    """All of it is matched, but a far limit of 1 m cuts pairs at 10 / 6 and 10 / 9 m: the headline says what the cloud holds."""
+    report = run_stereo(_job(photos, lambda size: _core(size, far_m=1.0)), _Watch())
+    for pair in report.computed:
+        assert pair.density > 0.7
+    sentence = report.computed[2].trust.answer.sentence  # at 0.83 m
+    assert f"{report.computed[2].share:.0%} of the pixels have depth" in sentence
+    assert report.computed[0].share == 0
+
+
 def test_pairs_without_depth_are_not_sound(photos: Path) -> None:
     """Images without texture give no depth at all: that is no success."""
     for side, name in (("left", "l"), ("right", "r00")):
@@ -190,3 +215,39 @@ def test_pairs_without_depth_are_not_sound(photos: Path) -> None:
     report = run_stereo(_job(photos), _Watch())
     assert not report.failed
     assert not report.is_sound
+
+
+class _Impatient(_Watch):
+    """Somebody who presses Ctrl-C as soon as two pairs are done."""
+
+    def __call__(self, amount: int = 1) -> None:
+        super().__call__(amount)
+        if self.done == 2:
+            raise KeyboardInterrupt
+
+
+def test_the_pairs_before_ctrl_c_have_a_report_and_a_page(photos: Path) -> None:
+    """Two of three pairs are done: their folders are whole, and the report says that it is not of all pairs."""
+    with pytest.raises(KeyboardInterrupt):
+        run_stereo(_job(photos), _Impatient())
+    out = photos / "out"
+    told = json.loads((out / "report.json").read_text())
+    assert (told["interrupted_of"], told["computed"]) == (3, 2)
+    assert told["headline"].startswith("Interrupted after 2 of 3 pairs.")
+    assert [pair["name"] for pair in told["pairs"]] == ["pair-000002", "pair-000007"]
+    assert "Interrupted after 2 of 3 pairs" in (out / "index.html").read_text()
+    assert not list(out.glob("*.part"))
+
+
+def test_a_result_that_cannot_be_written_whole_leaves_nothing(photos: Path) -> None:
+    """The system takes no file of more than 20 kB: the pictures that could be written are gone, like the maps that could not."""
+    for name in ("left/l2.png", "left/l7.png"):
+        (photos / name).unlink()
+    _, hard = limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
+    try:
+        with pytest.raises(OSError, match="too large"):
+            run_stereo(_job(photos), _Watch())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [path.name for path in (photos / "out").iterdir()] == [".tandemscan"]

@@ -1,14 +1,17 @@
 """The options of the stereo core: what they build, and what is refused in one line with its remedy."""
 
 import argparse
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError, TandemError
+from phone_host.cli import main
 from phone_host.model import Crop, Side, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.rig_yaml import write_rig
@@ -141,13 +144,20 @@ def test_kittis_colour_images_get_the_colour_cameras(tmp_path: Path) -> None:
     ]
     path = tmp_path / "calib.txt"
     path.write_text("\n".join(rows) + "\n")
-    for folder, expected_m in (("image_0", 0.54), ("image_2", 0.53), ("image_02/data", 0.53), ("image_20", 0.54)):
-        options = parsed("--calibration", str(path))
-        options.left = tmp_path / folder / "000000.png"
-        core, _ = build_core(options, str(path), "sgbm", (1226, 370))
-        assert core is not None
-        assert core.geometry is not None
-        assert core.geometry.baseline_m == pytest.approx(expected_m)
+    for left, right, expected_m in (
+        ("image_0", "image_1", 0.54),
+        ("image_2", "image_3", 0.53),
+        ("image_02/data", "image_03/data", 0.53),
+        ("image_20", "image_21", 0.54),
+        ("image_2/grey/image_0", "image_2/grey/image_1", 0.54),
+    ):
+        for folder in (left, right):
+            (tmp_path / folder).mkdir(parents=True, exist_ok=True)
+            cv2.imwrite(str(tmp_path / folder / "000000.png"), noise(320, 96))
+        words = (str(tmp_path / left), str(tmp_path / right), "--calibration", str(path), "--out", str(tmp_path / "o"))
+        assert main(["stereo", *words]) == 4  # noise has no depth, which the report says, too
+        found = json.loads((tmp_path / "o" / "report.json").read_text())["geometry"]["baseline_m"]
+        assert found == pytest.approx(expected_m)
 
 
 def test_with_metres_the_range_follows_from_near() -> None:
@@ -192,6 +202,11 @@ def test_a_rejected_rig_is_refused_unless_it_is_asked_for() -> None:
         (("--rectified", "--focal", "0", "--baseline", "60"), "--focal is '0'"),
         (("--rectified", "--focal", "long", "--baseline", "60"), "--focal is 'long'"),
         (("--rectified", "--focal", "500", "--baseline", "60px"), "--baseline is '60px'"),
+        (("--rectified", "--focal", "500", "--baseline", "0.193"), "--baseline 0.193 has no unit"),
+        (("--rectified", "--focal", "500", "--baseline", "193001"), "--baseline 193001 is 193.001 m"),
+        (("--rectified", "--focal", "500", "--baseline", "11m"), "--baseline 11m is 11 m"),
+        (("--near", "0.3"), "--near 0.3 has no unit"),
+        (("--far", "2"), "--far 2 has no unit"),
         (("--rectified", "--focal", "500", "--baseline", "60", "--center", "1,2,3"), "--center is '1,2,3'"),
         (("--rectified", "--focal", "500", "--baseline", "60", "--doffs", "x"), "--doffs is 'x'"),
     ],

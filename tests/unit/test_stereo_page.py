@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.model import CutCounts
+from common.words import distance_text
+from phone_host.model import CutCounts, Epipolar, Search
 from phone_host.report import depth_data
 from phone_host.report.cut_words import cut_rows, cut_sentence
 from phone_host.report.depth_script import SCRIPT
@@ -155,6 +156,23 @@ def test_the_figures_follow_from_the_depth() -> None:
     assert "12 % found no match" in words  # an eighth
 
 
+def test_the_page_says_from_where_on_depth_was_searched() -> None:
+    """Depth nearer than f b / (N - 1) cannot be found: 50 px m over 63 px with the page's geometry."""
+    found = replace(processed(), search=Search(disparities=64))
+    from_m = GEOMETRY.focal_px * GEOMETRY.baseline_m / (63 + GEOMETRY.doffs_px)
+    assert f"Searched from {distance_text(from_m)}: nothing nearer" in stereo_page(page_data(processed=found))
+
+
+def test_without_any_value_no_picture_has_a_scale() -> None:
+    """A black picture beside "0.5 px" or "1.2 m" would promise values; with values, disparity and depth have one each."""
+    full = processed()
+    assert full.disparity is not None
+    assert full.cloud is not None
+    empty = replace(full, disparity=np.full_like(full.disparity, np.nan), cloud=np.full_like(full.cloud, np.nan))
+    assert stereo_page(page_data(processed=full)).count('<div class="bar"') == 2
+    assert '<div class="bar"' not in stereo_page(page_data(processed=empty))
+
+
 def test_cut_pixels_are_told_in_words() -> None:
     """Shares are of all pixels; zeros are left out; a small share is never called 0 %."""
     cut = CutCounts(kept=50_000, unmatched=20_000, at_zero=30, too_far=12_000, too_near=3_000, outside=15_000 - 30)
@@ -192,7 +210,9 @@ def test_nothing_measured_makes_a_page_all_the_same() -> None:
 
 def test_stacked_cameras_have_column_lines() -> None:
     """Where epipolar lines run along columns, the pictures stand above each other, and the lines and the match run along columns."""
-    text = stereo_page(page_data(stacked=True))
+    flat = processed()
+    pair = replace(flat.pair, epipolar=Epipolar.DOWN)
+    text = stereo_page(page_data(processed=replace(flat, pair=pair)))
     assert "column lines" in Page(text).words
     assert "views stack" in text
     assert "views rows" not in text

@@ -1,12 +1,13 @@
 """What `stereo` tells about pairs: limits, cuts, images without partner."""
 
 from dataclasses import replace
+from textwrap import wrap
 
 import pytest
 
 from phone_host.measure.headline import Answer, Grade
 from phone_host.measure.image_doubts import ImageFigures
-from phone_host.measure.trust import NO_DEPTH
+from phone_host.measure.no_depth import no_depth
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
@@ -25,7 +26,7 @@ from phone_host.report.stereo_verdict import set_verdict
 
 # 1000 pixels; f b = 50 px m, so an error of 0.25 px makes a depth of 40 m wrong by 0.25 * 40 / 50 = 20 %.
 _GOOD = PairTrust(ImageFigures(), (), Answer(Grade.GOOD, "Depth looks right."))
-_BAD = PairTrust(ImageFigures(), (NO_DEPTH,), Answer(Grade.BAD, "Depth is wrong."))
+_BAD = PairTrust(ImageFigures(), (no_depth(None, None),), Answer(Grade.BAD, "Depth is wrong."))
 
 _PAIR = PairReport(
     name="",
@@ -88,13 +89,77 @@ def test_the_object_of_a_pair_states_limits_cuts_unit_and_axes() -> None:
     assert (flat["unit"], flat["axes"], flat["limits"]) == (None, None, None)
 
 
-def test_a_remedy_that_several_pairs_share_is_told_once() -> None:
-    """Twenty pairs do not repeat the same advice twenty times."""
-    remark = Remark("only 10% of the pixels have depth", "check the rig")
-    pairs = tuple(replace(_PAIR, name=f"pair-{number:06d}", remarks=(remark,)) for number in range(3))
-    lines = set_lines(SetReport(pairs=pairs, by_number=True), "scans")
-    assert sum("check the rig" in line for line in lines) == 1
-    assert sum("only 10%" in line for line in lines) == 3
+def _alike(count: int, *problems: str) -> SetReport:
+    """Pairs that each have one of the problems in turn; the files have no shared numbers."""
+    return SetReport(
+        pairs=tuple(
+            replace(
+                _PAIR,
+                name=f"pair-{number:06d}",
+                left=f"photos/Piano{number}L.png",
+                remarks=(Remark(problems[number % len(problems)], "check the rig"),),
+            )
+            for number in range(count)
+        ),
+        by_number=False,
+    )
+
+
+def test_a_remark_that_several_pairs_share_is_told_once_with_their_number() -> None:
+    """Twenty-four pairs do not repeat the same warning; one with other figures each names the first pair as an example."""
+    lines = set_lines(_alike(24, "nothing nearer than 478 mm is found"), "scans")
+    assert lines.count("warning: in 24 of 24 pairs: nothing nearer than 478 mm is found: check the rig") == 1
+    assert sum("478 mm" in line for line in lines) == 1
+    unlike = set_lines(_alike(4, "only 10% have depth", "only 8.5% have depth"), "scans")
+    [told] = [line for line in unlike if line.startswith("warning")]
+    assert told.startswith("warning: in 4 of 4 pairs, such as pair-000000 Piano0L.png: only 10% have depth")
+
+
+def test_the_verdict_of_24_pairs_is_the_last_thing_on_a_narrow_terminal() -> None:
+    """What is printed last stays on 30 rows of 50 columns: the verdict, its warnings and where the files are."""
+    report = _alike(24, "nothing nearer than 478 mm is found")
+    lines = set_lines(report, "scans")
+    rows = [row for line in lines for row in (wrap(line, 50) or [""])]
+    assert lines[-1] == set_verdict(report)[1]
+    assert any("in 24 of 24 pairs" in row for row in rows[-29:])
+
+
+def test_pairs_without_numbers_of_their_own_are_told_with_a_file() -> None:
+    """pair-000002 alone says nothing to whoever named the file Piano2L.png; where names share numbers, the folder's name does."""
+    report = _alike(3, "x")
+    assert set_lines(report, "scans")[2].startswith("pair-000002 Piano2L.png  good, 70% have depth, 700 points")
+    assert set_lines(replace(report, by_number=True), "scans")[2].startswith("pair-000002  good")
+
+
+def test_what_the_headline_tells_is_no_warning_beside_it() -> None:
+    """A doubt is told once, by the headline with its remedy; report.json lists it all the same."""
+    remarks = (Remark(_BAD.concerns[0].sentence, _BAD.concerns[0].remedy), Remark("something else"))
+    bad = replace(_PAIR, trust=_BAD, remarks=remarks)
+    assert [line for line in pair_lines(bad, "scan") if line.startswith("warning")] == ["warning: something else"]
+    assert len(pair_json(bad)["warnings"]) == 2
+
+
+def test_depths_beyond_a_16_bit_picture_are_a_note_and_no_warning() -> None:
+    """Far points are no fault of the result."""
+    lines = pair_lines(replace(_PAIR, written=WrittenPair(files=("depth.png",), points=700, not_in_depth_png=12)), "s")
+    assert "note: 12 depths beyond 65.5 m (or below 1 mm) only in xyz.pfm" in lines
+    assert not any(line.startswith("warning") for line in lines)
+
+
+def test_the_nearest_distance_searched_is_told_on_the_terminal_and_to_programs() -> None:
+    """N = 64, so up to 63 px: f b = 50 px m are 50 / 63 = 0.794 m; with doffs of 17 px, 50 / 80 = 0.625 m; px alone tell none."""
+    assert "searched from 794 mm" in pair_lines(_PAIR, "scan")[1]
+    assert pair_json(_PAIR)["searched_from_m"] == pytest.approx(50 / 63, abs=1e-4)
+    assert _PAIR.geometry is not None
+    shifted = replace(_PAIR, geometry=replace(_PAIR.geometry, doffs_px=17))
+    assert shifted.searched_from_m == pytest.approx(0.625)
+    assert pair_json(replace(_PAIR, geometry=None))["searched_from_m"] is None
+
+
+def test_pixels_outside_the_crop_do_not_lower_the_share() -> None:
+    """700 points of the 800 pixels inside the crop are 87.5 %; without metres the share is that of the disparities."""
+    assert replace(_PAIR, cut=CutCounts(kept=700, unmatched=100, outside=200)).share == pytest.approx(0.875)
+    assert replace(_PAIR, written=WrittenPair(files=())).share == 0.82
 
 
 @pytest.mark.parametrize(

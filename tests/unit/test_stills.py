@@ -1,11 +1,14 @@
 """Photographs are paired by the numbers in their names, whatever each side's folder holds; otherwise by their order."""
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from common.camera.image_numbers import ImageNumbers, numbers_of, numbers_told, with_numbers
 from common.protocol.wire_fields import MAX_TEXT
+from phone_host.stereo.view_files import pair_files
 from phone_host.sync.stills import PairedBy, PassedOver, Stills, Wanted
 
 PERIOD_NS = 33_333_333
@@ -112,6 +115,9 @@ def test_with_loop_the_numbers_come_again(*, own_loops: bool) -> None:
         (["frame7", "frame10"], (7, 10)),
         (["cam0_0012", "cam0_0013"], (12, 13)),
         (["0012_cam1", "0013_cam1"], (12, 13)),
+        (["cam0_0012_120530", "cam0_0013_120533"], (12, 13)),
+        (["120530_cam0_0012", "120533_cam0_0015", "120534_cam0_0013"], (12, 15, 13)),
+        (["5_1", "6_2"], (1, 2)),
         (["left", "right"], ()),
         (["a1", "b1"], ()),
         (["only12"], ()),
@@ -119,9 +125,28 @@ def test_with_loop_the_numbers_come_again(*, own_loops: bool) -> None:
         (["a1", "b"], ()),
     ],
 )
-def test_the_number_is_the_last_one_that_tells_all_names_apart(names: list[str], numbers: tuple[int, ...]) -> None:
-    """A camera's own number does not count its images; a single image, and times in ns, have no number."""
+def test_the_number_is_the_one_that_counts_the_images(names: list[str], numbers: tuple[int, ...]) -> None:
+    """It tells all names apart and leaves out the fewest values, so it is neither a camera's own number nor a time of day; the last of two alike.
+
+    A single image, and times in ns, have no number.
+    """
     assert numbers_of(names) == numbers
+
+
+@pytest.mark.parametrize("name", ["cam{side}_{number:04}_{time}", "{time}_{number}_cam{side}", "{side}_{number}"])
+def test_a_camera_chooses_the_number_that_stereo_chooses(tmp_path: Path, name: str) -> None:
+    """Times of day differ between the sides, so `stereo` pairs by the counter; each camera takes the same number from its own names alone."""
+    sides: list[list[str]] = []
+    for side in (0, 1):
+        (tmp_path / str(side)).mkdir()
+        stems = [name.format(side=side, number=n, time=120530 + 3 * n + side) for n in (9, 10, 12)]
+        for stem in stems:
+            (tmp_path / str(side) / f"{stem}.png").touch()
+        sides.append(stems)
+    files = pair_files(str(tmp_path / "0"), str(tmp_path / "1"))
+    paired = tuple(int(number) for number, _, _ in files.pairs)
+    assert files.by_number
+    assert paired == numbers_of(sides[0]) == numbers_of(sides[1]) == (9, 10, 12)
 
 
 @given(st.text(max_size=200), st.integers(1, 10**6), st.none() | st.integers(0, 10**9), st.booleans())

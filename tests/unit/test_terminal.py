@@ -1,8 +1,12 @@
 """Text on a phone's terminal: nothing is wider than 50 columns, and no number, path or command is cut."""
 
 import io
+import os
 import re
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -12,13 +16,17 @@ from rich.console import Console
 from common.ledger import BoardMarks
 from common.program.terminal import columns, folded
 from phone_host.bench.tables import narrow_rows
+from phone_host.calibration.board_pairs import Reason, Rejected
 from phone_host.measure.accounts import LinkAccount, LinkTally
 from phone_host.report.summary import summary
 from phone_host.run.terminal_view import LiveTable
+from phone_host.verbs.calibrate.figures import rejections
 from tests.support.samples import LEDGER
+from tests.support.terminal import in_terminal
 from tests.unit.test_bench_report import result
 from tests.unit.test_run_report import MS, run
 
+ROOT = Path(__file__).resolve().parents[2]
 PHONE = 50
 WORDS = st.lists(st.text(st.characters(categories=["L", "N", "P"]), min_size=1, max_size=70), max_size=30)
 
@@ -37,7 +45,9 @@ def test_folding_keeps_every_word_whole(words: list[str], width: int) -> None:
     [
         ("try next  phone-host run --camera 'replay:/a/very/long/path/of/a/film?fps=15&loop=1' --out scan", 1),
         ("          board-agent run --camera 'replay:/a/very/long/path/of/a/film?fps=15&loop=1'", 1),
+        ("phone-host: error: LEFT 'left' does not exist: give a folder of images", 2),
         ("use phone-host calibrate again, with more photographs of the board than before", 2),
+        ("phone-host: error: the camera has gone: plug it in again, and then start again", 2),
     ],
 )
 def test_commands_stay_whole(line: str, found: int) -> None:
@@ -94,3 +104,66 @@ def test_the_benchmarks_table_of_a_phone_has_one_run() -> None:
     assert ("processing", "15.000", "15.000", "15.000") in table
     assert max(len(cell) for row in table for cell in row[1:]) <= 9
     assert LinkAccount([]).links == ()
+
+
+_BENCH = """
+import sys
+sys.path.insert(0, {root!r})
+from phone_host.bench.analysis import analyse
+from phone_host.bench.changes import parse_changes
+from phone_host.bench.command import _print
+from tests.unit.test_bench_report import UNDER, result
+results = [result(link=link) for link in ("tcp", "ipc", "tcp://192.168.107.222:55555?a=1&b=2&c=3&d=4")]
+_print(results, UNDER, analyse(results, UNDER.fifo, parse_changes(["fps=60,link=bluetooth"])))
+"""
+
+
+@pytest.mark.parametrize("width", [PHONE, 80])
+def test_all_that_delay_bench_prints_fits_a_terminal(width: int, tmp_path: Path) -> None:
+    """In a real terminal every number is whole: the delays, the fits, the predictions. No line is wider, save one that is a single word."""
+    with in_terminal([sys.executable, "-P", "-c", _BENCH.format(root=str(ROOT))], width, tmp_path) as running:
+        assert running.read_all() == 0
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", running.seen.decode())
+    assert "…" not in text
+    assert len(re.findall(r"processing +(\S+ +)?15\.000 +15\.000 +15\.000", text.replace("│", ""))) >= 1
+    assert "predicted, not run:" in text
+    assert all(len(line) <= width or len(line.split()) == 1 for line in text.split("\r\n"))
+
+
+def test_the_benchmark_asks_columns_where_there_is_no_terminal(tmp_path: Path) -> None:
+    """In a pipe the table is whole, however many columns it takes; COLUMNS=50 asks for the narrow one. Neither cuts a number."""
+    texts = {}
+    for columns_asked in ("", "50"):
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", _BENCH.format(root=str(ROOT))],
+            env={**os.environ, "COLUMNS": columns_asked},
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert "…" not in done.stdout
+        texts[columns_asked] = done.stdout
+    assert "p99" in texts[""]
+    assert "p99" not in texts["50"]
+
+
+def test_the_list_of_interfaces_fits_a_phone(tmp_path: Path) -> None:
+    """`delay-bench --emulate list` names each interface at the beginning of a line, and its numbers are beside it."""
+    command = [sys.executable, "-P", "-m", "phone_host.bench.cli", "--emulate", "list"]
+    with in_terminal(command, PHONE, tmp_path) as running:
+        assert running.read_all() == 0
+    lines = running.seen.decode().split("\r\n")
+    assert "usb-serial: serial, 1000 kB/s, 1 to 2 ms" in lines
+    assert max(len(line) for line in lines) <= PHONE
+
+
+def test_rejected_pairs_fit_a_phones_terminal() -> None:
+    """The line of a pair that is not used goes on below its reason; nothing is wider than 50 columns."""
+    line = rejections(
+        (Rejected("12", Reason.NOT_FOUND_LEFT, "the board is not seen whole and sharp in the left image"),)
+    )
+    lines = folded(line, PHONE).split("\n")
+    assert len(lines) == 3
+    assert all(len(each) <= PHONE for each in lines)
+    assert all(each.startswith(" " * 10) for each in lines[1:])

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from common import now
-from common.camera.base import Camera
+from common.camera.base import Camera, upright_px
 from common.camera.factory import parse_camera, parse_orientation
-from common.camera.orientation import UPRIGHT, Flip, Orientation
 from common.camera.v4l2_stream import V4l2Settings
 from common.errors import DataError, SettingsError
+from common.orientation import UPRIGHT, Flip, Orientation
 from common.protocol.message import FrameMessage
 from phone_host.calibration.timing.shots import Shot
 from phone_host.camera import factory as host_factory
@@ -26,6 +26,7 @@ from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.raw_images import EncodedImage
 from phone_host.stereo.rectify import Rectifier
 from tests.support.numbered import HEIGHT_PX, WIDTH_PX, write_film
+from tests.support.oriented import oriented
 from tests.support.planes import plane
 from tests.support.rigs import small_rig
 from tests.unit.test_enlarged import halved, pair_of
@@ -121,6 +122,15 @@ def test_a_replay_says_how_it_is_mounted_and_stays_as_it_is_otherwise(tmp_path: 
     assert turned.read(10) == plain.read(10)
     turned.close()
     plain.close()
+
+
+def test_photographs_that_their_headers_turn_have_the_upright_size(tmp_path: Path) -> None:
+    """EXIF 6 is a quarter turn; a camera address that turns by a quarter again leads back. The principal point's default follows this size."""
+    (tmp_path / "1.jpg").write_bytes(oriented(".jpg", np.zeros((24, 32), np.uint8), 6))
+    assert upright_px(opened(f"replay:{tmp_path}")) == (24, 32)
+    assert upright_px(opened(f"replay:{tmp_path}?rotate=90")) == (32, 24)
+    (tmp_path / "1.jpg").write_bytes(oriented(".jpg", np.zeros((24, 32), np.uint8), 3))
+    assert upright_px(opened(f"replay:{tmp_path}")) == (32, 24)
 
 
 def test_every_kind_of_uri_takes_the_options() -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from common.errors import SettingsError
-from phone_host.verbs.units import length_mm
+from phone_host.verbs.units import baseline_mm, length_mm, limit_mm
 
 
 @pytest.mark.parametrize(
@@ -19,3 +19,25 @@ def test_anything_else_is_refused_with_the_option_and_an_example(text: str) -> N
     with pytest.raises(SettingsError, match="--x") as caught:
         length_mm(text, "--x", "25mm")
     assert "25mm" in caught.value.remedy
+
+
+def test_a_number_alone_that_can_only_mean_metres_is_refused_with_both_readings() -> None:
+    """Wrong by 1000, every depth would look right: 0.193 is refused as a baseline, 2 as a limit, and both readings are named."""
+    for read, text in ((baseline_mm, "0.193"), (lambda word: limit_mm(word, "--far", "5m"), "2")):
+        with pytest.raises(SettingsError, match="has no unit") as caught:
+            read(text)
+        assert f"or {text}m;" in caught.value.remedy
+        assert f"{text}mm" in caught.value.remedy
+
+
+def test_what_a_unit_states_is_believed() -> None:
+    """With a unit, and from 1 mm (baseline) or 10 mm (limits) on without one, the number is what it says."""
+    assert [baseline_mm(text) for text in ("0.5mm", "1", "193.001", "0.193m")] == pytest.approx([0.5, 1, 193.001, 193])
+    assert [limit_mm(text, "--near", "300mm") for text in ("2mm", "10", "2m")] == pytest.approx([2, 10, 2000])
+
+
+def test_cameras_ten_metres_apart_are_the_limit() -> None:
+    """10m is taken; 193001, which is micrometres, is not."""
+    assert baseline_mm("10m") == pytest.approx(10_000)
+    with pytest.raises(SettingsError, match=r"193001 is 193\.001 m"):
+        baseline_mm("193001")

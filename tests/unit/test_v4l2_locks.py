@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.camera import v4l2_abi as abi
-from common.camera.identity import Lock
 from common.camera.v4l2_controls import Axis, Control, ControlWishes, to_axis, to_locks
 from common.camera.v4l2_device import Device
 from common.camera.v4l2_open_controls import OpenControls
 from common.camera.v4l2_serial import serial_number
 from common.camera.v4l2_tally import Tally
+from common.camera_identity import Lock
 
 
 @given(st.sampled_from(Lock), st.integers(1, 2**31 - 1))

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from common import now
-from common.camera.identity import Lock
+from common.camera_identity import Lock
 from common.link.factory import open_link, parse_link
 from phone_host.stream.receiver import Receiver
 from tests.support.numbered import saved_numbers

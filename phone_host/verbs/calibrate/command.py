@@ -1,36 +1,42 @@
 """phone-host calibrate: calibrate two cameras from pictures of a chessboard."""
 
 import argparse
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from common.errors import DataError, UnavailableError
 from common.program.terminal import fitted
+from phone_host.calibration.arrangement import Misplaced, is_contradicted, misplaced
 from phone_host.calibration.board_pairs import Calibration, Reason
 from phone_host.calibration.board_views import BoardViews, Mounted, look_for_boards
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.cameras_beside import cameras_beside, require_sizes, with_cameras
+from phone_host.calibration.out_of_step import out_of_step
 from phone_host.calibration.target import Board, parse_board
 from phone_host.calibration.verdict import Assessment, Verdict, judge
-from phone_host.model import Rig, Side
+from phone_host.model import Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_yaml import REJECTED, is_rig, read_rig, write_rig
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import most_pixels
 from phone_host.stereo.view_files import ViewFiles, pair_files
-from phone_host.verbs.calibrate.figures import rejections, report_of, report_of_failure, summary, unwritten
+from phone_host.verbs.calibrate.figures import (
+    pairing_notes,
+    rejections,
+    report_of,
+    report_of_failure,
+    summary,
+    unwritten,
+)
+from phone_host.verbs.calibrate.hints import arrangement_hint, out_of_step_error
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, unwritable
 from phone_host.verbs.units import square_mm
 
 _CHECK_FAILED = 4
-_ROLLED_DEG = 45.0
-"""Nearer to a quarter turn than to none."""
-
 _NOT_FOUND = frozenset({Reason.NOT_FOUND_LEFT, Reason.NOT_FOUND_RIGHT, Reason.NOT_FOUND_BOTH})
 _COUNT_CORNERS = (
     "check --board: it counts inner corners, one less than the squares each way (10x7 squares are --board 9x6); or take 15 or"
@@ -49,37 +55,45 @@ def run(options: argparse.Namespace) -> int:
     keep_other_report(options.out.parent, "calibrate")
     claim_names(options.out.parent, options.out, "report.json")
     beside = cameras_beside(files, mounted)
-    views, found = _calibrated(files, board, options, mounted)
+    views, found, wrong = _calibrated(files, board, options, mounted)
+    hint = "" if wrong is None else arrangement_hint(views, mounted, wrong)
     if isinstance(found, DataError):
-        return _report_failure(files, views, found, options)
+        return _report_failure(files, views, DataError(found.problem, hint or found.remedy), options)
     if beside is not None:
         require_sizes(*beside, views.sizes_px)
     rejected = (*views.rejected, *found.rejected)
-    judgement = judge(found, rejected)
-    if (hint := _turn_hint(views, found.rig)) is not None:
-        judgement = Assessment(judgement.verdict, (hint, *judgement.remedies))
+    judgement = _advised(judge(found, rejected), found, wrong, hint)
     rig = replace(
         with_cameras(found.rig, None if beside is None else beside[1], mounted), verdict=judgement.verdict.value
     )
     report = report_of(files, views, rejected, found, judgement)
     report |= _write_rig(options.out, replace(found, rig=rig))
     _write_report(options.out, report)
-    print(json_text(report) if options.json else fitted(summary(report, views, found, rejected, options.out)))
+    print(
+        json_text(report)
+        if options.json
+        else fitted("\n".join([*pairing_notes(files), summary(report, views, found, rejected, options.out)]))
+    )
     return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
 
 
 def _calibrated(
     files: ViewFiles, board: Board, options: argparse.Namespace, mounted: Mounted
-) -> tuple[BoardViews, Calibration | DataError]:
-    """Search all images and calibrate; return why there is no calibration if there is none."""
+) -> tuple[BoardViews, Calibration | DataError, Misplaced | None]:
+    """Search all images and calibrate; return why there is no calibration if there is none, and which side seems turned or mirrored."""
     limit = most_pixels(None, options.max_megapixels)
     with step_bar("finding the board", len(files.pairs)) as step:
         views = look_for_boards(files, board, step, limit, mounted)
         step.say("fitting the rig")
+        shifted = out_of_step(*views.in_order, board, views.sizes_px)
+        if shifted is not None:
+            return views, out_of_step_error(shifted), None
+        found: Calibration | DataError
         try:
-            return views, calibrate(list(views.pairs), board, views.sizes_px, Side(options.board_side))
+            found = calibrate(list(views.pairs), board, views.sizes_px, Side(options.board_side))
         except DataError as failure:
-            return views, failure
+            found = failure
+        return views, found, misplaced(list(views.pairs), board, views.sizes_px, found)
 
 
 def _report_failure(files: ViewFiles, views: BoardViews, failure: DataError, options: argparse.Namespace) -> int:
@@ -92,23 +106,18 @@ def _report_failure(files: ViewFiles, views: BoardViews, failure: DataError, opt
     error = DataError(failure.problem, _COUNT_CORNERS) if 2 * unseen > len(files.pairs) else failure
     report = report_of_failure(files, views, error) | _write_rig(options.out, None)
     _write_report(options.out, report)
-    text = "\n".join([rejections(views.rejected), *unwritten(report, options.out)])
-    print(json_text(report) if options.json else text)
+    text = "\n".join([*pairing_notes(files), rejections(views.rejected), *unwritten(report, options.out)])
+    print(json_text(report) if options.json else fitted(text))
     raise error
 
 
-def _turn_hint(views: BoardViews, rig: Rig) -> str | None:
-    """Say that two EXIF headers disagree where the cameras seem rolled against each other; None otherwise."""
-    if views.turned[0] == views.turned[1]:
-        return None
-    roll_deg = math.degrees(math.atan2(rig.R_right_left[1, 0], rig.R_right_left[0, 0]))
-    if abs(roll_deg) < _ROLLED_DEG:
-        return None
-    by_deg = round(roll_deg / 90) * 90 % 360
-    return (
-        f"left and right EXIF headers differ, and the right camera appears turned by {abs(roll_deg):.0f} degrees: if both cameras"
-        f" are mounted alike, add --rotate-right {360 - by_deg}, or remove that tag from all images"
-    )
+def _advised(judgement: Assessment, found: Calibration, wrong: Misplaced | None, hint: str) -> Assessment:
+    """Put the side that is turned or mirrored first. A rig of mirrored or unlike views is none, whatever its figures."""
+    if wrong is None:
+        return judgement
+    if found.obstacle is not None or wrong.is_mirrored or is_contradicted(found):
+        return Assessment(Verdict.REJECT, (hint,))  # all else follows from it
+    return Assessment(judgement.verdict, (hint, *judgement.remedies))
 
 
 def _write_rig(out: Path, calibration: Calibration | None) -> dict[str, str]:

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from common.camera.orientation import UPRIGHT
 from common.errors import DataError
+from common.orientation import UPRIGHT
 from common.versions import REPORT_FORMAT
 from common.words import counted
 from phone_host.calibration.board_pairs import Calibration, Rejected
@@ -31,6 +31,7 @@ def report_of(
     """Return the report of a calibration that gave a rig."""
     return {
         "format_version": REPORT_FORMAT,
+        "command": "calibrate",
         "pairs": _pairs(files, rejected, len(calibration.used)),
         **_figures(calibration),
         **_turned(views),
@@ -43,6 +44,7 @@ def report_of_failure(files: ViewFiles, views: BoardViews, error: DataError) -> 
     """Return the report of a calibration that gave no rig."""
     return {
         "format_version": REPORT_FORMAT,
+        "command": "calibrate",
         "pairs": _pairs(files, views.rejected, 0),
         **_turned(views),
         "verdict": REJECTED,
@@ -132,6 +134,15 @@ def rejections(rejected: tuple[Rejected, ...]) -> str:
     return "\n".join(f"{each.name:>8}  rejected: {each.reason.value} ({each.detail})" for each in rejected)
 
 
+def pairing_notes(files: ViewFiles) -> list[str]:
+    """Warn if the pairs were guessed from the order of names though the counts differ."""
+    if files.by_number or not (files.left_alone or files.right_alone):
+        return []
+    left, right = (len(files.pairs) + len(alone) for alone in (files.left_alone, files.right_alone))
+    counts = f"{left} left and {right} right pictures"
+    return [f"warning  {counts} were paired in the order of their names, because the names share no numbers"]
+
+
 def unwritten(report: dict[str, Any], out: Path) -> list[str]:
     """Say that there is no new rig, and where the earlier one is."""
     return [f"{out} was not written{_earlier(report)}"]
@@ -145,8 +156,13 @@ def summary(
     report: dict[str, Any], views: BoardViews, calibration: Calibration, rejected: tuple[Rejected, ...], out: Path
 ) -> str:
     """Return the report as text."""
-    rows = [f"{'pair':>8}  {'left px':>8} {'right px':>8} {'vertical px':>11}"]
-    rows += [f"{u.name:>8}  {u.left_px:8.3f} {u.right_px:8.3f} {u.vertical_px:11.3f}" for u in calibration.used]
+    # A rig that cannot be rectified has no vertical errors.
+    known = calibration.obstacle is None
+    rows = [f"{'pair':>8}  {'left px':>8} {'right px':>8}" + (f" {'vertical px':>11}" if known else "")]
+    rows += [
+        f"{u.name:>8}  {u.left_px:8.3f} {u.right_px:8.3f}" + (f" {u.vertical_px:11.3f}" if known else "")
+        for u in calibration.used
+    ]
     if rejected:
         rows.append(rejections(rejected))
     rms, vertical, used = report["rms_px"], report["vertical_error_px"], report["pairs"]["used"]

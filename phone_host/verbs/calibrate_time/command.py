@@ -162,6 +162,7 @@ def _seen(
 def _report(options: argparse.Namespace, measured: Measured, footage: Footage) -> dict[str, Any]:
     return {
         "format_version": REPORT_FORMAT,
+        "command": "calibrate-time",
         "method": measured.method.value,
         "time_offset_ns": measured.offset.offset_ns,
         "uncertainty_ns": measured.offset.uncertainty_ns,

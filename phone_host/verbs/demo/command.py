@@ -15,7 +15,7 @@ from common.program.commandline import INTERRUPTED
 from common.program.invocation import command_line, program_name
 from common.program.settings import with_origins
 from common.program.signals import StopSignals
-from common.program.terminal import columns, fitted
+from common.program.terminal import columns, fitted, headed, rows
 from common.words import counted
 from phone_host.children.board_process import socket_folder
 from phone_host.demo.demo_page import demo_page
@@ -59,12 +59,12 @@ def run(options: argparse.Namespace) -> int:
                 with live or nullcontext():
                     demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
             except BaseException:
-                demo.host.write_report(build(demo.host.snapshot("failed")))
+                demo.host.write_report(build(demo.host.snapshot("failed"), "demo"))
                 raise
         snapshot = demo.host.snapshot("stopped" if signals.stop else "time_over")
         with busy_bar("comparing the depth with the known scene, writing the page", console):
             errors = demo.check(scene)
-            report = build(snapshot) | {"truth": truth_json(errors)}
+            report = build(snapshot, "demo") | {"truth": truth_json(errors)}
             complete = demo.host.write_report(report)
             demo.write_pictures(out)
             write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers, _by_hand(out, film)))
@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
             f"{error.filename or out} cannot be written ({error.strerror})",
             "make room on the disk, or give another folder with --out",
         ) from None
-    print(json.dumps(report) if options.json else fitted(summary(snapshot, columns())))
+    print(json.dumps(report) if options.json else headed(summary(snapshot, columns()), columns(), rows()))
     print(fitted(_closing(out, film, errors), sys.stderr), file=sys.stderr)
     if signals.stop:
         return INTERRUPTED if signals.interrupted else 0

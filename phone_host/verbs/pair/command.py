@@ -69,7 +69,7 @@ def _paired(keys: KeyFolder, door: tuple[str, int], link: str, given: str | None
     """Enrol with the board. On a terminal, ask again after a wrong code."""
     tries = 1
     while True:
-        call = PairingCall(door, keys)
+        call = PairingCall(door, keys, link, lambda line: print(f"phone-host: {line}", file=sys.stderr, flush=True))
         code = _code(given, call.ask())
         try:
             return call.prove(code, link, lambda: None)

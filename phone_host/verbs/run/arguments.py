@@ -22,6 +22,21 @@ EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:ri
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
+    _add_sources(parser)
+    add_stereo_arguments(parser)
+    _add_pairing(parser)
+    _add_ends(parser)
+    _add_results(parser)
+    parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
+    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
+    parser.add_argument(
+        "--log-level",
+        choices=("debug", "info", "warning", "error"),
+        help="least important messages that are logged to stderr",
+    )
+
+
+def _add_sources(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
     parser.add_argument(
         "--link",
@@ -31,7 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " the frames come over the best link that is up",
     )
     parser.add_argument("--camera", metavar="URI", help=f"camera of this machine: {EXAMPLE}; {TURNED}")
-    add_stereo_arguments(parser)
+
+
+def _add_pairing(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--board-side",
         choices=("left", "right"),
@@ -61,6 +78,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="move the board's image along the optical flow to the moment of the other camera's exposure",
     )
+
+
+def _add_ends(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--pairs",
         type=int,
@@ -81,6 +101,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="seconds to wait for a board, then exit with code 3 (default: wait for ever)",
     )
+
+
+def _add_results(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder for delays.jsonl, report.json, index.html and saved pairs"
     )
@@ -90,11 +113,4 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=30,
         metavar="N",
         help="save every Nth pair, beginning with the first; 0 saves none (default 30)",
-    )
-    parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
-    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
-    parser.add_argument(
-        "--log-level",
-        choices=("debug", "info", "warning", "error"),
-        help="least important messages that are logged to stderr",
     )

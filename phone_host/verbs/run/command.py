@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from common import now
+from common.camera.base import upright_px
 from common.errors import SettingsError
 from common.link.factory import open_links, parse_link, tell_insecure
 from common.program import logs
@@ -16,7 +17,7 @@ from common.program.commandline import INTERRUPTED
 from common.program.interrupts import leave
 from common.program.settings import Resolved, log_level, with_origins
 from common.program.signals import StopSignals
-from common.program.terminal import columns, fitted
+from common.program.terminal import columns, headed, rows
 from common.stamp import HOST_CLOCK
 from phone_host.boards.discovery import find_board_and_say, remember
 from phone_host.camera.examples import EXAMPLE
@@ -60,11 +61,10 @@ def run(options: argparse.Namespace) -> int:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
     _check_numbers(options)
     if options.out is not None:
-        inputs = {"--camera": replayed(settings.camera), "--calibration": settings.calibration}
-        spare_inputs(options.out, NAMES, {what: Path(path) for what, path in inputs.items() if path})
+        spare(options.out, replayed(settings.camera), settings.calibration)
     fifo = FifoSettings.parse(settings.fifo)
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
-    core, board_side = _core(options, settings, camera.description.upright_px)
+    core, board_side = _core(options, settings, upright_px(camera))
     keys = key_folder(settings.keys)
     named = settings.link or (find_board_and_say(keys.path, options.wait),)
     uris = [parse_link(uri, listens_by_default=False) for uri in named]
@@ -90,8 +90,12 @@ def run(options: argparse.Namespace) -> int:
     report = build(snapshot)
     page = _page(host, snapshot, board_side, options.out) if options.out else ""
     complete = host.write_report(report, page)
-    text = json.dumps(report) if options.json else fitted(summary(snapshot, columns()))
+    missing = f"\nnot written: {host.missing_files}: make room and run again" if host.missing_files else ""
+    told = summary(snapshot, columns()) + missing
+    text = json.dumps(report) if options.json else headed(told, columns(), rows())
     print(text, flush=host.has_given_up)
+    if options.json and snapshot.shortfall:
+        print(f"phone-host: {snapshot.shortfall}", file=sys.stderr)
     if signals.interrupted and host.has_given_up:
         leave()  # the interpreter's end would wait for native code
     if signals.interrupted:
@@ -100,6 +104,29 @@ def run(options: argparse.Namespace) -> int:
     too_few = too_few or (ended is EndReason.SECONDS_OVER and not snapshot.processed)
     is_wrong = not signals.stop and (depth_is_wrong(snapshot) or snapshot.spoiled_counts.nothing_whole)
     return _CHECK_FAILED if too_few or is_wrong or not complete else 0
+
+
+def spare(out: Path, replay: str, calibration: str) -> None:
+    """Refuse a results folder that would lose the inputs, or holds the replay's photographs.
+
+    Args:
+        out: folder for the results.
+        replay: folder, glob or file that the own camera replays; empty: another camera.
+        calibration: path of the rig; empty: none.
+
+    Raises:
+        SettingsError: it is such a folder.
+    """
+    inputs = {"--camera": replay, "--calibration": calibration}
+    spare_inputs(out, NAMES, {what: Path(path) for what, path in inputs.items() if path})
+    if not replay:
+        return
+    folder = Path(replay) if Path(replay).is_dir() else Path(replay).parent
+    if out.resolve() == folder.resolve():
+        raise SettingsError(
+            f"--out {out} is the folder of the photographs of --camera",
+            f"give a folder of its own, such as --out {out / 'scan'}",
+        )
 
 
 def _page(host: Host, snapshot: RunSnapshot, board_side: Side, out: Path) -> str:
@@ -113,7 +140,10 @@ def _core(
     options: argparse.Namespace, settings: PhoneHostSettings, size_px: tuple[int, int]
 ) -> tuple[StereoCore | None, Side]:
     """Return the stereo core, if any, and the side of the board's camera: from the option, else the rig, else left."""
-    core, rig_side = build_core(options, settings.calibration, settings.matcher, size_px)
+    images = replayed(settings.camera)
+    core, rig_side = build_core(
+        options, settings.calibration, settings.matcher, size_px, Path(images) if images else None
+    )
     board_side = Side(options.board_side) if options.board_side else rig_side or Side.LEFT
     if rig_side not in {None, board_side}:
         raise SettingsError(

@@ -1,17 +1,16 @@
 """phone-host stereo: compute disparity and point clouds of pairs of image files."""
 
 import argparse
-import shlex
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError
 from common.program.terminal import fitted
-from phone_host.output.axes import Axes
+from phone_host.output.calib_txt import is_calib_txt
 from phone_host.output.json_text import json_text
-from phone_host.report.page_links import NextCommand
 from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_lines import pair_lines, set_lines
 from phone_host.report.stereo_report import Size
@@ -24,6 +23,7 @@ from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
+from phone_host.verbs.stereo.next_commands import Typed, next_commands
 from phone_host.verbs.stereo_options import build_core, output_options
 
 _DEFAULT_MATCHER: Final = "sgbm"
@@ -42,12 +42,12 @@ def run(options: argparse.Namespace) -> int:
     job = StereoJob(
         files=files,
         out=options.out,
-        make_core=lambda size_px: _core(options, size_px),
+        make_core=lambda size_px: _core(options, size_px, files.pairs[0][1]),
         matcher=options.matcher or _DEFAULT_MATCHER,
         axes=output_options(options).axes,
         most_pixels=most_pixels(None, options.max_megapixels),
         mounted=orientations(options),
-        commands=_next(options),
+        commands=partial(next_commands, _typed(options)),
     )
     count = len(files.pairs)
     try:
@@ -63,24 +63,23 @@ def run(options: argparse.Namespace) -> int:
     return 0 if report.is_sound else _CHECK_FAILED
 
 
-def _core(options: argparse.Namespace, size_px: Size) -> StereoCore:
-    core, _ = build_core(options, options.calibration or "", options.matcher or _DEFAULT_MATCHER, size_px)
+def _core(options: argparse.Namespace, size_px: Size, image: Path) -> StereoCore:
+    core, _ = build_core(options, options.calibration or "", options.matcher or _DEFAULT_MATCHER, size_px, image)
     if core is None:  # cannot happen: one of the two options was checked above
         raise SettingsError("no stereo core", "give --calibration or --rectified")
     return core
 
 
-def _next(options: argparse.Namespace) -> tuple[NextCommand, ...]:
-    """Return commands to copy from the page."""
-    commands = []
-    if options.axes == Axes.CAMERA.value and sys.argv[1:2] == ["stereo"]:
-        again = shlex.join(["phone-host", *(word for word in sys.argv[1:] if word != "--json")])
-        commands.append(NextCommand("the same with y up, as most 3D viewers expect", f"{again} --axes y-up"))
-    if options.calibration:
-        rig = shlex.quote(options.calibration)
-        run = f"phone-host run --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration {rig} --out live"
-        commands.append(NextCommand("the same rig live: the board's camera and this machine's", run))
-    return tuple(commands)
+def _typed(options: argparse.Namespace) -> Typed:
+    """Return what the user typed, for the pages' commands."""
+    is_rig = options.calibration and not is_calib_txt(Path(options.calibration))  # live images are not rectified
+    return Typed(
+        words=tuple(word for word in sys.argv[1:] if word != "--json") if sys.argv[1:2] == ["stereo"] else (),
+        images=tuple(options.images),
+        axes=output_options(options).axes,
+        rig=options.calibration if is_rig else "",
+        folder=Path.cwd(),
+    )
 
 
 def _require_place(out: Path, files: ViewFiles) -> None:
@@ -96,7 +95,7 @@ def _require_place(out: Path, files: ViewFiles) -> None:
             f"--out {out} is the folder of the images, where later runs would take pictures of depth for photographs",
             f"give a folder of its own, such as --out {out / 'scan'}",
         )
-    for left, right in ((left, right) for _, left, right in files.pairs):
+    for _, left, right in files.pairs:
         spare_inputs(out, NAMES, {"LEFT": left, "RIGHT": right})
     keep_other_report(out, "stereo")
 

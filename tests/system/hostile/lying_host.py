@@ -12,7 +12,7 @@ import msgpack
 import zmq
 
 from common import now
-from common.camera.identity import Lock
+from common.camera_identity import Lock
 from common.link.base import SendResult
 from common.link.zeromq import ZeroMqDialer
 from common.protocol.message import (

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from common.camera.orientation import UPRIGHT, Orientation
+from common.orientation import UPRIGHT, Orientation
 
 
 class Lock(Enum):
@@ -77,7 +77,7 @@ def identity_of(driver: str, name: str, serial: str) -> CameraIdentity:
 
 
 @dataclass(frozen=True, slots=True)
-class CameraState:
+class RememberedCamera:
     """A camera as it was when its images were taken.
 
     Attributes:

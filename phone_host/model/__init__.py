@@ -1,0 +1,71 @@
+"""The types that the host's stages pass to each other. No behaviour, no I/O.
+
+Conventions: camera axes x right, y down, z forward; pixel centres are integers (OpenCV); metres inside; NaN = no
+    measurement.
+"""
+
+from phone_host.model.evidence import (
+    Arrangement,
+    Evidence,
+    Exposure,
+    Support,
+)
+from phone_host.model.images import (
+    CloudImage,
+    Crop,
+    CutCounts,
+    DepthLimits,
+    Disparity,
+    Epipolar,
+    Image,
+    RectifiedPair,
+    Search,
+    StereoGeometry,
+)
+from phone_host.model.rig import (
+    UNMEASURED_NS,
+    CameraModel,
+    Rectification,
+    Rig,
+    Side,
+    TimeOffset,
+)
+from phone_host.model.run import (
+    BoardFrame,
+    DepthAccount,
+    FramePair,
+    PairCounts,
+    Processed,
+    Result,
+    Unwritten,
+)
+
+__all__ = [
+    "UNMEASURED_NS",
+    "Arrangement",
+    "BoardFrame",
+    "CameraModel",
+    "CloudImage",
+    "Crop",
+    "CutCounts",
+    "DepthAccount",
+    "DepthLimits",
+    "Disparity",
+    "Epipolar",
+    "Evidence",
+    "Exposure",
+    "FramePair",
+    "Image",
+    "PairCounts",
+    "Processed",
+    "Rectification",
+    "RectifiedPair",
+    "Result",
+    "Rig",
+    "Search",
+    "Side",
+    "StereoGeometry",
+    "Support",
+    "TimeOffset",
+    "Unwritten",
+]

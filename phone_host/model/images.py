@@ -1,0 +1,146 @@
+"""A rectified pair of images, and the depth that is found in it. No behaviour, no I/O."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]
+"""(H, W) grey or (H, W, 3) BGR, dtype uint8."""
+
+Disparity = NDArray[np.float32]
+"""(H, W) float32, px, left x - right x, NaN = none."""
+
+CloudImage = NDArray[np.float32]
+"""(H, W, 3) float32, metres: X, Y, Z of each left pixel in the left camera's axes, NaN = none."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StereoGeometry:
+    """Converts the disparity of a rectified pair to metres: z = focal_px * baseline_m / (disparity + doffs_px).
+
+    Attributes:
+        focal_px: focal length of both rectified images, px.
+        baseline_m: distance of the two camera centres, m.
+        cx_px: x of the left image's principal point, px.
+        cy_px: y of both principal points, px.
+        doffs_px: x of the right principal point minus that of the left, px (Middlebury's `doffs`).
+    """
+
+    focal_px: float
+    baseline_m: float
+    cx_px: float
+    cy_px: float
+    doffs_px: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Crop:
+    """A rectangle of the rectified left image. Only its pixels get a depth.
+
+    Attributes:
+        x_px: its first column, px.
+        y_px: its first row, px.
+        width_px: its width, px.
+        height_px: its height, px.
+    """
+
+    x_px: int
+    y_px: int
+    width_px: int
+    height_px: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DepthLimits:
+    """Between which depths a point is kept, and how certain its disparity is.
+
+    Attributes:
+        near_m: nearer points are cut, m; 0: none.
+        far_m: points are cut that have a coordinate beyond it, m.
+        disparity_error_px: the error of a disparity from which `far_m` and every depth's uncertainty follow, px of the
+            rectified images.
+        from_rig: whether `far_m` follows from the rig; else the user gave it.
+    """
+
+    near_m: float
+    far_m: float
+    disparity_error_px: float
+    from_rig: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CutCounts:
+    """What became of a rectified left image's pixels. The six counts add up to all of them.
+
+    Attributes:
+        kept: have a point.
+        unmatched: the matcher found no disparity.
+        at_zero: their disparity is not above the noise of zero, so it is no measurement.
+        too_far: beyond the far limit.
+        too_near: nearer than the near limit.
+        outside: outside the crop.
+    """
+
+    kept: int = 0
+    unmatched: int = 0
+    at_zero: int = 0
+    too_far: int = 0
+    too_near: int = 0
+    outside: int = 0
+
+    @property
+    def inside(self) -> int:
+        """Number of pixels inside the crop; all, without one."""
+        return self.kept + self.unmatched + self.at_zero + self.too_far + self.too_near
+
+    def __add__(self, other: "CutCounts") -> "CutCounts":
+        """Return the counts of both."""
+        return CutCounts(**{name: getattr(self, name) + getattr(other, name) for name in self.__slots__})
+
+
+class Epipolar(Enum):
+    """Where a point of the left image lies in the rectified right one, d px away: which way the epipolar lines run.
+
+    LEFT: on the same row, at (x - d, y). The right camera stands to the right of the left one, as is usual.
+    UP: in the same column, at (x, y - d). The "right" camera stands below the left one.
+    DOWN: in the same column, at (x, y + d). The "right" camera stands above the left one.
+    """
+
+    LEFT = "left"
+    UP = "up"
+    DOWN = "down"
+
+    @property
+    def is_vertical(self) -> bool:
+        """Whether the epipolar lines are columns: the cameras stand one above the other."""
+        return self is not Epipolar.LEFT
+
+
+@dataclass(frozen=True, slots=True)
+class RectifiedPair:
+    """Two images of equal size whose epipolar lines are their rows: a point at (x, y) left lies at (x - d, y) right.
+
+    Attributes:
+        left: of the reference camera.
+        right: the same size.
+        epipolar: other than LEFT if the cameras stand one above the other; then the lines are columns.
+    """
+
+    left: Image
+    right: Image
+    epipolar: Epipolar = Epipolar.LEFT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """How a pair was matched.
+
+    Attributes:
+        scale: size of the images that were matched, as a share of the rectified ones', in (0, 1].
+        disparities: N, px of the rectified images: 0 <= d < N was searched; 0: the matcher's own range, not known here.
+    """
+
+    scale: float = 1.0
+    disparities: int = 0

@@ -1,0 +1,134 @@
+"""Two calibrated cameras, and how their images are rectified. No behaviour, no I/O."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.camera_identity import RememberedCamera
+from phone_host.model.images import Epipolar, StereoGeometry
+
+
+class Side(Enum):
+    """One of the two views. The left camera is the reference: the pixels of its image get a depth."""
+
+    LEFT = "left"
+    RIGHT = "right"
+
+    @property
+    def other(self) -> "Side":
+        """The opposite side."""
+        return Side.RIGHT if self is Side.LEFT else Side.LEFT
+
+
+REJECTED: Final = "reject"
+"""The verdict of a calibration that found its rig unfit."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class CameraModel:
+    """How one camera projects: OpenCV's pinhole model with its distortion polynomial.
+
+    The device itself is `common.camera.base.Camera`.
+
+    Attributes:
+        width_px: image width, px.
+        height_px: image height, px.
+        matrix: (3, 3) float64 camera matrix K, px.
+        distortion: (N,) float64 coefficients k1 k2 p1 p2 k3 ..., N in 4, 5, 8, 12, 14 as OpenCV takes them.
+    """
+
+    width_px: int
+    height_px: int
+    matrix: NDArray[np.float64]
+    distortion: NDArray[np.float64]
+
+
+UNMEASURED_NS: Final = 16_700_000
+"""Assumed limit of the time offset until it is measured: one readout, taken as half the period of 30 frames/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class TimeOffset:
+    """The host camera's stamp minus the board camera's stamp for the same moment, both on the host's clock.
+
+    Attributes:
+        offset_ns: added to the board's stamps before frames are paired.
+        uncertainty_ns: half-width around `offset_ns` that contains the true value in 99.9 % of cases.
+    """
+
+    offset_ns: int = 0
+    uncertainty_ns: int = UNMEASURED_NS
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Rig:
+    """Two calibrated cameras, possibly of different image size, and their relative pose.
+
+    A point p_left in the left camera's axes is p_right = R_right_left @ p_left + t_right_left_m in the right camera's
+    (OpenCV's R and T of stereoCalibrate).
+
+    Attributes:
+        left: model of the reference camera.
+        right: model of the other camera.
+        R_right_left: (3, 3) float64 rotation.
+        t_right_left_m: (3,) float64 translation, m; its x is negative when the right camera is on the right.
+        board_side: which of the two is the board's camera.
+        rms_left_px: reprojection RMS of the left camera alone, px; NaN = not measured.
+        rms_right_px: the same for the right camera.
+        rms_stereo_px: reprojection RMS of the stereo calibration, px; NaN = not measured.
+        time_offset: time offset between the two cameras' stamps.
+        zero_sigma_px: standard uncertainty of the disparity of infinitely far points, px, at the size of the rig's
+            images; NaN = not measured.
+        verdict: how the calibration judged itself (good, usable or reject); empty: not stated.
+        left_camera: which camera the left one was, and how it was set; None: not stated.
+        right_camera: the same for the right one.
+    """
+
+    left: CameraModel
+    right: CameraModel
+    R_right_left: NDArray[np.float64]
+    t_right_left_m: NDArray[np.float64]
+    board_side: Side = Side.LEFT
+    rms_left_px: float = float("nan")
+    rms_right_px: float = float("nan")
+    rms_stereo_px: float = float("nan")
+    time_offset: TimeOffset = TimeOffset()
+    zero_sigma_px: float = float("nan")
+    verdict: str = ""
+    left_camera: RememberedCamera | None = None
+    right_camera: RememberedCamera | None = None
+
+    @property
+    def is_rejected(self) -> bool:
+        """Whether its own calibration found it unfit."""
+        return self.verdict == REJECTED
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rectification:
+    """How both images are rotated and cropped. `rig.yaml` holds these values beside the rig itself.
+
+    Attributes:
+        geometry: converts disparity to metres; its axes are those of the *rectified* left camera.
+        width_px: width of both rectified images, px.
+        height_px: height of both rectified images, px.
+        R_left: (3, 3) float64, takes the left camera's axes to the rectified ones (OpenCV's R1).
+        R_right: (3, 3) float64, the same for the right camera (R2).
+        P_left: (3, 4) float64 projection of rectified points into the left rectified image (P1).
+        P_right: (3, 4) float64, the same for the right rectified image (P2), metres.
+        Q: (4, 4) float64, maps (u, v, d, 1) to homogeneous metres; d >= 0 also if the cameras stand one above the other.
+        epipolar: which way the epipolar lines of the rectified images run.
+    """
+
+    geometry: StereoGeometry
+    width_px: int
+    height_px: int
+    R_left: NDArray[np.float64]
+    R_right: NDArray[np.float64]
+    P_left: NDArray[np.float64]
+    P_right: NDArray[np.float64]
+    Q: NDArray[np.float64]
+    epipolar: Epipolar = Epipolar.LEFT

@@ -1,0 +1,157 @@
+"""Frames, pairs and results on their way through a run, and what became of them. No behaviour, no I/O."""
+
+from dataclasses import dataclass
+
+from common.frame import Frame
+from common.ledger import BoardMarks, PairLedger, StageTimes
+from common.orientation import UPRIGHT, Orientation
+from common.protocol.message import FrameMessage
+from phone_host.model.images import CloudImage, CutCounts, DepthLimits, Disparity, RectifiedPair, Search, StereoGeometry
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardFrame:
+    """A frame that came over a link, with its marks on the host's clock.
+
+    Attributes:
+        message: the frame's message.
+        link: name of the link.
+        marks: exposed, grabbed and sent, on the host's clock; fixed on receipt.
+        received_ns: when the last byte arrived.
+        offset_ns: host clock minus board clock, as estimated then.
+        uncertainty_ns: uncertainty of that offset.
+        asked_px: (width, height) that the camera was asked for, px. The frame itself may be smaller. Zeros: use the
+            frame's own size.
+        orientation: how its image becomes upright. All sizes are those before that.
+    """
+
+    message: FrameMessage
+    link: str
+    marks: BoardMarks
+    received_ns: int
+    offset_ns: int
+    uncertainty_ns: int
+    asked_px: tuple[int, int] = (0, 0)
+    orientation: Orientation = UPRIGHT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FramePair:
+    """Two frames that belong together, on their way to the stereo pipeline.
+
+    Attributes:
+        board: the board's frame.
+        host: the host's frame.
+        time_skew_ns: exposure of the board's frame minus exposure of the host's frame.
+        paired_ns: when the partner was found.
+        queued_ns: when the pair entered the FIFO.
+        before: the board's previous frame, if available.
+    """
+
+    board: BoardFrame
+    host: Frame
+    time_skew_ns: int
+    paired_ns: int
+    queued_ns: int
+    before: BoardFrame | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Processed:
+    """The outcome of processing a pair.
+
+    Attributes:
+        pair: the rectified images; without a core, the images as received.
+        disparity: px; None without a core.
+        cloud: metres, cut to the limits; None without a core or geometry.
+        stages: time of each stage; `write` is still 0.
+        geometry: converts this disparity to metres; None without a core or geometry.
+        limits: to which the cloud was cut; None without a cloud.
+        cut: what became of the pixels; None without a core. Without geometry, `kept` counts disparities.
+        search: how the pair was matched; None without a core.
+    """
+
+    pair: RectifiedPair
+    disparity: Disparity | None
+    cloud: CloudImage | None
+    stages: StageTimes
+    geometry: StereoGeometry | None = None
+    limits: DepthLimits | None = None
+    cut: CutCounts | None = None
+    search: Search | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What the worker passes to the sinks of a run.
+
+    Attributes:
+        number: index of the processed pair in this run, from 0.
+        pair: its two frames as received.
+        processed: its images and depth.
+        ledger: its marks and delays.
+    """
+
+    number: int
+    pair: FramePair
+    processed: Processed
+    ledger: PairLedger
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DepthAccount:
+    """What became of the pixels of all pairs of a run.
+
+    Attributes:
+        cut: the counts of all pairs together; None without a core.
+        limits: of the newest pair; None without a cloud.
+        search: how the newest pair was matched; None without a core.
+    """
+
+    cut: CutCounts | None = None
+    limits: DepthLimits | None = None
+    search: Search | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairCounts:
+    """What became of the frames that reached the host, and of the pairs.
+
+    Attributes:
+        received: board frames.
+        host_frames: host frames.
+        paired: pairs formed.
+        dropped: pairs that a full FIFO dropped.
+        taken: pairs given to the worker.
+        waiting: pairs in the FIFO now.
+        held_board: board frames still waiting for a partner.
+        held_host: host frames still waiting for a partner.
+        board_orphans: board frames that found no partner, by reason.
+        host_orphans: host frames that found no partner, by reason.
+    """
+
+    received: int = 0
+    host_frames: int = 0
+    paired: int = 0
+    dropped: int = 0
+    taken: int = 0
+    waiting: int = 0
+    held_board: int = 0
+    held_host: int = 0
+    board_orphans: tuple[tuple[str, int], ...] = ()
+    host_orphans: tuple[tuple[str, int], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Unwritten:
+    """What could not be written.
+
+    Attributes:
+        lines: lines of delays.jsonl that are lost or still wait to be written.
+        pairs: pair folders that were due but could not be written.
+        cause: the operating system's error message; empty when everything was written.
+    """
+
+    lines: int = 0
+    pairs: int = 0
+    cause: str = ""

@@ -1,0 +1,72 @@
+"""Ctrl-C out of native code: the terminal is left in order, and a stderr that nobody reads keeps nobody alive."""
+
+import os
+import signal
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from tests.support.terminal import in_terminal
+
+_STUCK = """
+import hashlib, os
+from common.program.interrupts import interruptible, leave_at_once
+leave_at_once()
+said = False
+with interruptible(native=True):
+    while True:
+        try:
+            if not said:
+                said = True
+                os.write({begun}, {said!r})
+            hashlib.pbkdf2_hmac("sha256", b"", b"", 10**9)
+        except KeyboardInterrupt:
+            pass
+"""
+"""A command in native code that looks at no signal and takes minutes, also if the signal comes just before."""
+
+_IN_PYTHON = """
+import argparse, os, time
+from common.program.commandline import ExamplesFirstParser, run_command
+from common.program.interrupts import interruptible, leave_at_once
+leave_at_once()
+def command(options):
+    with interruptible():
+        os.write(1, b"begun")
+        time.sleep(60)
+raise SystemExit(run_command(ExamplesFirstParser("sample"), [], command))
+"""
+
+
+def test_the_cursor_comes_back_and_the_line_stands_alone(tmp_path: Path) -> None:
+    """A bar has hidden the cursor and stands in its line; after Ctrl-C the bar is gone, the cursor is there, and one line says why."""
+    code = _STUCK.format(begun=2, said=b"\x1b[?25lmatching 40%")
+    with in_terminal([sys.executable, "-P", "-c", code], 50, tmp_path) as running:
+        running.read_until(b"40%")
+        running.process.send_signal(signal.SIGINT)
+        assert running.read_all() == 130
+    assert running.seen.endswith(b"40%\r\x1b[K\x1b[?25hinterrupted\r\n")
+
+
+@pytest.mark.parametrize("code", [_STUCK.format(begun=1, said=b"begun"), _IN_PYTHON])
+def test_a_full_pipe_keeps_nobody_alive(code: str) -> None:
+    """Nobody empties stderr, and it is full; Ctrl-C ends the process with 130 all the same, in native code and in Python."""
+    unread, stderr = os.pipe()
+    os.set_blocking(stderr, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(stderr, bytes(4096))
+    os.set_blocking(stderr, True)
+    with subprocess.Popen([sys.executable, "-P", "-c", code], stdout=subprocess.PIPE, stderr=stderr) as running:
+        assert running.stdout is not None
+        assert running.stdout.read(5) == b"begun"
+        running.send_signal(signal.SIGINT)
+        try:
+            assert running.wait(10) == 130
+        finally:
+            running.kill()
+    os.close(unread)
+    os.close(stderr)
