@@ -240,7 +240,11 @@ class _Work:
             ThreadPoolExecutor(_WRITERS) as writers,
             self._results.folder_of(folder, names, writers.map) as place,
         ):
-            written = write_pair(place, processed, planned, self._job.axes, writers.map)
+            try:
+                written = write_pair(place, processed, planned, self._job.axes, writers.map)
+            except BaseException:
+                writers.shutdown(cancel_futures=True)  # the other thread's file must be there when all are removed
+                raise
             watch.lap("write")
             remarks = [
                 *turned_remarks(*opened),

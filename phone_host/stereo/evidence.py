@@ -16,6 +16,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence_features import Matches, find_features, match, on_common_rows, supports
 from phone_host.stereo.evidence_light import measure_exposure
 from phone_host.stereo.evidence_points import PointMaps, ThroughRig, Unmoved
+from phone_host.stereo.evidence_sample import sampled_places
 from phone_host.stereo.evidence_search import ambiguity, measure_fit
 from phone_host.stereo.match_align import with_levels_of
 from phone_host.stereo.stacked import lying, lying_pair
@@ -26,9 +27,6 @@ _FEATURE_PX: Final = 48_000
 _CHECK_WIDTH_PX: Final = 480
 _CHECKS: Final = 160
 """Samples of consistency: its standard error is 4 % at most."""
-
-_SAMPLED: Final = 50_000
-"""Places of the grid from which the checks are chosen; a denser grid spreads them no better."""
 
 _PATCH_PX: Final = 9
 _BACK_PX: Final = 1.5
@@ -195,14 +193,9 @@ def _consistency(left: Image, right: Image, disparity: Disparity, offset_px: flo
     scale = min(1.0, _CHECK_WIDTH_PX / width)
     small = _reduced(left, scale), _reduced(right, scale)
     half = _PATCH_PX // 2
-    # Not of all pixels: the places of all in a photograph of 50 megapixels take a gigabyte.
-    step = max(1, round(math.sqrt(disparity.size / _SAMPLED)))
-    known = np.argwhere(np.isfinite(disparity[::step, ::step])) * step
-    if len(known) < _CHECKS:  # a small crop, or few disparities: then all are few
-        known = np.argwhere(np.isfinite(disparity))
-    if len(known) < _CHECKS:
+    sample = sampled_places(disparity, _CHECKS)
+    if not len(sample):
         return math.nan
-    sample = known[np.linspace(0, len(known) - 1, _CHECKS).astype(np.intp)]
     values = disparity[sample[:, 0], sample[:, 1]] * scale
     reach = math.ceil(float(np.nanmax(disparity)) * scale) + 2
     found = tried = 0

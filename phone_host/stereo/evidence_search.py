@@ -16,6 +16,7 @@ from phone_host.model import Disparity, Image, Processed, Search
 from phone_host.stereo.evidence_features import Matches, on_common_rows
 from phone_host.stereo.evidence_points import Points
 from phone_host.stereo.evidence_rows import row_skew_px
+from phone_host.stereo.evidence_sample import sampled_places
 from phone_host.stereo.reproject import nearest_depth_m
 
 _FEWEST: Final = 20
@@ -113,8 +114,10 @@ def measure_fit(upright: Matches, processed: Processed, disparity: Disparity) ->
 
 def _inside_the_crop(points_px: Points, processed: Processed, disparity: Disparity) -> NDArray[np.bool_]:
     """Tell which points lie where depth was wanted: all of them, or with a crop those amid its disparities."""
+    if processed.cut is None or not processed.cut.outside:
+        return np.ones(len(points_px), np.bool_)
     known = np.isfinite(disparity)
-    if processed.cut is None or not processed.cut.outside or not known.any():
+    if not known.any():
         return np.ones(len(points_px), np.bool_)
     x, y = (np.flatnonzero(known.any(axis=axis)) for axis in (0, 1))
     low, high = np.array([x[0], y[0]]), np.array([x[-1], y[-1]])
@@ -134,10 +137,9 @@ def ambiguity(left: Image, right: Image, disparity: Disparity, searched: int, sc
     Returns:
         Share of the patches that fit anywhere at all; NaN with too few of them.
     """
-    known = np.argwhere(np.isfinite(disparity))
-    if len(known) < _PATCHES:
+    sample = sampled_places(disparity, _PATCHES)
+    if not len(sample):
         return math.nan
-    sample = known[np.linspace(0, len(known) - 1, _PATCHES).astype(np.intp)]
     reach = math.ceil((searched or float(np.nanmax(disparity))) * scale)
     half, tried, unsure = _PATCH_PX // 2, 0, 0
     for y, x in np.rint((sample + 0.5) * scale - 0.5).astype(np.intp).tolist():
