@@ -20,6 +20,10 @@ _OUTLIER_SIGMAS: Final = 2.5
 _LEAST_PX: Final = 0.15
 """Features farther from the plane than 2.5 robust standard deviations, and than tracking's own error, are left out."""
 
+_EXPLAINED: Final = 0.7
+"""The plane must leave less than this share of the median departure: half a degree of roll leaves 0.1 to 0.4 of it. False
+matches of a chessboard tilt a plane that explains nothing: four times as much is left."""
+
 _SIGMA_OF_MEDIAN: Final = 1.48
 """Standard deviation of normal errors relative to their median absolute value."""
 
@@ -33,7 +37,8 @@ def row_skew_px(left_px: Points, down_px: NDArray[np.float64], size_px: tuple[in
         size_px: width and height of the image.
 
     Returns:
-        Root mean square over the image, px; at the edge it is some 1.7 times as much. NaN with too few features.
+        Root mean square over the image, px; at the edge it is some 1.7 times as much. 0 if a plane does not explain the
+        offsets. NaN with too few features.
     """
     if len(left_px) < _FEWEST:
         return math.nan
@@ -47,4 +52,7 @@ def row_skew_px(left_px: Points, down_px: NDArray[np.float64], size_px: tuple[in
         kept = rest <= max(_OUTLIER_SIGMAS * _SIGMA_OF_MEDIAN * float(np.median(rest)), _LEAST_PX)
         if kept.sum() < _FEWEST // 2:
             return math.nan
+    departure = np.abs(down_px - np.median(down_px))
+    if np.median(np.abs(down_px - design @ plane)) > _EXPLAINED * np.median(departure) and np.median(departure) > 0:
+        return 0.0
     return math.hypot(float(plane[1]), float(plane[2])) / math.sqrt(12.0)  # of a ramp from -1/2 to 1/2

@@ -134,6 +134,16 @@ def test_without_a_known_search_nothing_is_said_about_it() -> None:
     assert math.isnan(beyond_search(places, np.full(100, 90.0), 0, (320, 240))[0])
 
 
+def test_false_matches_are_no_roll() -> None:
+    """Most features agree on their rows; a tenth, all at one edge, is off by 8 px, as repeated squares are. No plane explains that."""
+    random = np.random.default_rng(5)
+    places = random.uniform(0, (640, 480), (100, 2))
+    down = random.normal(0, 0.1, 100)
+    at_the_edge = np.argsort(places[:, 0])[-30:]
+    down[at_the_edge[::3]] += 8.0
+    assert row_skew_px(places, down, (640, 480)) < 0.8
+
+
 def test_no_depth_because_of_a_short_search_is_told_with_its_remedy() -> None:
     """The remedy of missing depth is that of the search."""
     short = Concern(Doubt.SEARCH_TOO_SHORT, "all of the scene is nearer", "give --near 1m")

@@ -72,8 +72,8 @@ BLIND: Final = replace(evidence(right=0, tilted=0), right=COVERED)
         (replace(evidence(right=0, tilted=5, mirrored=90), ambiguous_share=0.9), [Doubt.AMBIGUOUS]),  # a regular pattern
         (replace(evidence(right=0, tilted=5, mirrored=90), ambiguous_share=0.5), [Doubt.MIRRORED]),
         (replace(SWAPPED, ambiguous_share=math.nan), [Doubt.SWAPPED]),
-        (replace(GOOD, ambiguous_share=0.6), [Doubt.AMBIGUOUS]),
-        (replace(GOOD, ambiguous_share=0.4), []),
+        (replace(GOOD, ambiguous_share=0.78), [Doubt.AMBIGUOUS]),
+        (replace(GOOD, ambiguous_share=0.61), []),
         (replace(GOOD, beyond_share=0.06, enough_disparities=80, density=0.1), [Doubt.SEARCH_TOO_SHORT]),
         (replace(GOOD, beyond_share=0.04), []),
         (replace(GOOD, skew_px=0.9), [Doubt.VERTICAL_ERROR]),
