@@ -40,12 +40,19 @@ class PairingCall:
         keys: this host's keys. The board's key is added once the board has proved the code.
         link: the board's address, `tcp://HOST:PORT`, as the user knows it.
         say: is told in one line what takes long.
+        patience_s: time limit for an answer, s.
     """
 
     def __init__(
-        self, door: tuple[str, int], keys: KeyFolder, link: str = "", say: Callable[[str], None] = lambda _: None
+        self,
+        door: tuple[str, int],
+        keys: KeyFolder,
+        link: str = "",
+        say: Callable[[str], None] = lambda _: None,
+        *,
+        patience_s: float = _ANSWER_S,
     ) -> None:
-        self._door, self._keys, self._link, self._say = door, keys, link, say
+        self._door, self._keys, self._link, self._say, self._patience_s = door, keys, link, say, patience_s
         me = Identity(z85.decode(keys.own().public.encode()), clean_name(socket.gethostname()))
         self._asking = Asking(me, os.urandom)
 
@@ -56,7 +63,7 @@ class PairingCall:
             UnavailableError: the board takes in no new host, or not now.
             DataError: the answer is not from a board.
         """
-        deadline_ns = now.monotonic_ns() + round(_ANSWER_S * 1e9)
+        deadline_ns = now.monotonic_ns() + round(self._patience_s * 1e9)
         has_said = False
         while True:
             try:
@@ -68,7 +75,7 @@ class PairingCall:
                     raise
                 if not has_said:
                     has_said = True
-                    self._say(f"waiting {_ANSWER_S:.0f} s for {self._name} to take in a new host")
+                    self._say(f"waiting {self._patience_s:g} s for {self._name} to take in a new host")
                 threading.Event().wait(_AGAIN_S)
             else:
                 break
@@ -121,7 +128,7 @@ class PairingCall:
     @contextmanager
     def _line(self) -> "Iterator[_Line]":
         try:
-            connected = socket.create_connection(self._door, _ANSWER_S)
+            connected = socket.create_connection(self._door, self._patience_s)
         except OSError as error:
             raise self._closed(error.strerror or str(error)) from None
         with connected:

@@ -55,6 +55,7 @@ class LiveTable:
         console: where to draw; stderr by default, so that stdout is free for results.
         seconds: planned length of the run for the progress bar, s; 0 if it is given in pairs or open.
         pairs: the same, in pairs.
+        refresh_s: least time between two redraws, s.
     """
 
     def __init__(
@@ -64,8 +65,9 @@ class LiveTable:
         *,
         seconds: float = 0.0,
         pairs: int = 0,
+        refresh_s: float = _REFRESH_S,
     ) -> None:
-        self._snapshot = snapshot
+        self._snapshot, self._refresh_s = snapshot, refresh_s
         self._live = Live(console=console or Console(stderr=True), auto_refresh=False, transient=True)
         # Two threads that draw at once would each move the cursor from where the other one had left it.
         self._drawing = RLock()
@@ -98,7 +100,7 @@ class LiveTable:
     def refresh(self) -> None:
         """Show the present state, at most a few times a second."""
         now_s = now.monotonic_ns() / 1e9
-        if now_s - self._shown_s < _REFRESH_S:
+        if now_s - self._shown_s < self._refresh_s:
             return
         self._shown_s = now_s
         run = self._snapshot()

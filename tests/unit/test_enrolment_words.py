@@ -8,7 +8,6 @@ import pytest
 from board_agent.enrolment import absence
 from common.errors import UnavailableError
 from common.keys import SERVICE_FOLDER, KeyFolder
-from phone_host.boards import enrolment
 from phone_host.boards.enrolment import PairingCall
 
 
@@ -47,15 +46,14 @@ def test_a_link_at_which_nobody_listens_is_told_with_the_address_that_was_typed(
             pass
 
 
-def test_what_pairing_waits_for_is_said_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_pairing_waits_for_is_said_at_once(tmp_path: Path) -> None:
     """While the board's door is closed, one line says for what and how long the host waits, before the first pause."""
     said: list[str] = []
     port = closed_port()
-    call = PairingCall(("127.0.0.1", port), KeyFolder(tmp_path), f"tcp://127.0.0.1:{port}", said.append)
-    monkeypatch.setattr(enrolment, "_ANSWER_S", 0.3)
+    call = PairingCall(("127.0.0.1", port), KeyFolder(tmp_path), f"tcp://127.0.0.1:{port}", said.append, patience_s=0.3)
     with pytest.raises(UnavailableError):
         call.ask()
-    assert said == [f"waiting 0 s for tcp://127.0.0.1:{port} (pairing port {port}) to take in a new host"]
+    assert said == [f"waiting 0.3 s for tcp://127.0.0.1:{port} (pairing port {port}) to take in a new host"]
 
 
 def test_before_the_set_up_the_board_says_how_to_start(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pty
 import termios
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stderr, suppress
 from dataclasses import replace
 
 import pytest
@@ -16,7 +16,6 @@ from rich.console import Console
 from common.program import logs
 from common.program.terminal import headed, rows
 from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.run import terminal_view
 from phone_host.run.terminal_view import LiveTable
 from tests.support.screen import Screen
 from tests.unit.test_run_report import run
@@ -57,16 +56,15 @@ def terminal(monkeypatch: pytest.MonkeyPatch, columns: int, lines: int) -> Itera
     for name in ("COLUMNS", "LINES", "NO_COLOR"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("TERM", "xterm-256color")
-    monkeypatch.setattr("sys.stderr", shown.file)
-    monkeypatch.setattr(terminal_view, "_REFRESH_S", 0.0)
     root = logging.getLogger()
     before, level = root.handlers[:], root.level
     try:
-        logs.set_up(logging.WARNING)
-        console = Console(stderr=True)
-        # The sizes of a pseudo terminal that is not this process's own.
-        console.size = os.get_terminal_size(shown.file.fileno())
-        yield shown, console
+        with redirect_stderr(shown.file):
+            logs.set_up(logging.WARNING)
+            console = Console(stderr=True)
+            # The sizes of a pseudo terminal that is not this process's own.
+            console.size = os.get_terminal_size(shown.file.fileno())
+            yield shown, console
     finally:
         root.handlers[:] = before
         root.setLevel(level)
@@ -87,7 +85,7 @@ def test_log_lines_stand_above_the_table_and_nothing_stays_of_it(
     seen = [covered(31), run(5), covered(12), run(40)]
     with terminal(monkeypatch, columns, lines) as (shown, console):
         turn = iter(seen * 3)
-        with LiveTable(lambda: next(turn), console, pairs=100) as live:
+        with LiveTable(lambda: next(turn), console, pairs=100, refresh_s=0.0) as live:
             for number in range(12):
                 live.refresh()
                 _LOG.warning(logs.event("depth_doubtful", number=number, problem=SENTENCE))
@@ -104,12 +102,11 @@ def test_log_lines_stand_above_the_table_and_nothing_stays_of_it(
 
 
 @pytest.mark.parametrize("lines", [3, 8, 12])
-def test_a_low_terminal_shows_the_bar_and_the_table_first(monkeypatch: pytest.MonkeyPatch, lines: int) -> None:
+def test_a_low_terminal_shows_the_bar_and_the_table_first(lines: int) -> None:
     """On a low terminal the view leaves one row free, and the bar stays when the regime has no room."""
-    monkeypatch.setattr(terminal_view, "_REFRESH_S", 0.0)
     stream, screen = io.StringIO(), Screen(50, lines)
     console = Console(file=stream, width=50, height=lines, force_terminal=True)
-    with LiveTable(lambda: covered(31), console, pairs=100) as live:
+    with LiveTable(lambda: covered(31), console, pairs=100, refresh_s=0.0) as live:
         live.refresh()
         screen.feed(stream.getvalue().replace("\n", "\r\n"))
         assert "31/100" in "".join(screen.rows)
