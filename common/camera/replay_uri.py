@@ -1,15 +1,13 @@
 """The options of a `replay:` URI."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from fractions import Fraction
-from typing import Final, TypeVar
+from typing import Final
 
-from common.camera.options import exact
+from common.camera.options import TRUTHS, OptionReader, exact, rate
 from common.camera.replay import ReplaySettings
 from common.errors import SettingsError
 from common.protocol.message import Pacing
-
-T = TypeVar("T")
 
 _HELP: Final = {
     "fps": "images per second from 0.01 to 1000 without a unit, such as fps=30",
@@ -37,22 +35,9 @@ def replay_settings(uri: str, path: str, options: Mapping[str, str], clock: str)
     Raises:
         SettingsError: an option is unknown or makes no sense.
     """
-    if unknown := set(options) - set(_HELP):
-        raise SettingsError(
-            f"camera {uri!r} has an unknown option {min(unknown)!r}",
-            f"the options are {', '.join(_HELP)}, rotate, flip",
-        )
-
-    def read(name: str, parse: Callable[[str], T], default: T) -> T:
-        if name not in options:
-            return default
-        try:
-            return parse(options[name])
-        except (ValueError, KeyError, ZeroDivisionError):
-            raise SettingsError(f"camera {uri!r} has {name}={options[name]}", f"give {_HELP[name]}") from None
-
-    fps = read("fps", _rate, Fraction(30))
-    loop = read("loop", _TRUTHS.__getitem__, _ONCE)
+    read = OptionReader(uri, options, _HELP).read
+    fps = read("fps", rate, Fraction(30))
+    loop = read("loop", TRUTHS.__getitem__, _ONCE)
     pacing = read("pace", _PACINGS.__getitem__, _usual_pacing(options))
     phase_ns = read("phase_ms", _nanoseconds, 0)
     if phase_ns and pacing is Pacing.DEMAND:
@@ -63,15 +48,7 @@ def replay_settings(uri: str, path: str, options: Mapping[str, str], clock: str)
 
 
 _ONCE: Final[bool] = False
-_TRUTHS: Final = {"0": False, "1": True}
 _PACINGS: Final = {pacing.name.lower(): pacing for pacing in Pacing}
-
-
-def _rate(text: str) -> Fraction:
-    rate_hz = exact(text)
-    if not Fraction(1, 100) <= rate_hz <= 1000:
-        raise ValueError(text)
-    return rate_hz
 
 
 def _nanoseconds(text: str) -> int:

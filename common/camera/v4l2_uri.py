@@ -1,19 +1,15 @@
 """The options of a `v4l2:` URI."""
 
 import re
-from collections.abc import Callable, Mapping
-from fractions import Fraction
-from typing import Final, TypeVar
+from collections.abc import Mapping
+from typing import Final
 
-from common.camera.options import exact, milliseconds
+from common.camera.options import TRUTHS, OptionReader, exact, milliseconds, rate
 from common.camera.v4l2_controls import Axis, ControlWishes, PowerLine
 from common.camera.v4l2_formats import Wanted
 from common.camera.v4l2_pack import SendPart
 from common.camera.v4l2_stream import V4l2Settings
-from common.errors import SettingsError
 from common.frame import PixelFormat
-
-T = TypeVar("T")
 
 FORMATS: Final = (PixelFormat.MJPEG, PixelFormat.YUYV, PixelFormat.GREY, PixelFormat.NV12)
 
@@ -50,20 +46,7 @@ def v4l2_settings(uri: str, path: str, options: Mapping[str, str], clock: str) -
     Raises:
         SettingsError: an option is unknown or makes no sense.
     """
-    if unknown := set(options) - set(_HELP):
-        raise SettingsError(
-            f"camera {uri!r} has an unknown option {min(unknown)!r}",
-            f"the options are {', '.join(_HELP)}, rotate, flip",
-        )
-
-    def read(name: str, parse: Callable[[str], T], default: T) -> T:
-        if name not in options:
-            return default
-        try:
-            return parse(options[name])
-        except (ValueError, KeyError, ZeroDivisionError):
-            raise SettingsError(f"camera {uri!r} has {name}={options[name]}", f"give {_HELP[name]}") from None
-
+    read = OptionReader(uri, options, _HELP).read
     held = [
         (axis, value)
         for axis, value in (
@@ -77,9 +60,9 @@ def v4l2_settings(uri: str, path: str, options: Mapping[str, str], clock: str) -
     ]
     return V4l2Settings(
         path="" if path == "auto" else path,
-        wanted=Wanted(read("size", _size, None), read("fps", _rate, None), read("format", _format, None)),
+        wanted=Wanted(read("size", _size, None), read("fps", rate, None), read("format", _format, None)),
         wishes=ControlWishes(
-            tuple(held), read("power_line", _POWER_LINES.__getitem__, None), read("lock", _TRUTHS.__getitem__, _LOCK)
+            tuple(held), read("power_line", _POWER_LINES.__getitem__, None), read("lock", TRUTHS.__getitem__, _LOCK)
         ),
         part=read("send", SendPart, SendPart.WHOLE),
         readout_ns=read("readout_ms", milliseconds, None),
@@ -89,7 +72,6 @@ def v4l2_settings(uri: str, path: str, options: Mapping[str, str], clock: str) -
 
 
 _LOCK: Final[bool] = True
-_TRUTHS: Final = {"0": False, "1": True}
 _POWER_LINES: Final[Mapping[str, PowerLine | None]] = {
     "off": PowerLine.OFF,
     "50": PowerLine.HZ_50,
@@ -102,13 +84,6 @@ def _size(text: str) -> tuple[int, int]:
     if match is None or not all(map(int, match.groups())):
         raise ValueError(text)
     return int(match[1]), int(match[2])
-
-
-def _rate(text: str) -> Fraction:
-    rate_hz = exact(text)
-    if not Fraction(1, 100) <= rate_hz <= 1000:
-        raise ValueError(text)
-    return rate_hz
 
 
 def _format(text: str) -> PixelFormat:

@@ -33,10 +33,7 @@ def seconds(text: str, option: str) -> float:
     Raises:
         SettingsError: it is no time.
     """
-    value_s = _quantity(text, {"": 1.0, **_SECONDS})
-    if math.isnan(value_s):
-        raise SettingsError(f"{option} is {text!r}", "give a time, for example 3, 3s, 500ms or 2min")
-    return value_s
+    return _read(text, {"": 1.0, **_SECONDS}, option, "give a time, for example 3, 3s, 500ms or 2min")
 
 
 def milliseconds(text: str, option: str) -> float:
@@ -50,10 +47,7 @@ def milliseconds(text: str, option: str) -> float:
         SettingsError: it is no time.
     """
     units = {unit: 1000 * value for unit, value in _SECONDS.items()}
-    value_ms = _quantity(text, {"": 1.0, **units})
-    if math.isnan(value_ms):
-        raise SettingsError(f"{option} is {text!r}", "give a time, for example 5, 5ms or 0.005s")
-    return value_ms
+    return _read(text, {"": 1.0, **units}, option, "give a time, for example 5, 5ms or 0.005s")
 
 
 def frames_per_second(text: str, option: str) -> float:
@@ -66,10 +60,7 @@ def frames_per_second(text: str, option: str) -> float:
     Raises:
         SettingsError: it is no rate.
     """
-    rate_hz = _quantity(text, _RATES)
-    if math.isnan(rate_hz):
-        raise SettingsError(f"{option} is {text!r}", "give a rate in frames per second, for example 30 or 30fps")
-    return rate_hz
+    return _read(text, _RATES, option, "give a rate in frames per second, for example 30 or 30fps")
 
 
 def image_size(text: str, option: str) -> tuple[int, int]:
@@ -97,8 +88,11 @@ def reading(read: Callable[[str, str], float], option: str) -> Reader:
     return lambda text: read(text, option)
 
 
-def _quantity(text: str, units: Mapping[str, float]) -> float:
-    """Return the value in the unit that the factors lead to; NaN if the text is no such quantity."""
+def _read(text: str, units: Mapping[str, float], option: str, remedy: str) -> float:
+    """Return the value in the unit that the factors lead to."""
     found = _QUANTITY.fullmatch(text)
     factor = units.get(found[2].lower(), math.nan) if found else math.nan
-    return float(found[1]) * factor if found else math.nan
+    value = float(found[1]) * factor if found else math.nan
+    if math.isnan(value):
+        raise SettingsError(f"{option} is {text!r}", remedy)
+    return value

@@ -9,7 +9,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Generic, Protocol, TypeVar
+from typing import Any, Final, Generic, Protocol, TypeVar
 
 from common import now
 from phone_host.measure.delays import Series
@@ -161,27 +161,15 @@ class SinkQueue(Generic[T]):
                 self._changed.notify_all()
 
 
-class FunctionSink:
-    """A sink that calls a function with each result.
+class OneQueueSink:
+    """What sinks with one queue have in common.
 
     Args:
-        name: its name in report.json.
-        take: the function, called in the sink's thread.
-        depth: greatest number of results in the queue.
-        waits: whether it must not miss any result.
+        queue: the sink's queue.
     """
 
-    def __init__(self, name: str, take: Callable[[Result], None], *, depth: int = DEPTH, waits: bool = False) -> None:
-        self._queue = SinkQueue(name, take, depth=depth, waits=waits)
-
-    def await_place(self, number: int) -> None:
-        """See Sink."""
-        del number  # all are alike
-        self._queue.await_place()
-
-    def offer(self, result: Result) -> None:
-        """See Sink."""
-        self._queue.offer(result)
+    def __init__(self, queue: SinkQueue[Any]) -> None:
+        self._queue = queue
 
     def finish(self) -> None:
         """See Sink."""
@@ -196,3 +184,26 @@ class FunctionSink:
     def accounts(self) -> tuple[SinkAccount, ...]:
         """See Sink."""
         return (self._queue.account,)
+
+
+class FunctionSink(OneQueueSink):
+    """A sink that calls a function with each result.
+
+    Args:
+        name: its name in report.json.
+        take: the function, called in the sink's thread.
+        depth: greatest number of results in the queue.
+        waits: whether it must not miss any result.
+    """
+
+    def __init__(self, name: str, take: Callable[[Result], None], *, depth: int = DEPTH, waits: bool = False) -> None:
+        super().__init__(SinkQueue(name, take, depth=depth, waits=waits))
+
+    def await_place(self, number: int) -> None:
+        """See Sink."""
+        del number  # all are alike
+        self._queue.await_place()
+
+    def offer(self, result: Result) -> None:
+        """See Sink."""
+        self._queue.offer(result)

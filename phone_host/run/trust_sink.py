@@ -8,9 +8,8 @@ from typing import Final
 from common import now
 from phone_host.measure.image_doubts import ImageTrust
 from phone_host.measure.image_judge import ImageJudge
-from phone_host.measure.sink_account import SinkAccount
 from phone_host.model import DepthLimits, Result, StereoGeometry
-from phone_host.run.sinks import SinkQueue
+from phone_host.run.sinks import OneQueueSink, SinkQueue
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
 
@@ -21,7 +20,7 @@ _DEPTH: Final = 2
 """A judged pair may still hold its place in the queue when the next one comes. Never more than one waits to be judged."""
 
 
-class TrustSink:
+class TrustSink(OneQueueSink):
     """Judges the newest pair whenever one is due; the other pairs pass. It never delays a pair.
 
     Args:
@@ -30,10 +29,10 @@ class TrustSink:
     """
 
     def __init__(self, core: StereoCore | None, clock: Callable[[], int] = now.monotonic_ns) -> None:
+        super().__init__(SinkQueue[tuple[Result, int]]("trust", self._take, depth=_DEPTH))
         self._core, self._clock = core, clock
         self._judge = ImageJudge()
         self._lock = threading.Lock()
-        self._queue: SinkQueue[tuple[Result, int]] = SinkQueue("trust", self._take, depth=_DEPTH)
         self._due_ns = 0
         self._started_ns = clock()
         self._is_busy = False
@@ -57,20 +56,6 @@ class TrustSink:
         self._due_ns = now_ns + _PERIOD_NS
         self._is_busy = True  # before the offer: the thread may be done with it before this one goes on
         self._queue.offer((result, now_ns))  # refused only if the sink has failed or ends
-
-    def finish(self) -> None:
-        """See Sink."""
-        self._queue.finish()
-
-    @property
-    def failure(self) -> Exception | None:
-        """See Sink."""
-        return self._queue.failure
-
-    @property
-    def accounts(self) -> tuple[SinkAccount, ...]:
-        """See Sink."""
-        return (self._queue.account,)
 
     @property
     def trust(self) -> ImageTrust:

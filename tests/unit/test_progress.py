@@ -2,8 +2,7 @@
 
 import os
 import pty
-import sys
-from typing import TextIO
+from contextlib import redirect_stderr
 
 import pytest
 
@@ -25,12 +24,9 @@ def test_a_terminal_shows_what_is_done_how_far_and_the_time_left(monkeypatch: py
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "50")
     control, terminal = pty.openpty()
-    with os.fdopen(terminal, "w") as stderr:
-        stream: TextIO = stderr
-        monkeypatch.setattr(sys, "stderr", stream)
-        with step_bar("finding the board", 3) as step:
-            step()
-            step()
+    with os.fdopen(terminal, "w") as stderr, redirect_stderr(stderr), step_bar("finding the board", 3) as step:
+        step()
+        step()
     said = _all_of(control)
     assert "finding the board" in said
     assert "2/3" in said
