@@ -2,20 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from enum import Enum
 from typing import Final
 
 from common.orientation import UPRIGHT, Flip, Orientation
+from phone_host.measure.file_remedies import ImageSource
 from phone_host.measure.trust import Concern
 from phone_host.model import Arrangement
-
-
-class Spelling(Enum):
-    """How the user states an orientation."""
-
-    OF_CAMERA = "of_camera"
-    OF_FILES = "of_files"
-
 
 _SIDES: Final = ("left", "right")
 
@@ -56,19 +48,19 @@ def mirrored_further(present: Orientation) -> Orientation:
 
 
 def with_final_options(
-    concern: Concern, present: Sequence[Orientation], spelling: Spelling = Spelling.OF_CAMERA
+    concern: Concern, present: Sequence[Orientation], source: ImageSource = ImageSource.CAMERAS
 ) -> Concern:
     """Return a concern whose remedy names the options to be given in the end, if it is mended by turning or mirroring.
 
     Args:
         concern: any concern.
         present: the orientations that the left and the right camera have been given.
-        spelling: how the user states them.
+        source: where the images come from, and so how the user states them.
     """
     if concern.arrangement not in _TURNS:
         return concern
     is_plain = all(orientation == UPRIGHT for orientation in present)
-    if is_plain and (spelling is Spelling.OF_FILES or not concern.quarters):
+    if is_plain and (source is ImageSource.FILES or not concern.quarters):
         return concern  # the options are known by their kind alone
     both = concern.arrangement in _OF_BOTH
     turns = _TURNS[concern.arrangement]
@@ -77,7 +69,7 @@ def with_final_options(
             side,
             present[side],
             [_further(present[side], turn) for turn in _of_side(turns, concern.quarters, side)],
-            spelling,
+            source,
         )
         for side in _by_suspicion(present)
     ]
@@ -102,9 +94,9 @@ def _by_suspicion(present: Sequence[Orientation]) -> list[int]:
     return sorted((0, 1), key=lambda side: present[side] == UPRIGHT)
 
 
-def _words(side: int, present: Orientation, wanted: Sequence[Orientation], spelling: Spelling) -> str:
+def _words(side: int, present: Orientation, wanted: Sequence[Orientation], source: ImageSource) -> str:
     name = _SIDES[side]
-    if spelling is Spelling.OF_FILES:
+    if source is ImageSource.FILES:
         options = " or ".join(_of_files(item, name) for item in wanted)
         instead = "" if present == UPRIGHT else f" in place of {_of_files(present, name)}"
         return f"{options}{instead}"

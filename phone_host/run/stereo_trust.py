@@ -8,7 +8,7 @@ from phone_host.measure.file_remedies import ImageSource
 from phone_host.measure.headline import answer
 from phone_host.measure.image_doubts import gravest_first, image_doubts, median_figures
 from phone_host.measure.no_depth import no_depth
-from phone_host.measure.orient_words import Spelling, with_final_options
+from phone_host.measure.orient_words import with_final_options
 from phone_host.measure.trust import REJECTED_RIG, Doubt
 from phone_host.model import Processed
 from phone_host.report.depth_data import density
@@ -32,7 +32,7 @@ def judge_pair(
     """
     evidence = measure_evidence(processed, maps_of(core, processed))
     seen = image_doubts(evidence, ImageSource.FILES)
-    found = tuple(with_final_options(concern, mounted, Spelling.OF_FILES) for concern in seen)
+    found = tuple(with_final_options(concern, mounted, ImageSource.FILES) for concern in seen)
     if not has_depth(processed) and not any(concern.doubt.blocks for concern in found):
         # That there are few disparities, too, says nothing more.
         further = (concern for concern in found if concern.doubt is not Doubt.LOW_DENSITY)

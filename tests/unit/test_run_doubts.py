@@ -9,11 +9,12 @@ from common.camera.base import CameraHealth, CameraState
 from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.measure.absence import Away
 from phone_host.measure.doubt_history import history_lines, past_seconds
+from phone_host.measure.file_remedies import ImageSource
 from phone_host.measure.headline import Answer, Grade, headline
 from phone_host.measure.image_doubts import ImageFigures, ImageTrust, image_doubts
 from phone_host.measure.image_judge import ImageJudge
 from phone_host.measure.numbers import ImageEvidence
-from phone_host.measure.orient_words import Spelling, mirrored_further, turned_further, with_final_options
+from phone_host.measure.orient_words import mirrored_further, turned_further, with_final_options
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, depth_is_wrong
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement, Evidence, Side
@@ -233,9 +234,9 @@ def test_turns_and_mirrorings_add_up_behind_a_mirroring() -> None:
     assert mirrored_further(Orientation(90, Flip.V)) == Orientation(270)
 
 
-def remedy(found: Evidence, *present: Orientation, spelling: Spelling = Spelling.OF_CAMERA) -> str:
+def remedy(found: Evidence, *present: Orientation, source: ImageSource = ImageSource.CAMERAS) -> str:
     """What is to be done about the first doubt of a pair."""
-    return with_final_options(image_doubts(found)[0], present, spelling).remedy
+    return with_final_options(image_doubts(found)[0], present, source).remedy
 
 
 def test_a_remedy_names_the_final_option() -> None:
@@ -249,9 +250,9 @@ def test_a_remedy_names_the_final_option() -> None:
     assert "the right camera neither rotate= nor flip= in place of rotate=180" in remedy(
         on_head, UPRIGHT, Orientation(180)
     )
-    files = remedy(on_head, UPRIGHT, TURN_90, spelling=Spelling.OF_FILES)
+    files = remedy(on_head, UPRIGHT, TURN_90, source=ImageSource.FILES)
     assert "give --rotate-right 270 in place of --rotate-right 90, or else --rotate-left 180" in files
-    assert remedy(on_head, UPRIGHT, UPRIGHT, spelling=Spelling.OF_FILES) == remedy(on_head, UPRIGHT, UPRIGHT)
+    assert remedy(on_head, UPRIGHT, UPRIGHT, source=ImageSource.FILES) == remedy(on_head, UPRIGHT, UPRIGHT)
     both = evidence(right=20, swapped=100, both_mirrored=150)
     assert "the left camera flip=h and the right camera flip=h" not in remedy(both, UPRIGHT, UPRIGHT)
     assert "the right camera rotate=90&flip=h in place of rotate=90 and the left camera flip=h" in remedy(
