@@ -56,8 +56,9 @@ async def main(own: str, other: str) -> None:
             await ask(bus, adapter, _PROPERTIES, "Set", "ssv", "org.bluez.Adapter1", name, _YES)
     await ask(bus, adapters[own], "org.bluez.Adapter1", "StartDiscovery")
     device = await found(bus, "org.bluez.Device1", other, adapters[own])
-    await ask(bus, adapters[own], "org.bluez.Adapter1", "StopDiscovery")
+    # Pair first: the end of a search makes the daemon forget devices that it has only seen, not yet connected.
     await ask(bus, device, "org.bluez.Device1", "Pair")
+    await ask(bus, adapters[own], "org.bluez.Adapter1", "StopDiscovery")
     for path in (device, await found(bus, "org.bluez.Device1", own, adapters[other])):
         await ask(bus, path, _PROPERTIES, "Set", "ssv", "org.bluez.Device1", "Trusted", _YES)
 

@@ -1,7 +1,5 @@
 """A host outside the guest that pairs its own images with the board's, and the proof that each pair is correct."""
 
-import json
-import re
 import signal
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -185,15 +183,24 @@ def check_counts(report: dict[str, Any]) -> None:
             assert session["sent"] == session["received"] + session["lost"], session
 
 
-_STOPPED: Final = re.compile(r' stopped session=(\w+) grabbed=(\d+) sent=(\d+) dropped=("?)(\{.*?\})\4 garbage=(\d+)')
-
-
 def board_accounts(journal: str) -> dict[str, dict[str, int]]:
-    """Accounts of ended sessions in the journal, by session: grabbed, sent, dropped (over all reasons)."""
+    """Accounts of ended sessions in the journal, by session: grabbed, sent, spoiled, dropped (over all reasons)."""
     accounts = {}
-    for session, grabbed, sent, _, dropped, _ in _STOPPED.findall(journal):
-        reasons: dict[str, int] = json.loads(dropped.replace("'", '"'))
-        accounts[session] = {"grabbed": int(grabbed), "sent": int(sent), "dropped": sum(reasons.values())}
+    for line in journal.splitlines():
+        _, stopped, told = line.partition(" stopped session=")
+        if stopped:
+            session, *fields = told.split()
+            counts = {
+                key: int(count) for key, _, count in (field.partition("=") for field in fields) if count.isdigit()
+            }
+            dropped = sum(count for key, count in counts.items() if key.startswith("dropped_"))
+            spoiled = counts.get("dropped_spoiled", 0)
+            accounts[session] = {
+                "grabbed": counts["grabbed"],
+                "sent": counts["sent"],
+                "spoiled": spoiled,
+                "dropped": dropped,
+            }
     return accounts
 
 

@@ -108,7 +108,7 @@ def test_rate_and_size_give_way_and_come_back(
     assert (session["camera"]["rung"], session["camera"]["lowest_rung"]) == (0, 2)
     assert session["camera"]["changes"] == len(board_rungs) >= 4
     assert session["camera"]["size"] == "320x240"
-    assert "board camera: as it was asked for (10 frames/s, 320x240), changed" in (out / "index.html").read_text()
+    assert "Board camera: as it was asked for (10 frames/s, 320x240), changed" in (out / "index.html").read_text()
     images = [cv2.imread(str(path / "left.png")) for path in out.glob("pair-*[0-9]")]
     assert {np.asarray(image).shape[:2] for image in images} == {(240, 320)}
     assert report["pairs_account"]["undecodable"] == 0
