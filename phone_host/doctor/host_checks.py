@@ -6,7 +6,7 @@ from enum import Enum
 from typing import Final, assert_never
 
 from common.doctor.finding import Finding, fail, ok, warn
-from phone_host.stereo.scaled_rig import is_scaling
+from phone_host.stereo.scaled_rig import fits_rig, is_scaling
 
 OPENCV_WHEELS: Final = (
     "opencv-python-headless",
@@ -147,10 +147,10 @@ def check_rig(rig: RigReadings) -> Finding:
     asked_px = rig.asked_size_px
     if asked_px is not None and asked_px != rig.host_size_px:
         asked = f"{asked_px[0]}x{asked_px[1]}"
-        if not is_scaling(asked_px, rig.host_size_px):
+        if not fits_rig(rig.host_size_px, asked_px):
             remedy = f"ask for size={width_px}x{height_px} or another size of this shape, or calibrate at {asked}"
             return fail("rig", f"{text}, but the camera is asked for {asked}, another shape", remedy)
-        text += f", scaled to {asked}"
+        text += f", scaled to {asked}" if is_scaling(rig.host_size_px, asked_px) else f", cropped to {asked}"
     if rig.verdict == _REJECT:
         return warn("rig", f"{text}, verdict reject", "calibrate again; report.json beside it says what was wrong")
     if rig.rms_px > _USABLE_PX:

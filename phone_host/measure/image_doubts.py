@@ -281,6 +281,13 @@ _OTHER_SCENE: Final = Concern(
 )
 
 
+_CROPPED: Final = Concern(
+    Doubt.CROPPED_RIG,
+    "an image is smaller than in the calibration and has another shape: it was taken for the middle of that one",
+    "use a size of the calibration's shape; or calibrate at this size, if the camera may cut elsewhere or squeeze",
+)
+
+
 def _named(arrangement: Arrangement, source: ImageSource) -> Concern:
     concern = _NAMED[arrangement]
     return concern if source is ImageSource.CAMERAS else replace(concern, remedy=FILE_REMEDIES[arrangement].words)
@@ -327,7 +334,8 @@ def _figures(evidence: Evidence, support: dict[Arrangement, int]) -> tuple[Conce
         rows = tuple(replace(item, remedy=_NOT_RECTIFIED) for item in rows)
     short, unsure = too_short(evidence), ambiguous(evidence)
     sparse = (item for item in plain if item.doubt is not Doubt.VERTICAL_ERROR)
-    return (*rows, *short, *unsure, *(() if short or unsure else sparse))
+    cropped = (_CROPPED,) if evidence.is_cropped else ()
+    return (*rows, *short, *unsure, *(() if short or unsure else sparse), *cropped)
 
 
 def _skewed(evidence: Evidence) -> tuple[Concern, ...]:

@@ -41,6 +41,7 @@ class Doubt(Enum):
     IMAGE_NUMBERS = "image_numbers"
     IMAGES_APART = "images_apart"
     REJECTED_RIG = "rejected_rig"
+    CROPPED_RIG = "cropped_rig"
     BOARD_GONE = "board_gone"
     CAMERA_GONE = "camera_gone"
     NO_WHOLE_IMAGE = "no_whole_image"

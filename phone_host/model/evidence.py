@@ -73,6 +73,7 @@ class Evidence:
         ambiguous_share: share of sampled patches that fit another place of the search as well as the best one.
         skew_px: how unevenly rows are off over the image once the common offset is taken away, px of the matched images.
         from_rig: whether a rig has rectified the pair.
+        is_cropped: whether the pair was taken for the middle of the images that the rig was calibrated with.
         matched_scale: size of the images that were matched, as a share of the full size in whose px all this is.
     """
 
@@ -90,4 +91,5 @@ class Evidence:
     ambiguous_share: float = float("nan")
     skew_px: float = float("nan")
     from_rig: bool = True
+    is_cropped: bool = False
     matched_scale: float = 1.0

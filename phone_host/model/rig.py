@@ -85,6 +85,7 @@ class Rig:
         verdict: how the calibration judged itself (good, usable or reject); empty: not stated.
         left_camera: which camera the left one was, and how it was set; None: not stated.
         right_camera: the same for the right one.
+        is_cropped: whether images are taken for the middle of those of the calibration, cut px by px.
     """
 
     left: CameraModel
@@ -100,6 +101,7 @@ class Rig:
     verdict: str = ""
     left_camera: RememberedCamera | None = None
     right_camera: RememberedCamera | None = None
+    is_cropped: bool = False
 
     @property
     def is_rejected(self) -> bool:

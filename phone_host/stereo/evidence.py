@@ -91,6 +91,7 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
         return Evidence(left=measure_exposure(left, 0), right=measure_exposure(right, 0))
     height_px, width_px = left.shape
     from_rig = isinstance(maps, ThroughRig)
+    is_cropped = isinstance(maps, ThroughRig) and maps.rig.is_cropped
     if epipolar.is_vertical:
         # Points then take the way of images that came rectified: a turned camera's axis is taken for the image's middle.
         disparity, maps = lying(disparity, epipolar), Unmoved(width_px, height_px)
@@ -118,6 +119,7 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
             _reduced(left, check), _reduced(right, check), disparity, (processed.search or Search()).disparities, check
         ),
         from_rig=from_rig,
+        is_cropped=is_cropped,
         matched_scale=1.0 if processed.search is None else processed.search.scale,
     )
 

@@ -180,7 +180,7 @@ class Rectifier:
                 raise DataError(
                     f"the {side.value} image is {size_text(found_px)} px, rig.yaml was calibrated for"
                     f" {model.width_px}x{model.height_px}",
-                    "use the resolution of the calibration; a crop cannot be told from its size: calibrate at this size",
+                    "use the size of the calibration; StereoCore takes others, too",
                 )
 
     def rectify(self, left: Image, right: Image) -> RectifiedPair:

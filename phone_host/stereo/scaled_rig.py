@@ -1,6 +1,9 @@
 """A rig at another resolution: the same two cameras, whose images came out larger or smaller than in the calibration.
 
-Only a scaling of the whole image can be told from a size alone. A crop cannot: it may have been cut anywhere.
+A scaling of the whole image can be told from its size. A crop may have been cut anywhere. But a camera that keeps its
+pixels and leaves out rows (4:3 becomes 16:9) or columns cuts as much on either side. So an image that is smaller in one
+direction only is taken for the middle, and `Rig.is_cropped` says so: depth has the right scale wherever the cut was, as
+long as it was the same in both cameras.
 """
 
 from dataclasses import replace
@@ -16,7 +19,7 @@ _ROUNDING_PX = 1.0
 
 
 def scaled_rig(rig: Rig, left_px: tuple[int, int], right_px: tuple[int, int]) -> Rig:
-    """Scale a rig to the sizes of its images; each camera may have a scale of its own.
+    """Scale or crop a rig to the sizes of its images; each camera may have a scale of its own.
 
     Args:
         rig: two calibrated cameras.
@@ -27,14 +30,18 @@ def scaled_rig(rig: Rig, left_px: tuple[int, int], right_px: tuple[int, int]) ->
         The rig for these sizes, with its uncertainty at infinity; the rig itself if they are those of the calibration.
 
     Raises:
-        DataError: a size is no scaling of the size that its camera was calibrated for.
+        DataError: a size is neither a scaling nor a crop of the size that its camera was calibrated for.
     """
     left, right = _scaled(rig.left, left_px, Side.LEFT), _scaled(rig.right, right_px, Side.RIGHT)
     if left is rig.left and right is rig.right:
         return rig
     # Disparities are in px of the rectified images, whose focal length is that of the coarser camera (`rectify`).
     finer = coarser_focal_px(left, right) / coarser_focal_px(rig.left, rig.right)
-    return replace(rig, left=left, right=right, zero_sigma_px=rig.zero_sigma_px * finer)
+    is_cropped = any(
+        _is_middle((model.width_px, model.height_px), size_px)
+        for model, size_px in ((rig.left, left_px), (rig.right, right_px))
+    )
+    return replace(rig, left=left, right=right, zero_sigma_px=rig.zero_sigma_px * finer, is_cropped=is_cropped)
 
 
 def scaled_geometry(
@@ -75,8 +82,13 @@ def _scaled(model: CameraModel, size_px: tuple[int, int], side: Side) -> CameraM
     own_px = (model.width_px, model.height_px)
     if size_px == own_px:
         return model
+    if _is_middle(own_px, size_px):
+        cut = np.array(
+            [[1, 0, (size_px[0] - own_px[0]) / 2], [0, 1, (size_px[1] - own_px[1]) / 2], [0, 0, 1]], np.float64
+        )
+        return replace(model, width_px=size_px[0], height_px=size_px[1], matrix=cut @ model.matrix)
     if not is_scaling(own_px, size_px):
-        differ = f"the {side.value} image is {size_text(size_px)} px, no scaling of the {size_text(own_px)} px that the rig was calibrated for"
+        differ = f"the {side.value} image is {size_text(size_px)} px, neither a scaling nor a crop of the {size_text(own_px)} px that the rig was calibrated for"
         if is_scaling(own_px, size_px[::-1]):
             raise DataError(
                 f"{differ}: it lies on its side",
@@ -84,12 +96,28 @@ def _scaled(model: CameraModel, size_px: tuple[int, int], side: Side) -> CameraM
             )
         raise DataError(
             differ,
-            "use a resolution of the calibration's aspect ratio; a crop cannot be told from its size: calibrate at this size",
+            "use a size of the calibration's shape, or calibrate at this size",
         )
     scale_x, scale_y = (new / old for new, old in zip(size_px, own_px, strict=True))
     # Pixel centres are integers, so an image begins at -0.5: x' + 0.5 = (x + 0.5) s.
     to_scaled = np.array([[scale_x, 0, (scale_x - 1) / 2], [0, scale_y, (scale_y - 1) / 2], [0, 0, 1]], np.float64)
     return replace(model, width_px=size_px[0], height_px=size_px[1], matrix=to_scaled @ model.matrix)
+
+
+def fits_rig(rig_px: tuple[int, int], size_px: tuple[int, int]) -> bool:
+    """Return whether a rig holds for images of a size.
+
+    Args:
+        rig_px: width and height of the calibration, px.
+        size_px: those of the images, px.
+    """
+    return is_scaling(rig_px, size_px) or _is_middle(rig_px, size_px)
+
+
+def _is_middle(rig_px: tuple[int, int], size_px: tuple[int, int]) -> bool:
+    """Return whether a size is the calibration's but for rows or columns that are left out, and no scaling of it."""
+    fewer = [own - new for own, new in zip(rig_px, size_px, strict=True)]
+    return min(fewer) == 0 < max(fewer) and min(size_px) > 0 and not is_scaling(rig_px, size_px)
 
 
 def is_scaling(one_px: tuple[int, int], other_px: tuple[int, int]) -> bool:

@@ -93,6 +93,7 @@ BLIND: Final = replace(evidence(right=0, tilted=0), right=COVERED)
         (replace(GOOD, vertical_px=2.1), [Doubt.VERTICAL_ERROR]),
         (replace(GOOD, vertical_px=4.2, matched_scale=0.22), []),  # 48 megapixels: 0.9 px where they are matched
         (replace(GOOD, vertical_px=9.5, matched_scale=0.22), [Doubt.VERTICAL_ERROR]),
+        (replace(evidence(), is_cropped=True), [Doubt.CROPPED_RIG]),
         (evidence(right=50), [Doubt.VERTICAL_ERROR]),  # most features are on tilted rows
     ],
 )  # fmt: skip

@@ -47,13 +47,25 @@ def test_a_size_rounded_to_whole_pixels_is_a_scaling(scale: float) -> None:
         assert scaled_rig(unlike_rig(), left, (1280, 720)).left.width_px == left[0]
 
 
-@pytest.mark.parametrize("size", [(640, 360), (640, 470), (1920, 1080), (100, 60)])
+@pytest.mark.parametrize("size", [(640, 360), (640, 470), (500, 480)])
+def test_rows_or_columns_that_are_left_out_are_a_crop_of_the_middle(size: tuple[int, int]) -> None:
+    """The principal point moves by half of what is missing; the pixels, and so depth's scale, stay. The rig says that it was cropped."""
+    rig, cropped = unlike_rig(), scaled_rig(unlike_rig(), size, (1280, 720))
+    moved = cropped.left.matrix - rig.left.matrix
+    assert moved[0, 2] == (size[0] - 640) / 2
+    assert moved[1, 2] == (size[1] - 480) / 2
+    assert np.count_nonzero(moved) == 1
+    assert (cropped.left.width_px, cropped.left.height_px) == size
+    assert cropped.is_cropped
+    assert not scaled_rig(rig, (320, 240), (1280, 720)).is_cropped
+
+
+@pytest.mark.parametrize("size", [(600, 470), (1920, 1080), (100, 60), (640, 500), (700, 480)])
 def test_another_shape_is_refused_with_both_sizes(size: tuple[int, int]) -> None:
-    """A crop cannot be told from its size; the error names both sizes and the remedy."""
+    """Neither a scaling nor rows or columns left out; the error names both sizes and the remedy."""
     with pytest.raises(DataError, match=rf"left image is {size[0]}x{size[1]} px, .*640x480") as caught:
         scaled_rig(unlike_rig(), size, (1280, 720))
-    assert "aspect ratio" in caught.value.remedy
-    assert "a crop cannot be told from its size: calibrate at this size" in caught.value.remedy
+    assert "a size of the calibration's shape, or calibrate at this size" in caught.value.remedy
     with pytest.raises(DataError, match=r"right image is 640x480 px, .*1280x720"):
         scaled_rig(unlike_rig(), (640, 480), (640, 480))
 
