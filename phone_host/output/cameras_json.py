@@ -13,7 +13,6 @@ from common.errors import DataError
 from common.files import read_whole
 from common.orientation import Flip, Orientation
 from common.versions import CAMERAS_FORMAT
-from phone_host.output.atomic import write_text
 
 CAMERAS_NAME: Final = "cameras.json"
 """Its name beside a run's results, and beside the images of a calibration."""
@@ -36,20 +35,6 @@ def cameras_text(left: RememberedCamera, right: RememberedCamera) -> str:
     """
     cameras = {"format_version": CAMERAS_FORMAT, "left": _values(left), "right": _values(right)}
     return json.dumps(cameras, indent=1) + "\n"
-
-
-def write_cameras(path: Path, left: RememberedCamera, right: RememberedCamera) -> None:
-    """Write cameras.json, whole or not at all.
-
-    Args:
-        path: the file.
-        left: the left camera.
-        right: the right camera.
-
-    Raises:
-        OSError: the file cannot be written.
-    """
-    write_text(path, cameras_text(left, right))
 
 
 def read_cameras(path: Path) -> tuple[RememberedCamera, RememberedCamera]:

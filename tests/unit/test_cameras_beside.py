@@ -9,7 +9,7 @@ from common.camera_identity import CameraIdentity, RememberedCamera
 from common.errors import DataError, SettingsError
 from common.orientation import UPRIGHT, Orientation
 from phone_host.calibration.cameras_beside import cameras_beside, with_cameras
-from phone_host.output.cameras_json import write_cameras
+from phone_host.output.cameras_json import cameras_text
 from phone_host.stereo.view_files import pair_files
 from tests.support.pictures import encoded, picture
 from tests.support.rigs import unlike_rig
@@ -39,7 +39,7 @@ def test_it_is_found_beside_the_images(
 ) -> None:
     """In the folder of one side, or in the one that holds both, as a run leaves it above its pairs."""
     _images(tmp_path, names)
-    write_cameras(tmp_path / where / "cameras.json", _LEFT, _RIGHT)
+    (tmp_path / where / "cameras.json").write_text(cameras_text(_LEFT, _RIGHT))
     found = cameras_beside(pair_files(str(tmp_path / left), str(tmp_path / right)), _AS_GIVEN)
     assert found is not None
     assert found[1] == (_LEFT, _RIGHT)
@@ -60,7 +60,7 @@ def test_without_one_a_rig_states_how_the_user_says_its_cameras_are_mounted(tmp_
 def test_images_of_another_size_are_refused(tmp_path: Path) -> None:
     """The file, the side and both sizes are named."""
     _images(tmp_path, ("left/1.png", "right/1.png"))
-    write_cameras(tmp_path / "cameras.json", _LEFT, replace(_RIGHT, width_px=640, height_px=480))
+    (tmp_path / "cameras.json").write_text(cameras_text(_LEFT, replace(_RIGHT, width_px=640, height_px=480)))
     files = pair_files(str(tmp_path / "left"), str(tmp_path / "right"))
     with pytest.raises(
         DataError, match=r"cameras.json: the right camera gives images of 640x480 px, these are 32x24 px"
@@ -71,7 +71,7 @@ def test_images_of_another_size_are_refused(tmp_path: Path) -> None:
 def test_images_that_are_upright_already_are_not_turned_again(tmp_path: Path) -> None:
     """A run saves images upright, so --rotate-left would turn them a second time: refused with the remedy."""
     _images(tmp_path, ("left/1.png", "right/1.png"))
-    write_cameras(tmp_path / "cameras.json", _LEFT, _RIGHT)
+    (tmp_path / "cameras.json").write_text(cameras_text(_LEFT, _RIGHT))
     files = pair_files(str(tmp_path / "left"), str(tmp_path / "right"))
     with pytest.raises(SettingsError, match=r"saved upright.*leave out --rotate-left"):
         cameras_beside(files, (Orientation(90), UPRIGHT))
@@ -80,7 +80,9 @@ def test_images_that_are_upright_already_are_not_turned_again(tmp_path: Path) ->
 def test_two_files_that_differ_are_refused(tmp_path: Path) -> None:
     """Nobody can tell which of them belongs to these images."""
     _images(tmp_path, ("left/1.png", "right/1.png"))
-    write_cameras(tmp_path / "left" / "cameras.json", _LEFT, _RIGHT)
-    write_cameras(tmp_path / "right" / "cameras.json", _LEFT, replace(_RIGHT, identity=CameraIdentity(serial="3")))
+    (tmp_path / "left" / "cameras.json").write_text(cameras_text(_LEFT, _RIGHT))
+    (tmp_path / "right" / "cameras.json").write_text(
+        cameras_text(_LEFT, replace(_RIGHT, identity=CameraIdentity(serial="3")))
+    )
     with pytest.raises(DataError, match="name different cameras"):
         cameras_beside(pair_files(str(tmp_path / "left"), str(tmp_path / "right")), _AS_GIVEN)

@@ -12,7 +12,7 @@ from common.camera_identity import LARGEST_LOCK, CameraIdentity, Lock, Remembere
 from common.errors import DataError
 from common.orientation import Flip, Orientation
 from common.versions import CAMERAS_FORMAT
-from phone_host.output.cameras_json import cameras_text, read_cameras, write_cameras
+from phone_host.output.cameras_json import cameras_text, read_cameras
 
 LEFT = RememberedCamera(
     CameraIdentity("uvcvideo", "HD Pro Webcam C920", "A1B2"), 640, 480, Orientation(180), (("focus", 20), ("zoom", 100))
@@ -37,7 +37,7 @@ def test_both_cameras_come_back_as_they_were(
     tmp_path_factory: pytest.TempPathFactory, left: RememberedCamera, right: RememberedCamera
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "cameras.json"
-    write_cameras(path, left, right)
+    path.write_text(cameras_text(left, right))
     assert read_cameras(path) == (left, right)
 
 
