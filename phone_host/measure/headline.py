@@ -110,7 +110,8 @@ def headline(run: RunSnapshot) -> Answer:
     found = concerns(run)
     if run.images.wants_depth:
         gone = [concern for concern in found if concern.doubt in GONE]
-        said = _of_images(run, tuple(concern for concern in found if concern.doubt not in GONE))
+        of_depth = (concern for concern in found if concern.doubt not in GONE and not concern.is_of_unused)
+        said = _of_images(run, tuple(of_depth))
         return said if not gone or said.grade is Grade.BAD else _while_it_was_there(gone[0], said)
     if found:
         sentence = f"{_capital(found[0].sentence)}. Remedy: {found[0].remedy}."

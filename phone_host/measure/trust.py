@@ -169,6 +169,7 @@ class Concern:
         is_severe: whether the figures leave no hope, though the kind of reason alone would.
         arrangement: how the images lie to each other, if that is the reason.
         quarters: by how many quarters the right image is turned clockwise against the left one; 0: not known.
+        is_of_unused: whether it is about images that were not used, so that the depth of the others is not doubted.
     """
 
     doubt: Doubt
@@ -177,6 +178,7 @@ class Concern:
     is_severe: bool = False
     arrangement: Arrangement | None = None
     quarters: int = 0
+    is_of_unused: bool = False
 
     @property
     def is_certain(self) -> bool:
@@ -238,15 +240,17 @@ def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
                 Doubt.SPOILED_IMAGES,
                 f"{counted(sum(unbelieved.spoiled_images.values()), 'spoiled image was', 'spoiled images were')} not used ({_reasons(unbelieved.spoiled_images)})",
                 "check the cable, the camera and its format; one now and then does no harm",
+                is_of_unused=True,
             )
         )
     if unbelieved.disbelieved:
-        reasons = _reasons(unbelieved.disbelieved)
+        reasons, is_of_clock = _reasons(unbelieved.disbelieved), _OF_THE_CLOCK.issuperset(unbelieved.disbelieved)
         found.append(
             Concern(
                 Doubt.DISBELIEVED,
                 f"{sum(unbelieved.disbelieved.values())} of {counted(unbelieved.received, 'frame')} could not be true and {'was' if sum(unbelieved.disbelieved.values()) == 1 else 'were'} dropped ({reasons})",
-                _STOOD_STILL if _OF_THE_CLOCK.issuperset(unbelieved.disbelieved) else _LIES,
+                _STOOD_STILL if is_of_clock else _LIES,
+                is_of_unused=is_of_clock,
             )
         )
     return tuple(found)

@@ -148,6 +148,15 @@ def test_a_rejected_rig_is_doubted_but_does_not_block() -> None:
         assert "rejected" in text
 
 
+def test_what_was_not_used_makes_no_depth_doubtful_unless_somebody_lies() -> None:
+    """Spoiled images are told with the doubts, and the depth of the others is right. Stamps from the future are no accident."""
+    spoiled = replace(with_judged(GOOD, GOOD), spoiled_images=(("truncated", 2),))
+    assert [concern.doubt for concern in concerns(spoiled)] == [Doubt.SPOILED_IMAGES]
+    assert headline(spoiled).sentence.startswith("Depth looks right")
+    lying = replace(with_judged(GOOD, GOOD), own_future=2)
+    assert headline(lying).sentence.startswith("Depth may be wrong: 2 of")
+
+
 def test_rows_that_no_matcher_can_bridge_are_wrong_in_words_only() -> None:
     """12 px and 17 % of depth: `is wrong`, but the run does not fail; 12 px and dense depth: `may be wrong`."""
     off = replace(evidence(), vertical_px=12.0, density=0.17)
