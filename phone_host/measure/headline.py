@@ -16,6 +16,9 @@ from phone_host.model import StereoGeometry
 _PATCHY: Final = 0.6
 """Scenes with texture reach 0.68 and more; boards and a guitar before bare walls 0.36 to 0.58, and specks stand on the walls."""
 
+_SPECKS: Final = 0.09
+"""Scenes with texture have up to 6 % of their depth in specks; boards before bare walls 7 to 20 %, a striped wall 21 %."""
+
 USUAL_ERROR_PX: Final = 0.25
 """A matcher's median error on real images (`tests/bench/bench_depth.py`), where the core states none."""
 
@@ -56,10 +59,12 @@ def answer(
         return _doubtful(found[0])
     if math.isnan(figures.density):
         return Answer(Grade.GOOD, "Depth was computed; no pair of this run was judged.")
-    patchy = figures.consistency < _PATCHY
+    patchy = figures.consistency < _PATCHY or figures.scattered_share > _SPECKS
     parts = [f"{figures.density:.0%} of the pixels have depth"]
     checked = not math.isnan(figures.vertical_px)
-    if patchy:
+    if figures.scattered_share > _SPECKS:
+        parts.append(f"{figures.scattered_share:.0%} of it in specks that may be wrong")
+    if figures.consistency < _PATCHY:
         parts.append(f"of which {figures.consistency:.0%} are found again from right to left")
     if checked:
         parts.append(f"rows agree to {max(figures.vertical_px, 0.1):.1f} px")
@@ -110,7 +115,7 @@ def headline(run: RunSnapshot) -> Answer:
     found = concerns(run)
     if run.images.wants_depth:
         gone = [concern for concern in found if concern.doubt in GONE]
-        of_depth = (concern for concern in found if concern.doubt not in GONE and not concern.is_of_unused)
+        of_depth = (concern for concern in found if concern.doubt not in GONE and not concern.spares_depth)
         said = _of_images(run, tuple(of_depth))
         return said if not gone or said.grade is Grade.BAD else _while_it_was_there(gone[0], said)
     if found:

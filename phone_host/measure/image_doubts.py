@@ -86,7 +86,8 @@ class ImageFigures:
         consistency: share of sampled disparities that are found again from right to left.
         vertical_px: distance of features from their rows, px.
         vertical_offset_px: how far too low the right image lies, px.
-        disparity_px: the middle one of the disparities, px.
+        disparity_px: the middle one of the disparities between the limits of depth, px.
+        scattered_share: share of the disparities that lie in pieces too small for a surface.
         matched_scale: size of the images that were matched, as a share of the full size in whose px all this is.
     """
 
@@ -95,6 +96,7 @@ class ImageFigures:
     vertical_px: float = math.nan
     vertical_offset_px: float = math.nan
     disparity_px: float = math.nan
+    scattered_share: float = math.nan
     matched_scale: float = 1.0
 
 
@@ -245,7 +247,7 @@ _NAMED: Final = {
     Arrangement.BOTH_MIRRORED: Concern(
         Doubt.MIRRORED,
         "both images are mirror images: only mirrored do they fit the calibration",
-        "switch mirroring off in both cameras, or give both flip=h",
+        "switch mirroring off in both cameras, or give both flip=h (flip=v if top and bottom are exchanged)",
         arrangement=Arrangement.BOTH_MIRRORED,
     ),
     Arrangement.BOTH_TURNED_BY_QUARTER: Concern(
@@ -257,7 +259,7 @@ _NAMED: Final = {
     Arrangement.MIRRORED: Concern(
         Doubt.MIRRORED,
         "one of the two images is a mirror image",
-        "switch mirroring off in the camera's app, or give that camera flip=h",
+        "switch mirroring off in the camera's app, or give that camera flip=h (flip=v if top and bottom are exchanged)",
         arrangement=Arrangement.MIRRORED,
     ),
     Arrangement.SAME_PLACE: Concern(
@@ -346,6 +348,10 @@ def _skewed(evidence: Evidence) -> tuple[Concern, ...]:
     return (Concern(Doubt.VERTICAL_ERROR, sentence, _MOVED),)
 
 
+def _percent(share: float) -> str:
+    return f"{share:.0%}" if share >= 0.01 or not share else "less than 1%"
+
+
 def figure_doubts(figures: ImageFigures, *, is_tilted: bool = False) -> tuple[Concern, ...]:
     """Say which figures are not those of right depth; empty if all may be.
 
@@ -369,8 +375,8 @@ def figure_doubts(figures: ImageFigures, *, is_tilted: bool = False) -> tuple[Co
         found.append(
             Concern(
                 Doubt.LOW_DENSITY,
-                f"only {figures.density:.0%} of the pixels have depth",
-                "check that --calibration or --rectified fits the images, that the scene has texture, and that it is not nearer than --near",
+                f"only {_percent(figures.density)} of the pixels have depth",
+                "plain walls and tables give none: light the scene well and put patterned things into it; else check that --calibration or --rectified fits the images, and that nothing is nearer than --near",
             )
         )
     elif figures.consistency < _LEAST_CONSISTENCY:
@@ -397,5 +403,6 @@ def median_figures(found: Sequence[Evidence]) -> ImageFigures:
         vertical_px=median("vertical_px"),
         vertical_offset_px=median("vertical_offset_px"),
         disparity_px=median("disparity_px"),
+        scattered_share=median("scattered_share"),
         matched_scale=median("matched_scale") if found else 1.0,
     )

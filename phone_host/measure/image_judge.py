@@ -81,7 +81,10 @@ class ImageJudge:
     @property
     def _standing(self) -> frozenset[Doubt]:
         counts = Counter(concern.doubt for _, found in self._latest for concern in found)
-        return frozenset(doubt for doubt, count in counts.items() if 2 * count > len(self._latest))
+        standing = frozenset(doubt for doubt, count in counts.items() if 2 * count > len(self._latest))
+        doubtful = sum(1 for _, found in self._latest if found)
+        # Most are doubtful, each for another reason: the newest reason is as good as any.
+        return standing or (_doubts(self._latest[-1][1]) if 2 * doubtful > len(self._latest) else frozenset())
 
 
 def _doubts(found: tuple[Concern, ...]) -> frozenset[Doubt]:

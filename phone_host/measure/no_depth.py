@@ -9,6 +9,9 @@ from phone_host.model import CutCounts, DepthLimits
 _ENOUGH: Final = 0.15
 """If fewer pixels than this share were matched and then cut, the pairs lack depth because their images do not match."""
 
+_CAUSES: Final = frozenset({Doubt.SEARCH_TOO_SHORT, Doubt.DARK, Doubt.UNFOCUSED})
+"""Doubts that explain it."""
+
 _UNMATCHED: Final = Concern(
     Doubt.NO_DEPTH,
     "no pair has depth",
@@ -27,11 +30,11 @@ def no_depth(cut: CutCounts | None, limits: DepthLimits | None, others: tuple[Co
     Args:
         cut: what became of their pixels; None: not counted.
         limits: to which their clouds were cut; None without a cloud.
-        others: the other doubts about them: a search that is too short says why.
+        others: the other doubts about them: one of them may say why.
     """
-    short = [concern for concern in others if concern.doubt is Doubt.SEARCH_TOO_SHORT]
-    if short:
-        return Concern(Doubt.NO_DEPTH, f"{_UNMATCHED.sentence}: {short[0].sentence}", short[0].remedy)
+    cause = [concern for concern in others if concern.doubt in _CAUSES]
+    if cause:
+        return Concern(Doubt.NO_DEPTH, f"{_UNMATCHED.sentence}: {cause[0].sentence}", cause[0].remedy)
     return _UNMATCHED if cut is None else _by_cut(cut, limits)
 
 

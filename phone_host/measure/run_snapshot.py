@@ -250,16 +250,14 @@ def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
     found = tuple(with_final_options(concern, run.orientations) for concern in run.images.concerns)
     if run.ended == "running" or not lacks_depth(run) or not run.processed:
         return found  # without any pair there is another reason
-    if any(concern.doubt.blocks for concern in found):
+    if any(concern.is_certain for concern in found):
         return found  # which says why there is none
     return (no_depth(run.depth.cut, run.depth.limits, found), *found)
 
 
 def depth_is_wrong(run: RunSnapshot) -> bool:
-    """Tell whether depth was wanted and cannot be right: a blocking doubt stands, or no pair has depth."""
-    return run.images.wants_depth and (
-        not run.images.has_depth or any(concern.doubt.blocks for concern in concerns(run))
-    )
+    """Tell whether depth was wanted and cannot be right: a doubt stands that leaves no hope, or no pair has depth."""
+    return run.images.wants_depth and (not run.images.has_depth or any(concern.is_certain for concern in concerns(run)))
 
 
 def lacks_depth(run: RunSnapshot) -> bool:

@@ -169,7 +169,7 @@ class Concern:
         is_severe: whether the figures leave no hope, though the kind of reason alone would.
         arrangement: how the images lie to each other, if that is the reason.
         quarters: by how many quarters the right image is turned clockwise against the left one; 0: not known.
-        is_of_unused: whether it is about images that were not used, so that the depth of the others is not doubted.
+        spares_depth: whether it does not say that depth is wrong: results are old, or images were not used.
     """
 
     doubt: Doubt
@@ -178,7 +178,7 @@ class Concern:
     is_severe: bool = False
     arrangement: Arrangement | None = None
     quarters: int = 0
-    is_of_unused: bool = False
+    spares_depth: bool = False
 
     @property
     def is_certain(self) -> bool:
@@ -240,7 +240,7 @@ def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
                 Doubt.SPOILED_IMAGES,
                 f"{counted(sum(unbelieved.spoiled_images.values()), 'spoiled image was', 'spoiled images were')} not used ({_reasons(unbelieved.spoiled_images)})",
                 "check the cable, the camera and its format; one now and then does no harm",
-                is_of_unused=True,
+                spares_depth=True,
             )
         )
     if unbelieved.disbelieved:
@@ -250,7 +250,7 @@ def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
                 Doubt.DISBELIEVED,
                 f"{sum(unbelieved.disbelieved.values())} of {counted(unbelieved.received, 'frame')} could not be true and {'was' if sum(unbelieved.disbelieved.values()) == 1 else 'were'} dropped ({reasons})",
                 _STOOD_STILL if is_of_clock else _LIES,
-                is_of_unused=is_of_clock,
+                spares_depth=is_of_clock,
             )
         )
     return tuple(found)
@@ -296,6 +296,7 @@ def timing_concerns(timing: Timing) -> tuple[Concern, ...]:
                 Doubt.AGE,
                 f"results are {timing.end_to_end_ns / 1e6:.0f} ms old while {moves}: the scene has moved {lag_px:.0f} px since",
                 "move slower; the summary says what delays the results",
+                spares_depth=True,
             )
         )
     return tuple(found)

@@ -66,7 +66,8 @@ class Evidence:
         vertical_px: median distance of matched features from their rows, px.
         vertical_offset_px: how far too low the right image lies, px.
         supports: how many features agree with each arrangement; empty without a core.
-        disparity_px: the middle one of the disparities, px.
+        disparity_px: the middle one of the disparities between the limits of depth, px.
+        scattered_share: share of the disparities that lie in pieces too small for a surface.
         beyond_share: share of the image, as far as features tell, that is nearer than was searched.
         enough_disparities: a search that reaches all but a few features, px; 0: not known.
         enough_from_m: the same as a depth, m.
@@ -85,6 +86,7 @@ class Evidence:
     vertical_offset_px: float = float("nan")
     supports: tuple[Support, ...] = ()
     disparity_px: float = float("nan")
+    scattered_share: float = float("nan")
     beyond_share: float = float("nan")
     enough_disparities: int = 0
     enough_from_m: float = float("nan")

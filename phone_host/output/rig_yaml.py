@@ -35,6 +35,7 @@ _LARGEST_IMAGE_PX = 100_000
 _ROTATION_TOLERANCE = 1e-6  # files hold 16 digits; a matrix typed with 6 digits has this error
 # The two cameras of a scanner never stand farther apart; a larger number is a T in millimetres.
 _LARGEST_BASELINE_M = 10.0
+_BASELINE_TOLERANCE = 1e-3  # files typed with four digits
 _LARGEST_OFFSET_NS = 2e9  # no camera with its driver is seconds behind another one
 
 
@@ -121,6 +122,8 @@ def read_rig(path: Path) -> Rig:
     """
     reader = _Reader(path)
     reader.require_known_format()
+    baseline_m = reader.baseline("T")
+    reader.require_same_baseline("P2", baseline_m)
     left = reader.camera_model("left_image_width", "left_image_height", "M1", "D1")
     right = reader.camera_model("right_image_width", "right_image_height", "M2", "D2")
     side = reader.text("board_side", Side.LEFT.value)
@@ -130,7 +133,7 @@ def read_rig(path: Path) -> Rig:
         left=left,
         right=right,
         R_right_left=reader.rotation("R"),
-        t_right_left_m=reader.baseline("T"),
+        t_right_left_m=baseline_m,
         board_side=Side(side),
         rms_left_px=reader.number("rms_left"),
         rms_right_px=reader.number("rms_right"),
@@ -144,10 +147,10 @@ def read_rig(path: Path) -> Rig:
 
 
 def is_rig(path: Path) -> bool:
-    """Return whether a file begins like FileStorage YAML. False also for a file that cannot be read."""
+    """Return whether a file begins like FileStorage YAML, or like a rig.yaml that lost its first line. False also for a file that cannot be read."""
     try:
         with path.open("rb") as file:
-            return file.read(16).removeprefix(b"\xef\xbb\xbf").startswith(b"%YAML")
+            return file.read(16).removeprefix(b"\xef\xbb\xbf").startswith((b"%YAML", b"format_version:"))
     except OSError:
         return False
 
@@ -270,6 +273,18 @@ class _Reader:
         if length_m > _LARGEST_BASELINE_M:
             raise self.problem(key, f"is {length_m:g} m long", "T is in metres; divide millimetres by 1000")
         return matrix.reshape(3)
+
+    def require_same_baseline(self, key: str, baseline_m: NDArray[np.float64]) -> None:
+        """Check that the projection which other programs use, if there is one, has the same baseline as T."""
+        if self._storage.getNode(key).empty():
+            return
+        projection = self._shaped(key, (3, 4))
+        length_m = float(np.linalg.norm(baseline_m))
+        focal_px = projection[0, 0]
+        projected_m = float(np.abs(projection[:2, 3]).max()) / focal_px if focal_px > 0 else math.nan
+        if not abs(projected_m - length_m) <= _BASELINE_TOLERANCE * length_m:
+            differ = f"has a baseline of {projected_m * 1e3:.2f} mm, but T one of {length_m * 1e3:.2f} mm"
+            raise self.problem(key, differ, "calibrate again, or remove the wrong one of the two")
 
     def number(self, key: str) -> float:
         """Read a figure that may be missing (NaN)."""

@@ -177,7 +177,7 @@ def concern_values(concern: Concern) -> dict[str, object]:
         "doubt": concern.doubt.value,
         "sentence": concern.sentence,
         "remedy": concern.remedy,
-        "blocking": concern.doubt.blocks,
+        "blocking": concern.is_certain,
     }
 
 
@@ -186,6 +186,7 @@ def figure_values(figures: ImageFigures) -> dict[str, float | None]:
     return {
         "density": _number(figures.density),
         "consistency": _number(figures.consistency),
+        "scattered": _number(figures.scattered_share),
         "vertical_error_px": _number(figures.vertical_px),
         "vertical_offset_px": _number(figures.vertical_offset_px),
     }

@@ -43,7 +43,7 @@ def pair_lines(report: PairReport, out: str) -> list[str]:
             f"f = {report.geometry.focal_px:.1f} px, b = {report.geometry.baseline_m * 1e3:.2f} mm",
             *cut_lines(report),
         ]
-    lines += [f"warning: {remark.text}" for remark in report.remarks_beside_headline]
+    lines += [remark.line for remark in report.remarks_beside_headline]
     if missing := depth_png_words(written.not_in_depth_png):
         lines.append(f"note: {missing}")
     return [*lines, f"written to {out}: {', '.join([*written.files, *ALWAYS])}"]
@@ -57,8 +57,8 @@ def set_lines(report: SetReport, out: str) -> list[str]:
         out: the results folder, as the user named it.
     """
     lines = [_pair_line(pair, by_number=report.by_number) for pair in report.pairs]
-    lines += [f"warning: {_shared_words(shared, report)}" for shared in shared_remarks(report)]
-    lines += [f"warning: {remark.text}" for remark in report.remarks]
+    lines += [_shared_line(shared, report) for shared in shared_remarks(report)]
+    lines += [remark.line for remark in report.remarks]
     told = f"{len(report.computed)} of {counted(len(report.pairs), 'pair')} computed"
     failed = f", {len(report.failed)} failed" if report.failed else ""
     lines.append(f"{told}{failed}; written to {out}: one folder per pair, report.json and index.html")
@@ -74,10 +74,11 @@ def _pair_line(pair: PairReport | FailedPair, *, by_number: bool) -> str:
     return f"{name}  {pair_verdict(pair)[0].value}, {pair.share:.0%} {points}"
 
 
-def _shared_words(shared: SharedRemark, report: SetReport) -> str:
+def _shared_line(shared: SharedRemark, report: SetReport) -> str:
     """Say how many pairs a remark is about, then the remark."""
     such = "" if shared.alike else f", such as {shared.first}"
-    return f"in {shared.pairs} of {len(report.pairs)} pairs{such}: {shared.remark.text}"
+    kind = "note" if shared.remark.is_note else "warning"
+    return f"{kind}: in {shared.pairs} of {len(report.pairs)} pairs{such}: {shared.remark.text}"
 
 
 def cut_lines(report: PairReport) -> list[str]:
@@ -92,9 +93,7 @@ def cut_lines(report: PairReport) -> list[str]:
         (cut.too_far, f"farther than {distance_text(limits.far_m)}{why}"),
         (cut.too_near, f"nearer than {distance_text(limits.near_m)}"),
         (cut.at_zero, "with a disparity no larger than the noise of zero"),
-        (cut.outside, "outside the crop"),
     )
-    total = report.rectified_px[0] * report.rectified_px[1]
-    said = [f"{share_text(count, total)} {words}" for count, words in parts if count]
+    said = [f"{share_text(count, cut.inside)} {words}" for count, words in parts if count]
     kept = f"the cloud ends at {distance_text(limits.far_m)}"
     return [f"cut: {'; '.join(said)}"] if said else [kept]

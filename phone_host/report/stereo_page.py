@@ -93,6 +93,7 @@ class StereoIndexData:
         pairs: in order.
         files: beside the page.
         commands: what to do next.
+        notes: what the user must know about all of them.
     """
 
     title: str
@@ -102,6 +103,7 @@ class StereoIndexData:
     pairs: tuple[PairEntry, ...]
     files: tuple[FileLink, ...] = ()
     commands: tuple[NextCommand, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def stereo_page(data: StereoPageData) -> str:
@@ -119,7 +121,7 @@ def stereo_page(data: StereoPageData) -> str:
     parts = [
         back,
         heading(data.title, data.subtitle, data.verdict, data.sentence),
-        figures_row(_figures(data.processed)),
+        figures_row(_figures(data.processed, data.verdict)),
         section("What the cameras saw, and the depth", _uncertainty_words(data.processed), shown) if shown else "",
         section("The cloud", "", cloud) if cloud else "",
         _pixels(data.processed),
@@ -144,6 +146,7 @@ def stereo_index(data: StereoIndexData) -> str:
     parts = [
         heading(data.title, data.subtitle, data.verdict, data.sentence),
         section(counted(len(data.pairs), "pair"), "", f'<div class="pictures">{cards}</div>') if cards else "",
+        list_section("Remarks", data.notes),
         next_section((), data.commands),
         files_section(data.files),
     ]
@@ -163,8 +166,8 @@ def thumbnail(processed: Processed) -> Picture | None:
     return Picture("disparity: bright is near", depth_data.drawing(colour_disparity(small, *colour_range_px(small))))
 
 
-def _figures(processed: Processed) -> tuple[Figure, ...]:
-    """Return density, points, depth and how certain it is, as far as they are known."""
+def _figures(processed: Processed, verdict: Headline) -> tuple[Figure, ...]:
+    """Return density, points, depth and how certain it is, as far as they are known. Nothing is certain about wrong depth."""
     share = depth_data.density(processed)
     figures = []
     if not math.isnan(share):
@@ -188,7 +191,7 @@ def _figures(processed: Processed) -> tuple[Figure, ...]:
             note=f"median; nearly all from {distance_text(near)} to {distance_text(far)}",
         )
     )
-    if processed.limits is not None and processed.limits.disparity_error_px > 0:
+    if verdict is not Headline.BAD and processed.limits is not None and processed.limits.disparity_error_px > 0:
         wrong = depth_error_m(processed.geometry, middle, processed.limits.disparity_error_px)
         at = f"at {distance_text(middle)}, if a disparity is wrong by {processed.limits.disparity_error_px:.2g} px"
         figures.append(Figure(label="uncertainty", value=f"± {distance_text(wrong)}", note=at))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.words import counted
+from phone_host.measure.trust import Doubt
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
@@ -33,11 +34,18 @@ class Remark:
         problem: what it is, with figures.
         remedy: what to do about it; empty: nothing.
         is_blocking: whether the result must not be taken for right; the command then ends with exit code 4.
+        is_note: whether nothing is wrong: it only tells what was done.
     """
 
     problem: str
     remedy: str = ""
     is_blocking: bool = False
+    is_note: bool = False
+
+    @property
+    def line(self) -> str:
+        """As a terminal shows it."""
+        return f"{'note' if self.is_note else 'warning'}: {self.text}"
 
     @property
     def text(self) -> str:
@@ -108,7 +116,9 @@ class PairReport:
 
     @property
     def has_depth(self) -> bool:
-        """Whether any pixel has a depth; without a geometry, a disparity."""
+        """Whether it has depth; without a geometry, a disparity."""
+        if any(concern.doubt is Doubt.NO_DEPTH for concern in self.trust.concerns):
+            return False
         return self.density > 0 if self.written.points is None else self.written.points > 0
 
 

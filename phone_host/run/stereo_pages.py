@@ -78,12 +78,13 @@ def set_page(report: SetReport, thumbnails: Mapping[str, Picture], commands: Seq
     return stereo_index(
         StereoIndexData(
             title="Pairs of images",
-            subtitle="; ".join(remark.text for remark in report.remarks),
+            subtitle="",
             verdict=verdict,
             sentence=sentence,
             pairs=tuple(_entry(pair, thumbnails.get(pair.name)) for pair in report.pairs),
             files=_files(["report.json"], ""),
             commands=tuple(commands),
+            notes=tuple(remark.text for remark in report.remarks),
         )
     )
 

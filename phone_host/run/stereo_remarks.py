@@ -28,7 +28,7 @@ def pair_remarks(processed: Processed, trust: PairTrust, near_m: float) -> tuple
         Remark(
             concern.sentence,
             concern.remedy,
-            is_blocking=concern.doubt.blocks and concern.doubt is not Doubt.NO_DEPTH,
+            is_blocking=concern.is_certain and concern.doubt is not Doubt.NO_DEPTH,
         )
         for concern in trust.concerns
     ]
@@ -77,7 +77,7 @@ def turned_remarks(*files: EncodedFile) -> tuple[Remark, ...]:
         files: the pair's image files.
     """
     return tuple(
-        Remark(f"{file.name} was turned upright, as its EXIF header says")
+        Remark(f"{file.name} was turned upright, as its EXIF header says", is_note=True)
         for file in files
         if file.head.orientation != UPRIGHT
     )

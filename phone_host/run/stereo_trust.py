@@ -33,7 +33,7 @@ def judge_pair(
     evidence = measure_evidence(processed, maps_of(core, processed))
     seen = image_doubts(evidence, ImageSource.FILES)
     found = tuple(with_final_options(concern, mounted, ImageSource.FILES) for concern in seen)
-    if not has_depth(processed) and not any(concern.doubt.blocks for concern in found):
+    if not has_depth(processed) and not any(concern.is_certain for concern in found):
         # That there are few disparities, too, says nothing more.
         further = (concern for concern in found if concern.doubt is not Doubt.LOW_DENSITY)
         why = no_depth(processed.cut, processed.limits, found)
@@ -44,6 +44,8 @@ def judge_pair(
         found = gravest_first((REJECTED_RIG, *found))
     figures = median_figures((evidence,))
     error_px = float("nan") if processed.limits is None else processed.limits.disparity_error_px
-    # The headline counts what the files hold: the pixels that have a point, where metres are known.
-    shown = replace(figures, density=density(processed))
+    # The headline counts the pixels that have a point, where metres are known. What the user has cut away is no loss.
+    limits = processed.limits
+    is_own_cut = limits is not None and (not limits.from_rig or limits.near_m > 0)
+    shown = figures if is_own_cut else replace(figures, density=density(processed))
     return PairTrust(figures, found, answer(shown, found, processed.geometry, error_px))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import Disparity, Evidence, Image, Processed, Search
+from phone_host.stereo import filters
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence_features import Matches, find_features, match, on_common_rows, supports
 from phone_host.stereo.evidence_light import measure_exposure
@@ -36,6 +37,14 @@ _TRACK_WIDTH_PX: Final = 1280
 _TRACKED_PX: Final = 4.0
 """Features found at a quarter of the size are off by less."""
 
+_CHANCE_SHARE: Final = 0.005
+"""A black image beside a good one is matched at 0.1 % of its pixels, a plain wall at 0.2 %; the sparsest good pair at 21 %."""
+
+_SCATTERED_WIDTH_PX: Final = 640
+_PIECE_SHARE: Final = 0.002
+_PIECE_STEP_PX: Final = 1.0
+"""A piece of surface smaller than this share of the image is a speck: 600 px of 640x480, some 25 x 25."""
+
 _FEWEST: Final = 8
 
 
@@ -54,13 +63,14 @@ def maps_of(core: StereoCore, processed: Processed) -> PointMaps:
 
 
 def has_depth(processed: Processed) -> bool:
-    """Tell whether any pixel of a pair has depth.
+    """Tell whether a pair has depth: a point, and not only the few chance matches that images without relation give.
 
     Args:
         processed: the pair.
     """
-    if processed.cut is not None:
-        return processed.cut.kept > 0
+    cut = processed.cut
+    if cut is not None:
+        return cut.kept > 0 and cut.inside - cut.unmatched >= _CHANCE_SHARE * cut.inside
     return processed.disparity is not None and bool(np.isfinite(processed.disparity).any())
 
 
@@ -106,7 +116,8 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
         left=measure_exposure(left, len(found[0].points_px)),
         right=measure_exposure(right, len(found[1].points_px)),
         density=density(processed),
-        disparity_px=_middle(disparity),
+        scattered_share=_scattered(disparity),
+        disparity_px=_middle(_wanted(disparity, processed)),
         consistency=_consistency(left, right, disparity, 0.0 if math.isnan(offset_px) else offset_px),
         vertical_px=vertical_px,
         vertical_offset_px=offset_px,
@@ -122,6 +133,33 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
         is_cropped=is_cropped,
         matched_scale=1.0 if processed.search is None else processed.search.scale,
     )
+
+
+def _wanted(disparity: Disparity, processed: Processed) -> Disparity:
+    """Return the disparities that lie between the limits of depth; all, if that leaves none."""
+    limits, geometry = processed.limits, processed.geometry
+    if limits is None or geometry is None:
+        return disparity
+    depth_m = np.float32(geometry.focal_px * geometry.baseline_m) / np.maximum(
+        disparity + np.float32(geometry.doffs_px), np.float32(1e-6)
+    )
+    kept = np.where((depth_m >= limits.near_m) & (depth_m <= limits.far_m), disparity, np.float32(np.nan))
+    return kept if np.isfinite(kept).any() else disparity
+
+
+def _scattered(disparity: Disparity) -> float:
+    """Return the share of the disparities that lie in pieces too small for a surface; NaN without any."""
+    height_px, width_px = disparity.shape
+    scale = min(1.0, _SCATTERED_WIDTH_PX / width_px)
+    if scale < 1:
+        size = (max(1, round(width_px * scale)), max(1, round(height_px * scale)))
+        disparity = np.asarray(cv2.resize(disparity, size, interpolation=cv2.INTER_NEAREST)) * np.float32(scale)
+    known = np.isfinite(disparity)
+    if not known.any():
+        return math.nan
+    whole = np.where(known, np.rint(disparity * filters.STEPS_PER_PX), filters.NO_STEPS).astype(np.int16)
+    kept = filters.without_speckles(whole, round(_PIECE_SHARE * whole.size), _PIECE_STEP_PX)
+    return 1.0 - np.count_nonzero(kept >= 0) / np.count_nonzero(known)
 
 
 def _middle(disparity: Disparity) -> float:

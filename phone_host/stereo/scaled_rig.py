@@ -92,7 +92,7 @@ def _scaled(model: CameraModel, size_px: tuple[int, int], side: Side) -> CameraM
         if is_scaling(own_px, size_px[::-1]):
             raise DataError(
                 f"{differ}: it lies on its side",
-                f"turn it upright: --rotate-{side.value} 90 or 270; for a camera, rotate=90 or 270 in its address",
+                f"turn it upright: rotate=90 or 270 in the camera's address; for files, --rotate-{side.value} 90 or 270",
             )
         raise DataError(
             differ,

@@ -19,6 +19,7 @@ from phone_host.model import (
     CameraModel,
     Crop,
     CutCounts,
+    DepthLimits,
     Epipolar,
     Evidence,
     Image,
@@ -255,6 +256,35 @@ def test_depth_is_what_is_left_after_the_cut() -> None:
     assert not has_depth(replace(known, disparity=some * np.float32(np.nan)))
     assert not has_depth(replace(known, cut=CutCounts(kept=0, too_far=16)))
     assert not has_depth(Processed(pair, None, None, StageTimes()))
+    # A plain wall is matched by chance at 2 pixels of 1000; a small thing amid what the user cut away is depth.
+    assert not has_depth(replace(known, cut=CutCounts(kept=2, unmatched=998)))
+    assert has_depth(replace(known, cut=CutCounts(kept=2, unmatched=500, too_far=498)))
+
+
+def test_specks_are_told_from_surfaces(good: Pair) -> None:
+    """Half the depth of a good pair strewn as 8 x 8 px pieces at unlike disparities: about half is scattered; of the pair as it is, little."""
+    core = FLAT
+    processed = core.compute(*good, now.monotonic_ns)
+    disparity = np.asarray(processed.disparity).copy()
+    assert measure_evidence(processed, maps_of(core, processed)).scattered_share < 0.09
+    height, width = disparity.shape
+    random = np.random.default_rng(5)
+    specks = np.kron(random.uniform(2, 40, (height // 16, width // 8)), np.ones((8, 8))).astype(np.float32)
+    disparity[: specks.shape[0], : specks.shape[1]] = specks
+    strewn = replace(processed, disparity=disparity, cloud=None, cut=None)
+    assert measure_evidence(strewn, maps_of(core, strewn)).scattered_share == pytest.approx(0.5, abs=0.1)
+
+
+def test_the_middle_of_the_scene_is_that_of_what_is_kept() -> None:
+    """Left half 40 px, right half 10 px, and everything farther than 1 m cut away (f b = 26 px m): the middle is 40 px."""
+    disparity = np.full((60, 80), 10.0, np.float32)
+    disparity[:, :30] = 40.0
+    pair = RectifiedPair(np.zeros((60, 80), np.uint8), np.zeros((60, 80), np.uint8))
+    geometry = StereoGeometry(focal_px=260.0, baseline_m=0.1, cx_px=39.5, cy_px=29.5)
+    limits = DepthLimits(near_m=0.0, far_m=1.0, disparity_error_px=0.25, from_rig=False)
+    for given, middle in ((None, 10.0), (limits, 40.0)):
+        processed = Processed(pair, disparity, None, StageTimes(), geometry=geometry, limits=given)
+        assert measure_evidence(processed, Unmoved(80, 60)).disparity_px == middle
 
 
 def test_a_crop_raises_no_doubt(good: Pair) -> None:

@@ -149,6 +149,8 @@ def test_no_depth_because_of_a_short_search_is_told_with_its_remedy() -> None:
     short = Concern(Doubt.SEARCH_TOO_SHORT, "all of the scene is nearer", "give --near 1m")
     assert no_depth(None, None, (short,)).remedy == "give --near 1m"
     assert no_depth(None, None).doubt is Doubt.NO_DEPTH
+    dark = Concern(Doubt.DARK, "the right camera sees almost nothing", "switch on a light")
+    assert no_depth(None, None, (dark,)).sentence == "no pair has depth: the right camera sees almost nothing"
 
 
 def _pattern(kind: str, shift_px: int) -> Image:

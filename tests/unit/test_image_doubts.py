@@ -269,7 +269,13 @@ def test_the_report_holds_the_answer_and_every_doubt() -> None:
     assert told["doubts"][0]["doubt"] == "swapped"
     assert told["doubts"][0]["blocking"] is True
     assert told["doubts"][0]["remedy"]
-    assert told["now"] == {"density": 0.9, "consistency": 0.9, "vertical_error_px": 0.2, "vertical_offset_px": 0.1}
+    assert told["now"] == {
+        "density": 0.9,
+        "consistency": 0.9,
+        "scattered": None,
+        "vertical_error_px": 0.2,
+        "vertical_offset_px": 0.1,
+    }
     assert told["at_first"]["density"] is None
 
 
@@ -289,4 +295,8 @@ def test_depth_with_specks_is_not_called_right_without_reserve() -> None:
     assert said.grade is Grade.GOOD
     assert said.sentence.startswith("Depth looks right where the scene has texture, specks elsewhere: 28%")
     assert "43% are found again" in said.sentence
+    strewn = ImageFigures(density=0.37, consistency=0.68, vertical_px=0.3, disparity_px=50.0, scattered_share=0.21)
+    assert (
+        "specks elsewhere: 37% of the pixels have depth, 21% of it in specks" in answer(strewn, (), GEOMETRY).sentence
+    )
     assert "specks" not in answer(ImageFigures(density=0.7, consistency=0.8, vertical_px=0.2), (), GEOMETRY).sentence

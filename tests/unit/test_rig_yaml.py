@@ -11,7 +11,7 @@ from common.camera_identity import CameraIdentity, RememberedCamera
 from common.errors import DataError
 from common.orientation import Flip, Orientation
 from phone_host.model import UNMEASURED_NS, Rig, Side, TimeOffset
-from phone_host.output.rig_yaml import read_rig, write_rig, write_time_offset
+from phone_host.output.rig_yaml import is_rig, read_rig, write_rig, write_time_offset
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.rigs import unlike_rig
 
@@ -98,6 +98,24 @@ def test_an_edited_file_is_checked(tmp_path: Path, old: str, new: str, message: 
     assert old in text
     path.write_text(text.replace(old, new))
     with pytest.raises(DataError, match=message):
+        read_rig(path)
+
+
+def test_a_baseline_that_contradicts_the_projection_is_refused(tmp_path: Path) -> None:
+    """T edited by hand, P2 not: the line names both lengths. Without P2, which this program does not need, T counts."""
+    path = _written(tmp_path, t_right_left_m=2 * unlike_rig().t_right_left_m)
+    with pytest.raises(DataError, match=r"P2 has a baseline of 100\.26 mm, but T one of 200\.52 mm"):
+        read_rig(path)
+    path.write_text(re.sub(r"^P2:", "no_P2:", path.read_text(), flags=re.MULTILINE))
+    assert read_rig(path).t_right_left_m[0] == 2 * unlike_rig().t_right_left_m[0]
+
+
+def test_a_rig_that_lost_its_first_line_is_no_calib_txt(tmp_path: Path) -> None:
+    """It is taken for what it was, so that the error does not speak of another kind of file."""
+    path = _written(tmp_path)
+    path.write_text("format_version: 1\n" + path.read_text().partition("---\n")[2])
+    assert is_rig(path)
+    with pytest.raises(DataError, match=r"rig\.yaml is not a calibration file"):
         read_rig(path)
 
 

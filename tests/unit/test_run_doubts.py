@@ -157,15 +157,25 @@ def test_what_was_not_used_makes_no_depth_doubtful_unless_somebody_lies() -> Non
     assert headline(lying).sentence.startswith("Depth may be wrong: 2 of")
 
 
-def test_rows_that_no_matcher_can_bridge_are_wrong_in_words_only() -> None:
-    """12 px and 17 % of depth: `is wrong`, but the run does not fail; 12 px and dense depth: `may be wrong`."""
+def test_rows_that_no_matcher_can_bridge_are_wrong_and_fail_the_run() -> None:
+    """12 px and 17 % of depth: `is wrong`, and the exit code says the same; 12 px and dense depth: `may be wrong`."""
     off = replace(evidence(), vertical_px=12.0, density=0.17)
     said = headline(with_judged(off, off, off))
     assert said.grade is Grade.BAD
     assert said.sentence.startswith("Depth is wrong: the rows of the two images do not agree by 12.0 px")
-    assert not depth_is_wrong(with_judged(off, off, off))
+    assert depth_is_wrong(with_judged(off, off, off))
     dense = replace(off, density=0.8)
     assert headline(with_judged(dense, dense, dense)).grade is Grade.WARNING
+    assert not depth_is_wrong(with_judged(dense, dense, dense))
+
+
+def test_judgements_that_are_doubtful_for_unlike_reasons_do_not_cancel_out() -> None:
+    """One sparse, one with rows apart: neither holds in most, yet none was clean. The newest one's reason stands, in headline and report."""
+    off = replace(evidence(), vertical_px=12.0, density=0.17)
+    mixed = with_judged(replace(evidence(), density=0.1), off)
+    assert [concern.doubt for concern in concerns(mixed)] == [Doubt.VERTICAL_ERROR]
+    assert headline(mixed).grade is Grade.BAD
+    assert concerns(with_judged(off, GOOD)) == ()
 
 
 def test_pairs_of_different_images_are_wrong_and_fail_the_run() -> None:

@@ -36,7 +36,8 @@ def run(options: argparse.Namespace) -> int:
     board = _paired(keys, door, link.address, options.code)
     known = {"name": board.name, "key": board.key, "link": link.address}
     to = ("--link", link.address) if needs_keys(link) else ()
-    next_step = command_line("phone-host", "run", *to, "--camera", "v4l2:auto", "--pairs", "100")
+    with_keys = ("--keys", options.keys) if options.keys else ()
+    next_step = command_line("phone-host", "run", *to, *with_keys, "--camera", "v4l2:auto", "--pairs", "100")
     print(json.dumps(known) if options.json else f"paired with {board.name}; now try\n  {next_step}")
     return 0
 
