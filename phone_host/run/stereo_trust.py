@@ -34,11 +34,12 @@ def judge_pair(
     seen = image_doubts(evidence, ImageSource.FILES)
     found = tuple(with_final_options(concern, mounted, ImageSource.FILES) for concern in seen)
     if not has_depth(processed) and not any(concern.is_certain for concern in found):
-        # That there are few disparities, too, says nothing more.
-        further = (concern for concern in found if concern.doubt is not Doubt.LOW_DENSITY)
         why = no_depth(processed.cut, processed.limits, found)
+        # That there are few disparities, too, says nothing more; nor does the cause, once it is named.
+        further = (item for item in found if item.doubt is not Doubt.LOW_DENSITY and item.sentence not in why.sentence)
         remedy = _OF_FILES if why == _UNMATCHED else why.remedy
-        sentence = why.sentence.replace("no pair has", "no pixel has", 1)  # it may be the only pair
+        pixels = "hardly any pixel has" if density(processed) > 0 else "no pixel has"
+        sentence = why.sentence.replace("no pair has", pixels, 1)  # it may be the only pair
         found = gravest_first((replace(why, sentence=sentence, remedy=remedy), *further))
     if core.rig is not None and core.rig.is_rejected:
         found = gravest_first((REJECTED_RIG, *found))
