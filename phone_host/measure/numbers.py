@@ -107,6 +107,8 @@ def _by_number(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) 
         return ()
     has = "has" if evidence.board_alone + evidence.own_alone == 1 else "have"
     shown = f"the board shows {board.words}, this machine {own.words}"
+    if not alone and board.words == own.words:
+        shown = f"{shown}, the first or last ones of other times"  # which the words leave out
     return (
         Concern(
             Doubt.IMAGE_NUMBERS,

@@ -42,6 +42,14 @@ def test_other_numbers_are_a_doubt_from_the_first_pair_on() -> None:
     )
 
 
+def test_times_that_begin_differently_are_a_doubt_before_any_image_lacks_its_partner() -> None:
+    """The words leave times out, so that they say in what the folders differ."""
+    board = ImageNumbers(count=9, first=1403636579763555584, last=1403636580163555584)
+    other = replace(board, first=1403636579813555456)
+    first = ImageEvidence(paired_by=PairedBy.NUMBER, board=board, own=other, pairs=1)
+    assert said(first) == "the board shows 9 images, this machine 9 images, the first or last ones of other times"
+
+
 def test_a_number_that_only_one_side_has_is_a_doubt() -> None:
     """Even if both begin and end alike; the pairs are of one number each, so their depth is not doubted."""
     alike = ImageEvidence(paired_by=PairedBy.NUMBER, board=SERIES, own=SERIES, pairs=3, own_alone=1)
