@@ -105,14 +105,19 @@ def _by_number(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) 
     alone = " and ".join(side for side in sides if side)
     if alike and not alone:
         return ()
-    has = "has" if evidence.board_alone + evidence.own_alone == 1 else "have"
-    shown = f"the board shows {board.words}, this machine {own.words}"
-    if not alone and board.words == own.words:
-        shown = f"{shown}, the first or last ones of other times"  # which the words leave out
+    if not alone:
+        # The words leave times out.
+        times = ", the first or last ones of other times" if board.words == own.words else ""
+        sentence = f"the board shows {board.words}, this machine {own.words}{times}"
+    else:
+        has = "has" if evidence.board_alone + evidence.own_alone == 1 else "have"
+        sentence = (
+            f"{alone} {has} no partner of the same number: the board shows {board.words}, this machine {own.words}"
+        )
     return (
         Concern(
             Doubt.IMAGE_NUMBERS,
-            f"{alone} {has} no partner of the same number: {shown}" if alone else shown,
+            sentence,
             "check that both folders are of one series: the number in the file name says which two images belong together",
             is_of_unused=True,
         ),
@@ -131,21 +136,34 @@ def _alone(side: str, images: int, numbers: tuple[int, ...]) -> str:
 
 
 def _by_order(why: WhyOrder | None, board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
-    shown = f"the board shows {board.words}, this machine {own.words}, paired in their order: "
     if why is WhyOrder.OTHER:
-        reason = "the numbers in the names of one side are not those of the other"
-        remedy = "give the two images of one moment the same number in their names"
-    elif why is WhyOrder.LATE:
-        reason = "numbers are missing on the board, and its first images were shown before this run"
-        remedy = "start board-agent again, so that it shows its first image to this run"
-    elif board.count != own.count:
-        reason = "a missing one shifts all that follow"
-        remedy = "number the files of both sides alike, such as 0012.jpg"
-        if own.first is not None and board.first is None:
-            remedy = f"{remedy}; if they are, update board-agent: it does not tell the numbers"
-    else:
+        return (
+            Concern(
+                Doubt.IMAGE_NUMBERS,
+                f"the board shows {board.words}, this machine {own.words}, paired in their order: the numbers in the names of one side are not those of the other",
+                "give the two images of one moment the same number in their names",
+            ),
+        )
+    if why is WhyOrder.LATE:
+        return (
+            Concern(
+                Doubt.IMAGE_NUMBERS,
+                f"the board shows {board.words}, this machine {own.words}, paired in their order: numbers are missing on the board, and it had shown its first images before this run",
+                "start board-agent again, so that this run gets its first image",
+            ),
+        )
+    if board.count == own.count:
         return ()
-    return (Concern(Doubt.IMAGE_NUMBERS, f"{shown}{reason}", remedy),)
+    untold = own.first is not None and board.first is None
+    return (
+        Concern(
+            Doubt.IMAGE_NUMBERS,
+            f"the board shows {board.words}, this machine {own.words}, paired in their order: a missing one shifts all that follow",
+            "number the files of both sides alike, such as 0012.jpg; if they are, update board-agent: it does not tell the numbers"
+            if untold
+            else "number the files of both sides alike, such as 0012.jpg",
+        ),
+    )
 
 
 def pairing_words(evidence: ImageEvidence) -> str:
