@@ -3,7 +3,7 @@
 pace=clock: at any moment the image is number floor(t * fps) of CLOCK_MONOTONIC, exposed exactly at k / fps. So two replays on one machine agree
 whenever they were started; `phase_ms` delays all its exposures by that much. A slower mode shows every n-th of these images at its own time.
 pace=demand: one image per read, nothing dropped; the stamps are first + k / fps, where k counts from the first image's number in its name:
-a missing number leaves a gap. The camera's name tells how many images there are and their numbers (`image_numbers.py`).
+a missing number leaves a gap. Where the numbers are times, the stamps are these, modulo 2**59. The camera's name tells how many images there are and their numbers (`image_numbers.py`).
 """
 
 import re
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final
 
 from common.camera.base import CameraHealth, Ended, Grab, Mode, Offers, Skipped, Spoiled
-from common.camera.image_numbers import ImageNumbers, numbers_of, with_numbers
+from common.camera.image_numbers import TIMES_RING, ImageNumbers, numbers_of, with_numbers
 from common.camera.imagefile import SUFFIXES, ImageFile, load
 from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import Frame, FrameFault, find_fault
@@ -206,7 +206,7 @@ class ReplayCamera:
         """
         if self._settings.pacing is Pacing.DEMAND:
             if self._first_ns is None:
-                self.anchor(now_ns, 0)
+                self.anchor(self._time_of(0) if self.images.are_times else now_ns, 0)
             return [self._grab(now_ns)]
         if now_ns < self._due_ns:
             return []
@@ -261,6 +261,8 @@ class ReplayCamera:
         start = self._phase_ns if self._settings.pacing is Pacing.CLOCK else self._first_ns or 0
         if self._settings.pacing is Pacing.DEMAND and self.numbers:
             lap, position = divmod(index, len(self.numbers))
+            if self.images.are_times:  # the same in each lap: the sequence tells the lap
+                return start + self.numbers[position] % TIMES_RING
             span = self.numbers[-1] - self.numbers[0] + 1
             index = lap * span + self.numbers[position] - self.numbers[0]
         return start + (2 * index * self._step + self._rate) // (2 * self._rate)  # rounded to the nearest ns

@@ -10,7 +10,7 @@ from phone_host.measure.doubt_history import past, past_seconds
 from phone_host.measure.gone import GONE
 from phone_host.measure.image_doubts import ImageFigures, figure_doubts
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, history
-from phone_host.measure.trust import Concern
+from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import StereoGeometry
 
 _PATCHY: Final = 0.6
@@ -116,12 +116,20 @@ def headline(run: RunSnapshot) -> Answer:
     if run.images.wants_depth:
         gone = [concern for concern in found if concern.doubt in GONE]
         of_depth = (concern for concern in found if concern.doubt not in GONE and not concern.spares_depth)
-        said = _of_images(run, tuple(of_depth))
+        said = _with_lone(_of_images(run, tuple(of_depth)), found)
         return said if not gone or said.grade is Grade.BAD else _while_it_was_there(gone[0], said)
     if found:
         sentence = f"{_capital(found[0].sentence)}. Remedy: {found[0].remedy}."
         return Answer(Grade.WARNING, sentence)
     return Answer(Grade.GOOD, "This run measured pairs and delays only, no depth: no calibration was given.")
+
+
+def _with_lone(said: Answer, found: tuple[Concern, ...]) -> Answer:
+    """Add to good news which images have no partner of their number."""
+    lone = [item.sentence for item in found if item.doubt is Doubt.IMAGE_NUMBERS and item.spares_depth]
+    if said.grade is not Grade.GOOD or not lone:
+        return said
+    return Answer(said.grade, f"{said.sentence} {_capital(lone[0])}.")
 
 
 def _without_pairs(run: RunSnapshot) -> Answer:

@@ -10,7 +10,10 @@ from typing import Final, assert_never
 from common.camera.image_numbers import ImageNumbers
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement
-from phone_host.sync.stills import PairedBy
+from phone_host.sync.stills import PairedBy, WhyOrder
+
+MOST_NAMED: Final = 5
+"""Images without a partner that are named; the others are counted."""
 
 _SAME_RATE: Final = 0.01
 """Rates that differ by less are the same one, rounded."""
@@ -27,6 +30,9 @@ class ImageEvidence:
         pairs: pairs so far.
         board_alone: board images of whose number this machine has none.
         own_alone: images of this machine of whose number the board has shown none.
+        board_numbers: the numbers of the first of the board's images that are alone, `MOST_NAMED` at most.
+        own_numbers: the same of this machine's.
+        why_order: why images are paired in their order; None if they are not.
         apart: pairs whose two images are at different places in their films.
         first_apart: the places of the first of them, board and host, from 0.
         board_period_ns: time between the board's images, ns; 0: not known, or images come on demand.
@@ -39,6 +45,9 @@ class ImageEvidence:
     pairs: int = 0
     board_alone: int = 0
     own_alone: int = 0
+    board_numbers: tuple[int, ...] = ()
+    own_numbers: tuple[int, ...] = ()
+    why_order: WhyOrder | None = None
     apart: int = 0
     first_apart: tuple[int, int] = (0, 0)
     board_period_ns: int = 0
@@ -79,7 +88,7 @@ def number_concerns(evidence: ImageEvidence) -> tuple[Concern, ...]:
         case PairedBy.NUMBER:
             return _by_number(evidence, board, own)
         case PairedBy.ORDER:
-            return _by_order(board, own)
+            return _by_order(evidence.why_order, board, own)
         case PairedBy.TIME:
             return _by_time(evidence, board, own)
         case _:
@@ -87,30 +96,96 @@ def number_concerns(evidence: ImageEvidence) -> tuple[Concern, ...]:
 
 
 def _by_number(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
-    there, here = evidence.board_alone, evidence.own_alone
+    """Pairs of one number belong together: what has no partner makes none of them doubtful."""
     alike = (board.count, board.first, board.last) == (own.count, own.first, own.last)
-    if alike and not there and not here:
+    sides = (
+        _alone("the board", evidence.board_alone, evidence.board_numbers),
+        _alone("this machine", evidence.own_alone, evidence.own_numbers),
+    )
+    alone = " and ".join(side for side in sides if side)
+    if alike and not alone:
         return ()
-    alone = f": {there} of the board's and {here} of this machine's had no partner of the same number so far"
+    if not alone:
+        # The words leave times out.
+        times = ", the first or last ones of other times" if board.words == own.words else ""
+        sentence = f"the board shows {board.words}, this machine {own.words}{times}"
+    else:
+        has = "has" if evidence.board_alone + evidence.own_alone == 1 else "have"
+        sentence = (
+            f"{alone} {has} no partner of the same number: the board shows {board.words}, this machine {own.words}"
+        )
     return (
         Concern(
             Doubt.IMAGE_NUMBERS,
-            f"the board shows {board.words}, this machine {own.words}{alone if there or here else ''}",
+            sentence,
             "check that both folders are of one series: the number in the file name says which two images belong together",
+            spares_depth=True,
         ),
     )
 
 
-def _by_order(board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
+def _alone(side: str, images: int, numbers: tuple[int, ...]) -> str:
+    """Name the images of a side that have no partner, as far as their numbers are known."""
+    if not images:
+        return ""
+    named = ", ".join(str(number) for number in numbers)
+    if images == 1:
+        return f"image {named} of {side}" if named else f"1 image of {side}"
+    more = ", ..." if len(numbers) < images else ""
+    return f"{images} images of {side}{f' ({named}{more})' if named else ''}"
+
+
+def _by_order(why: WhyOrder | None, board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
+    if why is WhyOrder.OTHER:
+        return (
+            Concern(
+                Doubt.IMAGE_NUMBERS,
+                f"the board shows {board.words}, this machine {own.words}, paired in their order: the numbers in the names of one side are not those of the other",
+                "give the two images of one moment the same number in their names",
+            ),
+        )
+    if why is WhyOrder.LATE:
+        return (
+            Concern(
+                Doubt.IMAGE_NUMBERS,
+                f"the board shows {board.words}, this machine {own.words}, paired in their order: numbers are missing on the board, and it had shown its first images before this run",
+                "start board-agent again, so that this run gets its first image",
+            ),
+        )
     if board.count == own.count:
         return ()
+    untold = own.first is not None and board.first is None
     return (
         Concern(
             Doubt.IMAGE_NUMBERS,
             f"the board shows {board.words}, this machine {own.words}, paired in their order: a missing one shifts all that follow",
-            "number the files of both sides alike, such as 0012.jpg",
+            "number the files of both sides alike, such as 0012.jpg; if they are, update board-agent: it does not tell the numbers"
+            if untold
+            else "number the files of both sides alike, such as 0012.jpg",
         ),
     )
+
+
+def pairing_words(evidence: ImageEvidence) -> str:
+    """Say what paired the images of two folders of stills; empty for anything else.
+
+    Args:
+        evidence: of the images.
+    """
+    if evidence.board is None or evidence.paired_by is PairedBy.TIME:
+        return ""
+    match evidence.why_order:
+        case None:
+            return "stills, paired by the numbers in their names"
+        case WhyOrder.UNKNOWN:
+            why = "the names of one side do not number them, or its numbers are not known"
+        case WhyOrder.OTHER:
+            why = "the numbers in the names of one side are not those of the other"
+        case WhyOrder.LATE:
+            why = "the board had shown its first images before this run"
+        case _:
+            assert_never(evidence.why_order)
+    return f"stills, paired in their order: {why}"
 
 
 def _by_time(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:

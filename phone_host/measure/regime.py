@@ -22,6 +22,13 @@ _SLOWER: Final = 1.15
 
 _FEW: Final = 10
 
+_LINK_SHARE: Final = 0.5
+"""A link that is too slow for the cameras is busy with each frame for more than a period, and so long is its propagation.
+Half of it leaves room for two frames under way at a time. Below that, the link is not what frames wait for."""
+
+_WORTH_WHILE: Final = 0.95
+"""Images are not made smaller by less than this: it changes nothing that anyone could notice."""
+
 
 class Regime(Enum):
     """The regime; for starvation, also what the processor waits for."""
@@ -29,6 +36,7 @@ class Regime(Enum):
     UNKNOWN = "unknown"
     STARVED_BY_CAMERAS = "starved by the cameras"
     STARVED_BY_LINK = "starved by the link"
+    STARVED_BY_MACHINES = "starved by a slow camera or machine"
     STARVED_BY_PAIRING = "starved by pairing"
     STARVED_BY_SPOILED = "starved by spoiled images"
     BACKLOG = "backlog"
@@ -36,7 +44,7 @@ class Regime(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFigures:
-    """The figures that determine the regime: means over a run or over its last pairs, ns; NaN = not measured.
+    """The figures that determine the regime: means over a run or over its last pairs, ns, if not stated otherwise; NaN = not measured.
 
     Attributes:
         pairs: number of processed pairs.
@@ -48,7 +56,7 @@ class RunFigures:
         received: board frames that reached the host, per paired frame.
         offered: pairs formed, per processed pair.
         frame_bytes: size of a board frame.
-        propagation_ns: propagation of a board frame.
+        propagation_ns: median propagation of a board frame. A machine that is busy delays some by much, a slow link all.
         overflow: the FIFO's overflow policy. With `block` the board is held back, so the pairs offered do not show how
             many there could be.
         spoiled: share of the board camera's frames that the board dropped because they were not whole.
@@ -123,7 +131,22 @@ def _judge(figures: RunFigures) -> Judgement:
         text = f"{waits}: frames arrive at the cameras' rate, but {lost:.0f} % of them find no partner"
         remedy = "give a larger --tolerance, or run both cameras at the same rate; frames.orphaned in report.json has the reasons"
         return Judgement(Regime.STARVED_BY_PAIRING, text, (remedy,))
-    return _starved_by_link(figures, waits)
+    is_quick = figures.propagation_ns < _LINK_SHARE * figures.period_ns
+    return _starved_by_machines(figures, waits) if is_quick else _starved_by_link(figures, waits)
+
+
+def _starved_by_machines(figures: RunFigures, waits: str) -> Judgement:
+    """Describe starvation that the link does not explain: frames are with it for a small part of a period."""
+    rate = _rate(figures.arrival_ns)
+    text = (
+        f"{waits}: only {rate} of the cameras' {_rate(figures.period_ns)} frames per second come, and not because of the link "
+        f"(propagation {_ms(figures.propagation_ns)} ms): a camera or a machine is too slow"
+    )
+    remedies = (
+        "look in top on both machines whether other programs need the processor; a webcam gives fewer frames in the dark",
+        f"lower the camera's rate (fps={rate}): that gives no more pairs, but it spares both machines",
+    )
+    return Judgement(Regime.STARVED_BY_MACHINES, text, remedies)
 
 
 def _starved_by_link(figures: RunFigures, waits: str) -> Judgement:
@@ -146,22 +169,24 @@ def _starved_by_link(figures: RunFigures, waits: str) -> Judgement:
 
 
 def _backlog(figures: RunFigures) -> Judgement:
-    """Describe a backlog: processing is slower than arrival."""
+    """Describe a backlog: processing is slower than arrival. Images shown on demand wait for the processor."""
+    busy = f"the processor is busy for {100 * figures.busy:.0f} % of the time: a pair takes it {_ms(figures.processing_ns)} ms"
+    if not figures.period_ns:
+        text = f"{busy}; images shown on demand wait for it, and none is dropped"
+        return Judgement(Regime.BACKLOG, text)
     # Pairs cannot arrive more often than the cameras give images; the ends of a short run only make it seem so.
     arrival_ns = max(figures.arrival_ns, figures.period_ns)
-    if figures.overflow is Overflow.BLOCK and figures.period_ns:
+    if figures.overflow is Overflow.BLOCK:
         arrival_ns = figures.period_ns
     scale = _fitting_scale(figures, arrival_ns)
     others = "the others wait in the FIFO or are dropped" if scale < 1 else "it just keeps up"
-    text = (
-        f"the processor is busy for {100 * figures.busy:.0f} % of the time: a pair takes it {_ms(figures.processing_ns)} ms, "
-        f"and {_rate(arrival_ns)} pairs arrive per second; {others}"
-    )
+    text = f"{busy}, and {_rate(arrival_ns)} pairs arrive per second; {others}"
     remedies = []
     if scale < 1:
-        remedies.append(
-            f"use smaller images: {100 * scale:.0f} % of width and height are enough (estimated from pixels and disparities)"
-        )
+        if scale < _WORTH_WHILE:
+            remedies.append(
+                f"use smaller images: {100 * scale:.0f} % of width and height are enough (estimated from pixels and disparities)"
+            )
         rest_ns = figures.processing_ns - figures.match_ns
         if figures.match_ns > 0 and rest_ns < arrival_ns:
             remedies.append(

@@ -203,7 +203,7 @@ def figures_of(
         received=counts.received / counts.paired if counts.paired else 1.0,
         offered=counts.paired / processed if processed else 1.0,
         frame_bytes=delays.frame_bytes,
-        propagation_ns=delays.spread("propagation").mean_ns,
+        propagation_ns=delays.spread("propagation").p50_ns,
         overflow=overflow,
     )
 

@@ -13,6 +13,7 @@ from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import rung_lines
 from phone_host.measure.doubt_history import saved_pairs
 from phone_host.measure.headline import headline
+from phone_host.measure.numbers import pairing_words
 from phone_host.measure.regime import Regime, judge
 from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures, history
 from phone_host.measure.unused import unused
@@ -82,6 +83,7 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
     """Say who waits for whom, what makes depth wrong, and how the cameras' exposures relate in time."""
     judgement = judge(figures(run))
     return (
+        *([_sentence(paired)] if (paired := pairing_words(run.replayed)) else []),
         f"Queue: {judgement.sentence}.",
         *([f"Not measured: when results were exposed: {TIMELESS}."] if run.timeless else []),
         *(_sentence(remark) for remark in judgement.remedies if judgement.regime in _FINE),

@@ -11,13 +11,13 @@ from phone_host.measure.delays import DELAYS
 from phone_host.measure.doubt_history import history_lines
 from phone_host.measure.headline import headline
 from phone_host.measure.image_doubts import ImageTrust
+from phone_host.measure.numbers import pairing_words
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures, history
 from phone_host.measure.unused import unused
 from phone_host.model import DepthAccount, TimeOffset
 from phone_host.report.cut_words import cut_sentence
 from phone_host.sync.phase import Alignment, Phase
-from phone_host.sync.stills import PairedBy
 
 _MS: Final = 1e6
 _LONGEST_BEAT_S: Final = 3600.0
@@ -77,14 +77,7 @@ def _delay_table(run: RunSnapshot, width: int) -> list[str]:
 
 def _pairing_lines(run: RunSnapshot) -> list[str]:
     """Say what paired the images of two replays, and when the board was away."""
-    by = run.replayed.paired_by
-    how = {
-        PairedBy.NUMBER: "stills, paired by the numbers in their names",
-        PairedBy.ORDER: "stills, paired in their order: the names of one side do not number them, or its numbers are not known",
-    }
-    stills = [how[by]] if by in how and run.replayed.board is not None else []
-    away = away_words(run.away)
-    return [*stills, *([away] if away else [])]
+    return [line for line in (pairing_words(run.replayed), away_words(run.away)) if line]
 
 
 def phase_lines(phase: Phase | None, alignment: Alignment | None) -> list[str]:

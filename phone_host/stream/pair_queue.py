@@ -15,7 +15,7 @@ from common import now
 from common.camera.image_numbers import ImageNumbers, numbers_told
 from common.frame import Frame
 from common.protocol.message import CameraDescription, Pacing
-from phone_host.measure.numbers import FilmWatch, ImageEvidence
+from phone_host.measure.numbers import MOST_NAMED, FilmWatch, ImageEvidence
 from phone_host.model import BoardFrame, FramePair, PairCounts
 from phone_host.stream.demand_clock import DemandClock
 from phone_host.sync.fifo import Fifo, FifoSettings, Overflow
@@ -83,6 +83,8 @@ class PairQueue:
         self._board_images: ImageNumbers | None = None
         self._films = FilmWatch()
         self._board_alone = self._own_alone = 0
+        self._board_numbers: list[int] = []
+        self._own_numbers: list[int] = []
         self._meter: PhaseMeter | None = None
         self._newest: deque[BoardFrame] = deque(maxlen=_NEWEST)
         self._received = self._host_frames = self._paired = self._dropped = self._taken = 0
@@ -131,6 +133,9 @@ class PairQueue:
                 pairs=self._paired,
                 board_alone=self._board_alone,
                 own_alone=self._own_alone,
+                board_numbers=tuple(self._board_numbers),
+                own_numbers=tuple(self._own_numbers),
+                why_order=None if stills is None else stills.why_order,
                 apart=self._films.apart,
                 first_apart=self._films.first_apart,
                 board_period_ns=0 if self._demand.is_timeless else self._film_period_ns,
@@ -250,17 +255,19 @@ class PairQueue:
             wanted = stills.wanted(number, frame.message.marks.exposed_ns)
             self._pass_over(wanted.passed)
             if wanted.index is None:
-                self._refuse_number()
+                self._refuse_number(wanted.number)
                 return
             number = wanted.index
         self._add_board(frame, stamp_ns)
         self._demand.frame_came(stamp_ns, number)
 
-    def _refuse_number(self) -> None:
+    def _refuse_number(self, number: int | None) -> None:
         """Count a board frame of whose number this machine has no image."""
         with self._changed:
             self._received += 1
             self._board_alone += 1
+            if number is not None and len(self._board_numbers) < MOST_NAMED:
+                self._board_numbers.append(number)
             self._count(self._board_orphans, OrphanReason.NO_SUCH_NUMBER.value)
 
     def _pass_over(self, passed: PassedOver) -> None:
@@ -268,6 +275,7 @@ class PairQueue:
         with self._changed:
             self._host_frames += passed.alone + passed.unsent
             self._own_alone += passed.alone
+            self._own_numbers += passed.numbers[: MOST_NAMED - len(self._own_numbers)]
             for reason, images in (OrphanReason.NO_SUCH_NUMBER, passed.alone), (OrphanReason.NO_PARTNER, passed.unsent):
                 if images:
                     self._count(self._host_orphans, reason.value, images)

@@ -7,7 +7,8 @@ paired in their order, as those of `stereo` and `calibrate`.
 
 The board's number follows from the frame's sequence: one frame for each image. If numbers are missing on its side, it
 follows from the frame's label, first + (number - first number) x period. Then the label of the very first image must be
-known; a host that comes too late for it pairs by order.
+known; a host that comes too late for it pairs by order. Where the numbers are times, the label is the number itself,
+modulo 2**59. Times that each camera has stamped itself are not the same on both sides; then, too, the order pairs.
 """
 
 from collections import deque
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Generic, TypeVar
 
-from common.camera.image_numbers import ImageNumbers
+from common.camera.image_numbers import TIMES_RING, ImageNumbers
 from phone_host.sync.pairing import BoardOrphan, HostOrphan, OrphanReason, Outcome, Paired, PairingSettings
 
 B = TypeVar("B")
@@ -31,6 +32,18 @@ class PairedBy(Enum):
     ORDER = "order"
 
 
+class WhyOrder(Enum):
+    """Why stills are paired in their order.
+
+    UNKNOWN: the names of one side do not number its images, or the board does not tell the numbers. OTHER: both sides
+    are numbered, by times or in ways that have nothing in common. LATE: the board's first images were shown to nobody.
+    """
+
+    UNKNOWN = "unknown"
+    OTHER = "other"
+    LATE = "late"
+
+
 @dataclass(frozen=True, slots=True)
 class PassedOver:
     """Own images that stay without a partner, because later ones were asked for, or none.
@@ -38,10 +51,12 @@ class PassedOver:
     Attributes:
         alone: the board has no image of their number.
         unsent: the board has one but did not send it, or it was lost on the link.
+        numbers: those of the images that are alone; empty if the order pairs.
     """
 
     alone: int = 0
     unsent: int = 0
+    numbers: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +66,12 @@ class Wanted:
     Attributes:
         index: index of the own image to show, over all laps; None: there is no image of that number.
         passed: own images that now stay without a partner.
+        number: the number of a board image that has no partner; None if it has one, or its number is not known.
     """
 
     index: int | None
     passed: PassedOver = PassedOver()
+    number: int | None = None
 
 
 class Stills:
@@ -78,9 +95,29 @@ class Stills:
     @property
     def paired_by(self) -> PairedBy:
         """What says which images belong together."""
+        return PairedBy.NUMBER if self.why_order is None else PairedBy.ORDER
+
+    @property
+    def why_order(self) -> WhyOrder | None:
+        """Why images are paired in their order; None if their numbers pair them."""
         board = self.board
-        by_order = not self._numbers or board is None or board.first is None or self._is_late
-        return PairedBy.ORDER if by_order else PairedBy.NUMBER
+        if not self._numbers or board is None or board.first is None:
+            return WhyOrder.UNKNOWN
+        if self._is_late:
+            return WhyOrder.LATE
+        if not board.are_times and not self.own.are_times:
+            return None
+        kinds_differ = board.are_times is not self.own.are_times
+        return WhyOrder.OTHER if kinds_differ or self._is_stamped_apart(board) else None
+
+    def _is_stamped_apart(self, board: ImageNumbers) -> bool:
+        """Whether each camera has stamped its images itself: as many, over as long a time, and none is known to be alike."""
+        assert board.first is not None
+        assert board.last is not None
+        if board.first in self._positions or board.last in self._positions or board.count != self.own.count:
+            return False
+        span, between = self._numbers[-1] - self._numbers[0], len(self._numbers) - 1
+        return 2 * between * abs(board.last - board.first - span) <= span  # half the mean time between two
 
     @property
     def unshown(self) -> PassedOver:
@@ -107,10 +144,12 @@ class Stills:
         """
         if self._first_label_ns is None:
             self._first_label_ns = label_ns
-            self._is_late = sequence > 0 and self.board is not None and self.board.has_gaps
+            hides = self.board is not None and self.board.has_gaps and not self.board.are_times
+            self._is_late = sequence > 0 and hides
         index = self._index(sequence, label_ns)
         if index is None:
-            return Wanted(None)
+            by_number = self.paired_by is PairedBy.NUMBER
+            return Wanted(None, number=self.number_of(sequence, label_ns)[1] if by_number else None)
         passed = self._passed_before(min(index, self.own.count))
         self._next = max(self._next, index + 1)
         return Wanted(index, passed)
@@ -119,8 +158,10 @@ class Stills:
         """Return what was passed over since the last image that was asked for, up to an index."""
         if self.own.looped or index <= self._next:
             return PassedOver()
-        alone = sum(not self._board_has(position) for position in range(self._next, index))
-        return PassedOver(alone, index - self._next - alone)
+        alone = [position for position in range(self._next, index) if not self._board_has(position)]
+        by_number = self.paired_by is PairedBy.NUMBER
+        numbers = tuple(self._numbers[position] for position in alone) if by_number else ()
+        return PassedOver(len(alone), index - self._next - len(alone), numbers)
 
     def _board_has(self, position: int) -> bool:
         """Whether the board has told of a partner for an own image. Of numbers with gaps it tells only the ends."""
@@ -140,6 +181,8 @@ class Stills:
         lap, position = divmod(sequence, board.count)
         if not board.has_gaps:
             return lap, board.first + position
+        if board.are_times:
+            return lap, board.first + (label_ns - board.first) % TIMES_RING
         assert self._first_label_ns is not None
         label = round((label_ns - self._first_label_ns) / self._period_ns)
         return lap, board.first + label % (board.last - board.first + 1)

@@ -176,7 +176,15 @@ def test_each_run_says_which_regime_held_and_what_would_help() -> None:
     """Work of 15 ms after a wait of 1 ms is a backlog; after a wait of 85 ms, at a tenth of the cameras' rate, it is a slow link. Object, terminal and page say so."""
     busy, waiting = result(pairs=100), result(link="serial")
     far = [
-        dataclasses.replace(ledger(number, 330_000_000), previous_done_ns=number * 330_000_000 - 75_000_000)
+        dataclasses.replace(
+            ledger(number, 330_000_000),
+            board=BoardMarks(  # the frame is on its way for the 100 ms before it arrives
+                exposed_ns=number * 330_000_000 - 97_000_000,
+                grabbed_ns=number * 330_000_000 - 96_000_000,
+                sent_ns=number * 330_000_000 - 94_000_000,
+            ),
+            previous_done_ns=number * 330_000_000 - 75_000_000,
+        )
         for number in range(100)
     ]
     kept, measured_s = after_warm_up(far)

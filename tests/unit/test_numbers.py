@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 
+import pytest
+
 from common.camera.image_numbers import ImageNumbers
-from phone_host.measure.numbers import FilmWatch, ImageEvidence, number_concerns, with_cause
+from phone_host.measure.numbers import FilmWatch, ImageEvidence, number_concerns, pairing_words, with_cause
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement
-from phone_host.sync.stills import PairedBy
+from phone_host.sync.stills import PairedBy, WhyOrder
 
 SERIES = ImageNumbers(count=16, first=3, last=18)
 LATER = ImageNumbers(count=16, first=4, last=19)
@@ -34,21 +36,59 @@ def test_other_numbers_are_a_doubt_from_the_first_pair_on() -> None:
     """Folders that begin at different numbers are named with their numbers, before any image lacks its partner."""
     first = ImageEvidence(paired_by=PairedBy.NUMBER, board=SERIES, own=LATER, pairs=1)
     assert said(first) == "the board shows 16 images, 3 to 18, this machine 16 images, 4 to 19"
-    assert said(replace(first, board_alone=1, own_alone=2)).endswith(
-        ": 1 of the board's and 2 of this machine's had no partner of the same number so far"
+    alone = replace(first, board_alone=1, own_alone=7, board_numbers=(3,), own_numbers=(19, 20, 21, 22, 23))
+    assert said(alone).startswith(
+        "image 3 of the board and 7 images of this machine (19, 20, 21, 22, 23, ...) have no partner of the same number: the board"
     )
 
 
+def test_times_that_begin_differently_are_a_doubt_before_any_image_lacks_its_partner() -> None:
+    """The words leave times out, so that they say in what the folders differ."""
+    board = ImageNumbers(count=9, first=1403636579763555584, last=1403636580163555584)
+    other = replace(board, first=1403636579813555456)
+    first = ImageEvidence(paired_by=PairedBy.NUMBER, board=board, own=other, pairs=1)
+    assert said(first) == "the board shows 9 images, this machine 9 images, the first or last ones of other times"
+
+
 def test_a_number_that_only_one_side_has_is_a_doubt() -> None:
-    """Even if both begin and end alike."""
+    """Even if both begin and end alike; the pairs are of one number each, so their depth is not doubted."""
     alike = ImageEvidence(paired_by=PairedBy.NUMBER, board=SERIES, own=SERIES, pairs=3, own_alone=1)
-    assert "1 of this machine's had no partner" in said(alike)
+    assert "1 image of this machine has no partner" in said(alike)
+    assert all(concern.spares_depth for concern in number_concerns(alike))
 
 
 def test_different_counts_are_a_doubt_where_order_or_time_pairs() -> None:
     """Paired in their order, a missing image shifts the rest; two looped films of different length drift apart."""
     for by, words in ((PairedBy.ORDER, "paired in their order"), (PairedBy.TIME, "drift apart")):
         assert words in said(ImageEvidence(paired_by=by, board=SERIES, own=SHORT, pairs=1))
+
+
+@pytest.mark.parametrize("why", [WhyOrder.OTHER, WhyOrder.LATE])
+def test_numbers_that_say_nothing_of_the_pairs_are_a_doubt_even_of_equal_counts(why: WhyOrder) -> None:
+    """Both sides are numbered, but the order pairs: the headline must doubt the depth from the first pair on."""
+    evidence = ImageEvidence(paired_by=PairedBy.ORDER, why_order=why, board=SERIES, own=SERIES, pairs=1)
+    (concern,) = number_concerns(evidence)
+    assert "paired in their order" in concern.sentence
+    assert concern.doubt is Doubt.IMAGE_NUMBERS
+    assert not concern.spares_depth
+
+
+def test_a_board_that_does_not_tell_its_numbers_is_named_where_counts_differ() -> None:
+    """This machine's names are numbered and the board, maybe an older one, tells only how many it has."""
+    evidence = ImageEvidence(paired_by=PairedBy.ORDER, why_order=WhyOrder.UNKNOWN, board=SHORT, own=SERIES, pairs=1)
+    assert "update board-agent" in number_concerns(evidence)[0].remedy
+    assert "update" not in number_concerns(replace(evidence, own=replace(SHORT, count=9)))[0].remedy
+
+
+def test_the_words_say_what_paired_the_stills() -> None:
+    """By numbers, by order with its reason; nothing of films and live cameras."""
+    stills = ImageEvidence(paired_by=PairedBy.NUMBER, board=SERIES, own=SERIES)
+    assert pairing_words(stills) == "stills, paired by the numbers in their names"
+    said_of = {pairing_words(replace(stills, paired_by=PairedBy.ORDER, why_order=why)) for why in WhyOrder}
+    assert len(said_of) == len(WhyOrder)
+    assert all(words.startswith("stills, paired in their order: ") for words in said_of)
+    assert not pairing_words(replace(stills, paired_by=PairedBy.TIME))
+    assert not pairing_words(replace(stills, board=None))
 
 
 def test_films_that_run_once_and_began_apart_are_a_doubt() -> None:

@@ -169,3 +169,30 @@ def test_time_without_the_board_is_named() -> None:
     with_gap = judge(replace(steady, gap_s=6.2))
     assert with_gap.regime is judge(steady).regime
     assert with_gap.sentence == f"{judge(steady).sentence}; the 6.2 s around the board's absence are not counted"
+
+
+@pytest.mark.parametrize(("propagation_ms", "is_link"), [(0.234, False), (16.0, False), (17.0, True), (60.0, True)])
+def test_a_link_is_blamed_only_if_frames_are_long_with_it(propagation_ms: float, *, is_link: bool) -> None:
+    """Of 30 frames a second 17.4 come. A link as slow as that holds each frame for a period of 33 ms; half of it is the limit."""
+    slow = figures(period_ms=100 / 3, arrival_ms=1000 / 17.4, processing_ms=10)
+    judgement = judge(replace(slow, propagation_ns=propagation_ms * MS))
+    assert judgement.regime is (Regime.STARVED_BY_LINK if is_link else Regime.STARVED_BY_MACHINES)
+    assert ("the link carries only" in judgement.sentence) is is_link
+    assert any("use another link" in remedy for remedy in judgement.remedies) is is_link
+    assert "17.4 of the cameras' 30 frames per second" in judgement.sentence
+
+
+def test_stills_wait_and_get_no_advice_for_films() -> None:
+    """Nothing is dropped of images shown on demand, and they have no rate that could be lowered."""
+    judgement = judge(figures(period_ms=0, arrival_ms=117.5, processing_ms=121.1, match_ms=113.3))
+    assert judgement.regime is Regime.BACKLOG
+    assert "a pair takes it 121.1 ms" in judgement.sentence
+    assert "none is dropped" in judgement.sentence
+    assert judgement.remedies == ()
+
+
+@pytest.mark.parametrize(("processing_ms", "advised"), [(104.0, False), (116.0, False), (118.0, True), (130.0, True)])
+def test_images_are_not_made_smaller_by_a_hair(processing_ms: float, *, advised: bool) -> None:
+    """If all is matching, 95 % of width and height take 0.95**3 of the time: 116.6 ms becomes 100."""
+    judgement = judge(figures(period_ms=100, arrival_ms=100, processing_ms=processing_ms, match_ms=processing_ms))
+    assert any("smaller images" in remedy for remedy in judgement.remedies) is advised

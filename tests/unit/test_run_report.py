@@ -1,5 +1,6 @@
 """A run's summary and page: what was not measured is called so, and never shown as a number."""
 
+import html
 from dataclasses import replace
 from typing import Any
 
@@ -7,12 +8,16 @@ import numpy as np
 import pytest
 
 from common.camera.base import CameraHealth, CameraState
+from common.camera.image_numbers import ImageNumbers
 from common.frame import FrameFault
 from common.ledger import BoardMarks, HostMarks
 from common.protocol.message import BoardCounts, DropReason
 from phone_host.measure.absence import Absence, away_of, away_words
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.measure.delays import DelayStatistics, Series
+from phone_host.measure.headline import headline
+from phone_host.measure.image_doubts import ImageFigures, ImageTrust
+from phone_host.measure.numbers import ImageEvidence, pairing_words
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.unused import Unused, unused
@@ -25,6 +30,7 @@ from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Aligning, Alignment, Phase
 from phone_host.sync.quarantine import Disbelief, Suspects
+from phone_host.sync.stills import PairedBy, WhyOrder
 from tests.support.html import Page
 from tests.support.samples import LEDGER
 from tests.support.stereo_pages import processed
@@ -407,3 +413,34 @@ def test_a_run_without_one_whole_image_says_so() -> None:
     assert replace(run(0), link=link).spoiled_counts.nothing_whole
     assert not replace(run(1), link=link).spoiled_counts.nothing_whole
     assert not replace(run(0), spoiled=9).spoiled_counts.nothing_whole
+
+
+def test_images_without_a_partner_do_not_make_the_depth_of_the_pairs_doubtful() -> None:
+    """Image 7 of the board has no partner, and every pair has one number: the headline answers that depth is right, then names it; the doubt is listed."""
+    figures = ImageFigures(density=0.9, consistency=0.9, vertical_px=0.2)
+    trust = ImageTrust(judged=5, wants_depth=True, has_depth=True, start=figures, now=figures)
+    board, own = (ImageNumbers(count=count, first=0, last=23) for count in (24, 23))
+    by_number = ImageEvidence(
+        paired_by=PairedBy.NUMBER, board=board, own=own, pairs=23, board_alone=1, board_numbers=(7,)
+    )
+    seen = replace(run(30), images=trust, replayed=by_number, timeless=True, period_ns=0)
+    said = headline(seen)
+    assert said.sentence.startswith("Depth looks right: 90% of the pixels have depth")
+    assert "Image 7 of the board has no partner of the same number: the board shows 24 images" in said.sentence
+    report: Any = build(seen)
+    assert [warning["doubt"] for warning in report["warnings"]] == ["image_numbers"]
+    by_order = replace(by_number, paired_by=PairedBy.ORDER, why_order=WhyOrder.UNKNOWN)
+    said = headline(replace(seen, replayed=by_order))
+    assert said.sentence.startswith("Depth may be wrong: the board shows 24 images, 0 to 23, this machine 23 images")
+
+
+@pytest.mark.parametrize("why", [None, *WhyOrder])
+def test_page_and_terminal_say_alike_what_paired_the_stills(why: WhyOrder | None) -> None:
+    """The line that says that images are paired in their order, and why, is on the page too."""
+    images = ImageNumbers(count=30, first=0, last=29)
+    by = PairedBy.NUMBER if why is None else PairedBy.ORDER
+    evidence = ImageEvidence(paired_by=by, why_order=why, board=images, own=images, pairs=30)
+    seen = replace(run(30), replayed=evidence, timeless=True, period_ns=0)
+    words = pairing_words(evidence)
+    assert words in summary(seen).splitlines()
+    assert words.removeprefix("s") in html.unescape(run_page(seen, None, Side.LEFT, ()))

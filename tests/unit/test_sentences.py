@@ -49,7 +49,9 @@ REGIMES: Final = {
     "too few": replace(CALM, pairs=3),
     "cameras": CALM,
     "pairing": replace(CALM, interval_ns=300 * MS, starvation_ns=280 * MS, received=3.0),
-    "link": replace(CALM, interval_ns=300 * MS, starvation_ns=280 * MS),
+    "link": replace(CALM, interval_ns=300 * MS, starvation_ns=280 * MS, propagation_ns=310 * MS),
+    "machines": replace(CALM, interval_ns=300 * MS, starvation_ns=280 * MS),
+    "stills": replace(CALM, interval_ns=200 * MS, processing_ns=200 * MS, starvation_ns=0, period_ns=0),
     "backlog": replace(
         CALM, interval_ns=200 * MS, processing_ns=200 * MS, starvation_ns=0, match_ns=150 * MS, offered=2
     ),

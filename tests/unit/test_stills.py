@@ -1,15 +1,20 @@
 """Photographs are paired by the numbers in their names, whatever each side's folder holds; otherwise by their order."""
 
+import re
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.camera.factory import open_camera
 from common.camera.image_numbers import ImageNumbers, numbers_of, numbers_told, with_numbers
+from common.frame import Frame
 from common.protocol.wire_fields import MAX_TEXT
+from common.stamp import HOST_CLOCK
 from phone_host.stereo.view_files import pair_files
-from phone_host.sync.stills import PairedBy, PassedOver, Stills, Wanted
+from phone_host.sync.stills import PairedBy, PassedOver, Stills, Wanted, WhyOrder
+from tests.support.numbered import write_film
 
 PERIOD_NS = 33_333_333
 FIRST_NS = 7_000_000_000_000
@@ -61,6 +66,85 @@ def test_each_image_meets_the_one_of_its_number_and_every_other_is_counted(
     assert passed + stills.unshown.alone + stills.unshown.unsent == len(set(own) - set(board))
 
 
+SECOND_NS = 10**9
+EUROC_NS = 1403636579763555584
+"""The first image's time in a public data set, ns since 1970."""
+
+TIMES = st.sets(st.integers(0, 2**59 - 1), min_size=2, max_size=30).flatmap(
+    lambda steps: st.integers(10**15, 2**63 - 2**59).map(lambda start: tuple(sorted(start + step for step in steps)))
+)
+
+
+def time_labels(numbers: tuple[int, ...], folder: Path) -> list[int]:
+    """The stamps that a replay of images with these times gives its frames, ns."""
+    folder.mkdir()
+    image = write_film(folder.parent / f"{folder.name}-one", 1) / "0.jpg"
+    for number in numbers:
+        (folder / f"{number}.jpg").write_bytes(image.read_bytes())
+    camera = open_camera(f"replay:{folder}", HOST_CLOCK, 5 * SECOND_NS)
+    frames = [camera.read(6 * SECOND_NS)[0] for _ in numbers]
+    return [frame.exposed.ns for frame in frames if isinstance(frame, Frame)]
+
+
+def test_images_named_by_times_are_paired_by_them(tmp_path: Path) -> None:
+    """One image is missing on each side, each of another moment: the two alone are named, and no pair is of two moments.
+
+    The same holds where the first is missing on one side and the last on the other, and for a host that comes late.
+    """
+    every = [EUROC_NS + number * SECOND_NS // 20 for number in range(9)]
+    for at, (theirs, mine) in enumerate(((7, 3), (8, 0), (0, 8))):
+        board, own = (tuple(n for n in every if n != every[gone]) for gone in (theirs, mine))
+        labels = time_labels(board, tmp_path / str(at))
+        assert max(labels) < 2**59  # an older host refuses labels from 2**60 on
+        for first in (0, 4):
+            stills = Stills(told(own), own)
+            stills.begin(numbers_told(with_numbers("replay left", told(board))), PERIOD_NS)
+            found = [stills.wanted(sequence, labels[sequence]) for sequence in range(first, 8)]
+            assert stills.paired_by is PairedBy.NUMBER
+            pairs = [(board[first + n], own[item.index]) for n, item in enumerate(found) if item.index is not None]
+            assert pairs == [(number, number) for number in board[first:] if number in own]
+            assert [item.number for item in found if item.index is None] == [n for n in board[first:] if n not in own]
+
+
+@given(TIMES, TIMES, st.data())
+def test_times_anywhere_in_63_bits_meet_their_own(
+    numbers: tuple[int, ...], others: tuple[int, ...], data: st.DataObject
+) -> None:
+    """Labels modulo 2**59 lose nothing: each image meets its own, also in the second lap, and no image meets another."""
+    own = tuple(sorted({*data.draw(st.sets(st.sampled_from(numbers), min_size=1)), *others}))
+    if own[-1] - own[0] >= 2**59 or len(own) < 2 or not told(own).are_times or not told(numbers).are_times:
+        return
+    stills = Stills(told(own, looped=True), own)
+    stills.begin(told(numbers, looped=True), PERIOD_NS)
+    if stills.paired_by is PairedBy.ORDER:
+        return  # no end is shared
+    for sequence in range(2 * len(numbers)):
+        lap, position = divmod(sequence, len(numbers))
+        number = numbers[position]
+        index = stills.wanted(sequence, number % 2**59).index
+        assert index == (lap * len(own) + own.index(number) if number in own else None)
+
+
+def test_times_that_each_camera_stamped_itself_are_paired_by_order_and_say_so() -> None:
+    """As many over as long a time, but none alike; a counter beside times. Where some could be alike, they pair by number."""
+    board = tuple(EUROC_NS + number * SECOND_NS for number in range(9))
+    late = tuple(number + 3_000_017 for number in board)
+    for own, why in (
+        (late, WhyOrder.OTHER),
+        (tuple(range(9)), WhyOrder.OTHER),
+        (late[1:], None),
+        (board[1:], None),
+        (board, None),
+    ):
+        stills = Stills(told(own), own)
+        stills.begin(told(board), PERIOD_NS)
+        assert stills.why_order is why
+    inner, outer = board[1:-1], (*board[:3], *board[5:])  # as many, no end shared, but not as long
+    stills = Stills(told(inner), inner)
+    stills.begin(told(outer), PERIOD_NS)
+    assert stills.why_order is None
+
+
 def test_a_host_that_comes_late_still_meets_the_right_numbers() -> None:
     """A board without gaps tells its numbers by counting alone, so the first image is not needed."""
     board, own = tuple(range(3, 19)), tuple(range(5, 21))
@@ -95,7 +179,7 @@ def test_an_image_that_the_board_has_but_did_not_send_is_told_from_one_that_it_h
     stills.begin(told(board), PERIOD_NS)
     stills.wanted(0, label_ns(board, 0))
     assert stills.wanted(2, label_ns(board, 2)) == Wanted(2, PassedOver(unsent=1))
-    assert stills.unshown == PassedOver(alone=1)
+    assert stills.unshown == PassedOver(alone=1, numbers=(9,))
 
 
 @pytest.mark.parametrize("own_loops", [True, False])
@@ -121,14 +205,19 @@ def test_with_loop_the_numbers_come_again(*, own_loops: bool) -> None:
         (["left", "right"], ()),
         (["a1", "b1"], ()),
         (["only12"], ()),
-        (["1403636579763555584", "1403636579813555456"], ()),
+        (["1403636579763555584", "1403636579813555456"], (1403636579763555584, 1403636579813555456)),
+        (["cam0_7_1403636579763555584", "cam0_8_1403636579813555456"], (7, 8)),
+        (["9223372036854775807", "9223372036854775806"], (2**63 - 1, 2**63 - 2)),
+        (["9223372036854775808", "9223372036854775806"], ()),
+        (["10000000000000000000", "20000000000000000000"], ()),
+        (["1", "576460752303423489"], ()),
         (["a1", "b"], ()),
     ],
 )
 def test_the_number_is_the_one_that_counts_the_images(names: list[str], numbers: tuple[int, ...]) -> None:
     """It tells all names apart and leaves out the fewest values, so it is neither a camera's own number nor a time of day; the last of two alike.
 
-    A single image, and times in ns, have no number.
+    A single image has no number, nor have names whose numbers do not fit 63 bits or lie 2**59 apart.
     """
     assert numbers_of(names) == numbers
 
@@ -159,8 +248,29 @@ def test_what_a_name_tells_is_read_back(name: str, count: int, first: int | None
     assert numbers_told(told_name) == images
 
 
+@given(st.text(max_size=200), TIMES.filter(lambda numbers: len(numbers) > 1), st.booleans())
+def test_times_in_a_name_are_read_back(name: str, numbers: tuple[int, ...], looped: bool) -> None:  # noqa: FBT001
+    """With 19 digits too; an older host, which knows nothing of times, still reads how many images there are."""
+    images = told(numbers, looped=looped)
+    told_name = with_numbers(name, images)
+    assert len(told_name) <= MAX_TEXT
+    assert numbers_told(told_name) == images
+    older = re.search(r" \((\d{1,9}) images?(?:, (\d{1,15}) to (\d{1,15}))?(, looped)?\)\Z", told_name)
+    assert older is not None
+    assert (int(older[1]), older[2], bool(older[4])) == (len(numbers), None, looped)
+
+
 @pytest.mark.parametrize(
-    "name", ["replay left", "webcam (2 images)x", "x (0 images)", "x (5 images, 9 to 3)", "x (9 images, 3 to 5)"]
+    "name",
+    [
+        "replay left",
+        "webcam (2 images)x",
+        "x (0 images)",
+        "x (5 images, 9 to 3)",
+        "x (9 images, 3 to 5)",
+        "x [3 to 18] (16 images)",
+        "x [1403636579763555584 to 9999999999999999999] (2 images)",
+    ],
 )
 def test_a_name_that_tells_nothing_or_nonsense_is_not_believed(name: str) -> None:
     """Other cameras, older boards and liars tell no numbers."""

@@ -53,6 +53,7 @@ def test_images_without_a_partner_are_orphans_with_the_reason() -> None:
     assert dict(counts.host_orphans) == {"no_image_of_that_number": 1}
     assert counts.host_frames == counts.paired + 1
     assert (queue.images.paired_by, queue.images.board_alone, queue.images.own_alone) == (PairedBy.NUMBER, 2, 1)
+    assert (queue.images.board_numbers, queue.images.own_numbers) == ((3, 5), (7,))
 
 
 def test_a_spoiled_image_of_this_machine_holds_nothing_up(tmp_path: Path) -> None:
