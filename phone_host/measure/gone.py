@@ -27,14 +27,15 @@ def gone_concerns(
     found = []
     back = "has not come back" if ended == "running" else "did not come back"
     if away and not away[-1].is_over and ended != "stream_ended":
-        why = back if refused is None else f"{back}, because {refused.problem}"
-        cable = "check its power, its cable or network, and that board-agent still runs there"
+        gone = f"the board went away at {away[-1].at_s:.0f} s and {back}"
         found.append(
             Concern(
                 Doubt.BOARD_GONE,
-                f"the board went away at {away[-1].at_s:.0f} s and {why}: there is no newer depth",
-                cable if refused is None else refused.remedy,
+                f"{gone}: there is no newer depth",
+                "check its power, its cable or network, and that board-agent still runs there",
             )
+            if refused is None
+            else Concern(Doubt.BOARD_GONE, f"{gone}, because {refused.problem}", refused.remedy)
         )
     if camera.state is CameraState.GONE:
         found.append(
