@@ -36,6 +36,7 @@ from phone_host.declared_settings import NEAR_M
 from phone_host.measure.delays import Series
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
+from phone_host.measure.trouble import trouble_of
 from phone_host.model import Result, Rig, Side, StereoGeometry, TimeOffset
 from phone_host.output.rig_yaml import read_rig
 from phone_host.report.run_json import build
@@ -225,7 +226,7 @@ class Scanner:
     def snapshot(self) -> RunSnapshot:
         """Return delays, accounts, clock, doubts and drops as of now, or as of the end of the run."""
         if self._failure is not None:
-            return self._host.snapshot("failed")
+            return self._host.snapshot("failed", trouble_of(self._failure))
         return self._host.snapshot("running" if self.ended is None else self.ended.value)
 
     def _run(self) -> None:

@@ -56,7 +56,7 @@ def demo_page(
             figures=_figures(run, errors),
             depth=depth_card(last.processed if last else None, Side.LEFT, "A pair, and its depth"),
             pictures=pictures(last.processed if last else None),
-            delays=delay_series(ledgers),
+            delays=delay_series(ledgers, after_gap_ns=run.after_gap_ns, statistics=run.delays),
             tables=(unused_table(run), camera_table(run.camera)),
             commands=commands,
             notes=(

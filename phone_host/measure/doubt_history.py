@@ -1,7 +1,8 @@
 """Remembers which doubts stood during a run, when, and over which pairs. Pure.
 
 What stood for a while and has gone is no reason to doubt the newest depth, but the pairs of that while are as wrong as
-ever, and some of them may be saved.
+ever, and some of them may be saved. Only a judged pair is called wrong. A pair between two wrong ones is perhaps wrong,
+and of one that lies between a wrong and a sound one nothing is known.
 """
 
 from collections import deque
@@ -18,6 +19,9 @@ _LEAST_JUDGEMENTS: Final = 2
 _MOST: Final = 100
 """This many past doubts are remembered, the latest: a lamp that flickers for a day must not fill the memory."""
 
+_MOST_JUDGED: Final = 1000
+"""The numbers of this many judged pairs of one while are kept, the latest: eight minutes at two judgements a second."""
+
 _MOST_TOLD: Final = 5
 _MOST_SAVED: Final = 6
 
@@ -30,9 +34,12 @@ class Episode:
         concern: the doubt, with its latest figures.
         from_s: when it was first seen, counted from the start of the run, s.
         to_s: when it was seen to be gone, or judged for the last time, s.
-        first_pair: first pair that may be concerned: the one after the last judged pair without the doubt.
-        last_pair: last pair that may be concerned.
+        first_pair: the first judged pair with the doubt.
+        last_pair: the last judged pair with the doubt.
         is_over: whether it has gone.
+        judged: numbers of the judged pairs with the doubt, ascending, the latest `_MOST_JUDGED`.
+        judgements: how many there were.
+        sound: numbers of the judged pairs without the doubt since it was first seen, kept like `judged`.
     """
 
     concern: Concern
@@ -41,28 +48,18 @@ class Episode:
     first_pair: int
     last_pair: int
     is_over: bool
-
-    @property
-    def pairs(self) -> int:
-        """Number of pairs that may be concerned."""
-        return self.last_pair - self.first_pair + 1
-
-
-@dataclass(slots=True)
-class _Open:
-    """A doubt that holds, or has held so recently that it may return."""
-
-    episode: Episode
+    judged: tuple[int, ...] = ()
     judgements: int = 1
+    sound: tuple[int, ...] = ()
 
 
 class DoubtHistory:
     """Follows the doubts from judgement to judgement."""
 
     def __init__(self) -> None:
-        self._open: dict[Doubt, _Open] = {}
+        # Doubts that hold, or have held so recently that they may return.
+        self._open: dict[Doubt, Episode] = {}
         self._over: deque[Episode] = deque(maxlen=_MOST)
-        self._next_pair = 0
 
     def add(self, found: Sequence[Concern], standing: frozenset[Doubt], at_s: float, pair: int) -> None:
         """Take one judgement.
@@ -79,24 +76,30 @@ class DoubtHistory:
         for doubt, known in tuple(self._open.items()):
             if doubt in here:
                 continue
-            if not known.episode.is_over:
-                known.episode = replace(known.episode, to_s=at_s, last_pair=pair - 1, is_over=True)
+            sound = (*known.sound[1 - _MOST_JUDGED :], pair)
+            gone = replace(known, to_s=known.to_s if known.is_over else at_s, is_over=True, sound=sound)
+            self._open[doubt] = gone
             if doubt not in standing:
                 del self._open[doubt]
-                if known.judgements >= _LEAST_JUDGEMENTS:
-                    self._over.append(known.episode)
-        self._next_pair = pair + 1
+                if gone.judgements >= _LEAST_JUDGEMENTS:
+                    self._over.append(gone)
 
     def _see(self, doubt: Doubt, concern: Concern, at_s: float, pair: int) -> None:
         known = self._open.get(doubt)
         if known is None:
-            first = min(self._next_pair, pair)
-            self._open[doubt] = _Open(
-                Episode(concern=concern, from_s=at_s, to_s=at_s, first_pair=first, last_pair=pair, is_over=False)
+            self._open[doubt] = Episode(
+                concern=concern, from_s=at_s, to_s=at_s, first_pair=pair, last_pair=pair, is_over=False, judged=(pair,)
             )
             return
-        known.judgements += 1
-        known.episode = replace(known.episode, concern=concern, to_s=at_s, last_pair=pair, is_over=False)
+        self._open[doubt] = replace(
+            known,
+            concern=concern,
+            to_s=at_s,
+            last_pair=pair,
+            is_over=False,
+            judged=(*known.judged[1 - _MOST_JUDGED :], pair),
+            judgements=known.judgements + 1,
+        )
 
     def episodes(self, standing: frozenset[Doubt]) -> tuple[Episode, ...]:
         """Return what stood and what stands, in order of beginning.
@@ -104,7 +107,7 @@ class DoubtHistory:
         Args:
             standing: the doubts that stand now.
         """
-        now = [replace(known.episode, is_over=False) for doubt, known in self._open.items() if doubt in standing]
+        now = [replace(known, is_over=False) for doubt, known in self._open.items() if doubt in standing]
         return tuple(sorted((*self._over, *now), key=lambda episode: episode.from_s))
 
 
@@ -122,6 +125,17 @@ def past_seconds(history: Sequence[Episode]) -> float:
     return total
 
 
+def told_past(history: Sequence[Episode], pairs: int, save_every: int) -> list[tuple[Concern, str]]:
+    """Return the gravest of what stood for a while and has gone, each with one line that says so.
+
+    Args:
+        history: of the run.
+        pairs: number of processed pairs.
+        save_every: every Nth pair was saved, beginning with the first; 0: none.
+    """
+    return [(item.concern, _line(item, pairs, save_every)) for item in past(history)[:_MOST_TOLD]]
+
+
 def history_lines(history: Sequence[Episode], pairs: int, save_every: int) -> list[str]:
     """Say what stood for a while and has gone, in one line each.
 
@@ -130,9 +144,8 @@ def history_lines(history: Sequence[Episode], pairs: int, save_every: int) -> li
         pairs: number of processed pairs.
         save_every: every Nth pair was saved, beginning with the first; 0: none.
     """
-    gone = past(history)
-    lines = [_line(item, pairs, save_every) for item in gone[:_MOST_TOLD]]
-    more = len(gone) - _MOST_TOLD
+    lines = [line for _, line in told_past(history, pairs, save_every)]
+    more = len(past(history)) - _MOST_TOLD
     return [
         *lines,
         *([f"{counted(more, 'more doubt')} stood for a while: see trust.history in report.json"] if more > 0 else []),
@@ -141,22 +154,53 @@ def history_lines(history: Sequence[Episode], pairs: int, save_every: int) -> li
 
 def _line(item: Episode, pairs: int, save_every: int) -> str:
     verdict = "wrong" if item.concern.is_certain else "doubtful"
+    sound = sum(number < item.last_pair for number in item.sound)
+    between = item.last_pair - item.first_pair + 1 - item.judgements - sound
+    unjudged = f", {counted(between, 'pair')} between them not judged" if between else ""
     saved = saved_pairs(item, save_every)
-    names = ", ".join(str(number) for number in saved[:_MOST_SAVED]) + (" ..." if len(saved) > _MOST_SAVED else "")
-    among = f", among them saved {'pair' if len(saved) == 1 else 'pairs'} {names}" if saved else ""
+    parts = (_numbers(saved.judged, verdict), _numbers(saved.between, "not judged"))
+    listed = "; ".join(filter(None, parts))
     return (
         f"from {item.from_s:.1f} s to {item.to_s:.1f} s {item.concern.sentence}:"
-        f" about {item.pairs} of {counted(pairs, 'pair')} are {verdict}{among}"
+        f" {item.judgements} judged {'pair' if item.judgements == 1 else 'pairs'} of {pairs} {'is' if item.judgements == 1 else 'are'} {verdict}{unjudged}"
+        f"{f' (saved: {listed})' if listed else ''}"
     )
 
 
-def saved_pairs(item: Episode, save_every: int) -> range:
-    """Return the numbers of the saved pairs that may be concerned.
+def _numbers(pairs: Sequence[int], what: str) -> str:
+    """Name some pairs: `pairs 6, 9 wrong`; empty if there are none."""
+    if not pairs:
+        return ""
+    more = f" and {len(pairs) - _MOST_SAVED} more" if len(pairs) > _MOST_SAVED else ""
+    names = ", ".join(str(number) for number in pairs[:_MOST_SAVED])
+    return f"{'pair' if len(pairs) == 1 else 'pairs'} {names}{more} {what}"
+
+
+@dataclass(frozen=True, slots=True)
+class SavedPairs:
+    """Numbers of the saved pairs that a while concerns.
+
+    Attributes:
+        judged: those that had the doubt themselves.
+        between: those that were not judged and lie between two that had it.
+    """
+
+    judged: tuple[int, ...]
+    between: tuple[int, ...]
+
+
+def saved_pairs(item: Episode, save_every: int) -> SavedPairs:
+    """Return the numbers of the saved pairs that a while concerns.
 
     Args:
         item: the while.
         save_every: every Nth pair was saved, beginning with the first; 0: none.
     """
     if not save_every:
-        return range(0)
-    return range(-(-item.first_pair // save_every) * save_every, item.last_pair + 1, save_every)
+        return SavedPairs((), ())
+    judged = frozenset(item.judged)
+    saved = range(-(-item.first_pair // save_every) * save_every, item.last_pair + 1, save_every)
+    known = judged | frozenset(item.sound)
+    return SavedPairs(
+        tuple(number for number in saved if number in judged), tuple(number for number in saved if number not in known)
+    )

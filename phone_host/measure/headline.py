@@ -1,7 +1,7 @@
 """Answers the user's question in one sentence: is my depth right, and how far can I trust it? Pure."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
@@ -10,6 +10,7 @@ from phone_host.measure.doubt_history import past, past_seconds
 from phone_host.measure.gone import GONE
 from phone_host.measure.image_doubts import ImageFigures, figure_doubts
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, history
+from phone_host.measure.trouble import Trouble
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import StereoGeometry
 
@@ -111,7 +112,12 @@ def headline(run: RunSnapshot) -> Answer:
         run: the run.
     """
     if not run.processed:
-        return _without_pairs(run)
+        return Answer(Grade.BAD, _without_pairs(run))
+    if run.failure is not None:
+        until = replace(run, failure=None)
+        return Answer(
+            Grade.BAD, f"The run broke off: {run.failure.sentences} Until then: {_lower(headline(until).sentence)}"
+        )
     found = concerns(run)
     if run.images.wants_depth:
         gone = [concern for concern in found if concern.doubt in GONE]
@@ -132,12 +138,18 @@ def _with_lone(said: Answer, found: tuple[Concern, ...]) -> Answer:
     return Answer(said.grade, f"{said.sentence} {_capital(lone[0])}.")
 
 
-def _without_pairs(run: RunSnapshot) -> Answer:
+def _without_pairs(run: RunSnapshot) -> str:
+    """Say why there is no pair: the error that ended the run knows best, then what the pairs that failed had."""
+    if run.failure is not None:
+        return f"No pair was processed: {run.failure.sentences}"
     if run.spoiled_images:
-        return Answer(Grade.BAD, "No pair had two whole images: check the cameras.")
+        return "No pair had two whole images: check the cameras."
+    if run.failed_pairs:
+        return f"No pair was processed: {run.failed_pairs[0][0].sentences}"
     if not run.link.sessions:
-        return Answer(Grade.BAD, "No pair was processed: no board came. Remedy: start board-agent on the board.")
-    return Answer(Grade.BAD, "No pair was processed: no frames of the two cameras came together.")
+        absent = Trouble("no board came", "start board-agent on the board")
+        return f"No pair was processed: {(run.refused or absent).sentences}"
+    return "No pair was processed: no frames of the two cameras came together."
 
 
 def _of_images(run: RunSnapshot, found: tuple[Concern, ...]) -> Answer:
@@ -161,8 +173,12 @@ def _of_images(run: RunSnapshot, found: tuple[Concern, ...]) -> Answer:
 
 def _while_it_was_there(gone: Concern, said: Answer) -> Answer:
     """Put an absence before what can be said of the depth until then."""
-    before = f"{said.sentence[:1].lower()}{said.sentence[1:]}"
-    return Answer(Grade.WARNING, f"{_capital(gone.sentence)}. Remedy: {gone.remedy}. Until then: {before}")
+    sentence = f"{_capital(gone.sentence)}. Remedy: {gone.remedy}. Until then: {_lower(said.sentence)}"
+    return Answer(Grade.WARNING, sentence)
+
+
+def _lower(words: str) -> str:
+    return f"{words[:1].lower()}{words[1:]}"
 
 
 def _capital(words: str) -> str:

@@ -22,6 +22,7 @@ from phone_host.measure.orient_words import with_final_options
 from phone_host.measure.regime import RunFigures
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.spoiled import SpoiledCounts, spoiled_concerns
+from phone_host.measure.trouble import Trouble
 from phone_host.measure.trust import (
     NO_DOUBT,
     REJECTED_RIG,
@@ -58,9 +59,13 @@ class RunSnapshot:
         interpolated to the moment of the host's. If so, their time skew does not matter.
         spoiled_images: pairs with a spoiled image, by reason; part of `undecodable`.
         stamps_exact: whether both cameras' stamps are the times of exposure by definition.
+        failed_pairs: the rest of `undecodable`, by reason, the most frequent first.
+        failure: the error that ended the run; None: none did. refused: why the board refuses this host, now or at the
+        end; None: it does not, or is silent.
         timeless: whether images are shown on demand: nothing is counted from their exposure. replayed: what is known of
         the images if both sides replay files. away: when the board was away. gaps: how often it was away between two
-        pairs. gap_s: the time between those pairs, s; no part of `seconds`.
+        pairs. gap_s: the time between those pairs, s; no part of `seconds`. after_gap_ns: when the first pair after each
+        such time was done, CLOCK_MONOTONIC.
         judged_pairs: number of newest pairs over which time and motion are judged; None: all.
         missed_locks: controls of the rig's cameras that could not be restored.
         images: what the images say about the depth.
@@ -95,6 +100,9 @@ class RunSnapshot:
     interpolated: bool = False
     stamps_exact: bool = False
     spoiled_images: tuple[tuple[str, int], ...] = ()
+    failed_pairs: tuple[tuple[Trouble, int], ...] = ()
+    failure: Trouble | None = None
+    refused: Trouble | None = None
     time_offset: TimeOffset = field(default_factory=TimeOffset)
     phase: Phase | None = None
     alignment: Alignment | None = None
@@ -105,6 +113,7 @@ class RunSnapshot:
     away: tuple[Away, ...] = ()
     gaps: int = 0
     gap_s: float = 0.0
+    after_gap_ns: frozenset[int] = frozenset()
     images: ImageTrust = field(default_factory=ImageTrust)
     depth: DepthAccount = field(default_factory=DepthAccount)
     rig_rejected: bool = False
@@ -233,7 +242,7 @@ def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
     )
     numbers, images = with_cause(number_concerns(run.replayed), image_concerns(run), run.replayed)
     rejected = (REJECTED_RIG,) if run.rig_rejected else ()
-    gone = gone_concerns(run.ended, run.away, run.camera, run.last_s) if run.processed else ()
+    gone = gone_concerns(run.ended, run.away, run.camera, run.last_s, run.refused) if run.processed else ()
     told = (*spoiled_concerns(run.spoiled_counts), *settings_concerns(run.missed_locks))
     timing = unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
     return gravest_first((*rejected, *numbers, *images, *told, *gone, *timing))

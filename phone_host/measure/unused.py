@@ -27,7 +27,7 @@ class Unused:
     @property
     def words(self) -> str:
         """Place and reason for people."""
-        return f"{self.place}: {self.reason}".replace("_", " ") if self.reason else self.place
+        return f"{self.place}: {self._reason_words}" if self.reason else self.place
 
     @property
     def told(self) -> str:
@@ -38,8 +38,13 @@ class Unused:
             noun = f"{noun} {second}"
         if self.count == 1:
             noun, rest = noun.removesuffix("s"), rest.replace("that were not whole images", "that was no whole image")
-        reason = f": {self.reason}".replace("_", " ") if self.reason else ""
+        reason = f": {self._reason_words}" if self.reason else ""
         return f"{self.count} {noun} {rest}{reason}"
+
+    @property
+    def _reason_words(self) -> str:
+        """The reason for people: a word of an account gets its spaces; a sentence may hold a name and stays as it is."""
+        return self.reason if " " in self.reason else self.reason.replace("_", " ")
 
 
 def unused(run: RunSnapshot) -> tuple[Unused, ...]:
@@ -71,10 +76,10 @@ def _on_the_host(run: RunSnapshot) -> Iterator[Unused]:
     for reason, count in counts.host_orphans:
         yield Unused("host frames without partner", reason, count)
     yield Unused("pairs dropped from a full FIFO", "", counts.dropped)
-    spoiled = sum(count for _, count in run.spoiled_images)
     for reason, count in run.spoiled_images:
         yield Unused("pairs with a spoiled image", reason, count)
-    yield Unused("pairs that could not be processed", "", run.undecodable - spoiled)
+    for trouble, count in run.failed_pairs:
+        yield Unused("pairs that could not be processed", trouble.problem, count)
     if run.ended != "running":
         yield Unused("pairs still waiting at the end", "", run.stopped)
     for sink in run.sinks:

@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from common.ledger import PairLedger, StageTimes
 from common.words import counted
-from phone_host.measure.delays import IDLE_STAGE_NS
+from phone_host.measure.delays import IDLE_STAGE_NS, DelayStatistics
 from phone_host.report.page_frame import HALF_PX, document, section, table, two_widths
 from phone_host.report.page_links import FileLink, NextCommand, files_section, list_section, next_section
 from phone_host.svg.plot_parts import legend
 from phone_host.svg.plots import (
     Budget,
+    Percentiles,
     Quantity,
     Strips,
     budgets,
@@ -169,12 +170,20 @@ class PageData:
     files: tuple[FileLink, ...] = ()
 
 
-def delay_series(ledgers: Sequence[PairLedger], *, timeless: bool = False) -> DelaySeries:
+def delay_series(
+    ledgers: Sequence[PairLedger],
+    *,
+    timeless: bool = False,
+    after_gap_ns: frozenset[int] = frozenset(),
+    statistics: DelayStatistics | None = None,
+) -> DelaySeries:
     """Make the series of all delays from ledgers.
 
     Args:
         ledgers: one per pair, in the order in which the pairs were done; may be empty.
         timeless: whether their exposures are labels, because images were shown on demand.
+        after_gap_ns: when the pairs were done before which the board was away: their wait is no starvation.
+        statistics: of all pairs, if the ledgers are a sample of them: the percentiles that are told.
 
     Returns:
         The series of every delay.
@@ -189,18 +198,43 @@ def delay_series(ledgers: Sequence[PairLedger], *, timeless: bool = False) -> De
     def stage(name: str) -> NDArray[np.float64]:
         return column(lambda ledger: int(getattr(ledger.stages, name)))
 
+    def percentiles(name: str) -> Percentiles | None:
+        spread = None if statistics is None else statistics.spread(name)
+        known = spread is not None and spread.count
+        return Percentiles(spread.p50_ns, spread.p95_ns, spread.p99_ns, spread.max_ns) if spread and known else None
+
+    waits = attribute("starvation_ns")
+    waits[[ledger.done_ns in after_gap_ns for ledger in ledgers]] = np.nan
     first_ns = ledgers[0].done_ns if ledgers else 0
     return DelaySeries(
         time_s=column(lambda ledger: ledger.done_ns - first_ns) / 1e9,
         delays=tuple(
-            Quantity(label=name, values_ns=attribute(f"{name}_ns"), colour=colour, meaning=meaning)
+            Quantity(
+                label=name,
+                values_ns=attribute(f"{name}_ns"),
+                colour=colour,
+                meaning=meaning,
+                percentiles=percentiles(name),
+            )
             for colour, (name, meaning) in enumerate(MEANINGS)
             if not (timeless and name == "capture")
         ),
-        end_to_end=Quantity(label="end-to-end", values_ns=attribute("end_to_end_ns"), colour=7, meaning=_END_TO_END),
-        starvation=Quantity(label="starvation", values_ns=attribute("starvation_ns"), colour=6, meaning=_STARVATION),
+        end_to_end=Quantity(
+            label="end-to-end",
+            values_ns=attribute("end_to_end_ns"),
+            colour=7,
+            meaning=_END_TO_END,
+            percentiles=percentiles("end_to_end"),
+        ),
+        starvation=Quantity(
+            label="starvation",
+            values_ns=waits,
+            colour=6,
+            meaning=_STARVATION,
+            percentiles=percentiles("starvation"),
+        ),
         stages=tuple(
-            Quantity(label=field.name, values_ns=stage(field.name), colour=colour)
+            Quantity(label=field.name, values_ns=stage(field.name), colour=colour, percentiles=percentiles(field.name))
             for colour, field in enumerate(fields(StageTimes))
         ),
         time_skew=Quantity(label="time skew", values_ns=attribute("time_skew_ns"), colour=5),

@@ -8,7 +8,7 @@ from common.camera.base import CameraHealth, health_values
 from common.versions import REPORT_FORMAT
 from phone_host.measure.accounts import LinkTally, rung_values
 from phone_host.measure.delays import DELAYS, FROM_EXPOSURE, STAGES, Spread
-from phone_host.measure.doubt_history import Episode, saved_pairs
+from phone_host.measure.doubt_history import Episode, saved_pairs, told_past
 from phone_host.measure.headline import headline
 from phone_host.measure.image_doubts import ImageFigures
 from phone_host.measure.regime import Judgement, judge
@@ -33,6 +33,7 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "format_version": REPORT_FORMAT,
         "command": command,
         "ended": run.ended,
+        "error": None if run.failure is None else asdict(run.failure),
         "pairs": run.processed,
         "pairs_asked": run.asked_pairs or None,
         "pairs_per_second": _number(run.pairs_per_second),
@@ -41,7 +42,11 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "clock": _clock(run),
         "phase": _phase(run),
         "time_offset_ms": _time_offset(run.time_offset),
-        "fifo": {"depth": run.fifo.depth, "overflow": run.fifo.overflow.value, "age_bound": age_bound(run)},
+        "fifo": {
+            "depth": run.fifo.depth,
+            "overflow": None if run.timeless else run.fifo.overflow.value,
+            "age_bound": age_bound(run),
+        },
         "tolerance_ms": run.tolerance_ns / _MS,
         "sessions": [_session(run, index) for index in range(len(run.link.sessions))],
         "links": [_link(tally, timeless=run.timeless) for tally in run.link.links],
@@ -54,15 +59,21 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "regime": _regime(judge(figures(run))),
         "image_motion_px_per_s": _number(run.motion_px_s),
         "trust": _trust(run),
-        "warnings": [
-            {"doubt": item.doubt.value, "sentence": item.sentence, "remedy": item.remedy} for item in concerns(run)
-        ],
+        "warnings": _warnings(run),
         "shortfall": run.shortfall or None,
         "pairs_account": _pairs_account(run),
         "unused": [{"place": item.place, "reason": item.reason, "count": item.count} for item in unused(run)],
         "sinks": {sink.name: _sink(sink) for sink in run.sinks},
         "unwritten": asdict(run.unwritten),
     }
+
+
+def _warnings(run: RunSnapshot) -> list[dict[str, object]]:
+    """Return what terminal and page warn of: what stands at the end, and what stood for a while."""
+    told = [(item.doubt, item.sentence, item.remedy) for item in concerns(run)]
+    gone = told_past(history(run), run.processed, run.save_every)
+    told += [(item.doubt, line, item.remedy) for item, line in gone]
+    return [{"doubt": doubt.value, "sentence": sentence, "remedy": remedy} for doubt, sentence, remedy in told]
 
 
 def _delays(run: RunSnapshot) -> dict[str, object]:
@@ -160,6 +171,7 @@ def _trust(run: RunSnapshot) -> dict[str, object]:
 
 def _episode(item: Episode, save_every: int) -> dict[str, object]:
     """Return one while during which a doubt stood, with the numbers of its pairs, counted from 0."""
+    saved = saved_pairs(item, save_every)
     return {
         **concern_values(item.concern),
         "from_s": round(item.from_s, 3),
@@ -167,7 +179,9 @@ def _episode(item: Episode, save_every: int) -> dict[str, object]:
         "is_over": item.is_over,
         "first_pair": item.first_pair,
         "last_pair": item.last_pair,
-        "saved_pairs": list(saved_pairs(item, save_every)),
+        "judged_pairs": item.judgements,
+        "saved_pairs": list(saved.judged),
+        "saved_pairs_between": list(saved.between),
     }
 
 
@@ -211,6 +225,8 @@ def spread_ms(spread: Spread) -> dict[str, float | int | None]:
 def age_bound(run: RunSnapshot) -> str:
     """Say how old a pair can get in the FIFO, given its depth and policy and this run's rates."""
     depth, processing = run.fifo.depth, run.delays.spread("processing")
+    if run.timeless:
+        return "none needed: images come on demand, when there is room, so that none is dropped and none has an age"
     if run.fifo.overflow is Overflow.DROP_OLDEST:
         return f"{depth} frame period(s): newer pairs push older ones out"
     how = (
@@ -298,7 +314,7 @@ def _link(tally: LinkTally, *, timeless: bool) -> dict[str, object]:
         "up": tally.is_up,
         "frames": tally.frames,
         "bytes": tally.bytes,
-        "carried": tally.carried,
+        "took_over": tally.carried,
         "lost": tally.lost,
         "age_ms": None if timeless else spread_ms(tally.age.spread()),
     }

@@ -64,7 +64,7 @@ def run_page(
                 last, board_side, f"The last pair: number {run.processed - 1} of this run, counted from 0"
             ),
             pictures=pictures(last, board_side),
-            delays=delay_series(ledgers, timeless=run.timeless),
+            delays=delay_series(ledgers, timeless=run.timeless, after_gap_ns=run.after_gap_ns, statistics=run.delays),
             tables=(*links_tables(run), unused_table(run), camera_table(run.camera)),
             steps=steps(run),
             notes=notes(run),
@@ -97,7 +97,12 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
 def steps(run: RunSnapshot) -> tuple[str, ...]:
     """Say what to do next: what makes depth right comes before what makes it fast."""
     judgement = judge(figures(run))
-    remedies = (*(item.remedy for item in concerns(run)), *(() if judgement.regime in _FINE else judgement.remedies))
+    failure = () if run.failure is None else (run.failure.remedy,)
+    remedies = (
+        *failure,
+        *(item.remedy for item in concerns(run)),
+        *(() if judgement.regime in _FINE else judgement.remedies),
+    )
     return tuple(_sentence(remedy) for remedy in dict.fromkeys(remedies))
 
 
@@ -106,15 +111,17 @@ def _sentence(words: str) -> str:
 
 
 def doubtful_pairs(run: RunSnapshot) -> dict[int, str]:
-    """Return why saved pairs are wrong or doubtful, by their number: what stood while they were taken.
+    """Return why saved pairs are wrong, doubtful or perhaps so, by their number: what stood while they were taken.
 
     Args:
         run: the run.
     """
     found: dict[int, str] = {}
     for item in sorted(history(run), key=lambda item: item.concern.is_certain):
-        verdict = "wrong" if item.concern.is_certain else "doubtful"
-        found |= dict.fromkeys(saved_pairs(item, run.save_every), f"{verdict}: {item.concern.sentence}")
+        verdict, saved = ("wrong" if item.concern.is_certain else "doubtful"), saved_pairs(item, run.save_every)
+        perhaps = f"not judged, between pairs that are {verdict}: {item.concern.sentence}"
+        found = dict.fromkeys(saved.between, perhaps) | found
+        found |= dict.fromkeys(saved.judged, f"{verdict}: {item.concern.sentence}")
     return found
 
 

@@ -174,7 +174,7 @@ def _links(link: LinkAccount, width: int) -> list[str]:
         return []
     if 0 < width < _LINK_TABLE:
         return [_link_line(tally) for tally in link.links]
-    lines = [f"{'link':14} {'frames':>9} {'carried':>9} {'lost':>9} {'age p50':>9} {'p95':>9}"]
+    lines = [f"{'link':14} {'frames':>9} {'took over':>9} {'lost':>9} {'age p50':>9} {'p95':>9}"]
     for tally in link.links:
         age = tally.age.spread()
         ages = f"{age.p50_ns / _MS:9.3f} {age.p95_ns / _MS:9.3f}" if age.count else f"{'-':>9} {'-':>9}"
@@ -185,7 +185,7 @@ def _links(link: LinkAccount, width: int) -> list[str]:
 def _link_line(tally: LinkTally) -> str:
     age = tally.age.spread()
     ages = f", age p50 {age.p50_ns / _MS:.3f} ms, p95 {age.p95_ns / _MS:.3f} ms" if age.count else ""
-    return f"link {tally.name}: {counted(tally.frames, 'frame')}, carried {times(tally.carried)}, lost {times(tally.lost)}{ages}"
+    return f"link {tally.name}: {counted(tally.frames, 'frame')}, took over {times(tally.carried)}, lost {times(tally.lost)}{ages}"
 
 
 def _unused_lines(run: RunSnapshot) -> list[str]:

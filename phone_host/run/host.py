@@ -20,6 +20,7 @@ from phone_host.measure.absence import away_of
 from phone_host.measure.image_motion import MotionMeter
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.sink_account import SinkAccount
+from phone_host.measure.trouble import Trouble
 from phone_host.model import Processed, Result, Side, TimeOffset
 from phone_host.output.axes import Axes
 from phone_host.run.doubt_log import DoubtLog
@@ -34,12 +35,13 @@ from phone_host.run.trust_sink import TrustSink
 from phone_host.run.worker import Worker
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
-from phone_host.stream.await_board import BoardPatience
+from phone_host.stream.await_board import BoardPatience, refusal_error
 from phone_host.stream.demand_clock import DemandClock
 from phone_host.stream.one_kind import require_one_kind
 from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.receiver import Receiver
+from phone_host.stream.refusals import BoardRefusal, refusal_text
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
 from phone_host.sync.stills import Stills
@@ -171,6 +173,7 @@ class Host:
         self._doubts = DoubtLog(lambda: concerns(self.snapshot()))
         self._time_limit = TimeLimit(settings.seconds_ns)
         self._steering = PhaseSteering(settings.steered, self._receiver, self._camera, self._queue)
+        self._refusal: BoardRefusal | None = None
         self._ended_ns = 0
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
@@ -261,15 +264,21 @@ class Host:
         """Whether a board has said hello."""
         return self._receiver.hello is not None
 
+    @property
+    def refused(self) -> Trouble | None:
+        """Why the board refuses this host, now or at the end of the run; None: it does not, or is silent."""
+        return None if self._refusal is None else Trouble(*refusal_text(self._refusal))
+
     def sample(self) -> Sequence[PairLedger]:
         """Return ledgers for plots, in order: those of all pairs, or an evenly spaced sample."""
         return self._ledgerer.sample()
 
-    def snapshot(self, ended: str = "running") -> RunSnapshot:
+    def snapshot(self, ended: str = "running", failure: Trouble | None = None) -> RunSnapshot:
         """Return everything that presenters show, as of now.
 
         Args:
             ended: why the run ended. While it is running, time and motion are judged over the newest pairs only.
+            failure: the error that ended it; None: none did.
         """
         books, receiver = self._ledgerer.books(), self._receiver
         return RunSnapshot(
@@ -298,6 +307,9 @@ class Host:
             width_px=self._motion.width_px,
             interpolated=self._settings.interpolate,
             spoiled_images=books.spoiled_images,
+            failed_pairs=books.failed_pairs,
+            failure=failure,
+            refused=self.refused,
             stamps_exact=self._stamps_are_exact,
             judged_pairs=_RECENT if ended == "running" else None,
             missed_locks=self._cameras.missed,
@@ -306,6 +318,7 @@ class Host:
             away=away_of(receiver.account.absences, self.started_ns, self._ended_ns or now.monotonic_ns()),
             gaps=books.gaps,
             gap_s=books.gap_ns / 1e9,
+            after_gap_ns=books.after_gap_ns,
             images=self._trust.trust,
             depth=books.depth,
             rig_rejected=self._rig_rejected,
@@ -361,7 +374,8 @@ class Host:
             if stop():
                 return EndReason.STOPPED
             present = self._receiver.connected or self._receiver.ended
-            patience.look(now_ns, self._receiver.refused, present=present)
+            patience.look(now_ns, None if present else self._receiver.refused, present=present)
+            self._refusal = patience.refused
             if self._time_limit.is_over(now_ns, has_met_board=self.has_met_board, begun_ns=self.first_done_ns):
                 return self._drain(stop, watch, EndReason.SECONDS_OVER)
             if self._receiver.ended or self._camera.ended:
@@ -382,12 +396,15 @@ class Host:
         Raises:
             SettingsError: the two kinds are mixed.
             AbsentBoardError: this machine's camera has shown its last image before a board came.
+            BusyBoardError: the same, because the board talks to another host.
         """
         hello = self._receiver.hello
         if hello is not None:
             if sum(bool(account.session) for account in tuple(self._receiver.account.sessions)) == 1:
                 require_one_kind(self._own, hello.camera)
         elif self._camera.ended:
+            if self._refusal is not None:
+                raise refusal_error(self._refusal)
             raise AbsentBoardError(
                 "no board came before this machine's camera had shown its last image",
                 "start board-agent first, or give loop=1 in --camera",

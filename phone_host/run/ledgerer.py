@@ -1,14 +1,19 @@
 """The books of a run: one ledger for each pair, and the totals."""
 
 import threading
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Final
 
 from common.frame import FrameFault, SpoiledImageError
 from common.ledger import HostMarks, PairLedger
 from phone_host.measure.delays import DelayStatistics, Sample
+from phone_host.measure.trouble import Trouble, Troubles
 from phone_host.model import CutCounts, DepthAccount, FramePair, Processed
+
+_MOST_GAPS: Final = 4096
+"""This many pairs after a gap are remembered, the latest: as many as a page can show."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,23 +39,27 @@ class Books:
         processed: pairs that were handed over.
         undecodable: pairs that could not be processed.
         spoiled_images: undecodable pairs with a spoiled image, by reason.
+        failed_pairs: the other undecodable pairs, by reason, the most frequent first.
         first_done_ns: when the first pair was done; 0: none yet.
         last_done_ns: when the last pair was done; 0: none yet.
         delays: delays of all pairs.
         depth: what became of the pixels.
         gaps: how often the board was away between two pairs.
         gap_ns: time between those pairs, in all.
+        after_gap_ns: when the first pair after each gap was done.
     """
 
     processed: int
     undecodable: int
     spoiled_images: tuple[tuple[str, int], ...]
+    failed_pairs: tuple[tuple[Trouble, int], ...]
     first_done_ns: int
     last_done_ns: int
     delays: DelayStatistics
     depth: DepthAccount
     gaps: int = 0
     gap_ns: int = 0
+    after_gap_ns: frozenset[int] = frozenset()
 
 
 class Ledgerer:
@@ -68,6 +77,8 @@ class Ledgerer:
     ) -> None:
         self._was_away, self._is_timeless = was_away, is_timeless
         self._gaps = self._gap_ns = 0
+        self._after_gap_ns: deque[int] = deque(maxlen=_MOST_GAPS)
+        self._failed = Troubles()
         self._lock = threading.Lock()
         self._delays, self._sample = DelayStatistics(), Sample()
         self._spoiled: Counter[FrameFault] = Counter()
@@ -116,7 +127,9 @@ class Ledgerer:
         is_gap = idle_ns > 0 and self._was_away(self.last_done_ns, pair.queued_ns)
         with self._lock:
             self._gaps += is_gap
-            self._gap_ns += idle_ns if is_gap else 0
+            if is_gap:
+                self._gap_ns += idle_ns
+                self._after_gap_ns.append(marks.done_ns)
             self._delays.add(ledger, after_gap=is_gap, timeless=self._is_timeless())
             self._sample.add(ledger)
             self._depth = _with(self._depth, processed)
@@ -132,6 +145,8 @@ class Ledgerer:
             self.undecodable += 1
             if isinstance(error, SpoiledImageError):
                 self._spoiled[error.fault] += 1
+            else:
+                self._failed.add(error)
 
     def books(self) -> Books:
         """Return the totals so far."""
@@ -140,12 +155,14 @@ class Ledgerer:
                 processed=self.processed,
                 undecodable=self.undecodable,
                 spoiled_images=tuple((fault.value, count) for fault, count in self._spoiled.items()),
+                failed_pairs=self._failed.counts(),
                 first_done_ns=self.first_done_ns,
                 last_done_ns=self.last_done_ns,
                 delays=self._delays.copy(),
                 depth=self._depth,
                 gaps=self._gaps,
                 gap_ns=self._gap_ns,
+                after_gap_ns=frozenset(self._after_gap_ns),
             )
 
     def sample(self) -> tuple[PairLedger, ...]:

@@ -53,7 +53,7 @@ class LiveTable:
     Args:
         snapshot: returns the run's present state.
         console: where to draw; stderr by default, so that stdout is free for results.
-        seconds: planned length of the run for the progress bar, s; 0 if it is given in pairs or open.
+        seconds: planned length of the run from its first pair, for the progress bar, s; 0 if it is given in pairs or open.
         pairs: the same, in pairs.
         refresh_s: least time between two redraws, s.
     """
@@ -73,9 +73,9 @@ class LiveTable:
         self._drawing = RLock()
         self._ending = ExitStack()
         self._seconds = seconds
-        self._started_s = now.monotonic_ns() / 1e9
+        self._begun_s = 0.0
         self._shown_s = 0.0
-        self._last = (0, self._started_s)
+        self._last = (0, now.monotonic_ns() / 1e9)
         self._rate = 0.0
         self._progress = Progress(
             TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f}")
@@ -108,8 +108,11 @@ class LiveTable:
         if now_s - since_s >= 1.0:
             self._rate = (run.processed - pairs) / (now_s - since_s)
             self._last = (run.processed, now_s)
+        if run.processed and not self._begun_s:
+            self._begun_s = now_s
         if self._task is not None:
-            self._progress.update(self._task, completed=now_s - self._started_s if self._seconds else run.processed)
+            lasted_s = min(self._seconds, now_s - self._begun_s) if self._begun_s else 0.0
+            self._progress.update(self._task, completed=lasted_s if self._seconds else run.processed)
         with self._drawing:
             console = self._live.console
             self._live.update(_fitted(self._parts(run, console.width), console), refresh=True)
@@ -197,7 +200,8 @@ def _state(run: RunSnapshot) -> Text:
         if estimate
         else "clock unknown"
     )
-    board = f"board connected over {run.carrier}" if run.carrier else "waiting for the board"
+    absent = "waiting for the board" if run.refused is None else f"{run.refused.problem}: {run.refused.remedy}"
+    board = f"board connected over {run.carrier}" if run.carrier else absent
     lost = ", ".join(item.told for item in unused(run)) or "nothing"
     phase = "\n".join(phase_lines(run.phase, run.alignment))
     return Text(f"{board} · {clock} · not used: {lost}" + (f"\n{phase}" if phase else ""))

@@ -6,6 +6,16 @@ _FIRST_PAIR_NS: Final = 10_000_000_000
 """A limited run allows this much for the first pair: learning the clock takes a second, the first use of OpenCV another."""
 
 
+def patience_s(wait_s: float | None, seconds: float) -> float | None:
+    """Return how long to wait for an absent board, s; None: for ever.
+
+    Args:
+        wait_s: what was asked for; None: nothing.
+        seconds: how long the run may take from its first pair, s; 0: no limit. A limited run must end without a board, too.
+    """
+    return wait_s if wait_s is not None or not seconds else seconds + _FIRST_PAIR_NS / 1e9
+
+
 class TimeLimit:
     """Counts a run's time from its first pair.
 

@@ -17,7 +17,10 @@ from phone_host.stream.refusals import BoardRefusal, refusal_text
 _STEP_S: Final = 0.05
 
 _BUSY_NS: Final = 4_000_000_000
-"""A board may briefly believe that a crashed host is alive. `busy` is believed only after this long."""
+"""A board may briefly believe that a crashed host is alive. `busy` is believed only after this long.
+
+A refusal is remembered as long: it repeats five times a second, but a machine may be too busy itself to hear that.
+"""
 
 _REMEDY: Final = "start board-agent there, check --link, or give --wait more seconds"
 
@@ -37,8 +40,15 @@ class BoardPatience:
     def __init__(self, patience_ns: int | None, began_ns: int, *, where: str = "", remedy: str = _REMEDY) -> None:
         self._patience_ns = patience_ns
         self._seen_ns = began_ns
+        self._refused: BoardRefusal | None = None
+        self._refused_ns = 0
         self._absent = f"no board at {where}" if where else "no board"
         self._remedy = remedy
+
+    @property
+    def refused(self) -> BoardRefusal | None:
+        """Why the board refused this host a moment ago; None if it did not, or is there."""
+        return self._refused
 
     def look(self, now_ns: int, refused: BoardRefusal | None, *, present: bool) -> None:
         """Check whether to wait any longer.
@@ -55,13 +65,17 @@ class BoardPatience:
         """
         if present:
             self._seen_ns = now_ns
+        if refused is not None:
+            self._refused, self._refused_ns = refused, now_ns
+        elif present or now_ns - self._refused_ns > _BUSY_NS:
+            self._refused = None
         patience_ns = self._patience_ns
         if refused is not None:
             patience_ns = max(patience_ns or 0, _BUSY_NS) if refused.reason is RefusalReason.BUSY else 0
         if patience_ns is None or now_ns - self._seen_ns <= patience_ns:
             return
-        if refused is not None:
-            raise _refusal(refused)
+        if self._refused is not None:
+            raise refusal_error(self._refused)
         raise AbsentBoardError(f"{self._absent} within {patience_ns / 1e9:g} s", self._remedy)
 
 
@@ -100,7 +114,12 @@ def await_board(
     return False
 
 
-def _refusal(refusal: BoardRefusal) -> UnavailableError:
+def refusal_error(refusal: BoardRefusal) -> UnavailableError:
+    """Return a refusal as the error that ends a wait.
+
+    Args:
+        refusal: the board's refusal.
+    """
     match refusal.reason:
         case RefusalReason.BUSY:
             return BusyBoardError(*refusal_text(refusal))

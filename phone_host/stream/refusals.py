@@ -88,7 +88,10 @@ def refusal_text(refusal: BoardRefusal) -> tuple[str, str]:
     """
     match refusal.reason:
         case RefusalReason.BUSY:
-            return "the board is busy with another host", "stop the other one first"
+            return (
+                "the board is busy with another host",
+                "stop that one first, because a board serves one host at a time",
+            )
         case RefusalReason.VERSION:
             # The same words as in `other_protocol`, written out: docs/troubleshooting.md is generated from them.
             theirs, ours = refusal.protocol, PROTOCOL_VERSION

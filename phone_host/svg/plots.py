@@ -26,6 +26,16 @@ _OUTLIER = 2.5
 """A total this many times above the 98th percentile would flatten all others, so it is cut off and marked."""
 
 
+@dataclass(frozen=True, slots=True)
+class Percentiles:
+    """What is known of a quantity's distribution over more pairs than its values are of, ns."""
+
+    p50_ns: float
+    p95_ns: float
+    p99_ns: float
+    max_ns: float
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Quantity:
     """One named delay of every pair.
@@ -35,12 +45,14 @@ class Quantity:
         values_ns: (N,) float64, ns.
         colour: index into the palette, 0..7.
         meaning: one sentence for the tooltip.
+        percentiles: over all pairs, if `values_ns` is a sample of them; None: those of the values are told.
     """
 
     label: str
     values_ns: Values
     colour: int
     meaning: str = ""
+    percentiles: Percentiles | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +215,9 @@ def distributions(groups: Sequence[Strips], width_px: int) -> str:
     Returns:
         An <svg> element.
     """
-    everything = [quantity.values_ns for group in groups for quantity in group.quantities]
+    quantities = [quantity for group in groups for quantity in group.quantities]
+    everything = [quantity.values_ns for quantity in quantities]
+    everything += [np.array([one.percentiles.max_ns]) for one in quantities if one.percentiles is not None]
     x = log_scale(np.concatenate(everything) if everything else np.zeros(0), 8.0, width_px - 12.0)
     height = 4.0
     rows = []
@@ -315,6 +329,8 @@ def _strip(quantity: Quantity, px: Callable[[float], float], top: float, width_p
         return name + f'<text x="{width_px}" y="{top + 12:.0f}" text-anchor="end">not measured</text>'
     p5, p50, p95, p99 = (float(p) for p in np.percentile(values, (5, 50, 95, 99)))
     greatest = float(values.max())
+    if (known := quantity.percentiles) is not None:
+        p50, p95, p99, greatest = known.p50_ns, known.p95_ns, known.p99_ns, known.max_ns
     numbers = f"p50 {duration_text(p50)} · p95 {duration_text(p95)} · p99 {duration_text(p99)}"
     title = f"{quantity.label}: p5 {duration_text(p5)}, {numbers.replace(' · ', ', ')}, max {duration_text(greatest)}"
     if width_px >= _ROOM_FOR_MAX_PX:

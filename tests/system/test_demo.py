@@ -54,6 +54,15 @@ def test_an_interrupted_demo_ends_both_programs_and_keeps_its_report(tmp_path: P
     assert not left
 
 
+def test_a_demo_that_is_interrupted_while_it_renders_says_so(tmp_path: Path) -> None:
+    """As every command does: one line, and 130."""
+    out = tmp_path / "demo"
+    with host(["demo", "--out", str(out)], tmp_path) as demo:
+        until((out / "film").exists, "the first image is rendered")
+        assert demo.stop(signal.SIGINT) == 130
+    assert demo.stderr == "phone-host: interrupted\n"
+
+
 def test_a_demo_that_cannot_write_says_so(tmp_path: Path) -> None:
     """A folder that cannot be created ends the demo with exit 3 and one line that names it; invalid seconds end it with exit 2."""
     for arguments, code, culprit in (

@@ -143,20 +143,25 @@ def test_a_stopped_board_process_is_missed_and_found_again(film: str, link: str,
 
 
 def test_a_second_host_is_told_busy(film: str, link: str, tmp_path: Path) -> None:
-    """While one host is served, another ends with exit 3 and one line that says busy; the first keeps its stream."""
-    out = tmp_path / "out"
+    """While one host is served, another ends with exit 3 and one line that says busy, as its report and page do; the first keeps its stream."""
+    out, refused = tmp_path / "out", tmp_path / "refused"
     arguments = ["run", "--camera", film, "--link", link]
     with (
         board(arguments, tmp_path),
         host([*arguments, "--out", str(out), "--save-every", "1"], tmp_path, "host1") as first,
     ):
         until(lambda: lines(out / "delays.jsonl") >= 5, "the first host streams")
-        with host(arguments, tmp_path, "host2") as second:
+        with host([*arguments, "--wait", "4", "--out", str(refused), "--json"], tmp_path, "host2") as second:
             assert second.wait() == 3
             complaint = [line for line in second.stderr.splitlines() if "error" in line]
             assert len(complaint) == 1
             assert "busy" in complaint[0]
             assert "Traceback" not in second.stderr
+        told = second.json()
+        assert "waiting for a board" not in second.stderr
+        assert "busy with another host" in told["error"]["problem"]
+        assert "busy with another host" in told["trust"]["headline"]
+        assert told["trust"]["headline"] in (refused / "index.html").read_text(encoding="utf-8")
         before = lines(out / "delays.jsonl")
         until(lambda: lines(out / "delays.jsonl") >= before + 5, "the first host streams on")
         assert first.stop(signal.SIGINT) == 130

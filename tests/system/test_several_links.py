@@ -107,7 +107,7 @@ def test_a_pulled_cable_and_back(film: str, cable: PtyLine, network: tuple[str, 
     serial, over_tcp = report["links"]
     assert (serial["link"], over_tcp["link"]) == ("serial", "tcp")
     assert serial["lost"] == 1
-    assert report["switches"] == serial["carried"] + over_tcp["carried"] - 1 >= 2
+    assert report["switches"] == serial["took_over"] + over_tcp["took_over"] - 1 >= 2
     page = (out / "index.html").read_text()
     assert f"the stream changed links {times(report['switches'])}" in page
     assert f"<td>tcp</td><td>{over_tcp['frames']}</td>" in page

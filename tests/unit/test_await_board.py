@@ -63,6 +63,21 @@ def test_without_a_limit_an_absent_board_is_waited_for() -> None:
     assert ends_after(None, None) is None
 
 
+def test_a_refusal_heard_a_moment_ago_is_still_the_reason() -> None:
+    """The machine was too busy to hear the board's last second of refusals: the board is busy, not absent. After 5 s it is absent."""
+    for heard_s, kind in ((2, BusyBoardError), (0, AbsentBoardError)):
+        patience = BoardPatience(5 * S, 0)
+        patience.look(heard_s * S, BoardRefusal(RefusalReason.BUSY), present=False)
+        patience.look(heard_s * S + 1, None, present=False)
+        assert patience.refused == BoardRefusal(RefusalReason.BUSY)
+        with pytest.raises(kind):
+            patience.look(5 * S + 1, None, present=False)
+    accepted = BoardPatience(5 * S, 0)
+    accepted.look(S, BoardRefusal(RefusalReason.BUSY), present=False)
+    accepted.look(2 * S, None, present=True)
+    assert accepted.refused is None
+
+
 def test_patience_begins_anew_when_a_board_goes() -> None:
     """The time in which the board was there does not count."""
     patience = BoardPatience(3 * S, 0)

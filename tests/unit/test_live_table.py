@@ -16,6 +16,7 @@ from rich.console import Console
 from common.program import logs
 from common.program.terminal import headed, rows
 from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.trouble import Trouble
 from phone_host.run.terminal_view import LiveTable
 from tests.support.screen import Screen
 from tests.unit.test_run_report import run
@@ -150,3 +151,20 @@ def test_a_summary_higher_than_the_terminal_says_its_headline_again() -> None:
     assert headed(text, 50, 29) == f"{text}\n\nthe depth is right"
     assert headed(text, 10, 29).endswith("\n\nthe depth\n  is right")
     assert rows(io.StringIO()) == 0
+
+
+def test_a_limited_runs_bar_waits_for_the_first_pair_and_a_busy_board_is_named() -> None:
+    """Its seconds count from the first pair: without one the bar stays empty, and the line below says who has the board."""
+    drawn = io.StringIO()
+    busy = replace(run(0), refused=Trouble("the board is busy with another host", "stop that one first"))
+    console = Console(file=drawn, width=100, height=40, force_terminal=True)
+    with LiveTable(lambda: busy, console, seconds=5.0, refresh_s=0.0) as live:
+        for _ in range(3):
+            live.refresh()
+        assert live._progress.tasks[0].completed == 0.0
+        assert "the board is busy with another host: stop that one first" in drawn.getvalue()
+        assert "waiting for the board" not in drawn.getvalue()
+        busy = run(5)
+        for _ in range(2):
+            live.refresh()
+        assert 0.0 < live._progress.tasks[0].completed <= 5.0

@@ -19,7 +19,7 @@ from phone_host.measure.run_snapshot import RunSnapshot, concerns, depth_is_wron
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement, Evidence, Side
 from phone_host.report.run_json import build
-from phone_host.report.run_page import run_page
+from phone_host.report.run_page import doubtful_pairs, run_page
 from phone_host.report.summary import summary
 from tests.unit.test_image_doubts import BLIND, GEOMETRY, GOOD, SWAPPED, evidence
 from tests.unit.test_numbers import SERIES, SHORT
@@ -82,23 +82,28 @@ def test_no_good_words_about_bad_figures(bad: ImageFigures) -> None:
 
 
 def test_a_cover_that_was_taken_off_is_remembered() -> None:
-    """It was seen from 2 s to 6 s: pairs 6 to 29 lie between the last clean and the next clean judgement."""
+    """It was seen from 2 s to 6 s, at pairs 10, 15, 20 and 25; twelve pairs between these were not judged."""
     covered = with_judged(GOOD, GOOD, LOW, LOW, LOW, LOW, GOOD, GOOD, GOOD)
     (past,) = covered.images.history
-    assert (past.from_s, past.to_s, past.first_pair, past.last_pair, past.is_over) == (2.0, 6.0, 6, 29, True)
+    assert (past.from_s, past.to_s, past.first_pair, past.last_pair, past.is_over) == (2.0, 6.0, 10, 25, True)
     said = headline(covered)
     assert said.grade is Grade.WARNING
     assert said.sentence.endswith("; but for 4 of 4 s it was not: the right camera sees no scene at all.")
-    line = "from 2.0 s to 6.0 s the right camera sees no scene at all: about 24 of 91 pairs are wrong"
+    line = (
+        "from 2.0 s to 6.0 s the right camera sees no scene at all: 4 judged pairs of 91 are wrong,"
+        " 12 pairs between them not judged"
+    )
     assert f"warning: {line}" in summary(covered)
     assert f"Warning: {line}." in run_page(covered, None, Side.LEFT, ())
+    told: Any = build(covered)
+    assert [(item["doubt"], item["sentence"]) for item in told["warnings"]] == [("covered", line)]
     assert not depth_is_wrong(covered)
 
 
 def test_saved_pairs_of_a_bad_while_are_named_and_marked_on_the_page() -> None:
-    """Of the saved pairs 0, 30, 60 and 90, number 30 was taken under the cover that was seen at pairs 25 to 40."""
+    """Of the saved pairs 0, 30, 60 and 90, number 30 was judged under the cover that was seen at pairs 25 to 40."""
     covered = with_judged(GOOD, GOOD, GOOD, GOOD, GOOD, LOW, LOW, LOW, LOW, GOOD, GOOD)
-    assert "are wrong, among them saved pair 30" in summary(covered)
+    assert "(saved: pair 30 wrong)" in summary(covered)
     saved = [f"pair-{number:06d}/cloud.ply" for number in (0, 30, 60)]
     page = run_page(covered, None, Side.LEFT, (), saved)
     assert page.count("wrong: the right camera sees no scene at all") == 1
@@ -109,9 +114,41 @@ def test_saved_pairs_of_a_bad_while_are_named_and_marked_on_the_page() -> None:
         {
             "doubt": "covered", "sentence": "the right camera sees no scene at all", "blocking": True,
             "remedy": "take off the lens cap, the shutter or the finger",
-            "from_s": 5.0, "to_s": 9.0, "is_over": True, "first_pair": 21, "last_pair": 44, "saved_pairs": [30],
+            "from_s": 5.0, "to_s": 9.0, "is_over": True, "first_pair": 25, "last_pair": 40,
+            "judged_pairs": 4, "saved_pairs": [30], "saved_pairs_between": [],
         }
     ]  # fmt: skip
+
+
+def test_only_a_judged_pair_is_called_wrong() -> None:
+    """Of 31 saved pairs every fifth was judged, 10 and 15 as covered: 11 to 14 lie between, 6 to 9 and 16 to 19 are not accused."""
+    covered = replace(with_judged(GOOD, GOOD, LOW, LOW, GOOD, GOOD, GOOD, pairs=31), save_every=1)
+    marked = doubtful_pairs(covered)
+    assert sorted(marked) == list(range(10, 16))
+    assert [number for number, words in marked.items() if words.startswith("wrong: ")] == [10, 15]
+    assert {marked[number] for number in range(11, 15)} == {
+        "not judged, between pairs that are wrong: the right camera sees no scene at all"
+    }
+    told: Any = build(covered)["trust"]
+    assert (told["history"][0]["saved_pairs"], told["history"][0]["saved_pairs_between"]) == (
+        [10, 15],
+        [11, 12, 13, 14],
+    )
+
+
+def test_a_pair_that_was_judged_sound_between_wrong_ones_is_neither() -> None:
+    """Covered at pairs 5, 10, 20 and 25, free of it at 15: that one is not marked, and not counted as unjudged."""
+    flicker = replace(with_judged(GOOD, LOW, LOW, GOOD, LOW, LOW, GOOD, GOOD, GOOD, pairs=41), save_every=5)
+    marked = doubtful_pairs(flicker)
+    assert {number: words.split(":")[0] for number, words in marked.items()} == dict.fromkeys((5, 10, 20, 25), "wrong")
+    assert "4 judged pairs of 41 are wrong, 16 pairs between them not judged" in summary(flicker)
+
+
+def test_a_cut_list_of_pairs_says_how_many_are_left_out() -> None:
+    """Of 13 pairs 6 are named; the page's full stop follows no dots."""
+    covered = replace(with_judged(GOOD, *[LOW] * 13, GOOD, GOOD, GOOD, pairs=81), save_every=5)
+    assert "(saved: pairs 5, 10, 15, 20, 25, 30 and 7 more wrong)." in run_page(covered, None, Side.LEFT, ())
+    assert "..." not in summary(covered)
 
 
 def test_a_single_judgement_is_not_remembered_and_one_that_stands_is_not_past() -> None:
@@ -189,7 +226,7 @@ def test_pairs_of_different_images_are_wrong_and_fail_the_run() -> None:
     assert "exchanged" not in summary(films)
     past = replace(films, images=judged(GOOD, SWAPPED, SWAPPED, SWAPPED, GOOD, GOOD))
     assert "exchanged" not in summary(past)
-    assert "films of different length drift apart: about 19 of 91 pairs are wrong" in summary(past)
+    assert "films of different length drift apart: 3 judged pairs of 91 are wrong" in summary(past)
 
 
 def test_a_run_without_pairs_has_no_doubt_about_its_rig() -> None:

@@ -20,6 +20,7 @@ from phone_host.measure.image_doubts import ImageFigures, ImageTrust
 from phone_host.measure.numbers import ImageEvidence, pairing_words
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
+from phone_host.measure.trouble import Trouble
 from phone_host.measure.unused import Unused, unused
 from phone_host.model import PairCounts, Side, TimeOffset, Unwritten
 from phone_host.report.report_page import delay_series
@@ -204,6 +205,7 @@ def test_everything_that_a_run_knows_is_told() -> None:
         camera=health,
         unwritten=Unwritten(4, 6, "disk full"),
         undecodable=2,
+        failed_pairs=((Trouble("this pair_1 lies on its side", "turn it"), 2),),
         counts=PairCounts(received=31, paired=40, taken=33, dropped=3, board_orphans=(("no_partner", 9),)),
     )
     told: Any = build(seen)
@@ -226,12 +228,12 @@ def test_everything_that_a_run_knows_is_told() -> None:
         "+-30 us", "skew +2.0 ppm", "alignment: aligned", "unplugged 4 times", "stalled twice", "failed 3 times",
         "back 5 times", "1 frame missed", "6 stamps not believed", "7 controls refused", "8 frames no end",
         "5 frames dropped on the board: replaced", "9 board frames without partner: no partner",
-        "3 pairs dropped from a full FIFO", "2 pairs that could not be processed",
+        "3 pairs dropped from a full FIFO", "2 pairs that could not be processed: this pair_1 lies on its side",
         "4 pairs still waiting at the end", "4 lines of delays.jsonl, 6 pairs (disk full)",
     ):  # fmt: skip
         assert words in text
     [head, ipc, tcp] = text[text.index("link  ") :].splitlines()[:3]
-    assert head.split()[:4] == ["link", "frames", "carried", "lost"]
+    assert head.split()[:4] == ["link", "frames", "took", "over"]
     assert ipc.split() == ["ipc", "20", "1", "0", "7.000", "7.000"]
     assert tcp.split() == ["tcp", "11", "2", "1", "-", "-"]
 
@@ -289,7 +291,8 @@ def test_what_was_not_used_is_told_once_each() -> None:
         run(2),
         link=LinkAccount([account], garbage=6, no_clock=7),
         counts=PairCounts(paired=20, dropped=8, board_orphans=(("no_partner", 9),), host_orphans=(("too_late", 10),)),
-        undecodable=3, spoiled_images=(("corrupt", 1),), spoiled=12, skipped=13,
+        undecodable=3, spoiled_images=(("corrupt", 1),), failed_pairs=((Trouble("other sizes", "calibrate"), 2),),
+        spoiled=12, skipped=13,
         sinks=(SinkAccount(name="pairs", written=1, dropped=14, failed=15, waiting=0, delay=Series().spread()),),
     )  # fmt: skip
     counts = {(item.place, item.reason): item.count for item in unused(seen)}

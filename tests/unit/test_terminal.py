@@ -79,7 +79,7 @@ def test_the_summary_of_a_run_fits_a_phone() -> None:
     assert max(len(line) for line in text.split("\n")) <= PHONE
     assert re.search(r"delay, ms +p50 +p95 +max\n", text)
     assert re.search(r"end-to-end +15\.000 +15\.000 +15\.000\n", text)
-    assert "link usb: 20 frames, carried once, lost 0 times," in text
+    assert "link usb: 20 frames, took over once, lost 0 times," in text
     assert "p99" in summary(seen)
 
 

@@ -21,7 +21,7 @@ _SECOND_NS = 1_000_000_000
 
 
 def test_the_pairs_of_a_cover_are_known_by_number_and_second() -> None:
-    """Of pairs a second apart, numbered 0, 10, ... 60, those of 2, 3 and 4 s are covered: 11 to 49 may be, from 2 to 5 s."""
+    """Of pairs a second apart, numbered 0, 10, ... 60, those of 2, 3 and 4 s are covered: 20 to 40, from 2 to 5 s."""
     rig = small_rig()
     core = StereoCore(MatchSettings(disparities=48), Rectifier(rig))
     left, right = (
@@ -39,7 +39,7 @@ def test_the_pairs_of_a_cover_are_known_by_number_and_second() -> None:
     trust = sink.trust
     (past,) = trust.history
     assert past.concern.doubt is Doubt.COVERED
-    assert (past.from_s, past.to_s, past.first_pair, past.last_pair) == (2.0, 5.0, 11, 49)
+    assert (past.from_s, past.to_s, past.first_pair, past.last_pair) == (2.0, 5.0, 20, 40)
     assert trust.concerns == trust.newest == ()
     assert trust.now.density > 0.5
 

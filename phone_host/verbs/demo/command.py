@@ -20,6 +20,7 @@ from common.words import counted
 from phone_host.children.board_process import socket_folder
 from phone_host.demo.demo_page import demo_page
 from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, truth_json
+from phone_host.measure.trouble import trouble_of
 from phone_host.model import Rig
 from phone_host.output.atomic import write_text
 from phone_host.output.listed import ListedFolder
@@ -58,8 +59,8 @@ def run(options: argparse.Namespace) -> int:
             try:
                 with live or nullcontext():
                     demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
-            except BaseException:
-                demo.host.write_report(build(demo.host.snapshot("failed"), "demo"))
+            except BaseException as error:
+                demo.host.write_report(build(demo.host.snapshot("failed", trouble_of(error)), "demo"))
                 raise
         snapshot = demo.host.snapshot("stopped" if signals.stop else "time_over")
         with busy_bar("comparing the depth with the known scene, writing the page", console):
@@ -69,7 +70,9 @@ def run(options: argparse.Namespace) -> int:
             demo.write_pictures(out)
             write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers, _by_hand(out, film)))
     except _StoppedError:
-        return INTERRUPTED if signals.interrupted else 0
+        if signals.interrupted:
+            raise KeyboardInterrupt from None  # told as by every other command
+        return 0
     except OSError as error:
         raise UnavailableError(
             f"{error.filename or out} cannot be written ({error.strerror})",

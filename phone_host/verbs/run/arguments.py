@@ -99,7 +99,7 @@ def _add_ends(parser: argparse.ArgumentParser) -> None:
         "--wait",
         type=reading(seconds, "--wait"),
         metavar="S",
-        help="seconds to wait for a board, then exit with code 3 (default: wait for ever)",
+        help="seconds to wait for a board, then exit with code 3 (default: wait for ever; with --seconds S, S + 10 seconds)",
     )
 
 

@@ -4,7 +4,7 @@ import argparse
 import json
 import math
 import sys
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.measure.run_snapshot import RunSnapshot, depth_is_wrong
+from phone_host.measure.trouble import Trouble, trouble_of
 from phone_host.model import Side, TimeOffset
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
@@ -32,6 +33,7 @@ from phone_host.report.summary import summary
 from phone_host.run.file_sink import NAMES
 from phone_host.run.host import EndReason, Host, HostSettings
 from phone_host.run.terminal_view import LiveTable
+from phone_host.run.time_limit import patience_s
 from phone_host.run.waiting_note import WaitingNote
 from phone_host.settings import check, key_folder, resolve_settings
 from phone_host.stereo.core import StereoCore
@@ -66,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
     core, board_side = _core(options, settings, upright_px(camera))
     keys = key_folder(settings.keys)
-    named = settings.link or (find_board_and_say(keys.path, options.wait),)
+    named = settings.link or (find_board_and_say(keys.path, patience_s(options.wait, options.seconds)),)
     uris = [parse_link(uri, listens_by_default=False) for uri in named]
     for uri in uris:
         tell_insecure(uri)
@@ -77,13 +79,16 @@ def run(options: argparse.Namespace) -> int:
     host = Host(_host_settings(options, resolved, fifo, board_side, core), camera, links, core)
     on_terminal = sys.stderr.isatty()
     live = LiveTable(host.snapshot, pairs=options.pairs, seconds=options.seconds) if on_terminal else None
-    note = WaitingNote(named, lambda: host.has_met_board, lambda line: print(line, file=sys.stderr, flush=True))
-    with live or nullcontext():
-        try:
+    note = WaitingNote(
+        named, lambda: host.has_met_board, lambda: host.refused, lambda line: print(line, file=sys.stderr, flush=True)
+    )
+    try:
+        with live or nullcontext():
             ended = host.run(lambda: signals.stop, live.refresh if live else note.refresh)
-        except BaseException:
-            host.write_report(build(host.snapshot("failed")))
-            raise
+    except BaseException as error:
+        with suppress(Exception):  # tell what ended the run, not what followed
+            _report_failure(options, host, trouble_of(error), board_side)
+        raise
     if host.has_met_board and len(named) == 1 and "?" not in named[0] and named[0].startswith("tcp://"):
         remember(keys.path, named[0])
     snapshot = host.snapshot(ended.value)
@@ -104,6 +109,15 @@ def run(options: argparse.Namespace) -> int:
     too_few = too_few or (ended is EndReason.SECONDS_OVER and not snapshot.processed)
     is_wrong = not signals.stop and (depth_is_wrong(snapshot) or snapshot.spoiled_counts.nothing_whole)
     return _CHECK_FAILED if too_few or is_wrong or not complete else 0
+
+
+def _report_failure(options: argparse.Namespace, host: Host, failure: Trouble, board_side: Side) -> None:
+    """Write and print the report of a run that an error ended. The error itself goes to stderr."""
+    snapshot = host.snapshot("failed", failure)
+    report = build(snapshot)
+    host.write_report(report, _page(host, snapshot, board_side, options.out) if options.out else "")
+    if options.json:
+        print(json.dumps(report))
 
 
 def spare(out: Path, replay: str, calibration: str) -> None:
@@ -162,7 +176,7 @@ def _host_settings(
     board_side: Side,
     core: StereoCore | None,
 ) -> HostSettings:
-    settings = resolved.values
+    settings, wait_s = resolved.values, patience_s(options.wait, options.seconds)
     return HostSettings(
         resolved=with_origins(
             replace(resolved, values=replace(settings, camera=without_password(settings.camera))),
@@ -174,7 +188,7 @@ def _host_settings(
         fifo=fifo,
         pairs=options.pairs,
         seconds_ns=round(options.seconds * 1e9),
-        wait_ns=None if options.wait is None else round(options.wait * 1e9),
+        wait_ns=None if wait_s is None else round(wait_s * 1e9),
         out=options.out,
         save_every=options.save_every,
         axes=output_options(options).axes,
