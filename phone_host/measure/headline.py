@@ -166,7 +166,7 @@ def _of_images(run: RunSnapshot, found: tuple[Concern, ...]) -> Answer:
         return Answer(Grade.WARNING, f"Depth looked right until the last judged pair: {newest[0].sentence}. {remedy}")
     if gone := past(history(run)):
         total_s = past_seconds(history(run))
-        but = f"but for {total_s:.0f} of {max(total_s, run.seconds):.0f} s it was not: {gone[0].concern.sentence}"
+        but = f"but for {_seconds(total_s)} of {_seconds(max(total_s, run.seconds))} s it was not: {gone[0].concern.sentence}"
         return Answer(Grade.WARNING, f"{said.sentence.removesuffix('.')}; {but}.")
     return said
 
@@ -175,6 +175,10 @@ def _while_it_was_there(gone: Concern, said: Answer) -> Answer:
     """Put an absence before what can be said of the depth until then."""
     sentence = f"{_capital(gone.sentence)}. Remedy: {gone.remedy}. Until then: {_lower(said.sentence)}"
     return Answer(Grade.WARNING, sentence)
+
+
+def _seconds(value_s: float) -> str:
+    return f"{value_s:.0f}" if value_s >= 10 else f"{value_s:.1f}"
 
 
 def _lower(words: str) -> str:

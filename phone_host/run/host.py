@@ -31,7 +31,7 @@ from phone_host.run.pipeline import Pipeline
 from phone_host.run.rig_cameras import RigCameras
 from phone_host.run.sinks import FunctionSink, Sink
 from phone_host.run.time_limit import TimeLimit
-from phone_host.run.trust_sink import TrustSink
+from phone_host.run.trust_sink import PERIOD_NS, TrustSink
 from phone_host.run.worker import Worker
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
@@ -136,7 +136,7 @@ class Host:
             settings=settings.resolved,
             axes=settings.axes,
         )
-        self._trust = TrustSink(core)
+        self._trust = TrustSink(core, period_ns=0 if demand.paces_own_camera else PERIOD_NS)
         motion = FunctionSink(_MOTION, self._measure_motion)
         self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *sinks)
         self._queue = PairQueue(

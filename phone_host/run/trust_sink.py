@@ -1,4 +1,4 @@
-"""A sink that judges a run's images twice a second: whether cameras are swapped, turned, covered, and how depth fares."""
+"""A sink that judges a run's images, twice a second or stills one by one: are cameras swapped, turned, covered, and how does depth fare?
 
 import math
 import threading
@@ -13,7 +13,7 @@ from phone_host.run.sinks import OneQueueSink, SinkQueue
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
 
-_PERIOD_NS: Final = 500_000_000
+PERIOD_NS: Final = 500_000_000
 """A mistake must be named within 2 s. Two of three judgements name it: 1 s, and at most one period until the first."""
 
 _DEPTH: Final = 2
@@ -26,11 +26,14 @@ class TrustSink(OneQueueSink):
     Args:
         core: the run's stereo core; None: only brightness is judged.
         clock: monotonic, ns.
+        period_ns: least time between the pairs that are judged, ns; 0 for stills, each of which may show another scene.
     """
 
-    def __init__(self, core: StereoCore | None, clock: Callable[[], int] = now.monotonic_ns) -> None:
+    def __init__(
+        self, core: StereoCore | None, clock: Callable[[], int] = now.monotonic_ns, *, period_ns: int = PERIOD_NS
+    ) -> None:
         super().__init__(SinkQueue[tuple[Result, int]]("trust", self._take, depth=_DEPTH))
-        self._core, self._clock = core, clock
+        self._core, self._clock, self._period_ns = core, clock, period_ns
         self._judge = ImageJudge()
         self._lock = threading.Lock()
         self._due_ns = 0
@@ -53,7 +56,7 @@ class TrustSink(OneQueueSink):
         now_ns = self._clock()
         if now_ns < self._due_ns or self._is_busy:
             return
-        self._due_ns = now_ns + _PERIOD_NS
+        self._due_ns = now_ns + self._period_ns
         self._is_busy = True  # before the offer: the thread may be done with it before this one goes on
         self._queue.offer((result, now_ns))  # refused only if the sink has failed or ends
 
