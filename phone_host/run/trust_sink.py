@@ -1,4 +1,4 @@
-"""A sink that judges a run's images, twice a second or stills one by one: are cameras swapped, turned, covered, and how does depth fare?
+"""A sink that judges a run's images, twice a second or stills one by one: are cameras swapped, turned, covered, and how does depth fare?"""
 
 import math
 import threading

@@ -88,7 +88,7 @@ def test_a_cover_that_was_taken_off_is_remembered() -> None:
     assert (past.from_s, past.to_s, past.first_pair, past.last_pair, past.is_over) == (2.0, 6.0, 10, 25, True)
     said = headline(covered)
     assert said.grade is Grade.WARNING
-    assert said.sentence.endswith("; but for 4 of 4 s it was not: the right camera sees no scene at all.")
+    assert said.sentence.endswith("; but for 4.0 of 4.5 s it was not: the right camera sees no scene at all.")
     line = (
         "from 2.0 s to 6.0 s the right camera sees no scene at all: 4 judged pairs of 91 are wrong,"
         " 12 pairs between them not judged"
