@@ -20,6 +20,9 @@ _PATCHY: Final = 0.6
 _SPECKS: Final = 0.09
 """Scenes with texture have up to 6 % of their depth in specks; boards before bare walls 7 to 20 %, a striped wall 21 %."""
 
+_ROWS_GOOD_PX: Final = 1.0
+"""Given pairs have 0.1 to 0.8 px. The matcher corrects a common offset of up to 2 px."""
+
 USUAL_ERROR_PX: Final = 0.25
 """A matcher's median error on real images (`tests/bench/bench_depth.py`), where the core states none."""
 
@@ -68,7 +71,8 @@ def answer(
     if figures.consistency < _PATCHY:
         parts.append(f"of which {figures.consistency:.0%} are found again from right to left")
     if checked:
-        parts.append(f"rows agree to {max(figures.vertical_px, 0.1):.1f} px")
+        only = "only " if figures.vertical_px * figures.matched_scale > _ROWS_GOOD_PX else ""
+        parts.append(f"rows agree {only}to {max(figures.vertical_px, 0.1):.1f} px")
     opening = "Depth looks right where the scene has texture, specks elsewhere" if patchy else "Depth looks right"
     if not checked:
         opening = "Depth could not be checked, too few features"

@@ -70,6 +70,9 @@ _MOST_SKEW_PX: Final = 0.8
 _MOVED: Final = "the calibration does not fit these cameras any more, or never did: calibrate the rig again"
 _NOT_RECTIFIED: Final = "these images are not rectified: calibrate your cameras and give --calibration rig.yaml"
 
+_BEHIND_SHARE: Final = 0.05
+"""False matches put fewer points there."""
+
 _EDGE_TO_EDGE: Final = 3.5
 """The full height of a ramp relative to its root mean square."""
 
@@ -337,7 +340,22 @@ def _figures(evidence: Evidence, support: dict[Arrangement, int]) -> tuple[Conce
     short, unsure = too_short(evidence), ambiguous(evidence)
     sparse = (item for item in plain if item.doubt is not Doubt.VERTICAL_ERROR)
     cropped = (_CROPPED,) if evidence.is_cropped else ()
-    return (*rows, *short, *unsure, *(() if short or unsure else sparse), *cropped)
+    if evidence.is_cropped:
+        rows = tuple(replace(item, remedy=_CROPPED.remedy) for item in rows)
+    return (*_behind(evidence), *rows, *short, *unsure, *(() if short or unsure else sparse), *cropped)
+
+
+def _behind(evidence: Evidence) -> tuple[Concern, ...]:
+    if not evidence.behind_share > _BEHIND_SHARE:
+        return ()
+    return (
+        Concern(
+            Doubt.GEOMETRY,
+            f"{evidence.behind_share:.0%} of the points would lie behind infinity: doffs is not that of these images",
+            "give the calib.txt that was published with these images, or --doffs: cx of the right camera minus cx of the left one, px",
+            is_severe=True,
+        ),
+    )
 
 
 def _skewed(evidence: Evidence) -> tuple[Concern, ...]:

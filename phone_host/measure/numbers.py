@@ -4,6 +4,7 @@ Two folders that belong together hold the same numbers. If they do not, images w
 or one side began earlier; then pairs may be of different moments, and their depth is wrong without looking wrong.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final, assert_never
 
@@ -203,9 +204,11 @@ def _by_time(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) ->
     if not all(rates) or abs(rates[0] - rates[1]) <= _SAME_RATE * max(rates):
         if board.count == own.count:
             return ()
+        # The time alone says which image of a loop is shown: equal ones meet while both are in the same round.
+        most_apart = board.looped and own.looped and math.lcm(board.count, own.count) > 2 * min(board.count, own.count)
         return (
             Concern(
-                Doubt.IMAGE_NUMBERS,
+                Doubt.IMAGES_APART if most_apart else Doubt.IMAGE_NUMBERS,
                 f"the board shows {board.words}, this machine {own.words}: films of different length drift apart",
                 "give two films of one recording, with as many images",
             ),

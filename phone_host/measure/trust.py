@@ -42,6 +42,7 @@ class Doubt(Enum):
     IMAGES_APART = "images_apart"
     REJECTED_RIG = "rejected_rig"
     CROPPED_RIG = "cropped_rig"
+    GEOMETRY = "geometry"
     BOARD_GONE = "board_gone"
     CAMERA_GONE = "camera_gone"
     NO_WHOLE_IMAGE = "no_whole_image"

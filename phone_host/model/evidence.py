@@ -67,6 +67,7 @@ class Evidence:
         vertical_offset_px: how far too low the right image lies, px.
         supports: how many features agree with each arrangement; empty without a core.
         disparity_px: the middle one of the disparities between the limits of depth, px.
+        behind_share: share of the disparities that lie behind infinity, which no scene does.
         scattered_share: share of the disparities that lie in pieces too small for a surface.
         beyond_share: share of the image, as far as features tell, that is nearer than was searched.
         enough_disparities: a search that reaches all but a few features, px; 0: not known.
@@ -86,6 +87,7 @@ class Evidence:
     vertical_offset_px: float = float("nan")
     supports: tuple[Support, ...] = ()
     disparity_px: float = float("nan")
+    behind_share: float = 0.0
     scattered_share: float = float("nan")
     beyond_share: float = float("nan")
     enough_disparities: int = 0

@@ -175,7 +175,7 @@ def _cloud_words(few: Points) -> str:
     shown = len(few.places)
     number = f"{shown:,} of {few.total:,} points" if shown < few.total else counted(shown, "point")
     return (
-        f"{number.replace(',', THIN)}, metres; axes of the left camera: X right, Y down, Z forward. Drag turns, two fingers or the wheel "
+        f"{number.replace(',', THIN)}, metres; drawn in the left camera's axes: X right, Y down, Z forward. Drag turns, two fingers or the wheel "
         "(after a click) zoom, shift and drag move, a double click goes back."
     )
 

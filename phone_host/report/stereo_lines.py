@@ -95,5 +95,5 @@ def cut_lines(report: PairReport) -> list[str]:
         (cut.at_zero, "with a disparity no larger than the noise of zero"),
     )
     said = [f"{share_text(count, cut.inside)} {words}" for count, words in parts if count]
-    kept = f"the cloud ends at {distance_text(limits.far_m)}"
+    kept = f"points up to {distance_text(limits.far_m)} are kept"
     return [f"cut: {'; '.join(said)}"] if said else [kept]

@@ -212,16 +212,17 @@ def _pixels(processed: Processed) -> str:
     if processed.cut is None:
         return ""
     rows = cut_rows(processed.cut, processed.limits)
+    colours = _CUT_COLOURS if processed.cut.kept else _CUT_COLOURS[1:]
     total = sum(count for _, count in rows)
     if len(rows) < 2:
         return ""
     bar = "".join(
         f'<div style="flex:{count};background:{colour}"></div>'
-        for (_, count), colour in zip(rows, _CUT_COLOURS, strict=False)
+        for (_, count), colour in zip(rows, colours, strict=False)
     )
     legend = "".join(
         f'<li><i style="background:{colour}"></i>{escape(f"{share_text(count, total)} {words}")}</li>'
-        for (words, count), colour in zip(rows, _CUT_COLOURS, strict=False)
+        for (words, count), colour in zip(rows, colours, strict=False)
     )
     words = f"Of {total:,} pixels of the left image:".replace(",", THIN)
     return section(

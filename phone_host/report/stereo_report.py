@@ -252,7 +252,7 @@ def alone_remarks(left: Sequence[str], right: Sequence[str], *, by_number: bool,
             remarks.append(
                 Remark(f"{counted(len(alone), f'{side} image has', f'{side} images have')} no partner: {named}")
             )
-    if not by_number and pairs > 1:
+    if not by_number and (pairs > 1 or left or right):
         unequal = " though the counts differ" if left or right else ""
         remarks.append(
             Remark(

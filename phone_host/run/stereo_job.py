@@ -33,7 +33,7 @@ from phone_host.report.stereo_report import (
     alone_remarks,
 )
 from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
-from phone_host.run.stereo_remarks import geometry_remarks, pair_remarks, turned_remarks
+from phone_host.run.stereo_remarks import pair_remarks, turned_remarks
 from phone_host.run.stereo_results import StereoResults
 from phone_host.run.stereo_trust import judge_pair
 from phone_host.stereo.core import StereoCore
@@ -249,7 +249,6 @@ class _Work:
             remarks = [
                 *turned_remarks(*opened),
                 *pair_remarks(processed, trust, core.wanted.search_from_m),
-                *(geometry_remarks(processed) if core.rig is None else ()),
                 *(() if folder else _alone(self._job)),
             ]
             report = PairReport(

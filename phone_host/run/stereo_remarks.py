@@ -8,7 +8,6 @@ from phone_host.report.cut_words import searched_from_m
 from phone_host.report.stereo_report import Remark
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.stereo.images import EncodedFile
-from phone_host.stereo.plausible import is_off_the_middle
 from phone_host.stereo.reproject import nearest_depth_m
 
 
@@ -50,24 +49,6 @@ def pair_remarks(processed: Processed, trust: PairTrust, near_m: float) -> tuple
             )
         )
     return tuple(remarks)
-
-
-def geometry_remarks(processed: Processed) -> tuple[Remark, ...]:
-    """Say that the geometry of images that came rectified may be that of other images.
-
-    Args:
-        processed: the pair.
-    """
-    geometry, (height_px, width_px) = processed.geometry, processed.pair.left.shape[:2]
-    if geometry is None or not is_off_the_middle(geometry, (width_px, height_px)):
-        return ()
-    return (
-        Remark(
-            f"calib.txt or --center may belong to other images: the principal point {geometry.cx_px:.0f},{geometry.cy_px:.0f}"
-            f" lies far from the middle of {width_px}x{height_px} px, and metres are wrong then",
-            "give the calib.txt that was published with these images",
-        ),
-    )
 
 
 def turned_remarks(*files: EncodedFile) -> tuple[Remark, ...]:

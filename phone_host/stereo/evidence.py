@@ -40,6 +40,9 @@ _TRACKED_PX: Final = 4.0
 _CHANCE_SHARE: Final = 0.005
 """A black image beside a good one is matched at 0.1 % of its pixels, a plain wall at 0.2 %; the sparsest good pair at 21 %."""
 
+_BEHIND_PX: Final = 2.0
+"""A rectification that is a little off puts far points up to a pixel behind infinity."""
+
 _SCATTERED_WIDTH_PX: Final = 640
 _PIECE_SHARE: Final = 0.002
 _PIECE_STEP_PX: Final = 1.0
@@ -112,12 +115,14 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
     vertical_px, offset_px = _vertical(upright, height_px)
     fit = measure_fit(upright, processed, disparity)
     check = min(1.0, _CHECK_WIDTH_PX / width_px)
+    few = disparity[::8, ::8]
     return Evidence(
         left=measure_exposure(left, len(found[0].points_px)),
         right=measure_exposure(right, len(found[1].points_px)),
         density=density(processed),
+        behind_share=_behind(few, processed),
         scattered_share=_scattered(disparity),
-        disparity_px=_middle(_wanted(disparity, processed)),
+        disparity_px=_middle(_wanted(few, processed)),
         consistency=_consistency(left, right, disparity, 0.0 if math.isnan(offset_px) else offset_px),
         vertical_px=vertical_px,
         vertical_offset_px=offset_px,
@@ -147,6 +152,14 @@ def _wanted(disparity: Disparity, processed: Processed) -> Disparity:
     return kept if np.isfinite(kept).any() else disparity
 
 
+def _behind(disparity: Disparity, processed: Processed) -> float:
+    """Return the share of the disparities that are clearly below those of infinitely far points."""
+    known = disparity[np.isfinite(disparity)]
+    if processed.geometry is None or not known.size:
+        return 0.0
+    return float(np.count_nonzero(known + np.float32(processed.geometry.doffs_px) < -_BEHIND_PX)) / known.size
+
+
 def _scattered(disparity: Disparity) -> float:
     """Return the share of the disparities that lie in pieces too small for a surface; NaN without any."""
     height_px, width_px = disparity.shape
@@ -163,9 +176,8 @@ def _scattered(disparity: Disparity) -> float:
 
 
 def _middle(disparity: Disparity) -> float:
-    """Return the median of every 64th disparity, px; NaN without any."""
-    some = disparity[::8, ::8]
-    known = some[np.isfinite(some)]
+    """Return the median, px; NaN without any."""
+    known = disparity[np.isfinite(disparity)]
     return float(np.median(known)) if known.size else math.nan
 
 

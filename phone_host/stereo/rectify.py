@@ -32,6 +32,9 @@ from phone_host.stereo.images import size_px
 Matrix = NDArray[np.float64]
 Maps = tuple[cv2.typing.MatLike, cv2.typing.MatLike]
 
+_LEAST_BASELINE_M = 5e-4
+"""No two cameras stand nearer to each other."""
+
 _RECALIBRATE = "calibrate the rig again"
 # Undistortion is iterative; 5 iterations (OpenCV's default) leave 0.1 px in the corners of a wide lens.
 _UNDISTORT = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
@@ -258,8 +261,11 @@ def _rotations(rig: Rig) -> tuple[Matrix, Matrix, float, Epipolar]:
     # The right camera's centre relative to the left one, in the middle's axes.
     to_right_m = -right_to_middle @ rig.t_right_left_m.reshape(3)
     baseline_m = float(np.linalg.norm(to_right_m))
-    if not baseline_m > 0:
-        raise DataError("the rig has no baseline (T is 0)", _RECALIBRATE)
+    if not baseline_m > _LEAST_BASELINE_M:
+        raise DataError(
+            f"both cameras stand at one place (baseline {baseline_m * 1e3:.1f} mm)",
+            "give the pictures of two cameras: perhaps both sides have the same ones; then calibrate again",
+        )
     x, y, z = to_right_m / baseline_m
     if abs(z) > max(abs(x), abs(y)):
         raise DataError(

@@ -29,14 +29,17 @@ def length_mm(text: str, option: str, example: str) -> float:
     found = _LENGTH.fullmatch(text)
     value = float(found[1]) * _MM[(found[2] or "").lower()] if found else math.nan
     if not (math.isfinite(value) and value > 0):
-        raise SettingsError(f"{option} is {text!r}", f"give a length above 0, for example {example}")
+        raise SettingsError(
+            f"{option} is {text!r}",
+            f"give a length above 0 in mm, cm or m, with a point for decimals, for example {example}",
+        )
     return value
 
 
 _LEAST_BARE_SQUARE_MM: Final = 0.5
-_LEAST_BARE_BASELINE_MM: Final = 1.0
+_LEAST_BARE_BASELINE_MM: Final = 5.0
 _LEAST_BARE_LIMIT_MM: Final = 10.0
-"""No chessboard has smaller squares, no two cameras are nearer to each other, no stereo camera sees what is nearer. A
+"""No chessboard has smaller squares, two webcams are never nearer to each other, no stereo camera sees what is nearer. A
 smaller number without a unit is a length in metres."""
 
 _MOST_BASELINE_MM: Final = 10_000.0

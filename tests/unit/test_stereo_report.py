@@ -64,7 +64,7 @@ def test_limits_that_the_user_gave_have_no_other_reason() -> None:
 
 def test_a_pair_of_which_nothing_was_cut_says_where_its_cloud_ends() -> None:
     """The far limit is told all the same."""
-    assert cut_lines(replace(_PAIR, cut=CutCounts(kept=1000))) == ["the cloud ends at 40 m"]
+    assert cut_lines(replace(_PAIR, cut=CutCounts(kept=1000))) == ["points up to 40 m are kept"]
 
 
 def test_lines_of_a_pair_hold_its_size_search_density_points_and_axes() -> None:

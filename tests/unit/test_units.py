@@ -32,7 +32,7 @@ def test_a_number_alone_that_can_only_mean_metres_is_refused_with_both_readings(
 
 def test_what_a_unit_states_is_believed() -> None:
     """With a unit, and from 1 mm (baseline) or 10 mm (limits) on without one, the number is what it says."""
-    assert [baseline_mm(text) for text in ("0.5mm", "1", "193.001", "0.193m")] == pytest.approx([0.5, 1, 193.001, 193])
+    assert [baseline_mm(text) for text in ("0.5mm", "5", "193.001", "0.193m")] == pytest.approx([0.5, 5, 193.001, 193])
     assert [limit_mm(text, "--near", "300mm") for text in ("2mm", "10", "2m")] == pytest.approx([2, 10, 2000])
 
 
