@@ -16,14 +16,19 @@ _AMBIGUOUS_SHARE: Final = 0.75
 _PATTERN_SHARE: Final = 0.8
 """Given scenes with any mistake measure 0.41 at most, where depth was found at all."""
 
+_HALF: Final = 0.5
+_FEW: Final = 24
+"""A fence before a wall: half of the patches repeat, and fewer features agree with anything. Chessboards have 80 and more."""
+
 
 def is_pattern(evidence: Evidence) -> bool:
-    """Tell whether nearly all that the images show repeats, so that matched features prove nothing.
+    """Tell whether so much of what the images show repeats that matched features prove nothing.
 
     Args:
         evidence: of the pair.
     """
-    return evidence.ambiguous_share > _PATTERN_SHARE
+    most = max((item.features for item in evidence.supports), default=0)
+    return evidence.ambiguous_share > _PATTERN_SHARE or (evidence.ambiguous_share > _HALF and most < _FEW)
 
 
 def too_short(evidence: Evidence) -> tuple[Concern, ...]:
@@ -60,12 +65,12 @@ def ambiguous(evidence: Evidence) -> tuple[Concern, ...]:
     Args:
         evidence: of the pair.
     """
-    if not evidence.ambiguous_share > _AMBIGUOUS_SHARE:
+    if not (evidence.ambiguous_share > _AMBIGUOUS_SHARE or is_pattern(evidence)):
         return ()
     return (
         Concern(
             Doubt.AMBIGUOUS,
             f"the pattern repeats: {evidence.ambiguous_share:.0%} of the places looked at fit elsewhere as well, and depth may be off by whole repeats",
-            "show a scene with irregular texture, or search less: a smaller --disparities, or a farther --near",
+            "show a scene with irregular texture, or put irregular things before the pattern",
         ),
     )

@@ -1,7 +1,8 @@
 """Measures how unevenly the rows of a rectified pair are off. Pure.
 
 A matcher corrects a common offset of the rows. A turned camera, another zoom or a wrong calibration moves rows more at
-one edge of the image than at the other; that no offset mends. To first order it is a plane over the image.
+one edge of the image than at the other; that no offset mends. To first order it is a plane over the image; a camera that
+was turned aside twists the rows, which is a product of x and y.
 """
 
 import math
@@ -29,7 +30,7 @@ _SIGMA_OF_MEDIAN: Final = 1.48
 
 
 def row_skew_px(left_px: Points, down_px: NDArray[np.float64], size_px: tuple[int, int]) -> float:
-    """Fit a plane to the features' offsets from their rows, and return how far it departs from its mean.
+    """Fit a twisted plane to the features' offsets from their rows, and return how far it departs from its mean.
 
     Args:
         left_px: (N, 2) features on common rows, px of the left image.
@@ -37,17 +38,15 @@ def row_skew_px(left_px: Points, down_px: NDArray[np.float64], size_px: tuple[in
         size_px: width and height of the image.
 
     Returns:
-        Root mean square over the image, px; at the edge it is some 1.7 times as much. 0 if a plane does not explain the
+        Root mean square over the image, px; at the edge it is some 1.7 times as much. 0 if it does not explain the
         offsets. NaN with too few features.
     """
     if len(left_px) < _FEWEST:
         return math.nan
-    places = (left_px - left_px.mean(axis=0)) / np.array(size_px)
-    design = np.column_stack([np.ones(len(places)), places])
-    plane = np.array([np.median(down_px), 0.0, 0.0])
-    kept = np.ones(len(places), np.bool_)
+    design = _terms((left_px + 0.5) / np.array(size_px) - 0.5)
+    plane, kept = np.zeros(design.shape[1], np.float64), np.ones(len(design), np.bool_)
     for _ in range(_ROUNDS):
-        plane = np.linalg.lstsq(design[kept], down_px[kept], rcond=None)[0]
+        plane[:] = np.linalg.lstsq(design[kept], down_px[kept], rcond=None)[0]
         rest = np.abs(down_px - design @ plane)
         kept = rest <= max(_OUTLIER_SIGMAS * _SIGMA_OF_MEDIAN * float(np.median(rest)), _LEAST_PX)
         if kept.sum() < _FEWEST // 2:
@@ -55,4 +54,14 @@ def row_skew_px(left_px: Points, down_px: NDArray[np.float64], size_px: tuple[in
     departure = np.abs(down_px - np.median(down_px))
     if np.median(np.abs(down_px - design @ plane)) > _EXPLAINED * np.median(departure) and np.median(departure) > 0:
         return 0.0
-    return math.hypot(float(plane[1]), float(plane[2])) / math.sqrt(12.0)  # of a ramp from -1/2 to 1/2
+    return float((_terms(_EVENLY) @ plane).std())
+
+
+def _terms(places: Points) -> NDArray[np.float64]:
+    """Return the surface's terms at places of the image, -1/2 to 1/2 in both directions."""
+    x, y = places.T
+    return np.column_stack([np.ones(len(places)), x, y, x * y])
+
+
+_EVENLY: Final = np.stack(np.meshgrid(np.linspace(-0.5, 0.5, 9), np.linspace(-0.5, 0.5, 9)), axis=-1).reshape(-1, 2)
+"""Places all over the image."""

@@ -35,6 +35,9 @@ _FEWEST_PATCHES: Final = 40
 _PATCH_PX: Final = 15
 """Edge of a patch at the size of the check: with 9 px, twigs and letters repeat by chance; larger ones see no more."""
 
+_LEAST_REACH: Final = 4
+"""As a part of the width."""
+
 _APART_PX: Final = 4
 """Nearer than this, a second place belongs to the same peak."""
 
@@ -131,7 +134,8 @@ def ambiguity(left: Image, right: Image, disparity: Disparity, searched: int, sc
         left: (h, w) uint8, reduced.
         right: the same size.
         disparity: (H, W), px, of the whole images; only pixels that have one are asked.
-        searched: N, px of the whole images; 0: as far as the greatest disparity.
+        searched: N, px of the whole images; 0: as far as the greatest disparity. At least a quarter of the width is tried:
+            whoever searches less finds one answer, which need not be the right one.
         scale: size of the reduced images relative to the whole ones.
 
     Returns:
@@ -140,7 +144,7 @@ def ambiguity(left: Image, right: Image, disparity: Disparity, searched: int, sc
     sample = sampled_places(disparity, _PATCHES)
     if not len(sample):
         return math.nan
-    reach = math.ceil((searched or float(np.nanmax(disparity))) * scale)
+    reach = max(math.ceil((searched or float(np.nanmax(disparity))) * scale), left.shape[1] // _LEAST_REACH)
     half, tried, unsure = _PATCH_PX // 2, 0, 0
     for y, x in np.rint((sample + 0.5) * scale - 0.5).astype(np.intp).tolist():
         first = max(half, x - reach)

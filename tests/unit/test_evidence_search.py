@@ -167,10 +167,10 @@ def test_a_repeated_pattern_is_told(kind: str) -> None:
     assert [concern.doubt for concern in found] == [Doubt.AMBIGUOUS]
 
 
-def test_a_pattern_whose_period_is_longer_than_the_search_is_not_ambiguous() -> None:
-    """A search of 8 px holds one repeat of 16 px at most: the remedy `search less` helps."""
+def test_a_search_that_was_narrowed_to_one_repeat_is_ambiguous_all_the_same() -> None:
+    """A search of 8 px holds one repeat of 16 px at most, and finds it: whether it is the right one, nobody knows."""
     evidence = _evidence(_core(8), _pattern("stripes", 0), _pattern("stripes", 5))
-    assert not evidence.ambiguous_share > 0.5
+    assert evidence.ambiguous_share > 0.75
 
 
 def test_depth_whose_rows_could_not_be_compared_is_no_plain_success() -> None:

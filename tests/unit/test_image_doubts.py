@@ -76,7 +76,7 @@ BLIND: Final = replace(evidence(right=0, tilted=0), right=COVERED)
         (replace(GOOD, ambiguous_share=0.61), []),
         (replace(GOOD, beyond_share=0.06, enough_disparities=80, density=0.1), [Doubt.SEARCH_TOO_SHORT]),
         (replace(GOOD, beyond_share=0.04), []),
-        (replace(GOOD, skew_px=0.9), [Doubt.VERTICAL_ERROR]),
+        (replace(GOOD, skew_px=0.95), [Doubt.VERTICAL_ERROR]),
         (replace(GOOD, skew_px=0.7), []),
         (evidence(mirrored=90), []),  # a chessboard looks like its mirror image
         (evidence(same_place=160), [Doubt.SAME_IMAGE]),

@@ -173,7 +173,7 @@ def summary(
     rows.append(f"RMS      left {rms['left']:.3f}, right {rms['right']:.3f}, stereo {rms['stereo']:.3f} px")
     if vertical["p95"] is not None:
         rows.append(f"vertical mean {vertical['mean']:.3f}, 95 % {vertical['p95']:.3f}, max {vertical['max']:.3f} px")
-    rows.append(f"baseline {report['baseline_mm']:.2f} +- {calibration.baseline_sigma_m * 1e3:.2f} mm")
+    rows.append(f"baseline {report['baseline_mm']:.2f} +- {calibration.baseline_sigma_m * 1e3:.2g} mm")
     rows.append("         compare it with a ruler: it shows a wrong --square")
     if report["zero_sigma_px"] is not None:
         far_m = report["depth_limit_m"]
