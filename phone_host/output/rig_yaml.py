@@ -258,7 +258,7 @@ class _Reader:
         if not (np.abs(matrix[:2, 2] - size_px / 2) <= _MOST_ASIDE * size_px).all():
             point = ",".join(f"{at:g}" for at in matrix[:2, 2])
             raise self.problem(
-                matrix_key, f"has its principal point at {point} px", "it lies in the image's middle, mostly"
+                matrix_key, f"has its principal point at {point} px", "calibrate again: it lies near the image's middle"
             )
         distortion = self.matrix(distortion_key)
         if min(distortion.shape) != 1 or distortion.size not in _DISTORTION_LENGTHS:
