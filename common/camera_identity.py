@@ -1,5 +1,6 @@
 """Which camera it is and how it is set: what a rig remembers of its two cameras. Values only."""
 
+import re
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
@@ -24,6 +25,15 @@ class Lock(Enum):
     WHITE_BALANCE = "white_balance"
     FOCUS = "focus"
     ZOOM = "zoom"
+
+
+_LOCK_NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,47}", re.ASCII)
+"""All that any version of this program may call a control, and that OpenCV's files accept as a key."""
+
+
+def is_lock_name(text: str) -> bool:
+    """Return whether a text can be the name of a held control, of this version or another."""
+    return _LOCK_NAME.fullmatch(text) is not None
 
 
 LARGEST_LOCK: Final = 2**31 - 1

@@ -35,6 +35,8 @@ _NEW: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXE
 _MOST_LINKS: Final = 40
 """The kernel's own limit (path_resolution(7))."""
 
+_PIECE_BYTES: Final = 1 << 20
+
 
 @contextmanager
 def opened_folder(path: Path, *, make: bool = False) -> Iterator[int]:
@@ -107,7 +109,7 @@ def read_file(folder: int, path: Path, most_bytes: int) -> tuple[bytes, os.stat_
         os.close(descriptor)
         raise _no_file(path)
     with os.fdopen(descriptor, "rb") as file:
-        content = file.read(most_bytes + 1)
+        content = _up_to(file, min(status.st_size, most_bytes), most_bytes)
     if len(content) > most_bytes:
         raise DataError(f"{path} is longer than {most_bytes} bytes", "move it away: this program did not write it")
     return content, status
@@ -132,10 +134,23 @@ def read_whole(path: Path, most_bytes: int) -> bytes:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
             raise DataError(f"{path} is not a plain file", "give a file")
-        content = file.read(most_bytes + 1) if status.st_size <= most_bytes else b""
+        content = b"" if status.st_size > most_bytes else _up_to(file, status.st_size, most_bytes)
     if status.st_size > most_bytes or len(content) > most_bytes:
         size = max(status.st_size, len(content))
         raise DataError(f"{path} has {size} bytes, {most_bytes} are the most", "give another file")
+    return content
+
+
+def _up_to(file: BinaryIO, expected_bytes: int, most_bytes: int) -> bytes:
+    """Read a file up to one byte beyond the limit. Memory is taken for what is there, not for what the limit allows."""
+    content = file.read(expected_bytes + 1)
+    while (
+        expected_bytes < len(content) <= most_bytes
+    ):  # it grew meanwhile, or is one of the kernel's, which state no size
+        piece = file.read(min(_PIECE_BYTES, most_bytes + 1 - len(content)))
+        if not piece:
+            break
+        content += piece
     return content
 
 

@@ -18,6 +18,9 @@ from phone_host.sync.fifo import FifoSettings
 
 ENVIRONMENT_PREFIX: Final = "PHONE_HOST"
 
+_MOST_MEGAPIXELS: Final = 1024
+"""OpenCV's own limit, 2^30 pixels (CV_IO_MAX_IMAGE_PIXELS)."""
+
 
 def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
     """Resolve the settings from file, environment and a verb's options. Options named like a setting are used."""
@@ -88,3 +91,7 @@ def most_pixels(file: Path | None, option: int | None) -> int:
 def _check_megapixels(settings: PhoneHostSettings) -> None:
     if settings.max_megapixels < 1:
         raise SettingsError(f"max_megapixels is {settings.max_megapixels}", "give 1 or more")
+    if settings.max_megapixels > _MOST_MEGAPIXELS:
+        raise SettingsError(
+            f"max_megapixels is more than {_MOST_MEGAPIXELS}", "give less: OpenCV decodes no larger images"
+        )

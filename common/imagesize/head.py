@@ -13,6 +13,12 @@ MEGAPIXEL: Final = 2**20
 MOST_PIXELS: Final = 64 * MEGAPIXEL
 """The default limit: the largest usual sensor. Decoded in colour it takes 192 MB."""
 
+_BYTES_A_PIXEL: Final = 6
+"""Three colours of 16 bit: what an image of the largest size may take once it is decoded. With an alpha channel or floating point it takes more."""
+
+_MOST_SIDE_PX: Final = 32_766
+"""OpenCV's `remap` has coordinates of 16 bit with a sign."""
+
 COPY_AGAIN: Final = "copy or record the image again"
 """The remedy for an image that is incomplete or damaged."""
 
@@ -39,6 +45,7 @@ class ImageHead:
         body_at: offset of the compressed image in the bytes; 0 if it is not looked for.
         least_bytes: with fewer bytes the compressed image cannot be whole; 0 if not known.
         block_pixels: pixels of the largest piece decoded at once; 0: no more than the image has.
+        pixel_bytes: bytes of one decoded pixel, at most.
         orientation: by which turn and mirroring the stored image becomes upright, as its metadata say.
     """
 
@@ -48,6 +55,7 @@ class ImageHead:
     body_at: int = 0
     least_bytes: int = 0
     block_pixels: int = 0
+    pixel_bytes: int = 4
     orientation: Orientation = UPRIGHT
 
     @property
@@ -82,7 +90,7 @@ def require_pixels(size_px: tuple[int, int], most_pixels: int, name: str) -> Non
 
 
 def require_believable(head: ImageHead, most_pixels: int, name: str) -> None:
-    """Check an image's size, and that of the pieces in which it is decoded, against the limit.
+    """Check an image's size, the memory it takes decoded, and the pieces in which it is decoded, against the limit.
 
     Args:
         head: the image's header.
@@ -90,9 +98,22 @@ def require_believable(head: ImageHead, most_pixels: int, name: str) -> None:
         name: the image's name in errors.
 
     Raises:
-        ImageSizeError: it has more pixels.
+        ImageSizeError: it has more pixels, takes more memory, or has a side that is too long.
     """
     require_pixels(head.size_px, most_pixels, name)
+    if max(head.size_px) > _MOST_SIDE_PX:
+        raise ImageSizeError(
+            FrameFault.TOO_LARGE,
+            f"{name} is {size_text(head.size_px)} px, the longest side may have {_MOST_SIDE_PX} px",
+            "scale it down, or cut it",
+        )
+    taken, most = head.width_px * head.height_px * head.pixel_bytes, most_pixels * _BYTES_A_PIXEL
+    if taken > most:
+        raise ImageSizeError(
+            FrameFault.TOO_LARGE,
+            f"{name} takes {taken / MEGAPIXEL:.3g} MB decoded ({head.pixel_bytes} bytes a pixel), the limit is {most / MEGAPIXEL:.3g} MB",
+            "save it without alpha, in 8 or 16 bit, or raise --max-megapixels",
+        )
     if head.block_pixels:
         require_pixels((head.block_pixels, 1), most_pixels, f"one piece of {name}")
 

@@ -13,6 +13,9 @@ PNG_START: Final = b"\x89PNG\r\n\x1a\n"
 
 _PIXEL_CHUNKS: Final = frozenset({b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"})
 _CHANNELS: Final = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
+_DECODED_CHANNELS: Final = {**_CHANNELS, 3: 4, 4: 4}
+"""OpenCV gives colours and alpha for a palette, and four channels for grey with alpha."""
+
 _DEFLATE_RATIO: Final = 1032
 """No deflate stream expands further: 258 bytes from two bits (zlib, "Maximum compression factor")."""
 
@@ -43,6 +46,7 @@ def png_head(data: bytes, name: str) -> ImageHead:
         height_px=height_px,
         body_at=33,
         least_bytes=height_px * row_bytes // _DEFLATE_RATIO,
+        pixel_bytes=_DECODED_CHANNELS[colour] * (2 if bits == 16 else 1),
         orientation=_orientation(data, name),
     )
 

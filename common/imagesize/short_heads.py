@@ -39,7 +39,13 @@ def pnm_head(found: re.Match[bytes]) -> ImageHead:
     Args:
         found: match of PNM_HEADER at the start of the encoded image.
     """
-    return ImageHead(kind=ImageKind.PNM, width_px=int(found[2]), height_px=int(found[3]), body_at=found.end())
+    return ImageHead(
+        kind=ImageKind.PNM,
+        width_px=int(found[2]),
+        height_px=int(found[3]),
+        body_at=found.end(),
+        pixel_bytes=6 if found[1] in b"36" else 2,  # the depth is stated behind the size
+    )
 
 
 def webp_head(data: bytes, name: str) -> ImageHead:

@@ -15,7 +15,8 @@ _WIDTH, _HEIGHT, _TILE_WIDTH, _TILE_HEIGHT = 256, 257, 322, 323
 _DNG_VERSION: Final = 50706
 """DNGVersion (Adobe, Digital Negative specification): four bytes, the first of which is 1."""
 
-_READ: Final = (_WIDTH, _HEIGHT, _TILE_WIDTH, _TILE_HEIGHT, ORIENTATION_TAG, _DNG_VERSION)
+_BITS, _SAMPLES = 258, 277
+_READ: Final = (_WIDTH, _HEIGHT, _TILE_WIDTH, _TILE_HEIGHT, _BITS, _SAMPLES, ORIENTATION_TAG, _DNG_VERSION)
 _TIFF_NUMBERS: Final = {1: "B", 3: "H", 4: "I", 16: "Q"}
 """BYTE, SHORT, LONG (TIFF 6.0, section 2) and LONG8."""
 
@@ -24,7 +25,7 @@ _MOST_ENTRIES: Final = 65_535
 
 
 def tiff_head(data: bytes, name: str) -> ImageHead:
-    """Read ImageWidth, ImageLength, TileWidth, TileLength and Orientation from the first directory (TIFF 6.0, sections 2, 8, 15); of duplicates, the largest.
+    """Read ImageWidth, ImageLength, BitsPerSample, SamplesPerPixel, TileWidth, TileLength and Orientation from the first directory (TIFF 6.0, sections 2, 8, 15); of duplicates, the largest.
 
     Args:
         data: the encoded image; begins with one of TIFF_KINDS.
@@ -44,6 +45,7 @@ def tiff_head(data: bytes, name: str) -> ImageHead:
         kind=ImageKind.TIFF,
         width_px=values[_WIDTH],
         height_px=values[_HEIGHT],
+        pixel_bytes=max(3, max(1, values[_SAMPLES]) * ((values[_BITS] + 7) // 8)),  # OpenCV gives colours for a palette
         block_pixels=values[_TILE_WIDTH] * values[_TILE_HEIGHT],
         orientation=orientation_named(values[ORIENTATION_TAG], name),
     )
@@ -74,10 +76,13 @@ def _numbers(data: bytes, name: str) -> Iterator[tuple[int, int, int, str]]:
     count = min(struct.unpack_from(f"{order}{count_code}", data, directory)[0], _MOST_ENTRIES)
     first = directory + struct.calcsize(f"={count_code}")
     for at in range(first, min(first + count * entry_bytes, len(data)), entry_bytes):
-        tag, kind, _ = struct.unpack_from(f"{order}{entry}", data, at)
+        tag, kind, values = struct.unpack_from(f"{order}{entry}", data, at)
         if tag not in _READ:
             continue
         if kind not in _TIFF_NUMBERS or (kind == 16 and not is_big):
             raise SpoiledImageError(FrameFault.NO_START, f"{name} is a TIFF whose size is no whole number", COPY_AGAIN)
-        code, value_at = _TIFF_NUMBERS[kind], at + entry_bytes - (8 if is_big else 4)
+        code, room = _TIFF_NUMBERS[kind], 8 if is_big else 4
+        value_at = at + entry_bytes - room
+        if tag == _BITS and values * struct.calcsize(f"={code}") > room:  # one number per channel: they lie elsewhere
+            (value_at,) = struct.unpack_from(f"{order}{'Q' if is_big else 'I'}", data, value_at)
         yield tag, struct.unpack_from(f"{order}{code}", data, value_at)[0], value_at, code

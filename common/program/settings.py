@@ -129,8 +129,11 @@ def log_level(name: str) -> int:
     return levels[name.lower()]
 
 
-_MOST_BYTES = 1 << 20
+_MOST_BYTES = 1 << 16
 """Limit for a settings file, which usually has one page."""
+
+_MOST_DOTS = 200
+"""Limit for a line. Python's TOML parser takes time and memory with the square of the parts of a key, a.b.c; a line with a dozen addresses has 50."""
 
 _MOST_SHOWN = 80
 """Characters of a wrong line that an error shows."""
@@ -140,6 +143,7 @@ def _read(file: Path, known: set[str]) -> dict[str, Any]:
     text = ""
     try:
         text = read_whole(file, _MOST_BYTES).decode("utf-8")
+        _require_few_dots(text, file)
         content = tomllib.loads(text)
     except OSError as error:
         raise SettingsError(f"settings file {file} cannot be read ({error.strerror})", "check --config") from None
@@ -153,9 +157,19 @@ def _read(file: Path, known: set[str]) -> dict[str, Any]:
             f"settings file {file} is not TOML{where}: {what}",
             'mend that line; texts are in quotes, as in camera = "v4l2:auto"',
         ) from None
+    except (ValueError, RecursionError):  # a number of thousands of digits; lists in lists, thousands deep
+        raise SettingsError(f"settings file {file} holds a number or a list beyond all measure", "remove it") from None
     if unknown := set(content) - known:
         raise SettingsError(f"unknown key {min(unknown)!r} in {file}", f"the keys are {', '.join(sorted(known))}")
     return content
+
+
+def _require_few_dots(text: str, file: Path) -> None:
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.count(".") > _MOST_DOTS:
+            raise SettingsError(
+                f"settings file {file} has {line.count('.')} dots in line {number}", "shorten that line"
+            )
 
 
 def _place(problem: str, text: str) -> tuple[str, str]:

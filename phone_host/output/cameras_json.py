@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-from common.camera_identity import LARGEST_LOCK, CameraIdentity, RememberedCamera
+from common.camera_identity import LARGEST_LOCK, CameraIdentity, RememberedCamera, is_lock_name
 from common.errors import DataError
 from common.files import read_whole
 from common.orientation import Flip, Orientation
@@ -121,11 +121,23 @@ class _Reader:
         value = self._values.get(key)
         if not isinstance(value, str) or len(value) > _MOST_TEXT:
             raise self.problem(key, "is no short text")
+        if any(
+            "\ud800" <= letter <= "\udfff" for letter in value
+        ):  # half of a pair of UTF-16: JSON can write it, no file can hold it
+            raise self.problem(key, "is no text")
         return value
 
     def numbers(self) -> tuple[tuple[str, int], ...]:
         """All of its keys, each with a whole number."""
-        if len(self._values) > _MOST_LOCKS or any(len(key) > _MOST_TEXT for key in self._values):
-            name = self._where.rstrip(".")
+        name = self._where.rstrip(".")
+        if len(self._values) > _MOST_LOCKS:
             raise DataError(f"{self._path}: {name} holds too much", _REMEDY)
+        wrong = next((key for key in self._values if not is_lock_name(key)), None)
+        if wrong is not None:
+            raise DataError(f"{self._path}: {name} holds {_short(wrong)}, which is no name of a control", _REMEDY)
         return tuple((key, self.whole(key, -LARGEST_LOCK - 1, LARGEST_LOCK)) for key in self._values)
+
+
+def _short(text: str) -> str:
+    """Return a key as messages quote it; files may hold anything."""
+    return repr(text if len(text) <= 40 else text[:37] + "...")

@@ -9,7 +9,7 @@ from typing import Final
 
 import cv2
 
-from common.camera_identity import LARGEST_LOCK, CameraIdentity, RememberedCamera
+from common.camera_identity import LARGEST_LOCK, CameraIdentity, RememberedCamera, is_lock_name
 from common.errors import DataError
 from common.orientation import Flip, Orientation
 
@@ -115,7 +115,7 @@ class _CameraReader:
         if node.empty():
             return ()
         names = list(node.keys()) if node.isMap() else []
-        if not names or len(names) > _MOST_LOCKS:
+        if not names or len(names) > _MOST_LOCKS or not all(map(is_lock_name, names)):
             raise self._wrong("locks", "is no map of controls", "calibrate again, or remove it")
         found = []
         for name in names:

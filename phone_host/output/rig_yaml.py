@@ -24,6 +24,7 @@ from common.versions import RIG_FORMAT
 from phone_host.model import CameraModel, Rectification, Rig, Side, TimeOffset
 from phone_host.output.atomic import write_text
 from phone_host.output.rig_cameras import read_camera, write_camera
+from phone_host.output.yaml_depth import is_too_deep
 
 REJECTED = "reject"
 """The verdict of a rig that `run` and `stereo` do not use unless they are told to."""
@@ -35,8 +36,13 @@ _LARGEST_IMAGE_PX = 100_000
 _ROTATION_TOLERANCE = 1e-6  # files hold 16 digits; a matrix typed with 6 digits has this error
 # The two cameras of a scanner never stand farther apart; a larger number is a T in millimetres.
 _LARGEST_BASELINE_M = 10.0
+_LEAST_BASELINE_M = 1e-3  # as for --baseline and calib.txt
 _BASELINE_TOLERANCE = 1e-3  # files typed with four digits
 _LARGEST_OFFSET_NS = 2e9  # no camera with its driver is seconds behind another one
+_LARGEST_NUMBER = 1e9  # ten thousand times the width of the largest image; beyond it sums of squares may overflow
+_FOCAL_WIDTHS = (0.05, 50.0)  # focal length / image width: views of 169 degrees and of 1 degree
+_MOST_ASIDE = 1.5  # image sizes from the middle to the principal point: even that of a crop is not so far away
+_LARGEST_ERROR_PX = 1e6  # of rms and zero_sigma: calibrations that failed have some thousands
 
 
 def write_rig(path: Path, rig: Rig, rectification: Rectification) -> None:
@@ -135,11 +141,11 @@ def read_rig(path: Path) -> Rig:
         R_right_left=reader.rotation("R"),
         t_right_left_m=baseline_m,
         board_side=Side(side),
-        rms_left_px=reader.number("rms_left"),
-        rms_right_px=reader.number("rms_right"),
-        rms_stereo_px=reader.number("rms_stereo"),
+        rms_left_px=reader.error_px("rms_left"),
+        rms_right_px=reader.error_px("rms_right"),
+        rms_stereo_px=reader.error_px("rms_stereo"),
         time_offset=reader.time_offset(),
-        zero_sigma_px=reader.zero_sigma_px(),
+        zero_sigma_px=reader.error_px("zero_sigma"),
         verdict=reader.verdict(),
         left_camera=reader.camera("left_camera", left),
         right_camera=reader.camera("right_camera", right),
@@ -174,6 +180,8 @@ class _Reader:
             raise self._no_storage() from error
         if not text.lstrip("\ufeff").startswith("%YAML"):
             # OpenCV would also accept JSON and XML, and abort on other text with a message of its own.
+            raise self._no_storage()
+        if is_too_deep(text):
             raise self._no_storage()
         try:
             self._storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
@@ -221,6 +229,8 @@ class _Reader:
         matrix = np.asarray(values, dtype=np.float64)
         if not np.isfinite(matrix).all():
             raise self.problem(key, "holds values that are not finite", "calibrate again")
+        if np.abs(matrix).max() > _LARGEST_NUMBER:
+            raise self.problem(key, f"holds {np.abs(matrix).max():g}, which no camera has", "calibrate again")
         return matrix
 
     def _shaped(self, key: str, shape: tuple[int, int]) -> NDArray[np.float64]:
@@ -236,12 +246,26 @@ class _Reader:
             raise self.problem(
                 matrix_key, "is no camera matrix", "its focal lengths are positive, its last row is 0 0 1"
             )
+        width_px = self.size(width_key)
+        for focal_px in (matrix[0, 0], matrix[1, 1]):
+            if not _FOCAL_WIDTHS[0] <= focal_px / width_px <= _FOCAL_WIDTHS[1]:
+                raise self.problem(
+                    matrix_key,
+                    f"has a focal length of {focal_px:g} px for images {width_px} px wide",
+                    "calibrate again, or give it in px",
+                )
+        size_px = np.array([width_px, self.size(height_key)])
+        if not (np.abs(matrix[:2, 2] - size_px / 2) <= _MOST_ASIDE * size_px).all():
+            point = ",".join(f"{at:g}" for at in matrix[:2, 2])
+            raise self.problem(
+                matrix_key, f"has its principal point at {point} px", "calibrate again: it lies near the image's middle"
+            )
         distortion = self.matrix(distortion_key)
         if min(distortion.shape) != 1 or distortion.size not in _DISTORTION_LENGTHS:
             lengths = ", ".join(map(str, _DISTORTION_LENGTHS))
             raise self.problem(distortion_key, f"has {distortion.size} values", f"OpenCV's models have {lengths}")
         return CameraModel(
-            width_px=self.size(width_key),
+            width_px=width_px,
             height_px=self.size(height_key),
             matrix=matrix,
             distortion=distortion.reshape(-1),
@@ -270,6 +294,8 @@ class _Reader:
         length_m = float(np.linalg.norm(matrix))
         if length_m == 0:
             raise self.problem(key, "is 0: both cameras at one place", "calibrate again")
+        if length_m < _LEAST_BASELINE_M:
+            raise self.problem(key, f"is {length_m:g} m long", "no two cameras are nearer than 1 mm; calibrate again")
         if length_m > _LARGEST_BASELINE_M:
             raise self.problem(key, f"is {length_m:g} m long", "T is in metres; divide millimetres by 1000")
         return matrix.reshape(3)
@@ -281,7 +307,7 @@ class _Reader:
         projection = self._shaped(key, (3, 4))
         length_m = float(np.linalg.norm(baseline_m))
         focal_px = projection[0, 0]
-        projected_m = float(np.abs(projection[:2, 3]).max()) / focal_px if focal_px > 0 else math.nan
+        projected_m = float(np.abs(projection[:2, 3]).max()) / focal_px if focal_px >= 1 else math.nan
         if not abs(projected_m - length_m) <= _BASELINE_TOLERANCE * length_m:
             differ = f"has a baseline of {projected_m * 1e3:.2f} mm, but T one of {length_m * 1e3:.2f} mm"
             raise self.problem(key, differ, "calibrate again, or remove the wrong one of the two")
@@ -289,7 +315,18 @@ class _Reader:
     def number(self, key: str) -> float:
         """Read a figure that may be missing (NaN)."""
         node = self._storage.getNode(key)
-        return float(node.real()) if node.isReal() or node.isInt() else math.nan
+        if node.empty() or node.isNone():
+            return math.nan
+        if not (node.isReal() or node.isInt()):
+            raise self.problem(key, "is no number", "calibrate again, or remove it")
+        return float(node.real())
+
+    def error_px(self, key: str) -> float:
+        """Read the size of an error, px, which may be missing or unknown (NaN)."""
+        value = self.number(key)
+        if value < 0 or value > _LARGEST_ERROR_PX:
+            raise self.problem(key, f"is {value:g} px", "calibrate again, or remove it")
+        return value
 
     def time_offset(self) -> TimeOffset:
         """Read the measured time offset, or return the default if none was measured."""
@@ -304,17 +341,9 @@ class _Reader:
             )
         return TimeOffset(round(offset_ns), round(uncertainty_ns))
 
-    def zero_sigma_px(self) -> float:
-        """Read the uncertainty of zero disparity, which may be missing (NaN)."""
-        value = self.number("zero_sigma")
-        if value < 0 or math.isinf(value):
-            raise self.problem("zero_sigma", f"is {value:g}", "calibrate again, or remove it")
-        return value
-
     def verdict(self) -> str:
         """Read what the calibration is good for; empty if it is missing."""
-        node = self._storage.getNode("verdict")
-        value = "" if node.empty() else self.text("verdict", "no word")
+        value = self.text("verdict", "")
         if value and value not in VERDICTS:
             raise self.problem("verdict", f"is {value!r}", f"write {', '.join(VERDICTS[:-1])} or {VERDICTS[-1]}")
         return value
@@ -326,4 +355,8 @@ class _Reader:
     def text(self, key: str, default: str) -> str:
         """Read a word; return the default if it is missing."""
         node = self._storage.getNode(key)
-        return str(node.string()) if node.isString() else default
+        if node.empty() or node.isNone():
+            return default
+        if not node.isString():
+            raise self.problem(key, "is no word", "calibrate again, or remove it")
+        return str(node.string())

@@ -1,5 +1,7 @@
 """Brings images of any depth to 8 bit. Both images of a pair get the same scale, or the matcher would see two brightnesses."""
 
+import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,7 @@ _LOW_PERCENT, _HIGH_PERCENT = 0.1, 99.9
 # If an image uses less than this share of the range (about 5 of 8 bits), plain scaling leaves too few levels: stretch
 # it instead (thermal cameras).
 _NARROW_SHARE = 1 / 8
+_STRIP_VALUES = 1 << 22
 
 
 def to_8_bit(images: tuple[AnyImage, ...]) -> tuple[Image, ...]:
@@ -37,30 +40,60 @@ def to_8_bit(images: tuple[AnyImage, ...]) -> tuple[Image, ...]:
     deep = [image for image in images if image.dtype != np.uint8]
     if not deep:
         return images
-    values = np.concatenate([image.ravel() for image in deep], dtype=np.float32, casting="unsafe")
-    if any(image.dtype.kind == "f" for image in deep):
-        values = values[np.isfinite(values)]
-    low, high = _ends(values) if values.size else (0.0, 1.0)
+    low, high = _ends_of_counts(deep) if all(image.dtype == np.uint16 for image in deep) else _ends(deep)
     if all(image.dtype == np.uint16 for image in deep):
         full = next(2**bits - 1 for bits in _SENSOR_BITS if high <= 2**bits - 1)
         if high - low >= full * _NARROW_SHARE or high <= 255:
             low, high = 0.0, float(full)
+    if not math.isfinite(high - low):
+        low, high = 0.0, 1.0
     scale = 255.0 / (high - low) if high > low else 0.0
-    return tuple(image if image.dtype == np.uint8 else _scaled(image, low, scale) for image in images)
+    return tuple(image if image.dtype == np.uint8 else _scaled(image, low, high, scale) for image in images)
 
 
-def _ends(values: NDArray[np.float32]) -> tuple[float, float]:
-    """Return the values beyond which hot pixels lie, dark and bright; reorders `values`."""
-    low, high = np.percentile(values, (_LOW_PERCENT, _HIGH_PERCENT), overwrite_input=True)
+def _ends(images: list[AnyImage]) -> tuple[float, float]:
+    """Return the values beyond which hot pixels lie, dark and bright."""
+    with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinite and is left out
+        values = np.concatenate([image.ravel() for image in images], dtype=np.float32, casting="unsafe")
+    if any(image.dtype.kind == "f" for image in images):
+        values = values[np.isfinite(values)]
+    if not values.size:
+        return 0.0, 1.0
+    with np.errstate(over="ignore", invalid="ignore"):  # between two numbers at the end of float32's range
+        low, high = np.percentile(values, (_LOW_PERCENT, _HIGH_PERCENT), overwrite_input=True)
     return float(low), float(high)
 
 
-def _scaled(image: AnyImage, low: float, scale: float) -> Image:
-    # In place: a copy at each step would take five times the memory of the image.
-    values = image.astype(np.float32)
-    np.nan_to_num(values, copy=False, nan=low)
-    values -= low
-    values *= scale
-    np.rint(values, out=values)
-    levels: Image = np.clip(values, 0, 255, out=values).astype(np.uint8)
+def _ends_of_counts(images: list[AnyImage]) -> tuple[float, float]:
+    """Return the same for 16-bit images, by counting: a sorted copy of the largest images would take 1.6 GB."""
+    counts = np.zeros(1 << 16, np.int64)
+    for image in images:
+        for rows in _strips(image):
+            counts += np.bincount(image[rows].ravel(), minlength=counts.size)
+    upto = np.cumsum(counts)
+    ends = []
+    for percent in (_LOW_PERCENT, _HIGH_PERCENT):
+        at = (int(upto[-1]) - 1) * percent / 100
+        below, above = np.searchsorted(upto, [math.floor(at), math.ceil(at)], side="right")
+        ends.append(float(below + (above - below) * (at - math.floor(at))))
+    return ends[0], ends[1]
+
+
+def _scaled(image: AnyImage, low: float, high: float, scale: float) -> Image:
+    levels = np.empty(image.shape, np.uint8)
+    for rows in _strips(image):
+        with np.errstate(over="ignore"):  # what becomes infinite is clipped
+            values = image[rows].astype(np.float32)
+            np.nan_to_num(values, copy=False, nan=low)
+            np.clip(values, low, high, out=values)
+            values -= low
+            values *= scale
+        np.rint(values, out=values)
+        levels[rows] = np.clip(values, 0, 255, out=values)
     return levels
+
+
+def _strips(image: AnyImage) -> Iterator[slice]:
+    """Yield the rows of an image in parts, whose copies in other types take little memory."""
+    rows = max(1, _STRIP_VALUES * len(image) // max(1, image.size))
+    return (slice(top, top + rows) for top in range(0, len(image), rows))

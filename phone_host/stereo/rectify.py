@@ -43,6 +43,10 @@ _SAMPLES_PER_EDGE = 65  # the outline bends slowly: between two of 65 samples it
 # A polynomial fitted to points in the middle may fold back near the corners; the usable field of view then ends before
 # that.
 _FIELD_SHARES = (1.0, 0.97, 0.94, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5)
+# Real lenses pull corners outwards by a tenth or so. A model that makes 10 px of 7 was fitted to nothing.
+_LEAST_SQUEEZE = 0.7
+# Beyond it a pixel at the edge would become a line of pixels. 170 degrees of a usual fisheye lens reach two diagonals.
+_MOST_DIAGONALS = 3.0
 _LEAST_SIZE_PX = 32
 _WHOLE_PX = 1e-6  # rounding of ideal cameras' windows, which are whole pixels wide, must not cost a row
 _MOST_KEPT_PIXELS = 4_000_000  # twice 1920 x 1080: what a live camera sends. The maps take 6 bytes per pixel and side.
@@ -317,6 +321,11 @@ def _filled_window(model: CameraModel, rotation: Matrix, side: Side) -> tuple[fl
         slopes = _rectified_slopes(edges.reshape(-1, 2), model, rotation)
         if _round_trip_error_px(slopes, edges.reshape(-1, 2), model, rotation) > _ROUND_TRIP_LIMIT_PX:
             continue
+        if not _is_lens(edges.reshape(-1, 2), model):
+            raise DataError(
+                f"the {side.value} camera's distortion is no lens's: it moves the image's edge too far",
+                f"{_RECALIBRATE}, with views that also cover the corners",
+            )
         top, right, bottom, left = slopes.reshape(4, -1, 2)
         return (
             float(left[:, 0].max()), float(top[:, 1].max()), float(right[:, 0].min()), float(bottom[:, 1].min())
@@ -330,6 +339,14 @@ def _filled_window(model: CameraModel, rotation: Matrix, side: Side) -> tuple[fl
         f"the {side.value} camera's distortion folds back inside its image",
         f"{_RECALIBRATE}, with views that also cover the corners",
     )
+
+
+def _is_lens(points_px: NDArray[np.float64], model: CameraModel) -> bool:
+    """Return whether the distortion leaves points at the image's edge about where a pinhole camera sees them."""
+    straight = np.linalg.norm((points_px - model.matrix[:2, 2]) / np.diag(model.matrix)[:2], axis=1)
+    seen = np.linalg.norm(_rectified_slopes(points_px, model, np.eye(3)), axis=1)
+    farthest = _MOST_DIAGONALS * math.hypot(model.width_px, model.height_px) / _mean_focal_px(model)
+    return bool((seen >= _LEAST_SQUEEZE * straight).all() and seen.max() <= farthest)
 
 
 def _edges_px(model: CameraModel, share: float) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import AnyMatcher, matcher_named
-from phone_host.stereo.plausible import require_plausible
+from phone_host.stereo.plausible import require_plausible, require_plausible_file
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.scaled_rig import scaled_geometry
 from phone_host.verbs.stereo_numbers import crop_of, pixels, point_px, scale_of
@@ -152,6 +152,7 @@ def _by_calib_txt(
     geometry, disparities = found.geometry, options.disparities
     if found.size_px is not None and found.size_px != size_px:
         geometry = scaled_geometry(geometry, found.size_px, size_px, str(path))
+    require_plausible_file(geometry, size_px, str(path))
     if disparities is None and options.near is None and found.disparities is not None:
         scale = 1.0 if found.size_px is None else size_px[0] / found.size_px[0]
         disparities = math.ceil(found.disparities * scale)

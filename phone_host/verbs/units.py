@@ -38,12 +38,16 @@ def length_mm(text: str, option: str, example: str) -> float:
 
 _LEAST_BARE_SQUARE_MM: Final = 0.5
 _LEAST_BARE_BASELINE_MM: Final = 5.0
+_LEAST_BASELINE_MM: Final = 1.0
 _LEAST_BARE_LIMIT_MM: Final = 10.0
 """No chessboard has smaller squares, two webcams are never nearer to each other, no stereo camera sees what is nearer. A
 smaller number without a unit is a length in metres."""
 
 _MOST_BASELINE_MM: Final = 10_000.0
 """As in rig.yaml and calib.txt. A longer one is given in micrometres."""
+
+_MOST_LIMIT_MM: Final = 1e8
+"""100 km: no stereo camera sees so far."""
 
 
 def square_mm(text: str) -> float:
@@ -68,12 +72,23 @@ def baseline_mm(text: str) -> float:
         text: what the user wrote.
 
     Returns:
-        mm, above 0, up to 10 m.
+        mm, 1 mm to 10 m.
 
     Raises:
-        SettingsError: it is no length, a number without a unit that can only mean metres, or more than 10 m.
+        SettingsError: it is no length, or shorter or longer than that.
     """
-    value = _not_metres(text, "--baseline", "60mm", _LEAST_BARE_BASELINE_MM)
+    value = length_mm(text, "--baseline", "60mm")
+    found = _LENGTH.fullmatch(text)
+    if value < _LEAST_BASELINE_MM:
+        if found is not None and not found[2]:
+            raise SettingsError(
+                f"--baseline {text.strip()} has no unit, and a number alone means mm",
+                f"write {value * 1000:g}mm or {value:g}m",
+            )
+        raise SettingsError(
+            f"--baseline {text.strip()} is {value:g} mm",
+            f"give the distance of the two cameras, at least {_LEAST_BASELINE_MM:g}mm",
+        )
     if value > _MOST_BASELINE_MM:
         said = f"--baseline {text.strip()} is {value / 1000:g} m"
         raise SettingsError(said, f"give the distance of the two cameras, at most {_MOST_BASELINE_MM / 1000:g}m")
@@ -89,12 +104,18 @@ def limit_mm(text: str, option: str, example: str) -> float:
         example: a value that would be right, for errors.
 
     Returns:
-        mm, above 0.
+        mm, above 0, up to 100 km.
 
     Raises:
-        SettingsError: it is no length, or a number without a unit that can only mean metres.
+        SettingsError: it is no length, a number without a unit that can only mean metres, or more than 100 km.
     """
-    return _not_metres(text, option, example, _LEAST_BARE_LIMIT_MM)
+    value = _not_metres(text, option, example, _LEAST_BARE_LIMIT_MM)
+    if value > _MOST_LIMIT_MM:
+        raise SettingsError(
+            f"{option} {text.strip()} is {value / 1e6:g} km",
+            f"give at most {_MOST_LIMIT_MM / 1e6:g} km, for example {example}",
+        )
+    return value
 
 
 def _not_metres(text: str, option: str, example: str, least_mm: float) -> float:

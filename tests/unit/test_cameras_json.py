@@ -96,6 +96,11 @@ def changed(key: str, value: Any) -> str:
         (changed("flip", "hv"), "left.flip is none of"),
         (changed("locks", {"focus": 2**31}), "left.locks.focus is no whole number"),
         (changed("locks", dict.fromkeys(map(str, range(33)), 1)), "left.locks holds too much"),
+        (changed("name", "\ud800"), "left.name is no text"),
+        (changed("locks", {"": 1}), "left.locks holds '', which is no name of a control"),
+        (changed("locks", {"1a": 1}), "left.locks holds '1a'"),
+        (changed("locks", {"a b:\n": 1}), "left.locks holds 'a b:"),
+        (changed("locks", {"x" * 49: 1}), "which is no name of a control"),
         ("x" * 70_000, "bytes"),
     ],
 )

@@ -268,6 +268,15 @@ def test_a_file_without_end_is_not_read(tmp_path: Path) -> None:
         read_whole(tmp_path / "link", 6)
 
 
+def test_a_limit_of_any_size_takes_no_memory(tmp_path: Path) -> None:
+    """Memory is taken for what is in the file, even if the limit is beyond any memory; files that state no size are read whole."""
+    (tmp_path / "file").write_bytes(b"content")
+    assert read_whole(tmp_path / "file", 10**30) == b"content"
+    stated = Path("/proc/self/status")
+    assert stated.stat().st_size == 0
+    assert b"Name:" in read_whole(stated, 10**12)
+
+
 @pytest.mark.parametrize("replay", ["photos", "photos/*.jpg", "photos/a1.jpg"])
 def test_a_run_does_not_write_among_the_photographs_it_replays(tmp_path: Path, replay: str) -> None:
     """The folder of a replay, or of what its glob names, is refused as --out; a folder in it or beside it is not."""

@@ -15,7 +15,7 @@ from common.camera.v4l2_stream import V4l2Settings
 from common.errors import SettingsError
 from common.program.quantities import frames_per_second, image_size, milliseconds, seconds
 from phone_host.bench.cases import Size, parse_qualities, parse_rates, parse_sizes
-from phone_host.settings import resolve_settings
+from phone_host.settings import most_pixels, resolve_settings
 
 Parser = Callable[[], argparse.ArgumentParser]
 HOST, BOARD, BENCH = phone_host.cli.parser, board_agent.cli.parser, phone_host.bench.cli.parser
@@ -118,3 +118,11 @@ def test_files_and_variables_take_units(tmp_path: Path, monkeypatch: pytest.Monk
     assert resolve_settings(HOST().parse_args(["settings"])).values.tolerance == 7
     monkeypatch.setenv("BOARD_AGENT_IDLE_AFTER", "2min")
     assert board_agent.settings.resolve_settings(BOARD().parse_args(["settings"])).values.idle_after == 120
+
+
+@pytest.mark.parametrize("megapixels", [0, 1025, 30_000, 10**30])
+def test_a_limit_of_megapixels_is_one_that_a_decoder_has(megapixels: int) -> None:
+    """OpenCV decodes up to 2^30 pixels: 1024 of our megapixels are taken, more are refused by name."""
+    assert most_pixels(None, 1024) == 2**30
+    with pytest.raises(SettingsError, match="max_megapixels is"):
+        most_pixels(None, megapixels)

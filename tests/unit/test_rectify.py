@@ -235,3 +235,13 @@ def test_cameras_that_look_to_opposite_sides_are_told(outwards_deg: float, words
     with pytest.raises(DataError, match=words) as caught:
         rectify_rig(rig)
     assert "towards the same scene" in caught.value.remedy
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_distortion_that_no_lens_has_is_refused(side: str) -> None:
+    """k3 = 99999 can be inverted, but would squeeze the image into its middle third; depth from it would look right."""
+    rig = unlike_rig()
+    model = getattr(rig, side)
+    wrong = replace(model, distortion=np.array([0.0, 0.0, 0.0, 0.0, 99999.0]))
+    with pytest.raises(DataError, match=f"the {side} camera's distortion is no lens's"):
+        rectify_rig(replace(rig, **{side: wrong}))

@@ -206,9 +206,13 @@ def test_cameras_come_back(tmp_path: Path, camera: RememberedCamera) -> None:
     ("line", "said"),
     [
         ("verdict: splendid", "verdict is 'splendid': write good, usable or reject"),
-        ("verdict: 7", "verdict is 'no word'"),
+        ("verdict: 7", "verdict is no word"),
         ("zero_sigma: -1.", "zero_sigma is -1"),
         ("zero_sigma: .Inf", "zero_sigma is inf"),
+        ("zero_sigma: 1e308", "zero_sigma is 1e+308"),
+        ("zero_sigma: x", "zero_sigma is no number"),
+        ("verdict: [good]", "verdict is no word"),
+        ('left_camera: { locks: { "1a": 1 } }', "left_camera"),
         ("left_camera: usb", "left_camera is no map"),
         ("left_camera: { rotate: 45 }", "left_camera.rotate is none of"),
         ("left_camera: { rotate: a }", "left_camera.rotate is none of"),
@@ -228,3 +232,53 @@ def test_what_a_rig_says_of_itself_is_checked_by_key(tmp_path: Path, line: str, 
         read_rig(path)
     assert said in str(failure.value)
     assert "\n" not in str(failure.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("board_side", "[1,2]", "board_side is no word"),
+        ("board_side", ".Nan", "board_side is no word"),
+        ("board_side", "{a: 1}", "board_side is no word"),
+        ("rms_left", "x", "rms_left is no number"),
+        ("rms_right", "-1.", "rms_right is -1 px"),
+        ("rms_stereo", "1e308", "rms_stereo is 1e+308 px"),
+    ],
+)
+def test_a_key_of_the_wrong_kind_is_not_taken_for_a_missing_one(
+    tmp_path: Path, key: str, value: str, said: str
+) -> None:
+    """It is named; the default holds only where the key is missing."""
+    path = _written(tmp_path)
+    path.write_text(re.sub(rf"^{key}:.*$", f"{key}: {value}", path.read_text(), flags=re.MULTILINE))
+    with pytest.raises(DataError) as failure:
+        read_rig(path)
+    assert said in str(failure.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("525., 0., 315.", "1e308, 0., 315.", "M1 holds 1e+308"),
+        ("525., 0., 315.", "3.5, 0., 315.", "M1 has a focal length of 3.5 px for images 640 px wide"),
+        ("525., 0., 315.", "525e2, 0., 315.", "M1 has a focal length of 52500 px"),
+        ("525., 0., 315.", "525., 0., 1e8", "M1 has its principal point at 1e+08,243 px"),
+    ],
+)
+def test_a_camera_that_cannot_be_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+    """A number that is finite but absurd is named with its key, and no library warns of an overflow."""
+    path = _written(tmp_path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(DataError) as failure:
+        read_rig(path)
+    assert said in str(failure.value)
+
+
+@pytest.mark.parametrize(("t_m", "said"), [([-1e308, 0, 0], "T holds 1e+308"), ([-1e-8, 0, 0], "T is 1e-08 m long")])
+def test_a_baseline_that_cannot_be_is_refused(tmp_path: Path, t_m: list[float], said: str) -> None:
+    """Neither the width of a galaxy nor that of an atom."""
+    with pytest.raises(DataError) as failure:
+        read_rig(_written(tmp_path, t_right_left_m=np.array(t_m)))
+    assert said in str(failure.value)

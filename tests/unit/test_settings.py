@@ -177,3 +177,22 @@ def test_a_line_that_is_not_toml_is_shown_without_its_password(tmp_path: Path) -
     with pytest.raises(SettingsError) as caught:
         resolve(Sample, "SAMPLE", file, {})
     assert len(str(caught.value)) < 300 + len(str(file))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("depth = " + "[" * 5000, "beyond all measure"),
+        ("depth = " + "1" * 5000, "beyond all measure"),
+        ("a." * 20_000 + "a = 1", "has 20000 dots in line 1"),
+        ("depth = 1\n" * 10_000, "are the most"),
+    ],
+)
+def test_a_hostile_file_costs_one_line(tmp_path: Path, text: str, said: str) -> None:
+    """Lists in lists, endless numbers and keys of thousands of parts are refused at once."""
+    file = tmp_path / "sample.toml"
+    file.write_text(text)
+    with pytest.raises(SettingsError) as caught:
+        resolve(Sample, "SAMPLE", file, {})
+    assert said in str(caught.value)
+    assert len(str(caught.value)) < 300 + len(str(file))

@@ -23,16 +23,17 @@ def test_anything_else_is_refused_with_the_option_and_an_example(text: str) -> N
 
 def test_a_number_alone_that_can_only_mean_metres_is_refused_with_both_readings() -> None:
     """Wrong by 1000, every depth would look right: 0.193 is refused as a baseline, 2 as a limit, and both readings are named."""
-    for read, text in ((baseline_mm, "0.193"), (lambda word: limit_mm(word, "--far", "5m"), "2")):
-        with pytest.raises(SettingsError, match="has no unit") as caught:
-            read(text)
-        assert f"or {text}m;" in caught.value.remedy
-        assert f"{text}mm" in caught.value.remedy
+    with pytest.raises(SettingsError, match="has no unit") as caught:
+        limit_mm("2", "--far", "5m")
+    assert caught.value.remedy == "write 2000mm or 2m; 2mm if you mean that"
+    with pytest.raises(SettingsError, match="has no unit") as caught:
+        baseline_mm("0.193")
+    assert caught.value.remedy == "write 193mm or 0.193m"  # 0.193 mm would be refused, too
 
 
 def test_what_a_unit_states_is_believed() -> None:
-    """With a unit, and from 1 mm (baseline) or 10 mm (limits) on without one, the number is what it says."""
-    assert [baseline_mm(text) for text in ("0.5mm", "5", "193.001", "0.193m")] == pytest.approx([0.5, 5, 193.001, 193])
+    """With a unit, and from 5 mm (baseline) or 10 mm (limits) on without one, the number is what it says."""
+    assert [baseline_mm(text) for text in ("1mm", "5", "193.001", "0.193m")] == pytest.approx([1, 5, 193.001, 193])
     assert [limit_mm(text, "--near", "300mm") for text in ("2mm", "10", "2m")] == pytest.approx([2, 10, 2000])
 
 
@@ -41,3 +42,17 @@ def test_cameras_ten_metres_apart_are_the_limit() -> None:
     assert baseline_mm("10m") == pytest.approx(10_000)
     with pytest.raises(SettingsError, match=r"193001 is 193\.001 m"):
         baseline_mm("193001")
+
+
+def test_no_two_cameras_are_nearer_than_a_millimetre() -> None:
+    """Nor is a length that a unit makes absurd believed: 0.1 um."""
+    with pytest.raises(SettingsError, match=r"--baseline 0\.0001mm is 0\.0001 mm") as caught:
+        baseline_mm("0.0001mm")
+    assert "at least 1mm" in caught.value.remedy
+
+
+def test_no_stereo_camera_sees_a_hundred_kilometres_far() -> None:
+    """100 km is taken, 1e99 m is named and refused."""
+    assert limit_mm("100000m", "--far", "5m") == pytest.approx(1e8)
+    with pytest.raises(SettingsError, match="give at most 100 km"):
+        limit_mm("1e99m", "--near", "300mm")
