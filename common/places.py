@@ -54,12 +54,16 @@ def nearest(path: Path) -> tuple[Path, Kind]:
     """Return a path, or the nearest of its parents that exists, and what that is.
 
     Raises:
-        OSError: see `kind_of`.
+        OSError: see `kind_of`; or nothing of such a long name can be made there.
     """
     there, kind = path, kind_of(path)
+    longest = 0
     while kind is Kind.MISSING and there != there.parent:
+        longest = max(longest, len(os.fsencode(there.name)))
         there = there.parent
         kind = kind_of(there)
+    if longest > os.pathconf(there, "PC_NAME_MAX"):
+        raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG), str(path))
     return there, kind
 
 

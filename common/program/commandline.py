@@ -129,7 +129,7 @@ def _path(text: str) -> Path:
 def _text(text: str) -> str:
     """Read a text."""
     if not text:
-        raise argparse.ArgumentTypeError("is empty (give a value, or leave it out)")
+        raise argparse.ArgumentTypeError("is empty (give a value)")
     return text
 
 

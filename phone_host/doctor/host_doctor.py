@@ -103,14 +103,18 @@ def examine(question: Question) -> list[Finding]:
 
         findings.append(check_rig(read_rig_readings(question.calibration, question.camera)))
     findings += check_clocks(machine.read_clocks(Path(__file__).parent))
-    findings += _examine_out(question.out)
+    findings += examine_out(question.out)
     log = machine.read_kernel_log()
     findings += [check_power(log, machine.read_supply()), check_usb_log(log)]
     return findings
 
 
-def _examine_out(out: Path) -> list[Finding]:
-    """Check the folder of the results, or where it would be made, as a run would find it."""
+def examine_out(out: Path) -> list[Finding]:
+    """Check the folder of the results, or where it would be made, as a run would find it.
+
+    Args:
+        out: as the user named it.
+    """
     try:
         there, kind = nearest(out)
         disk = machine.read_disk(there)
