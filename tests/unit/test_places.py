@@ -83,7 +83,7 @@ def test_images_that_are_none_are_told_in_one_line(path: str) -> None:
     """`stereo` and `calibrate` (4) and a replay (3) name the path, and say what it is if it is there."""
     for find, kind in ((lambda: pair_files(path, "file"), DataError), (lambda: find_images(path), UnavailableError)):
         with pytest.raises(kind) as caught:
-            find()  # type: ignore[no-untyped-call]
+            find()
         assert repr(path) in str(caught.value)
         assert "does not exist" not in str(caught.value)
 
