@@ -7,10 +7,7 @@ or a check failed, 130 interrupted.
 
 from typing import ClassVar
 
-
-def printable(text: str) -> str:
-    """Return the text as one line that cannot control the terminal, whatever name or value it quotes."""
-    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+from common.plain_text import printable
 
 
 class TandemError(Exception):

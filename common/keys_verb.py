@@ -6,6 +6,7 @@ from dataclasses import asdict
 
 from common.keys import KeyFolder
 from common.peers import Peer, clean_name
+from common.plain_text import printable_lines
 
 
 def change(
@@ -63,4 +64,6 @@ def listing(folder: KeyFolder, *, as_json: bool) -> str:
     rows = [(peer.name, peer.key, peer.added, peer.address) for peer in peers]
     widths = [max((len(row[column]) for row in rows), default=0) for column in range(4)]
     lines = ["  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join((f"folder  {folder.path}", f"public  {own.public}", *(lines or ["nobody is known yet"])))
+    return printable_lines(
+        "\n".join((f"folder  {folder.path}", f"public  {own.public}", *(lines or ["nobody is known yet"])))
+    )

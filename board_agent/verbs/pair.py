@@ -7,6 +7,7 @@ import sys
 from board_agent.enrolment import NOBODY, absence, follow
 from board_agent.settings import LONGEST_S, chosen_keys, is_service_hidden
 from common.errors import SettingsError, UnavailableError
+from common.program.terminal import fitted, say
 
 
 def run(options: argparse.Namespace) -> int:
@@ -18,15 +19,15 @@ def run(options: argparse.Namespace) -> int:
         if state == NOBODY and is_service_hidden(keys):
             raise UnavailableError("the service's keys may not be used by this user", "run sudo board-agent pair")
         if state == NOBODY:
-            print(f"board-agent: waiting: {absence(keys)}", file=sys.stderr)
+            say(f"board-agent: waiting: {absence(keys)}", sys.stderr)
         if state.problem:
-            print(f"board-agent: waiting: {state.problem}: stop what uses that port, or move the link", file=sys.stderr)
+            say(f"board-agent: waiting: {state.problem}: stop what uses that port, or move the link", sys.stderr)
         if failed is not None and state.failed > failed:
             print("board-agent: the code that was typed on the host was wrong; here is a new one", file=sys.stderr)
         name, failed = state.paired, state.failed
         if state.code and not name:
             asks = f"{state.asking} asks; " if state.asking else ""
             words = f"{state.address}: {asks}type this code on the host: {state.code}"
-            print(words, file=sys.stderr if options.json else None, flush=True)
-    print(json.dumps({"paired": name}) if options.json else f"paired with {name}")
+            say(words, sys.stderr if options.json else None, flush=True)
+    print(json.dumps({"paired": name}) if options.json else fitted(f"paired with {name}"))
     return 0

@@ -13,9 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol, runtime_checkable
 
+from common.name_order import DIGITS
 from common.protocol.wire_fields import MAX_TEXT
-
-_DIGITS: Final = re.compile(r"\d+")
 
 MOST_SPAN: Final = 10_000_000
 """Numbers further apart are times: at the lowest rate, 0.01 fps, stamps first + number / fps would not fit a message."""
@@ -98,7 +97,7 @@ def numbers_of(stems: Sequence[str]) -> tuple[int, ...]:
     """
     if len(stems) < 2:
         return ()
-    found = [_DIGITS.findall(stem) for stem in stems]
+    found = [DIGITS.findall(stem) for stem in stems]
     best: tuple[int, ...] = ()
     for place in range(1, 1 + min(map(len, found))):
         texts = [digits[-place] for digits in found]

@@ -6,7 +6,6 @@ pace=demand: one image per read, nothing dropped; the stamps are first + k / fps
 a missing number leaves a gap. Where the numbers are times, the stamps are these, modulo 2**59. The camera's name tells how many images there are and their numbers (`image_numbers.py`).
 """
 
-import re
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -17,6 +16,8 @@ from common.camera.image_numbers import TIMES_RING, ImageNumbers, numbers_of, wi
 from common.camera.imagefile import SUFFIXES, ImageFile, load
 from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import Frame, FrameFault, find_fault
+from common.name_order import name_order
+from common.places import Kind, kind_of
 from common.protocol.message import CameraDescription, Pacing, Steering
 from common.stamp import Stamp
 
@@ -46,12 +47,6 @@ class ReplaySettings:
     phase_ns: int = 0
 
 
-def name_order(path: Path) -> tuple[list[tuple[int, int | str]], str]:
-    """Sort key that treats numbers in names as numbers: frame2 before frame10."""
-    parts = [(0, int(part)) if part.isdecimal() else (1, part) for part in re.split(r"(\d+)", path.name) if part]
-    return parts, str(path)
-
-
 def find_images(pattern: str) -> list[Path]:
     """List the images that a folder or glob names, in name order.
 
@@ -70,25 +65,27 @@ def find_images(pattern: str) -> list[Path]:
     try:
         if not pattern:
             raise SettingsError("replay: names no folder", "give a folder of images, an image or a quoted glob")
-        if folder.is_dir():
+        kind = kind_of(folder)
+        if kind is Kind.FOLDER:
             found = [path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES]
-        elif any(letter in pattern for letter in "*?["):
+        elif kind is Kind.MISSING and any(letter in pattern for letter in "*?["):
             anchor = Path(folder.anchor or ".")
             found = [
                 path
                 for path in anchor.glob(str(folder.relative_to(anchor) if folder.anchor else folder))
-                if path.is_file()
+                if kind_of(path) is Kind.FILE
             ]
-        elif folder.is_file():
+        elif kind is Kind.FILE:
             found = [folder]
         else:
-            raise UnavailableError(
-                f"replay {pattern!r} does not exist", "give a folder of images, an image or a quoted glob"
-            )
+            what = "does not exist" if kind is Kind.MISSING else f"is {kind.value}, no file of an image"
+            raise UnavailableError(f"replay {pattern!r} {what}", "give a folder of images, an image or a quoted glob")
     except OSError as error:
         raise UnavailableError(
             f"replay {pattern!r} cannot be read ({error.strerror})", "check its permissions"
         ) from None
+    except RecursionError:
+        raise SettingsError(f"replay {pattern[:40]!r} ... has too many folders", "give a shorter pattern") from None
     except ValueError as error:  # pathlib's error for a pattern such as a**b
         raise SettingsError(
             f"replay {pattern!r} is not a valid pattern ({error})", "give a folder or another pattern"

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
 
-from common.errors import SettingsError, printable
+from common.errors import SettingsError
+from common.plain_text import printable
 
 CHECK_FAILED: Final = 4
 

@@ -20,6 +20,7 @@ from common.doctor.access import Account, Holder, Node
 from common.doctor.camera_checks import UsbBus, UsbCamera
 from common.doctor.machine_checks import Bluetooth, Clocks, Disk, KernelLog, LogLine, Supply, throttled
 from common.doctor.unit_check import Unit
+from common.places import nearest
 
 _VIDEO_CLASS: Final = "0e"
 _RECORD_BYTES: Final = 8192
@@ -189,12 +190,15 @@ def read_supply() -> Supply:
 
 
 def read_disk(path: Path) -> Disk:
-    """The file system of a folder, or of its nearest existing parent."""
-    while not path.exists() and path != path.parent:
-        path = path.parent
-    state = os.statvfs(path)
+    """The file system of a folder, or of its nearest existing parent.
+
+    Raises:
+        OSError: there is no telling where the path leads.
+    """
+    there, _ = nearest(path)
+    state = os.statvfs(there)
     return Disk(
-        path=str(path),
+        path=str(there),
         free_bytes=state.f_bavail * state.f_frsize,
         free_files=state.f_favail,
         counts_files=state.f_files > 0,

@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import errno
+import itertools
 import os
 import re
 import sys
@@ -11,8 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from common.errors import TandemError
+from common.plain_text import printable
 from common.program import interrupts
 from common.program.invocation import as_found
+from common.program.quantities import decimal_number, whole_number
+from common.program.streams import mend_streams
 from common.program.terminal import fitted
 from common.versions import all_versions
 
@@ -40,9 +44,10 @@ class ExamplesFirstParser(argparse.ArgumentParser):
     """What is being parsed."""
 
     def add_argument(self, *names: str, **options: Any) -> argparse.Action:  # noqa: ANN401 - argparse's own
-        """Declare an argument. A path must not be empty: to Path, that would be the current folder."""
-        if options.get("type") is Path:
-            options["type"] = _path
+        """Declare an argument. What is given must not be empty: to Path, that would be the current folder, and to others as if nothing was given."""
+        if options.get("action", "store") in {"store", "append"}:
+            kind = options.get("type", str)
+            options["type"] = _READERS.get(kind, kind)
         return super().add_argument(*names, **options)
 
     def format_help(self) -> str:
@@ -68,10 +73,18 @@ class ExamplesFirstParser(argparse.ArgumentParser):
         if words[:1] == ["help"] and self._subparsers is not None:
             words = [*words[1:2], "--help"]
         self._words = tuple(words)
+        if self._subparsers is None:
+            self._refuse_idle_dashes(words)
         options, rest = super().parse_known_args(words, namespace)
         if rest:
             self.error(self._unknown(rest))
         return options, rest
+
+    def _refuse_idle_dashes(self, words: Sequence[str]) -> None:
+        """Refuse `--option=--`. argparse takes these dashes out of the option's values, and gives it an empty list."""
+        before = itertools.takewhile(lambda word: word != "--", words)
+        if given := next((word for word in before if word.startswith("-") and word.endswith("=--")), ""):
+            self.error(f"argument {given.partition('=')[0]}: expected one argument")
 
     def _unknown(self, rest: Sequence[str]) -> str:
         """Say what is wrong with arguments that nothing takes."""
@@ -94,7 +107,7 @@ class ExamplesFirstParser(argparse.ArgumentParser):
         """
         if message.startswith(_MISSING) and (unknown := [word for word in self._words if self._is_unknown(word)]):
             message = self._unknown(unknown)
-        one_line = _plain(" ".join(message.split()))
+        one_line = printable(_plain(" ".join(message.split())))
         self.exit(2, f"{self.prog}: error: {one_line}: see {self.prog} --help\n")
 
 
@@ -113,18 +126,29 @@ def _path(text: str) -> Path:
     return Path(text)
 
 
+def _text(text: str) -> str:
+    """Read a text."""
+    if not text:
+        raise argparse.ArgumentTypeError("is empty (give a value)")
+    return text
+
+
+_READERS: Final[dict[Any, Callable[[str], Any]]] = {Path: _path, str: _text, int: whole_number, float: decimal_number}
+"""What reads the values of arguments that are declared with one of Python's own types."""
+
+
 def _plain(message: str) -> str:
     """Put argparse's own messages into plain words."""
     if found := re.fullmatch(r"argument VERB: invalid choice: '(.*)' \(choose from (.*)\)", message):
         verbs = re.findall(r"[\w-]+", found[2])
         listed = f" (the verbs are {', '.join(verbs)})"
         return f"unknown verb {found[1]}{_guess(found[1], verbs) or listed}"
-    if found := re.fullmatch(r"argument (\S+): invalid (float|int) value: (.*)", message):
-        kind = "a whole number, such as 30" if found[2] == "int" else "a number without a unit, such as 1.5"
+    if found := re.fullmatch(r"argument (\S+): invalid (decimal|whole)_number value: (.*)", message):
+        kind = "a whole number, such as 30" if found[2] == "whole" else "a number without a unit, such as 1.5"
         return f"{found[1]} is {found[3]}, but must be {kind}"
     if found := re.fullmatch(r"argument (\S+): expected (?:one|at least one|\d+) arguments?", message):
         return f"{found[1]} needs a value"
-    if found := re.fullmatch(r"argument (\S+): (is empty .*)", message):
+    if found := re.fullmatch(r"argument (.+?): (is empty .*)", message):
         return f"{found[1]} {found[2]}"
     if found := re.fullmatch(rf"{_MISSING}(.*)", message):
         return f"missing: {found[1]}"
@@ -168,6 +192,7 @@ def run_command(
     """
     options = argparse.Namespace(debug=False)
     code = 0
+    mend_streams()
     try:
         code = _ran(parser, arguments, command, options)
         if sys.stdout is not None:  # a process may be started without one

@@ -49,7 +49,16 @@ def sudo_name(program: str) -> str:
 
 def command_line(program: str, *arguments: str | Path) -> str:
     """Return a command of this installation with its arguments, quoted for a shell."""
-    return f"{program_name(program)} {shlex.join(map(str, arguments))}".rstrip()
+    return " ".join([program_name(program), *(shell_word(str(argument)) for argument in arguments)])
+
+
+def shell_word(word: str) -> str:
+    """Return a word quoted for a shell; one that cannot be printed becomes $'...' with codes for its bytes (POSIX.1-2024, 2.2.4)."""
+    if word.isprintable():
+        return shlex.quote(word)
+    # 32 to 126 are the printable characters of ASCII.
+    letters = (chr(byte) if 32 <= byte < 127 else f"\\{byte:03o}" for byte in os.fsencode(word))
+    return "$'" + "".join(f"\\{letter}" if letter in {"'", "\\"} else letter for letter in letters) + "'"
 
 
 def as_found(examples: str) -> str:

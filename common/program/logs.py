@@ -5,6 +5,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from common.plain_text import printable
+
 
 def set_up(level: int = logging.INFO) -> None:
     """Send this process's log to stderr. journald and terminals add whatever else they need."""
@@ -65,4 +67,4 @@ def event(name: str, **fields: object) -> str:
 
 def _value(value: object) -> str:
     text = str(value).replace("\n", " ")
-    return repr(text) if " " in text or not text else text
+    return repr(text) if " " in text or not text else printable(text)

@@ -17,6 +17,10 @@ _NUMBER: Final = r"\s*((?:\d{1,12}\.?\d{0,12}|\.\d{1,12})(?:e[+-]?\d{1,2})?)\s*"
 _QUANTITY: Final = re.compile(rf"{_NUMBER}([a-z/]*)\s*", re.ASCII | re.IGNORECASE)
 _SIZE: Final = re.compile(r"\s*(\d{1,5})\s*[x*]\s*(\d{1,5})\s*(?:px)?\s*", re.ASCII | re.IGNORECASE)
 
+_WHOLE: Final = re.compile(r"\s*[+-]?[0-9]{1,18}\s*")
+_DECIMAL: Final = re.compile(r"\s*[+-]?([0-9]{1,18}\.?[0-9]{0,18}|\.[0-9]{1,18})(e[+-]?[0-9]{1,3})?\s*", re.IGNORECASE)
+"""Python itself also takes 1_000 and the digits of other scripts, which nobody means."""
+
 _SECONDS: Final = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "sec": 1.0, "min": 60.0, "h": 3600.0}
 _RATES: Final = {"": 1.0, "fps": 1.0, "hz": 1.0, "/s": 1.0}
 
@@ -81,6 +85,28 @@ def image_size(text: str, option: str) -> tuple[int, int]:
     if not all(size_px):
         raise SettingsError(f"{option} is {text!r}", "give WIDTHxHEIGHT in px, for example 640x480")
     return size_px
+
+
+def whole_number(text: str) -> int:
+    """Read a whole number, with or without sign.
+
+    Raises:
+        ValueError: it is none.
+    """
+    if not _WHOLE.fullmatch(text):
+        raise ValueError(text)
+    return int(text)
+
+
+def decimal_number(text: str) -> float:
+    """Read a number, such as 30, -1.5 or 2e3. There is no infinity, and NaN is none.
+
+    Raises:
+        ValueError: it is none, or too large.
+    """
+    if not _DECIMAL.fullmatch(text) or not math.isfinite(value := float(text)):
+        raise ValueError(text)
+    return value
 
 
 def reading(read: Callable[[str, str], float], option: str) -> Reader:

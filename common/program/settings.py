@@ -9,13 +9,15 @@ import logging
 import os
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Generic, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Final, Generic, TypeVar, get_args, get_origin, get_type_hints
 
 from common.errors import DataError, SettingsError
 from common.files import read_whole
+from common.plain_text import printable_lines
+from common.program.quantities import decimal_number, whole_number
 
 T = TypeVar("T")
 
@@ -114,7 +116,9 @@ def listing(resolved: Resolved[Any], *, as_json: bool) -> str:
         (name, " ".join(value) if isinstance(value, tuple) else str(value), origin) for name, value, origin in rows
     ]
     widths = [max(len(row[column]) for row in shown) for column in (0, 1)]
-    return "\n".join(f"{name:{widths[0]}}  {value:{widths[1]}}  {origin}" for name, value, origin in shown)
+    return printable_lines(
+        "\n".join(f"{name:{widths[0]}}  {value:{widths[1]}}  {origin}" for name, value, origin in shown)
+    )
 
 
 def log_level(name: str) -> int:
@@ -196,13 +200,16 @@ def _checked(value: object, hint: Any, where: str) -> object:  # noqa: ANN401 - 
     raise SettingsError(f"{where} is {value!r}", f"give {_name(hint)}")
 
 
+_READERS: Final[dict[Any, Callable[[str], object]]] = {str: str, int: whole_number, float: decimal_number}
+
+
 def _parsed(text: str, hint: Any, where: str) -> object:  # noqa: ANN401 - a type hint
     try:
         if get_origin(hint) is tuple:
             return tuple(text.split())
         if hint is bool:
             return {"0": False, "1": True, "false": False, "true": True}[text.lower()]
-        return hint(text)
+        return _READERS[hint](text)
     except (ValueError, KeyError):
         raise SettingsError(f"{where} is {text!r}", f"give {_name(hint)}") from None
 

@@ -1,10 +1,16 @@
-"""Fits text to a terminal: a phone's has about 50 columns. Text that goes to a file or a pipe stays as it is."""
+"""Fits text to a terminal: a phone's has about 50 columns. Lines that go to a file or a pipe keep their length.
+
+Rule: all that people read goes through `folded`. So no name or value that it quotes can control their terminal, wherever it is shown later.
+"""
 
 import os
 import re
 import sys
 import textwrap
+from collections.abc import Sequence
 from typing import Final, TextIO
+
+from common.plain_text import printable, printable_lines
 
 _COMMAND: Final = re.compile(
     r"\s*(\S+ \S+ {2,})?((?:'[^']*/|\S*/)?(phone-host|board-agent|delay-bench)(?!\S)|(python3?|pipx?|sudo|make|\.) )"
@@ -23,11 +29,7 @@ def columns(stream: TextIO | None = None) -> int:
     Args:
         stream: standard output if left out.
     """
-    stream = stream or sys.stdout
-    try:
-        return os.get_terminal_size(stream.fileno()).columns
-    except (OSError, ValueError):  # no terminal, or no file at all
-        return 0
+    return _size(stream or sys.stdout).columns
 
 
 def rows(stream: TextIO | None = None) -> int:
@@ -36,11 +38,27 @@ def rows(stream: TextIO | None = None) -> int:
     Args:
         stream: standard output if left out.
     """
-    stream = stream or sys.stdout
+    return _size(stream or sys.stdout).lines
+
+
+def _size(stream: TextIO | None) -> os.terminal_size:
     try:
-        return os.get_terminal_size(stream.fileno()).lines
-    except (OSError, ValueError):
-        return 0
+        return os.get_terminal_size(-1 if stream is None else stream.fileno())
+    except (OSError, ValueError):  # no terminal, or no file at all
+        return os.terminal_size((0, 0))
+
+
+def say(text: str | Sequence[str], stream: TextIO | None = None, *, flush: bool = False) -> None:
+    """Print text that people read, fitted to the terminal.
+
+    Args:
+        text: as lines, each stays one whatever it quotes; as one text, it may hold the ends of lines.
+        stream: standard output if left out.
+        flush: whether it must be seen now, and not when the program ends.
+    """
+    lines = text if isinstance(text, str) else "\n".join(map(printable, text))
+    stream = stream or sys.stdout
+    print(fitted(lines, stream), file=stream, flush=flush)
 
 
 def headed(text: str, width: int, height: int) -> str:
@@ -66,6 +84,8 @@ def fitted(text: str, stream: TextIO | None = None) -> str:
 def folded(text: str, width: int) -> str:
     """Fold lines that are longer than a terminal's at spaces. Words, numbers and paths are never cut, commands stay whole.
 
+    What could control the terminal is shown as Python writes it: an escape becomes its code in letters.
+
     Args:
         text: lines.
         width: of the terminal; 0: no limit.
@@ -73,7 +93,8 @@ def folded(text: str, width: int) -> str:
     Returns:
         The lines; those that continue one are indented.
     """
-    return "\n".join(_fold(line, width) for line in text.split("\n")) if width else text
+    plain = printable_lines(text)
+    return "\n".join(_fold(line, width) for line in plain.split("\n")) if width else plain
 
 
 def _fold(line: str, width: int) -> str:

@@ -43,13 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's options."""
     parser.add_argument(
         "--links",
-        default="",
         metavar="NAMES",
         help="tcp, ipc, serial (over a pseudo terminal), rfcomm, or addresses of boards (default: every kind that works here)",
     )
-    parser.add_argument(
-        "--emulate", default="", metavar="NAMES", help="make links behave like these interfaces; `list` shows them"
-    )
+    parser.add_argument("--emulate", metavar="NAMES", help="make links behave like these interfaces; `list` shows them")
     parser.add_argument(
         "--size", default="320x240,640x480", metavar="SIZES", help="image sizes (default 320x240,640x480)"
     )

@@ -8,6 +8,7 @@ from common.camera_identity import UNKNOWN_CAMERA, RememberedCamera
 from common.errors import DataError, SettingsError
 from common.imagesize.head import MOST_PIXELS, size_text
 from common.orientation import UPRIGHT, Orientation
+from common.places import Kind, kind_of
 from phone_host.model import Rig
 from phone_host.output.cameras_json import CAMERAS_NAME, read_cameras
 from phone_host.stereo.images import open_image
@@ -31,7 +32,9 @@ def cameras_beside(files: ViewFiles, mounted: tuple[Orientation, Orientation]) -
         DataError: the file is not valid, two such files differ, or its cameras' images have another size than these.
         SettingsError: the user gives an orientation, but a run has saved these images upright.
     """
-    found = [path for path in (folder / CAMERAS_NAME for folder in _folders(files)) if path.exists()]
+    found = [
+        path for path in (folder / CAMERAS_NAME for folder in _folders(files)) if kind_of(path) is not Kind.MISSING
+    ]
     if not found:
         return None
     path, cameras = found[0], read_cameras(found[0])

@@ -194,9 +194,16 @@ def check_ports(ports: tuple[str, ...], problem: str) -> Finding:
     return ok("serial", ", ".join(ports) if ports else "no USB or Bluetooth serial port is there now")
 
 
-def check_out(folder: str, *, writable: bool) -> list[Finding]:
-    """Judge whether results can be written to a folder. If so, return nothing: the disk's finding names the folder."""
-    return [] if writable else [fail("out", f"{folder} cannot be written to", "choose another folder with --out")]
+def check_out(folder: str, obstacle: str) -> list[Finding]:
+    """Judge whether results can be written to a folder. If so, return nothing: the disk's finding names the folder.
+
+    Args:
+        folder: as the user named it.
+        obstacle: why nothing can be written there; empty: it can.
+    """
+    if not obstacle:
+        return []
+    return [fail("out", f"{folder} cannot be written to ({obstacle})", "choose another folder with --out")]
 
 
 def _numbers(version: str) -> tuple[int, ...]:

@@ -4,6 +4,7 @@ What board and host share is in common/doctor. The installed packages may be bro
 OpenCV is imported before both are known to work.
 """
 
+import errno
 import importlib
 import os
 import socket
@@ -25,6 +26,7 @@ from common.doctor.unit_check import Unit
 from common.errors import TandemError, UnavailableError
 from common.keys import KeyFolder
 from common.link.factory import parse_link
+from common.places import Kind, nearest
 from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import is_http
@@ -101,11 +103,27 @@ def examine(question: Question) -> list[Finding]:
 
         findings.append(check_rig(read_rig_readings(question.calibration, question.camera)))
     findings += check_clocks(machine.read_clocks(Path(__file__).parent))
-    disk = machine.read_disk(question.out)
-    findings += [*check_out(str(question.out), writable=os.access(disk.path, os.W_OK)), check_disk(disk)]
+    findings += examine_out(question.out)
     log = machine.read_kernel_log()
     findings += [check_power(log, machine.read_supply()), check_usb_log(log)]
     return findings
+
+
+def examine_out(out: Path) -> list[Finding]:
+    """Check the folder of the results, or where it would be made, as a run would find it.
+
+    Args:
+        out: as the user named it.
+    """
+    try:
+        there, kind = nearest(out)
+        disk = machine.read_disk(there)
+    except OSError as error:
+        return check_out(str(out), error.strerror or str(error))
+    if kind is not Kind.FOLDER:
+        return check_out(str(out), f"{there} is {kind.value}, not a folder")
+    may_write = os.access(there, os.W_OK | os.X_OK)
+    return [*check_out(str(out), "" if may_write else os.strerror(errno.EACCES)), check_disk(disk)]
 
 
 def _packages() -> list[Package]:

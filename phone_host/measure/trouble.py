@@ -4,7 +4,8 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Final
 
-from common.errors import TandemError, printable
+from common.errors import TandemError
+from common.plain_text import printable
 
 _MOST_KINDS: Final = 16
 """Reasons may name figures of a single image; beyond this many different ones they are counted together."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from common.files import replacing_in
+from common.plain_text import writable
 
 
 @contextmanager
@@ -63,10 +64,10 @@ def write_parts(path: Path, parts: Iterable[bytes | memoryview]) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write `text` as UTF-8 to `path`, whole or not at all; it survives a power cut.
+    """Write `text` as UTF-8 to `path`, whole or not at all; it survives a power cut. Names in it may hold bytes that are no UTF-8.
 
     Raises:
         OSError: see `replacing`.
     """
     with replacing(path, durable=True) as file:
-        file.write(text.encode())
+        file.write(writable(text).encode())

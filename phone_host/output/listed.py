@@ -18,6 +18,8 @@ from typing import Final
 
 from common.errors import DataError, UnavailableError
 from common.files import read_file, replacing_in, sync_folder
+from common.places import make_folder
+from common.plain_text import writable
 from common.unfinished import unfinished
 
 LIST: Final = ".tandemscan"
@@ -48,7 +50,7 @@ class ListedFolder:
 
     def __init__(self, path: Path, names: str, *, kept: str = "(?!)", inner: str = "(?!)") -> None:
         self._path, self._inner = path, re.compile(inner)
-        path.mkdir(parents=True, exist_ok=True)
+        make_folder(path)
         self.descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
         self._list = -1
         try:
@@ -131,7 +133,7 @@ class ListedFolder:
             OSError: as the operating system reports it.
         """
         with replacing_in(self.descriptor, name) as file:
-            file.write(text.encode())
+            file.write(writable(text).encode())
 
     def sync(self) -> None:
         """Make the list and all names in the folder survive a power cut.

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import Final
 
+from common.plain_text import printable_page
 from phone_host.report import depth_script, depth_view
 from phone_host.svg.plot_parts import STYLE
 
@@ -35,7 +36,7 @@ def document(title: str, body: str, *, shows_depth: bool = False) -> str:
     policy = f"{_POLICY}; script-src '{depth_script.HASH}'" if shows_depth else _POLICY
     script = f"<script>{depth_script.SCRIPT}</script>" if shows_depth else ""
     style = f"{_PAGE_STYLE}{STYLE}{depth_view.STYLE if shows_depth else ''}"
-    return (
+    return printable_page(
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
         '<meta name="viewport" content="width=device-width,initial-scale=1"><meta name="color-scheme" content="light dark">'

@@ -11,7 +11,6 @@ the run has ended.
 """
 
 import errno
-import json
 import logging
 import os
 from collections.abc import Mapping
@@ -27,6 +26,7 @@ from phone_host.measure.sink_account import SinkAccount
 from phone_host.model import Result, Unwritten
 from phone_host.output.axes import Axes
 from phone_host.output.cameras_json import CAMERAS_NAME
+from phone_host.output.json_text import json_text
 from phone_host.output.listed import ListedFolder
 from phone_host.output.pair_files import PAIR_NAMES, RUN_FILES, write_pair
 from phone_host.run.sinks import NotWrittenError, SinkQueue
@@ -164,7 +164,7 @@ class FileSink:
             self._file = self._own.create("delays.jsonl")
             if settings is not None:
                 self._own.add("settings.json")
-                self._own.write_text("settings.json", json.dumps(settings, indent=1) + "\n")
+                self._own.write_text("settings.json", json_text(settings, indent=1) + "\n")
         except OSError as error:
             self._let_go()
             raise UnavailableError(
@@ -241,7 +241,7 @@ class FileSink:
         if self._own is None:
             return
         texts = {
-            "report.json": json.dumps(report, indent=1) + "\n",
+            "report.json": json_text(report, indent=1) + "\n",
             "index.html": page,
             CAMERAS_NAME: cameras,
         }

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
+from common.places import nearest
 from phone_host.output.atomic import write_text
 from phone_host.output.listed import ListedFolder, RunAll
 from phone_host.output.pair_files import PAIR_NAMES, STEREO_NAMES
@@ -100,6 +101,6 @@ def require_writable(path: Path) -> None:
     Raises:
         OSError: it cannot.
     """
-    there = next(each for each in (path, *path.absolute().parents) if each.exists())
+    there, _ = nearest(path)
     if not os.access(there, os.W_OK | os.X_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(there))

@@ -10,6 +10,7 @@ import cv2
 
 from common.camera.imagefile import SUFFIXES
 from common.errors import UnavailableError
+from common.places import make_folder
 from phone_host.model import CameraModel, Rig
 from phone_host.output.atomic import write_bytes
 from phone_host.scene.scene import Look, Renderer, Scene, rig_poses
@@ -149,7 +150,7 @@ def _render(
     advance: Callable[[], None],
 ) -> None:
     for target in targets.values():
-        target.mkdir(parents=True, exist_ok=True)
+        make_folder(target)
         if target.is_symlink():
             raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(target))
     for index, time_s in enumerate(times_s):

@@ -1,13 +1,14 @@
 """Pairs the images of the left and the right camera: by the number in the name, else in name order."""
 
 import glob
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from common.errors import DataError, SettingsError
+from common.name_order import DIGITS, name_order
+from common.places import Kind, kind_of, resolved
 
 SUFFIXES: Final = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp"})
 _UNREAD: Final = frozenset({".heic", ".heif", ".avif"})
@@ -15,7 +16,7 @@ _UNREAD: Final = frozenset({".heic", ".heif", ".avif"})
 
 _REMEDY: Final = "give an image, a folder of images or a quoted glob such as 'left*.png'"
 _MOST_KINDS: Final = 4  # enough to recognise a folder by; the line stays short
-_NUMBER = re.compile(r"\d+")
+_SHOWN: Final = 40  # of a pattern with hundreds of folders
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +56,8 @@ def pair_files(left: str | Sequence[str], right: str | Sequence[str]) -> ViewFil
         _require_one_kind(lefts[0], rights[0])
     left_files, right_files = _images_of(lefts, "LEFT"), _images_of(rights, "RIGHT")
     _require_two_sides(lefts[0], left_files, right_files)
-    if (
-        both_single and Path(lefts[0]).is_file() and Path(rights[0]).is_file()
-    ):  # whatever their numbers: the user names this pair
+    # Whatever their numbers: the user names this pair.
+    if both_single and _kind(lefts[0], "LEFT") is _kind(rights[0], "RIGHT") is Kind.FILE:
         [first], [second] = left_files, right_files
         return ViewFiles(((first.stem, first, second),), (), (), by_number=False)
     numbered = _numbered(left_files, right_files)
@@ -77,8 +77,9 @@ def pair_files(left: str | Sequence[str], right: str | Sequence[str]) -> ViewFil
 
 def _require_one_kind(left: str, right: str) -> None:
     """Refuse a folder beside a single file: only one pair could come of it, and hardly the one that is meant."""
+    kinds = {left: _kind(left, "LEFT"), right: _kind(right, "RIGHT")}
     for folder, file, names in ((left, right, ("LEFT", "RIGHT")), (right, left, ("RIGHT", "LEFT"))):
-        if Path(folder).is_dir() and Path(file).is_file():
+        if kinds[folder] is Kind.FOLDER and kinds[file] is Kind.FILE:
             raise SettingsError(
                 f"{names[0]} {folder} is a folder, {names[1]} {file} is a file", "give two files, or two folders"
             )
@@ -86,13 +87,14 @@ def _require_one_kind(left: str, right: str) -> None:
 
 def _require_two_sides(given: str, left: list[Path], right: list[Path]) -> None:
     """Refuse files that are on both sides."""
-    both = {path.resolve() for path in left} & {path.resolve() for path in right}
+    both = set(map(resolved, left)) & set(map(resolved, right))
     if not both:
         return
-    if Path(given).is_file():
+    kind = _kind(given, "LEFT")
+    if kind is Kind.FILE:
         remedy = "give the image of the other camera as RIGHT"
     else:
-        folder = given if Path(given).is_dir() else str(Path(given).parent)
+        folder = given if kind is Kind.FOLDER else str(Path(given).parent)
         remedy = f"give two folders, or one quoted glob for each side, such as '{folder}/left*' '{folder}/right*'"
     raise SettingsError(f"LEFT and RIGHT both name {min(both)}", remedy)
 
@@ -102,40 +104,68 @@ def _images_of(given: Sequence[str], side: str) -> list[Path]:
     found = {path for each in given for path in _images(each, side)}
     if len(given) > 1:  # a shell's glob also catches Thumbs.db
         found = {path for path in found if path.suffix.lower() in SUFFIXES} or found
-    return sorted(found, key=_natural)
+    return sorted(found, key=name_order)
+
+
+def _kind(given: str | Path, side: str) -> Kind:
+    """Return what a path is.
+
+    Raises:
+        DataError: that cannot be told.
+    """
+    try:
+        return kind_of(given)
+    except OSError as error:
+        raise _unreadable(str(given), side, error) from None
+
+
+def _unreadable(given: str, side: str, error: OSError) -> DataError:
+    return DataError(f"{side} {given!r} cannot be read ({error.strerror})", "check its name and your permissions")
 
 
 def _images(given: str, side: str) -> list[Path]:
     """Return the image files of a file's name, a folder or a glob, without hidden ones, sorted with numbers in names as numbers."""
-    path = Path(given)
-    if path.is_file():
-        return [path]
-    if path.is_dir():
-        inside = [entry for entry in path.iterdir() if entry.is_file() and not entry.name.startswith(".")]
-        files = [entry for entry in inside if entry.suffix.lower() in SUFFIXES]
-        # A folder of nothing else: whoever opens one says how to convert it.
-        files = files or [entry for entry in inside if entry.suffix.lower() in _UNREAD]
-        if not files:
-            if not inside:
-                raise DataError(f"{side} {given!r} names no image", _REMEDY)
-            kinds = sorted({entry.suffix.lower() or "no suffix" for entry in inside})
-            shown = ", ".join(kinds[:_MOST_KINDS])
-            raise DataError(f"{side} {given!r} names no image, only {len(inside)} other files ({shown})", _REMEDY)
-    else:
-        found = [Path(name) for name in glob.glob(given)]  # noqa: PTH207 - a pattern may be absolute
-        files = [entry for entry in found if entry.is_file() and not entry.name.startswith(".")]
-        if not files:
-            what = "names no image" if glob.has_magic(given) else "does not exist"
-            raise DataError(f"{side} {given!r} {what}", _REMEDY)
-        # A wide pattern also catches Thumbs.db; one of nothing but unusual names is meant as it is.
-        files = [entry for entry in files if entry.suffix.lower() in SUFFIXES] or files
-    return sorted(files, key=_natural)
+    match kind := _kind(given, side):
+        case Kind.FILE:
+            return [Path(given)]
+        case Kind.FOLDER:
+            files = _inside(given, side)
+        case Kind.MISSING:
+            files = _matching(given, side)
+        case _:
+            raise DataError(f"{side} {given!r} is {kind.value}, no file of an image", _REMEDY)
+    return sorted(files, key=name_order)
 
 
-def _natural(path: Path) -> tuple[list[tuple[int, str]], str]:
-    """Return a sort key in which digits compare as numbers and the rest as text."""
-    parts = re.split(r"(\d+)", path.name)
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts], str(path)
+def _inside(folder: str, side: str) -> list[Path]:
+    try:
+        entries = [entry for entry in Path(folder).iterdir() if not entry.name.startswith(".")]
+    except OSError as error:
+        raise _unreadable(folder, side, error) from None
+    inside = [entry for entry in entries if _kind(entry, side) is Kind.FILE]
+    files = [entry for entry in inside if entry.suffix.lower() in SUFFIXES]
+    # A folder of nothing else: whoever opens one says how to convert it.
+    files = files or [entry for entry in inside if entry.suffix.lower() in _UNREAD]
+    if files:
+        return files
+    if not inside:
+        raise DataError(f"{side} {folder!r} names no image", _REMEDY)
+    kinds = sorted({entry.suffix.lower() or "no suffix" for entry in inside})
+    shown = ", ".join(kinds[:_MOST_KINDS])
+    raise DataError(f"{side} {folder!r} names no image, only {len(inside)} other files ({shown})", _REMEDY)
+
+
+def _matching(pattern: str, side: str) -> list[Path]:
+    try:
+        found = [Path(name) for name in glob.glob(pattern)]  # noqa: PTH207 - a pattern may be absolute
+    except RecursionError:
+        raise DataError(f"{side} {pattern[:_SHOWN]!r} ... has too many folders", _REMEDY) from None
+    files = [entry for entry in found if not entry.name.startswith(".") and _kind(entry, side) is Kind.FILE]
+    if not files:
+        what = "names no image" if glob.has_magic(pattern) else "does not exist"
+        raise DataError(f"{side} {pattern!r} {what}", _REMEDY)
+    # A wide pattern also catches Thumbs.db; one of nothing but unusual names is meant as it is.
+    return [entry for entry in files if entry.suffix.lower() in SUFFIXES] or files
 
 
 def _numbered(left: list[Path], right: list[Path]) -> tuple[dict[int, Path], dict[int, Path]] | None:
@@ -164,4 +194,4 @@ def _by_number(files: list[Path], place: int) -> dict[int, Path]:
 
 
 def _numbers(path: Path) -> list[str]:
-    return _NUMBER.findall(f"{path.absolute().parent.name}/{path.stem}")
+    return DIGITS.findall(f"{path.absolute().parent.name}/{path.stem}")

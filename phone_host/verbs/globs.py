@@ -54,7 +54,7 @@ def _folder(path: str) -> str:
 
 
 def _without_digits(path: str) -> str:
-    return re.sub(r"\d+", "#", path)
+    return re.sub(r"[0-9]+", "#", path)
 
 
 def _grouped(paths: Sequence[str], key: Callable[[str], str]) -> list[tuple[str, ...]]:

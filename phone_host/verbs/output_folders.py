@@ -1,6 +1,5 @@
 """Checks where a verb's results go. Impossible targets are refused before the work; write errors carry a remedy."""
 
-import json
 import os
 import re
 import sys
@@ -10,6 +9,9 @@ from typing import Final
 
 from common.errors import DataError, SettingsError, UnavailableError
 from common.files import read_whole
+from common.places import Kind, kind_of, nearest, resolved
+from common.program.terminal import say
+from phone_host.output.json_text import json_value
 from phone_host.output.listed import ListedFolder, claim
 
 REPORT: Final = "report.json"
@@ -73,9 +75,9 @@ def spare_inputs(out: Path, names: str, inputs: Mapping[str, Path]) -> None:
     Raises:
         SettingsError: an input lies under such a name.
     """
-    folder = out.resolve()
+    folder = resolved(out)
     for what, path in inputs.items():
-        inside = path.resolve()
+        inside = resolved(path)
         if folder in inside.parents and re.fullmatch(names, inside.relative_to(folder).parts[0]):
             raise SettingsError(
                 f"{what} {path} lies inside --out {out}, which is replaced", "give another folder with --out"
@@ -95,7 +97,11 @@ def keep_other_report(folder: Path, command: str) -> None:
     owner = _owner_of(folder / REPORT)
     if owner in {"", command}:
         return
-    moves = {name: f"{Path(name).stem}-{owner}{Path(name).suffix}" for name in _REPLACED if (folder / name).exists()}
+    moves = {
+        name: f"{Path(name).stem}-{owner}{Path(name).suffix}"
+        for name in _REPLACED
+        if kind_of(folder / name) is not Kind.MISSING
+    }
     try:
         listed = ListedFolder(folder, "(?!)", kept="|".join(map(re.escape, (*moves, *moves.values()))))
         try:
@@ -107,13 +113,13 @@ def keep_other_report(folder: Path, command: str) -> None:
     except OSError as error:
         raise unwritable(folder, error) from error
     names = " and ".join(moves.values())
-    print(f"phone-host: kept what {owner} had written in {folder} as {names}", file=sys.stderr)
+    say(f"phone-host: kept what {owner} had written in {folder} as {names}", sys.stderr)
 
 
 def _owner_of(report: Path) -> str:
     """Return the verb that wrote a report; empty if there is none, or it does not say."""
     try:
-        content = json.loads(read_whole(report, _MOST_REPORT_BYTES))
+        content = json_value(read_whole(report, _MOST_REPORT_BYTES))
     except (OSError, DataError, ValueError):
         return ""
     if not isinstance(content, dict):
@@ -135,8 +141,12 @@ def require_file(out: Path, option: str = "--out") -> None:
         UnavailableError: it is not a regular file, or a parent of it is not a folder.
     """
     _require_folder(out.parent, out, option)
-    if out.exists() and not out.is_file():
-        raise UnavailableError(f"{out} is not a file", f"name another {option}")
+    try:
+        kind = kind_of(out)
+    except OSError as error:
+        raise unwritable(out, error, option) from None
+    if kind not in {Kind.MISSING, Kind.FILE}:
+        raise UnavailableError(f"{out} is {kind.value}, not a file", f"name another {option}")
 
 
 def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableError:
@@ -158,8 +168,8 @@ def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableE
 
 def _require_folder(folder: Path, out: Path, option: str) -> None:
     try:
-        there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+        there, kind = nearest(folder)
     except OSError as error:
         raise unwritable(out, error, option) from None
-    if not there.is_dir():
-        raise UnavailableError(f"{there} is not a folder", f"name another {option}")
+    if kind is not Kind.FOLDER:
+        raise UnavailableError(f"{there} is {kind.value}, not a folder", f"name another {option}")

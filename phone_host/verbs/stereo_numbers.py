@@ -3,6 +3,7 @@
 import math
 
 from common.errors import SettingsError
+from common.program.quantities import decimal_number
 from phone_host.model import Crop
 
 _LEAST_SCALE = 0.1
@@ -64,6 +65,6 @@ def scale_of(text: str) -> float:
 def _number(text: str) -> float:
     """Return a number, or NaN if the text is none."""
     try:
-        return float(text)
+        return decimal_number(text)
     except ValueError:
         return math.nan

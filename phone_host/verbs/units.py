@@ -75,16 +75,10 @@ def baseline_mm(text: str) -> float:
         mm, 1 mm to 10 m.
 
     Raises:
-        SettingsError: it is no length, or shorter or longer than that.
+        SettingsError: it is no length, a number without a unit that can only mean metres, or shorter or longer than that.
     """
-    value = length_mm(text, "--baseline", "60mm")
-    found = _LENGTH.fullmatch(text)
+    value = _not_metres(text, "--baseline", "60mm", _LEAST_BARE_BASELINE_MM, _LEAST_BASELINE_MM)
     if value < _LEAST_BASELINE_MM:
-        if found is not None and not found[2]:
-            raise SettingsError(
-                f"--baseline {text.strip()} has no unit, and a number alone means mm",
-                f"write {value * 1000:g}mm or {value:g}m",
-            )
         raise SettingsError(
             f"--baseline {text.strip()} is {value:g} mm",
             f"give the distance of the two cameras, at least {_LEAST_BASELINE_MM:g}mm",
@@ -118,13 +112,14 @@ def limit_mm(text: str, option: str, example: str) -> float:
     return value
 
 
-def _not_metres(text: str, option: str, example: str, least_mm: float) -> float:
-    """Read a length; refuse a number without a unit that is too small to mean millimetres."""
+def _not_metres(text: str, option: str, example: str, least_mm: float, possible_mm: float = 0.0) -> float:
+    """Read a length; refuse a number without a unit that is below `least_mm`: too small to mean millimetres."""
     value = length_mm(text, option, example)
     found = _LENGTH.fullmatch(text)
     if found is not None and not found[2] and value < least_mm:
         raise SettingsError(
             f"{option} {text.strip()} has no unit, and a number alone means mm",
-            f"write {value * 1000:g}mm or {value:g}m; {value:g}mm if you mean that",
+            f"write {value * 1000:g}mm or {value:g}m"
+            + (f"; {value:g}mm if you mean that" if value >= possible_mm else ""),
         )
     return value

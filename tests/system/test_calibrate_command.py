@@ -202,7 +202,12 @@ def test_what_is_no_file_is_not_replaced(boards: Path, tmp_path: Path) -> None:
     """If --out is a folder or a pipe, or lies in a file, exit 3 follows at once; it stays unchanged."""
     (tmp_path / "file").write_text("no folder")
     os.mkfifo(tmp_path / "pipe")
-    for out, said in (("", "is not a file"), ("pipe", "pipe is not a file"), ("file/rig.yaml", "file is not a folder")):
+    cases = (
+        ("", "is a folder, not a file"),
+        ("pipe", "is a pipe, not a file"),
+        ("file/rig.yaml", "is a file, not a folder"),
+    )
+    for out, said in cases:
         done = _phone_host(
             "calibrate", boards / "left", boards / "right", "--board", "9x6", "--square", 25, "--out", tmp_path / out
         )

@@ -195,17 +195,21 @@ def _bad_cases(folder: Path) -> dict[str, tuple[list[object], int, str]]:
         "center alone": ([left, right, *rectified, "--center", "99,59", *out], 2, "--center without --focal"),
         "doffs alone": ([left, right, *rectified, "--doffs", 0, *out], 2, "--doffs without --focal"),
         "near": ([left, right, "--calibration", folder / "rig.yaml", "--near", 0, *out], 2, "--near"),
-        "out is a file": ([left, right, *rectified, "--out", folder / "file"], 3, "file is not a folder: name another"),
+        "out is a file": (
+            [left, right, *rectified, "--out", folder / "file"],
+            3,
+            "file is a file, not a folder: name another",
+        ),
         "out lies in a file": (
             [left, right, *rectified, "--out", folder / "file" / "a" / "b"],
             3,
-            "file is not a folder",
+            "file is a file, not a folder",
         ),
         "out holds the images": ([left, right, *rectified, "--out", folder], 2, "folder of the images"),
         "one side": ([left, *rectified, *out], 2, "only one side is given"),
         "same image": ([left, left, *rectified, *out], 2, "both name"),
         "folder and file": ([folder, right, *rectified, *out], 2, "is a folder, RIGHT"),
-        "out is a device": ([left, right, *rectified, "--out", "/dev/null"], 3, "/dev/null is not a folder"),
+        "out is a device": ([left, right, *rectified, "--out", "/dev/null"], 3, "/dev/null is a device, not a folder"),
     }
 
 

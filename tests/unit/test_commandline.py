@@ -125,3 +125,34 @@ def test_an_empty_path_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert leaving.value.code == 2
     assert "--out is empty" in capsys.readouterr().err
     assert parser.parse_args(["--out", "."]).out == Path()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "culprit"),
+    [
+        (["--kind", ""], "--kind is empty"),
+        (["--kind=--"], "--kind needs a value"),
+        (["--count=--"], "--count needs a value"),
+        (["--size=--"], "--size needs a value"),
+        (["--out=--"], "--out needs a value"),
+        (["--count", "1_0"], "--count is '1_0'"),
+        (["--size", "\u0661"], "--size is '\u0661'"),
+        ([""], "IMAGE is empty"),
+        (["--kind\x1b[31m"], r"--kind\x1b[31m"),
+    ],
+)
+def test_values_that_nobody_means_are_wrong_usage(
+    arguments: list[str], culprit: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing at all, two dashes and numbers in other scripts are refused for every kind of argument; the line controls no terminal."""
+    parser = ExamplesFirstParser("sample")
+    parser.add_argument("images", nargs="*", metavar="IMAGE")
+    parser.add_argument("--kind")
+    parser.add_argument("--count", type=int)
+    parser.add_argument("--size", type=float)
+    parser.add_argument("--out", type=Path)
+    assert run_command(parser, arguments, lambda _: 0) == 2
+    said = capsys.readouterr().err
+    assert culprit in said
+    assert said.rstrip("\n").isprintable()
+    assert run_command(parser, ["--kind=-", "--", "--count=--"], lambda options: len(options.images)) == 1

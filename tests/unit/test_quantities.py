@@ -13,7 +13,14 @@ import phone_host.cli
 from common.camera.factory import parse_camera
 from common.camera.v4l2_stream import V4l2Settings
 from common.errors import SettingsError
-from common.program.quantities import frames_per_second, image_size, milliseconds, seconds
+from common.program.quantities import (
+    decimal_number,
+    frames_per_second,
+    image_size,
+    milliseconds,
+    seconds,
+    whole_number,
+)
 from phone_host.bench.cases import Size, parse_qualities, parse_rates, parse_sizes
 from phone_host.settings import most_pixels, resolve_settings
 
@@ -126,3 +133,19 @@ def test_a_limit_of_megapixels_is_one_that_a_decoder_has(megapixels: int) -> Non
     assert most_pixels(None, 1024) == 2**30
     with pytest.raises(SettingsError, match="max_megapixels is"):
         most_pixels(None, megapixels)
+
+
+@pytest.mark.parametrize(
+    "text", ["1_000", "\u0661\u0666", "\uff11\uff16", "\u00b2", "", "1e", "0x10", "nan", "inf", "1e999", "9" * 5000]
+)
+def test_numbers_are_of_ascii_digits_only(text: str) -> None:
+    """What Python takes beside them is no number to us, nor is what is none at all."""
+    for read in (whole_number, decimal_number):
+        with pytest.raises(ValueError, match=r"^"):
+            read(text)
+
+
+def test_plain_numbers_are_read() -> None:
+    """With and without sign, blanks and exponent."""
+    assert [whole_number(text) for text in ("16", " -3", "+2 ")] == [16, -3, 2]
+    assert [decimal_number(text) for text in ("16", "-.5", "2.", "1e3", "+31.086")] == [16, -0.5, 2, 1000, 31.086]

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from common.camera.base import Skipped
 from common.camera.factory import open_camera, parse_camera
-from common.camera.replay import ReplayCamera, ReplaySettings, find_images, name_order
+from common.camera.replay import ReplayCamera, ReplaySettings, find_images
 from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import Frame
+from common.name_order import name_order
 from common.protocol.message import Pacing
 from phone_host.camera.factory import check_camera
 from tests.support.pictures import jpeg

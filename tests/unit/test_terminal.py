@@ -160,7 +160,7 @@ def test_the_list_of_interfaces_fits_a_phone(tmp_path: Path) -> None:
 
 def test_rejected_pairs_fit_a_phones_terminal() -> None:
     """The line of a pair that is not used goes on below its reason; nothing is wider than 50 columns."""
-    line = rejections(
+    [line] = rejections(
         (Rejected("12", Reason.NOT_FOUND_LEFT, "the board is not seen whole and sharp in the left image"),)
     )
     lines = folded(line, PHONE).split("\n")

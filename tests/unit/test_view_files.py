@@ -4,7 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from common.camera.image_numbers import numbers_of
+from common.camera.replay import find_images
 from common.errors import DataError, SettingsError
+from common.name_order import name_order
 from phone_host.stereo.view_files import pair_files
 
 
@@ -144,3 +147,17 @@ def test_saved_pairs_are_paired_by_the_numbers_of_their_folders(tmp_path: Path) 
     assert files.by_number
     assert [name for name, _, _ in files.pairs] == ["0", "15"]
     assert [path.parent.name for path in files.right_alone] == ["pair-000004"]
+
+
+def test_only_ascii_digits_number_a_file(tmp_path: Path) -> None:
+    """Superscripts, circled digits and those of other scripts are letters: they neither fail nor pair."""
+    left = _touch(tmp_path / "l", "1²3.png", "②.png", "٣.png", "4.png", "10.png")
+    right = _touch(tmp_path / "r", "r1.png", "r3.png", "r4.png", "r10.png")
+    files = pair_files(str(left), str(right))
+    assert [(name, a.name, b.name) for name, a, b in files.pairs] == [
+        ("3", "1²3.png", "r3.png"), ("4", "4.png", "r4.png"), ("10", "10.png", "r10.png"),
+    ]  # fmt: skip
+    assert {path.name for path in files.left_alone} == {"②.png", "٣.png"}
+    names = [path.name for path in find_images(str(left))]
+    assert names == sorted(names, key=lambda name: name_order(Path(name)))
+    assert numbers_of(["a²", "a①"]) == ()

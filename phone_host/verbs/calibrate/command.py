@@ -1,12 +1,14 @@
 """phone-host calibrate: calibrate two cameras from pictures of a chessboard."""
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from common.errors import DataError, UnavailableError
-from common.program.terminal import fitted
+from common.places import Kind, kind_of, make_folder
+from common.program.terminal import say
 from phone_host.calibration.arrangement import Misplaced, is_contradicted, misplaced
 from phone_host.calibration.board_pairs import Calibration, Reason
 from phone_host.calibration.board_views import BoardViews, Mounted, look_for_boards
@@ -49,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     board = parse_board(options.board, square_mm(options.square))
     mounted = orientations(options)
     require_file(options.out)
-    if options.out.exists() and not is_rig(options.out):
+    if kind_of(options.out) is not Kind.MISSING and not is_rig(options.out):
         raise UnavailableError(f"{options.out} is not a calibration, and would be replaced", "name another --out")
     files = pair_files(*two_lists(options.images))
     keep_other_report(options.out.parent, "calibrate")
@@ -69,11 +71,7 @@ def run(options: argparse.Namespace) -> int:
     report = report_of(files, views, rejected, found, judgement)
     report |= _write_rig(options.out, replace(found, rig=rig))
     _write_report(options.out, report)
-    print(
-        json_text(report)
-        if options.json
-        else fitted("\n".join([*pairing_notes(files), summary(report, views, found, rejected, options.out)]))
-    )
+    _tell(options, report, [*pairing_notes(files), *summary(report, views, found, rejected, options.out)])
     return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
 
 
@@ -106,9 +104,15 @@ def _report_failure(files: ViewFiles, views: BoardViews, failure: DataError, opt
     error = DataError(failure.problem, _COUNT_CORNERS) if 2 * unseen > len(files.pairs) else failure
     report = report_of_failure(files, views, error) | _write_rig(options.out, None)
     _write_report(options.out, report)
-    text = "\n".join([*pairing_notes(files), rejections(views.rejected), *unwritten(report, options.out)])
-    print(json_text(report) if options.json else fitted(text))
+    _tell(options, report, [*pairing_notes(files), *rejections(views.rejected), *unwritten(report, options.out)])
     raise error
+
+
+def _tell(options: argparse.Namespace, report: dict[str, Any], lines: Sequence[str]) -> None:
+    if options.json:
+        print(json_text(report))
+    else:
+        say(lines)
 
 
 def _advised(judgement: Assessment, found: Calibration, wrong: Misplaced | None, hint: str) -> Assessment:
@@ -129,8 +133,8 @@ def _write_rig(out: Path, calibration: Calibration | None) -> dict[str, str]:
     rig = None if calibration is None else calibration.rig
     moved: dict[str, str] = {}
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        if (rig is None or rig.verdict == REJECTED) and out.exists() and not _is_rejected(out):
+        make_folder(out.parent)
+        if (rig is None or rig.verdict == REJECTED) and kind_of(out) is not Kind.MISSING and not _is_rejected(out):
             aside = out.with_name(f"{out.name}.old")
             out.replace(aside)
             moved = {"earlier_rig": aside.name}

@@ -129,9 +129,9 @@ def depth_limit_m(calibration: Calibration) -> float:
     return depth_limits(made.geometry, error_px, DepthWanted()).far_m
 
 
-def rejections(rejected: tuple[Rejected, ...]) -> str:
+def rejections(rejected: tuple[Rejected, ...]) -> list[str]:
     """Return one line per pair that is not used."""
-    return "\n".join(f"{each.name:>8}  rejected: {each.reason.value} ({each.detail})" for each in rejected)
+    return [f"{each.name:>8}  rejected: {each.reason.value} ({each.detail})" for each in rejected]
 
 
 def pairing_notes(files: ViewFiles) -> list[str]:
@@ -154,8 +154,8 @@ def _earlier(report: dict[str, Any]) -> str:
 
 def summary(
     report: dict[str, Any], views: BoardViews, calibration: Calibration, rejected: tuple[Rejected, ...], out: Path
-) -> str:
-    """Return the report as text."""
+) -> list[str]:
+    """Return the report as lines of text."""
     # A rig that cannot be rectified has no vertical errors.
     known = calibration.obstacle is None
     rows = [f"{'pair':>8}  {'left px':>8} {'right px':>8}" + (f" {'vertical px':>11}" if known else "")]
@@ -163,8 +163,7 @@ def summary(
         f"{u.name:>8}  {u.left_px:8.3f} {u.right_px:8.3f}" + (f" {u.vertical_px:11.3f}" if known else "")
         for u in calibration.used
     ]
-    if rejected:
-        rows.append(rejections(rejected))
+    rows += rejections(rejected)
     rms, vertical, used = report["rms_px"], report["vertical_error_px"], report["pairs"]["used"]
     rows.append(f"{counted(used, 'pair')} used, {len(rejected)} rejected")
     for side, turn in zip(("left", "right"), views.turned, strict=True):
@@ -181,7 +180,7 @@ def summary(
         rows.append(f"zero     disparity +- {report['zero_sigma_px']:.2f} px; depth beyond {far} m is a guess")
     rows.append(f"verdict  {report['verdict']}")
     rows += [f"remedy   {remedy}" for remedy in report["remedy"].split("; ") if remedy]
-    return "\n".join([*rows, *_written(report, calibration, out)])
+    return [*rows, *_written(report, calibration, out)]
 
 
 def _written(report: dict[str, Any], calibration: Calibration, out: Path) -> list[str]:

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " --calibration, any textured thing that moves up and down (default screen)",
     )
     parser.add_argument("--link", metavar="URI", help="address of the board (default: look for one, as `run` does)")
-    parser.add_argument("--keys", default="", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
+    parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
     parser.add_argument("--camera", metavar="URI", help=f"camera of this machine: {EXAMPLE}")
     parser.add_argument(
         "--frames",

@@ -13,6 +13,7 @@ from common import now
 from common.errors import SettingsError
 from common.frame import SpoiledImageError
 from common.link.factory import open_links, parse_link, tell_insecure
+from common.places import make_folder
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level
@@ -85,11 +86,11 @@ def _check(options: argparse.Namespace) -> None:
 def _write_pattern(options: argparse.Namespace) -> int:
     require_file(options.pattern, "--pattern")
     try:
-        options.pattern.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(options.pattern.parent)
         write_text(options.pattern, pattern_page())
     except OSError as error:
         raise unwritable(options.pattern, error, "--pattern") from error
-    print(json_text({"pattern": str(options.pattern)}) if options.json else f"written to {options.pattern}")
+    print(json_text({"pattern": str(options.pattern)}) if options.json else fitted(f"written to {options.pattern}"))
     return 0
 
 
@@ -97,7 +98,7 @@ def _footage(options: argparse.Namespace, signals: StopSignals) -> Footage:
     if options.frames is not None:
         return read(options.frames)
     camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns())
-    keys = key_folder(options.keys)
+    keys = key_folder(options.keys or "")
     uri = parse_link(options.link or find_board_and_say(keys.path, options.wait), listens_by_default=False)
     tell_insecure(uri)
     links = open_links([uri], keys)

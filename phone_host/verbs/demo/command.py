@@ -1,7 +1,6 @@
 """phone-host demo: run both programs on this machine with a rendered scene of known depth, and write a full report."""
 
 import argparse
-import json
 import shlex
 import sys
 from contextlib import nullcontext
@@ -15,7 +14,7 @@ from common.program.commandline import INTERRUPTED
 from common.program.invocation import command_line, program_name
 from common.program.settings import with_origins
 from common.program.signals import StopSignals
-from common.program.terminal import columns, fitted, headed, rows
+from common.program.terminal import columns, headed, rows, say
 from common.words import counted
 from phone_host.children.board_process import socket_folder
 from phone_host.demo.demo_page import demo_page
@@ -23,6 +22,7 @@ from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, truth_json
 from phone_host.measure.trouble import trouble_of
 from phone_host.model import Rig
 from phone_host.output.atomic import write_text
+from phone_host.output.json_text import json_text
 from phone_host.output.listed import ListedFolder
 from phone_host.output.pair_files import PAIR_NAMES
 from phone_host.output.rig_yaml import write_rig
@@ -78,8 +78,8 @@ def run(options: argparse.Namespace) -> int:
             f"{error.filename or out} cannot be written ({error.strerror})",
             "make room on the disk, or give another folder with --out",
         ) from None
-    print(json.dumps(report) if options.json else headed(summary(snapshot, columns()), columns(), rows()))
-    print(fitted(_closing(out, film, errors), sys.stderr), file=sys.stderr)
+    print(json_text(report) if options.json else headed(summary(snapshot, columns()), columns(), rows()))
+    say(_closing(out, film, errors), sys.stderr)
     if signals.stop:
         return INTERRUPTED if signals.interrupted else 0
     return 0 if errors.pairs and not errors.wrong_pairs and complete else _CHECK_FAILED

@@ -1,7 +1,6 @@
 """phone-host doctor: check settings, Python, camera, link, rig and disk."""
 
 import argparse
-import json
 import math
 
 from common.doctor.finding import exit_code, settings_finding, table, values
@@ -9,6 +8,7 @@ from common.errors import SettingsError
 from common.program.terminal import fitted
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.doctor.host_doctor import Question, examine
+from phone_host.output.json_text import json_text
 from phone_host.settings import check, key_folder, resolve_settings
 
 
@@ -32,5 +32,5 @@ def run(options: argparse.Namespace) -> int:
         keys=key_folder(settings.keys),
     )
     findings = [settings_finding(str(options.config or ""), wrong), *examine(question)]
-    print(json.dumps(values(findings)) if options.json else fitted(table(findings)))
+    print(json_text(values(findings)) if options.json else fitted(table(findings)))
     return exit_code(findings, wrong)

@@ -1,7 +1,6 @@
 """phone-host pair: exchange keys with a board by a code that the board shows; or name a board on a USB cable."""
 
 import argparse
-import json
 import shutil
 import subprocess
 import sys
@@ -13,10 +12,12 @@ from common.link.enrolment_door import pairing_address
 from common.link.factory import needs_keys, parse_link
 from common.peers import Peer
 from common.program.invocation import command_line
+from common.program.terminal import fitted, say
 from common.protocol.enrolment_code import CODE_DIGITS, read_code
 from phone_host.boards.discovery import find_board_and_say
 from phone_host.boards.enrolment import PairingCall
 from phone_host.boards.udev_rule import RULES, find_usb_board, write_rule
+from phone_host.output.json_text import json_text
 from phone_host.settings import chosen_keys
 
 _TRIES = 3
@@ -38,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
     to = ("--link", link.address) if needs_keys(link) else ()
     with_keys = ("--keys", options.keys) if options.keys else ()
     next_step = command_line("phone-host", "run", *to, *with_keys, "--camera", "v4l2:auto", "--pairs", "100")
-    print(json.dumps(known) if options.json else f"paired with {board.name}; now try\n  {next_step}")
+    print(json_text(known) if options.json else fitted(f"paired with {board.name}; now try\n  {next_step}"))
     return 0
 
 
@@ -57,12 +58,10 @@ def _name_device(options: argparse.Namespace) -> int:
     if udevadm := shutil.which("udevadm"):
         subprocess.run([udevadm, "control", "--reload"], check=False)
     if options.json:
-        print(
-            json.dumps({"file": str(RULES), "vendor": board.vendor, "product": board.product, "serial": board.serial})
-        )
+        print(json_text({"file": str(RULES), "vendor": board.vendor, "product": board.product, "serial": board.serial}))
     else:
         next_step = command_line("phone-host", "run", "--link", "serial:/dev/tandemscan-board", "--camera", "v4l2:auto")
-        print(f"written to {RULES}; plug the board in again, then try\n  {next_step}")
+        say(f"written to {RULES}; plug the board in again, then try\n  {next_step}")
     return 0
 
 
@@ -70,7 +69,7 @@ def _paired(keys: KeyFolder, door: tuple[str, int], link: str, given: str | None
     """Enrol with the board. On a terminal, ask again after a wrong code."""
     tries = 1
     while True:
-        call = PairingCall(door, keys, link, lambda line: print(f"phone-host: {line}", file=sys.stderr, flush=True))
+        call = PairingCall(door, keys, link, lambda line: say(f"phone-host: {line}", sys.stderr))
         code = _code(given, call.ask())
         try:
             return call.prove(code, link, lambda: None)
@@ -78,7 +77,7 @@ def _paired(keys: KeyFolder, door: tuple[str, int], link: str, given: str | None
             if given is not None or not sys.stdin.isatty() or tries >= _TRIES:
                 raise
             tries += 1
-            print(f"phone-host: {error}", file=sys.stderr)
+            say(f"phone-host: {error}", sys.stderr)
 
 
 def _door(address: str, port: int | None) -> tuple[str, int]:
@@ -93,7 +92,7 @@ def _code(given: str | None, name: str) -> int:
     """Return the code from the option, or ask for it."""
     if given is None:
         words = f"run `sudo board-agent pair` on {name} and type the {CODE_DIGITS} digits that it shows: "
-        print(words, end="", file=sys.stderr, flush=True)
+        print(fitted(words, sys.stderr), end="", file=sys.stderr, flush=True)
         given = sys.stdin.readline()
         if not given:
             raise UnavailableError("no code was typed", "type the code that the board shows, or give it with --code")

@@ -1,7 +1,6 @@
 """phone-host run: pair a board's frames with the host camera's, compute depth and measure every delay."""
 
 import argparse
-import json
 import math
 import sys
 from contextlib import nullcontext, suppress
@@ -12,12 +11,13 @@ from common import now
 from common.camera.base import upright_px
 from common.errors import SettingsError
 from common.link.factory import open_links, parse_link, tell_insecure
+from common.places import Kind, kind_of, resolved
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.interrupts import leave
 from common.program.settings import Resolved, log_level, with_origins
 from common.program.signals import StopSignals
-from common.program.terminal import columns, headed, rows
+from common.program.terminal import columns, headed, rows, say
 from common.stamp import HOST_CLOCK
 from phone_host.boards.discovery import find_board_and_say, remember
 from phone_host.camera.examples import EXAMPLE
@@ -27,6 +27,7 @@ from phone_host.declared_settings import PhoneHostSettings
 from phone_host.measure.run_snapshot import RunSnapshot, depth_is_wrong
 from phone_host.measure.trouble import Trouble, trouble_of
 from phone_host.model import Side, TimeOffset
+from phone_host.output.json_text import json_text
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
 from phone_host.report.summary import summary
@@ -80,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
     on_terminal = sys.stderr.isatty()
     live = LiveTable(host.snapshot, pairs=options.pairs, seconds=options.seconds) if on_terminal else None
     note = WaitingNote(
-        named, lambda: host.has_met_board, lambda: host.refused, lambda line: print(line, file=sys.stderr, flush=True)
+        named, lambda: host.has_met_board, lambda: host.refused, lambda line: say(line, sys.stderr, flush=True)
     )
     try:
         with live or nullcontext():
@@ -97,10 +98,10 @@ def run(options: argparse.Namespace) -> int:
     complete = host.write_report(report, page)
     missing = f"\nnot written: {host.missing_files}: make room and run again" if host.missing_files else ""
     told = summary(snapshot, columns()) + missing
-    text = json.dumps(report) if options.json else headed(told, columns(), rows())
+    text = json_text(report) if options.json else headed(told, columns(), rows())
     print(text, flush=host.has_given_up)
     if options.json and snapshot.shortfall:
-        print(f"phone-host: {snapshot.shortfall}", file=sys.stderr)
+        say(f"phone-host: {snapshot.shortfall}", sys.stderr)
     if signals.interrupted and host.has_given_up:
         leave()  # the interpreter's end would wait for native code
     if signals.interrupted:
@@ -117,7 +118,7 @@ def _report_failure(options: argparse.Namespace, host: Host, failure: Trouble, b
     report = build(snapshot)
     host.write_report(report, _page(host, snapshot, board_side, options.out) if options.out else "")
     if options.json:
-        print(json.dumps(report))
+        print(json_text(report))
 
 
 def spare(out: Path, replay: str, calibration: str) -> None:
@@ -135,8 +136,11 @@ def spare(out: Path, replay: str, calibration: str) -> None:
     spare_inputs(out, NAMES, {what: Path(path) for what, path in inputs.items() if path})
     if not replay:
         return
-    folder = Path(replay) if Path(replay).is_dir() else Path(replay).parent
-    if out.resolve() == folder.resolve():
+    try:
+        folder = Path(replay) if kind_of(replay) is Kind.FOLDER else Path(replay).parent
+    except OSError:  # the camera will say why
+        return
+    if resolved(out) == resolved(folder):
         raise SettingsError(
             f"--out {out} is the folder of the photographs of --camera",
             f"give a folder of its own, such as --out {out / 'scan'}",

@@ -5,10 +5,11 @@ import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from common.errors import SettingsError
-from common.program.terminal import fitted
+from common.places import resolved
+from common.program.terminal import say
 from phone_host.output.calib_txt import is_calib_txt
 from phone_host.output.json_text import json_text
 from phone_host.report.stereo_json import pair_json, set_json
@@ -57,10 +58,17 @@ def run(options: argparse.Namespace) -> int:
         raise unwritable(options.out, error) from error
     if count == 1:
         [only] = report.computed
-        print(json_text(pair_json(only)) if options.json else fitted("\n".join(pair_lines(only, str(options.out)))))
+        _tell(options, pair_json(only), pair_lines(only, str(options.out)))
     else:
-        print(json_text(set_json(report)) if options.json else fitted("\n".join(set_lines(report, str(options.out)))))
+        _tell(options, set_json(report), set_lines(report, str(options.out)))
     return 0 if report.is_sound else _CHECK_FAILED
+
+
+def _tell(options: argparse.Namespace, report: dict[str, Any], lines: Sequence[str]) -> None:
+    if options.json:
+        print(json_text(report))
+    else:
+        say(lines)
 
 
 def _core(options: argparse.Namespace, size_px: Size, image: Path) -> StereoCore:
@@ -89,8 +97,8 @@ def _require_place(out: Path, files: ViewFiles) -> None:
         require_writable(out)
     except OSError as error:
         raise unwritable(out, error) from error
-    folders = {path.resolve().parent for path in _images(files)}
-    if out.resolve() in folders:
+    folders = {resolved(path).parent for path in _images(files)}
+    if resolved(out) in folders:
         raise SettingsError(
             f"--out {out} is the folder of the images, where later runs would take pictures of depth for photographs",
             f"give a folder of its own, such as --out {out / 'scan'}",

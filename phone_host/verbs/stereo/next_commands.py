@@ -1,11 +1,10 @@
 """The commands that a page of `stereo` offers: what mends the result, or what to do with a good one."""
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from common.program.invocation import command_line
+from common.program.invocation import command_line, shell_word
 from phone_host.measure.file_remedies import EXCHANGE, tries_of
 from phone_host.output.axes import Axes
 from phone_host.report.page_links import NextCommand
@@ -81,4 +80,4 @@ def _exchanged(typed: Typed) -> tuple[str, ...]:
 
 def _line(typed: Typed, words: tuple[str, ...]) -> str:
     """Return a line for any shell's folder: relative paths belong to the folder in which the command was typed."""
-    return f"cd {shlex.quote(str(typed.folder))} && {command_line('phone-host', *words)}"
+    return f"cd {shell_word(str(typed.folder))} && {command_line('phone-host', *words)}"
