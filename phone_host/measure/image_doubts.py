@@ -71,7 +71,7 @@ _MOVED: Final = "the calibration does not fit these cameras any more, or never d
 _NOT_RECTIFIED: Final = "these images are not rectified: calibrate your cameras and give --calibration rig.yaml"
 
 _BEHIND_SHARE: Final = 0.05
-"""False matches put fewer points there."""
+"""False matches put fewer points there; a sky may put more, where doffs is large and negative."""
 
 _EDGE_TO_EDGE: Final = 3.5
 """The full height of a ramp relative to its root mean square."""
@@ -351,9 +351,8 @@ def _behind(evidence: Evidence) -> tuple[Concern, ...]:
     return (
         Concern(
             Doubt.GEOMETRY,
-            f"{evidence.behind_share:.0%} of the points would lie behind infinity: doffs is not that of these images",
+            f"{evidence.behind_share:.0%} of the points would lie at infinity or behind it: doffs may be that of other images",
             "give the calib.txt that was published with these images, or --doffs: cx of the right camera minus cx of the left one, px",
-            is_severe=True,
         ),
     )
 

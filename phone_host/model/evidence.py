@@ -67,7 +67,7 @@ class Evidence:
         vertical_offset_px: how far too low the right image lies, px.
         supports: how many features agree with each arrangement; empty without a core.
         disparity_px: the middle one of the disparities between the limits of depth, px.
-        behind_share: share of the disparities that lie behind infinity, which no scene does.
+        behind_share: share of the disparities at infinity and behind it, where no scene lies; 0 if infinity is no larger disparity.
         scattered_share: share of the disparities that lie in pieces too small for a surface.
         beyond_share: share of the image, as far as features tell, that is nearer than was searched.
         enough_disparities: a search that reaches all but a few features, px; 0: not known.

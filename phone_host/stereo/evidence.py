@@ -41,7 +41,7 @@ _CHANCE_SHARE: Final = 0.005
 """A black image beside a good one is matched at 0.1 % of its pixels, a plain wall at 0.2 %; the sparsest good pair at 21 %."""
 
 _BEHIND_PX: Final = 2.0
-"""A rectification that is a little off puts far points up to a pixel behind infinity."""
+"""Cameras whose principal points are nearly equal see the sky at the edge of the search, which says nothing."""
 
 _SCATTERED_WIDTH_PX: Final = 640
 _PIECE_SHARE: Final = 0.002
@@ -120,7 +120,7 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
         left=measure_exposure(left, len(found[0].points_px)),
         right=measure_exposure(right, len(found[1].points_px)),
         density=density(processed),
-        behind_share=_behind(few, processed),
+        behind_share=_behind(processed),
         scattered_share=_scattered(disparity),
         disparity_px=_middle(_wanted(few, processed)),
         consistency=_consistency(left, right, disparity, 0.0 if math.isnan(offset_px) else offset_px),
@@ -152,12 +152,12 @@ def _wanted(disparity: Disparity, processed: Processed) -> Disparity:
     return kept if np.isfinite(kept).any() else disparity
 
 
-def _behind(disparity: Disparity, processed: Processed) -> float:
-    """Return the share of the disparities that are clearly below those of infinitely far points."""
-    known = disparity[np.isfinite(disparity)]
-    if processed.geometry is None or not known.size:
+def _behind(processed: Processed) -> float:
+    """Return the share of the disparities at infinity and behind it, if infinity is no edge of the search; else 0."""
+    cut, geometry = processed.cut, processed.geometry
+    if cut is None or geometry is None or geometry.doffs_px > -_BEHIND_PX:
         return 0.0
-    return float(np.count_nonzero(known + np.float32(processed.geometry.doffs_px) < -_BEHIND_PX)) / known.size
+    return cut.at_zero / max(1, cut.inside - cut.unmatched)
 
 
 def _scattered(disparity: Disparity) -> float:

@@ -275,6 +275,15 @@ def test_specks_are_told_from_surfaces(good: Pair) -> None:
     assert measure_evidence(strewn, maps_of(core, strewn)).scattered_share == pytest.approx(0.5, abs=0.1)
 
 
+def test_a_doffs_of_other_images_is_told(good: Pair) -> None:
+    """With the sign of doffs turned, most points would lie behind infinity; with 0 none does, and nothing is said."""
+    for doffs_px, told in ((-20.0, True), (0.0, False)):
+        geometry = StereoGeometry(focal_px=260.0, baseline_m=0.1, cx_px=159.5, cy_px=119.5, doffs_px=doffs_px)
+        core = StereoCore(create_matcher(MatchSettings(MatcherName.SGBM, 64)), geometry=geometry)
+        found = image_doubts(_evidence(core, *good))
+        assert [concern.doubt for concern in found] == ([Doubt.GEOMETRY] if told else [])
+
+
 def test_the_middle_of_the_scene_is_that_of_what_is_kept() -> None:
     """Left half 40 px, right half 10 px, and everything farther than 1 m cut away (f b = 26 px m): the middle is 40 px."""
     disparity = np.full((60, 80), 10.0, np.float32)
