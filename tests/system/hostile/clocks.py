@@ -79,6 +79,7 @@ def step(clock: ShiftedClock, mine: Program, other: Program, this: Step, watched
         if this.how in _SILENT_S:
             held.enter_context(stopped(other))
             time.sleep(_SILENT_S[this.how])
+        before_ns = time.monotonic_ns()
         if this.by_ns < 0:
             clock.stand_still(mine, -this.by_ns, asleep=this.how is How.ASLEEP, meanwhile=lambda: None)
         else:
@@ -86,7 +87,7 @@ def step(clock: ShiftedClock, mine: Program, other: Program, this: Step, watched
         if this.how in _SILENT_S:
             time.sleep(_SILENT_S[this.how])
     if abs(this.by_ns) < 2 * PERIOD_NS:
-        watched.small_step()
+        watched.small_step(before_ns)
 
 
 def _run(whose: Whose, steps: Sequence[Step], folder: Path, rounds: Rounds) -> Outcome:

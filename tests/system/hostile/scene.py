@@ -154,7 +154,7 @@ class Scene:
         self._offset = 0
         self.pairs: list[Pair] = []
         self._gone: list[int] = []
-        self._small_steps: list[int] = []
+        self._small_steps: list[tuple[int, int]] = []
 
     def look(self) -> list[Pair]:
         """Read what has been written since; return all pairs."""
@@ -196,15 +196,20 @@ class Scene:
         outcome.gaps_s.append((came_ns - at_ns) / 1e9)
         return True
 
-    def small_step(self) -> None:
-        """A clock was just stepped by less than two periods: until the next wave of echoes nobody can know."""
-        self._small_steps.append(time.monotonic_ns())
+    def small_step(self, since_ns: int) -> None:
+        """A clock was just stepped by less than two periods: until the next wave of echoes nobody can know.
+
+        Args:
+            since_ns: just before the step, true time. Pairs may come before this program runs again after the step.
+        """
+        self._small_steps.append((since_ns, time.monotonic_ns()))
 
     def judge_pairs(self, outcome: Outcome) -> None:
         """Count the pairs that are wrong by true exposure, and those whose offset error exceeds the stated uncertainty."""
         misstated = 0
         for pair in self.look():
-            excused = any(0 <= self._on_host(pair.received_ns) - step_ns <= _WAVE_NS for step_ns in self._small_steps)
+            received_ns = self._on_host(pair.received_ns)
+            excused = any(since_ns <= received_ns <= step_ns + _WAVE_NS for since_ns, step_ns in self._small_steps)
             outcome.wrong += self._apart_ns(pair) > TOLERANCE_NS + pair.uncertainty_ns + _SLACK_NS and not excused
             misstated += self._offset_error_ns(pair) > pair.uncertainty_ns + _SLACK_NS and not excused
         outcome.pairs += len(self.pairs)
