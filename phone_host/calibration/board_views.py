@@ -112,7 +112,7 @@ def _every_file(
 ) -> tuple[tuple[FileCorners, ...], tuple[FileCorners, ...]]:
     """Return the corners of all files of both sides, if they were paired by order and the counts differ; else nothing."""
     alone = files.left_alone, files.right_alone
-    if files.by_number or not any(alone):
+    if files.by_number or files.by_name or not any(alone):
         return (), ()
     nothing = np.empty((0, 2))
     sides = []

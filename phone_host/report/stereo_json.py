@@ -53,7 +53,7 @@ def set_json(report: SetReport) -> dict[str, Any]:
         "command": "stereo",
         "verdict": verdict.value,
         "headline": sentence,
-        "paired_by": "number" if report.by_number else "name order",
+        "paired_by": "number" if report.by_number else "name" if report.by_name else "name order",
         "left_alone": list(report.left_alone),
         "right_alone": list(report.right_alone),
         "interrupted_of": report.interrupted_of or None,

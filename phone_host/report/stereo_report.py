@@ -147,7 +147,8 @@ class SetReport:
 
     Attributes:
         pairs: in order; at least one of them was computed.
-        by_number: whether the files were paired by the numbers in their names; else in name order.
+        by_number: whether the files were paired by the numbers in their names.
+        by_name: whether they were paired by equal names; if neither, in name order.
         left_alone: left images without a partner.
         right_alone: right images without a partner.
         remarks: what the user must know about all of them.
@@ -160,6 +161,7 @@ class SetReport:
     right_alone: tuple[str, ...] = ()
     remarks: tuple[Remark, ...] = ()
     interrupted_of: int = 0
+    by_name: bool = False
 
     @property
     def computed(self) -> tuple[PairReport, ...]:
@@ -236,13 +238,13 @@ def told_name(pair: PairReport | FailedPair, *, by_number: bool) -> str:
     return pair.name if by_number else f"{pair.name} {pair.left.rpartition('/')[2]}"
 
 
-def alone_remarks(left: Sequence[str], right: Sequence[str], *, by_number: bool, pairs: int) -> tuple[Remark, ...]:
+def alone_remarks(left: Sequence[str], right: Sequence[str], *, is_told: bool, pairs: int) -> tuple[Remark, ...]:
     """Say which images have no partner, and if pairs were guessed.
 
     Args:
         left: left images without a partner.
         right: right images without a partner.
-        by_number: whether the files were paired by the numbers in their names.
+        is_told: whether the names say which files are pairs.
         pairs: how many pairs there are.
     """
     remarks = []
@@ -252,11 +254,11 @@ def alone_remarks(left: Sequence[str], right: Sequence[str], *, by_number: bool,
             remarks.append(
                 Remark(f"{counted(len(alone), f'{side} image has', f'{side} images have')} no partner: {named}")
             )
-    if not by_number and (pairs > 1 or left or right):
+    if not is_told and (pairs > 1 or left or right):
         unequal = " though the counts differ" if left or right else ""
         remarks.append(
             Remark(
-                f"the images were paired in the order of their names{unequal}, because the names share no numbers",
+                f"the images were paired in the order of their names{unequal}, because the names share neither numbers nor words",
                 "check that each pair shows one moment, or give the two images of a moment the same number",
             )
         )

@@ -150,6 +150,7 @@ def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...]) -> SetRepor
     return SetReport(
         pairs=pairs,
         by_number=job.files.by_number,
+        by_name=job.files.by_name,
         left_alone=left,
         right_alone=right,
         remarks=() if len(pairs) == 1 else _alone(job),
@@ -158,7 +159,8 @@ def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...]) -> SetRepor
 
 def _alone(job: StereoJob) -> tuple[Remark, ...]:
     left, right = ([path.name for path in alone] for alone in (job.files.left_alone, job.files.right_alone))
-    return alone_remarks(left, right, by_number=job.files.by_number, pairs=len(job.files.pairs))
+    is_told = job.files.by_number or job.files.by_name
+    return alone_remarks(left, right, is_told=is_told, pairs=len(job.files.pairs))
 
 
 class _StopWatch:

@@ -27,13 +27,15 @@ class ViewFiles:
         pairs: (name, left file, right file), in order.
         left_alone: files of the left side without a partner.
         right_alone: files of the right side without a partner.
-        by_number: whether files were paired by the numbers in their names; otherwise by order.
+        by_number: whether files were paired by the numbers in their names.
+        by_name: whether they were paired by equal names; if neither, by order.
     """
 
     pairs: tuple[tuple[str, Path, Path], ...]
     left_alone: tuple[Path, ...]
     right_alone: tuple[Path, ...]
     by_number: bool
+    by_name: bool = False
 
 
 def pair_files(left: str | Sequence[str], right: str | Sequence[str]) -> ViewFiles:
@@ -61,6 +63,8 @@ def pair_files(left: str | Sequence[str], right: str | Sequence[str]) -> ViewFil
         [first], [second] = left_files, right_files
         return ViewFiles(((first.stem, first, second),), (), (), by_number=False)
     numbered = _numbered(left_files, right_files)
+    if numbered is None and (named := _named(left_files, right_files)) is not None:
+        return named
     if numbered is None:
         count = min(len(left_files), len(right_files))
         pairs = tuple((a.stem, a, b) for a, b in zip(left_files, right_files, strict=False))
@@ -72,6 +76,21 @@ def pair_files(left: str | Sequence[str], right: str | Sequence[str]) -> ViewFil
         left_alone=tuple(path for path in left_files if path not in {left_numbers[n] for n in shared}),
         right_alone=tuple(path for path in right_files if path not in {right_numbers[n] for n in shared}),
         by_number=True,
+    )
+
+
+def _named(left: list[Path], right: list[Path]) -> ViewFiles | None:
+    """Pair files of equal names, whose order alone would shift after a missing one; None if no name is on both sides."""
+    lefts, rights = ({path.stem: path for path in side} for side in (left, right))
+    shared = [path.stem for path in left if path.stem in rights]
+    if not shared or len(lefts) < len(left) or len(rights) < len(right):
+        return None
+    return ViewFiles(
+        pairs=tuple((name, lefts[name], rights[name]) for name in shared),
+        left_alone=tuple(path for path in left if path.stem not in rights),
+        right_alone=tuple(path for path in right if path.stem not in lefts),
+        by_number=False,
+        by_name=True,
     )
 
 

@@ -125,12 +125,12 @@ def test_mirrored_pictures_are_told_with_the_option_that_helps(
 def test_folders_out_of_step_are_told_before_anything_is_fitted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Names without numbers and the second right picture missing: a warning that order was guessed, and the left picture to delete."""
+    """Names that share neither numbers nor words, and the second right picture missing: a warning that order was guessed, and the left picture to delete."""
     folder = _folders(tmp_path, lambda image: encoded(".png", image))
-    for side in ("left", "right"):
-        for index, name in enumerate(("ant", "bee", "cat", "dog")):
+    for side, names in (("left", ("ant", "bee", "cat", "dog")), ("right", ("ape", "bat", "cow", "doe"))):
+        for index, name in enumerate(names):
             (folder / side / f"{index}.png").rename(folder / side / f"{name}.png")
-    (folder / "right" / "bee.png").unlink()
+    (folder / "right" / "bat.png").unlink()
     with pytest.raises(
         DataError, match=r"missing on the right: the folders are out of step from bee\.png on"
     ) as caught:

@@ -188,12 +188,12 @@ def test_a_result_is_sound_if_nothing_failed_nothing_blocks_and_there_is_depth(
 
 def test_images_without_partner_are_counted_and_named_and_pairing_by_order_is_told() -> None:
     """Nothing is left out silently; a long list is cut short."""
-    [one] = alone_remarks([], ["r9.png"], by_number=True, pairs=4)
+    [one] = alone_remarks([], ["r9.png"], is_told=True, pairs=4)
     assert one.text == "1 right image has no partner: r9.png"
-    many, order = alone_remarks([f"{n}.png" for n in range(7)], [], by_number=False, pairs=4)
+    many, order = alone_remarks([f"{n}.png" for n in range(7)], [], is_told=False, pairs=4)
     assert many.problem == "7 left images have no partner: 0.png, 1.png, 2.png, 3.png, 4.png, …"
     assert "order of their names though the counts differ" in order.problem
-    assert alone_remarks([], [], by_number=False, pairs=1) == ()
+    assert alone_remarks([], [], is_told=False, pairs=1) == ()
 
 
 def test_the_verdict_of_several_pairs_counts_them() -> None:

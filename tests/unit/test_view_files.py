@@ -42,6 +42,16 @@ def test_the_number_that_counts_is_found_wherever_it_stands(tmp_path: Path, left
     assert files.left_alone == files.right_alone == ()
 
 
+def test_without_numbers_equal_names_are_pairs(tmp_path: Path) -> None:
+    """One image is missing on the right: in their order all pairs would be of unlike scenes."""
+    left = _touch(tmp_path / "ml", "board.png", "desk.png", "room.png")
+    right = _touch(tmp_path / "mr", "desk.jpg", "room.jpg", "shelf.jpg")
+    files = pair_files(str(left), str(right))
+    assert (files.by_number, files.by_name) == (False, True)
+    assert [(a.name, b.name) for _, a, b in files.pairs] == [("desk.png", "desk.jpg"), ("room.png", "room.jpg")]
+    assert [path.name for path in (*files.left_alone, *files.right_alone)] == ["board.png", "shelf.jpg"]
+
+
 def test_without_numbers_the_order_of_names_pairs(tmp_path: Path) -> None:
     """Names without numbers are paired in their order."""
     left, right = _touch(tmp_path / "l", "a.png", "c.png"), _touch(tmp_path / "r", "b.png", "d.png", "e.png")

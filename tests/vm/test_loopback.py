@@ -29,12 +29,13 @@ def loopback(guest: Guest) -> Iterator[Guest]:
 
 
 def test_its_first_buffer_is_no_frame_and_its_stamps_are_believed(loopback: Guest) -> None:
-    """The first buffer (never written, number 0) is spoiled, the jump in numbers after it is no loss, and plausible stamps of an unnamed clock are accepted."""
+    """The first buffer (number 0) is spoiled if it was never written, the jump in numbers after it is no loss, and plausible stamps of an unnamed clock are accepted."""
     loopback.sh("until board-agent cameras | grep -q MJPG; do sleep 0.1; done")
     order = "python3 -P /srv/kernel_camera.py 'size=320x240&fps=30&format=mjpeg' frames=20"
     shown = json.loads(loopback.sh(order))
     health = shown["health"]
     assert (shown["format"], shown["bytes"]) == ("mjpeg", 8004)
-    assert shown["sequences"][0] == 1
-    assert sum(health["faults"].values()) == 1
+    # A reader that is held up between its start and its first look finds that buffer written, and whole.
+    assert shown["sequences"][0] in {0, 1}
+    assert sum(health["faults"].values()) == shown["sequences"][0]
     assert (health["missed"], health["distrusted_stamps"]) == (0, 0)

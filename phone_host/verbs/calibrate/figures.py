@@ -64,7 +64,7 @@ def _pairs(files: ViewFiles, rejected: tuple[Rejected, ...], used: int) -> dict[
     return {
         "found": len(files.pairs),
         "used": used,
-        "paired_by": "number" if files.by_number else "name order",
+        "paired_by": "number" if files.by_number else "name" if files.by_name else "name order",
         "rejected": [{"pair": each.name, "reason": each.reason.value, "detail": each.detail} for each in rejected],
     }
 
@@ -136,7 +136,7 @@ def rejections(rejected: tuple[Rejected, ...]) -> list[str]:
 
 def pairing_notes(files: ViewFiles) -> list[str]:
     """Warn if the pairs were guessed from the order of names though the counts differ."""
-    if files.by_number or not (files.left_alone or files.right_alone):
+    if files.by_number or files.by_name or not (files.left_alone or files.right_alone):
         return []
     left, right = (len(files.pairs) + len(alone) for alone in (files.left_alone, files.right_alone))
     counts = f"{left} left and {right} right pictures"
@@ -150,6 +150,11 @@ def unwritten(report: dict[str, Any], out: Path) -> list[str]:
 
 def _earlier(report: dict[str, Any]) -> str:
     return f"; the earlier one is now {report['earlier_rig']}" if "earlier_rig" in report else ""
+
+
+def _sigma_mm(sigma_m: float) -> str:
+    """Write an uncertainty in mm: two digits after the point, or two that are not 0."""
+    return f"{sigma_m * 1e3:.2f}" if sigma_m >= 1e-5 else f"{sigma_m * 1e3:.2g}"
 
 
 def summary(
@@ -172,7 +177,7 @@ def summary(
     rows.append(f"RMS      left {rms['left']:.3f}, right {rms['right']:.3f}, stereo {rms['stereo']:.3f} px")
     if vertical["p95"] is not None:
         rows.append(f"vertical mean {vertical['mean']:.3f}, 95 % {vertical['p95']:.3f}, max {vertical['max']:.3f} px")
-    rows.append(f"baseline {report['baseline_mm']:.2f} +- {calibration.baseline_sigma_m * 1e3:.2g} mm")
+    rows.append(f"baseline {report['baseline_mm']:.2f} +- {_sigma_mm(calibration.baseline_sigma_m)} mm")
     rows.append("         compare it with a ruler: it shows a wrong --square")
     if report["zero_sigma_px"] is not None:
         far_m = report["depth_limit_m"]

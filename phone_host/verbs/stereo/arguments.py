@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         metavar="LEFT RIGHT",
         help="images of the left and of the right camera: two files, two folders or two globs; images of folders and globs"
-        " are paired by the number in the name, else in name order",
+        " are paired by the number in the name, else by equal names, else in name order",
     )
     add_stereo_arguments(parser)
     add_orientation_arguments(parser)
