@@ -8,7 +8,8 @@ from typing import Final
 from phone_host.measure.depth_error import depth_error_m
 from phone_host.measure.doubt_history import past, past_seconds
 from phone_host.measure.gone import GONE
-from phone_host.measure.image_doubts import ImageFigures, figure_doubts
+from phone_host.measure.image_doubts import figure_doubts
+from phone_host.measure.image_trust import ImageFigures
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, history
 from phone_host.measure.trouble import Trouble
 from phone_host.measure.trust import Concern, Doubt

@@ -4,8 +4,9 @@ from collections import Counter, deque
 from typing import Final
 
 from phone_host.measure.doubt_history import DoubtHistory, Episode
-from phone_host.measure.image_doubts import ImageFigures, gravest_first, image_doubts, median_figures
-from phone_host.measure.trust import Concern, Doubt
+from phone_host.measure.image_doubts import image_doubts
+from phone_host.measure.image_trust import ImageFigures, median_figures
+from phone_host.measure.trust import Concern, Doubt, gravest_first
 from phone_host.model import Evidence
 
 _LAST: Final = 3

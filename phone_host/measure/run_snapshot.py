@@ -15,7 +15,7 @@ from phone_host.measure.camera_match import LockMiss, settings_concerns
 from phone_host.measure.delays import DelayStatistics
 from phone_host.measure.doubt_history import Episode
 from phone_host.measure.gone import gone_concerns
-from phone_host.measure.image_doubts import ImageTrust, gravest_first
+from phone_host.measure.image_trust import ImageTrust
 from phone_host.measure.no_depth import no_depth
 from phone_host.measure.numbers import ImageEvidence, blamed, number_concerns, with_cause
 from phone_host.measure.orient_words import with_final_options
@@ -29,6 +29,7 @@ from phone_host.measure.trust import (
     Concern,
     Timing,
     Unbelieved,
+    gravest_first,
     stamp_doubt,
     timing_concerns,
     unbelieved_concerns,

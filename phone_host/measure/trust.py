@@ -187,6 +187,11 @@ class Concern:
         return self.doubt.blocks or self.is_severe
 
 
+def gravest_first(found: tuple[Concern, ...]) -> tuple[Concern, ...]:
+    """Sort concerns: blocking ones first, then the others that are certain, else in their order."""
+    return tuple(sorted(found, key=lambda concern: (not concern.doubt.blocks, not concern.is_certain)))
+
+
 REJECTED_RIG: Final = Concern(
     Doubt.REJECTED_RIG,
     "the calibration itself was rejected: it does not fit its own images (verdict reject)",

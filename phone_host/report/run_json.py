@@ -10,7 +10,7 @@ from phone_host.measure.accounts import LinkTally, rung_values
 from phone_host.measure.delays import DELAYS, FROM_EXPOSURE, STAGES, Spread
 from phone_host.measure.doubt_history import Episode, saved_pairs, told_past
 from phone_host.measure.headline import headline
-from phone_host.measure.image_doubts import ImageFigures
+from phone_host.measure.image_trust import ImageFigures
 from phone_host.measure.regime import Judgement, judge
 from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, disbelieved, figures, history
 from phone_host.measure.sink_account import SinkAccount

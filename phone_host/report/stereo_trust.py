@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from phone_host.measure.headline import Answer
-from phone_host.measure.image_doubts import ImageFigures
+from phone_host.measure.image_trust import ImageFigures
 from phone_host.measure.trust import Concern
 from phone_host.report.run_json import concern_values, figure_values
 

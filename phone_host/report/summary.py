@@ -10,7 +10,7 @@ from phone_host.measure.accounts import LinkAccount, LinkTally, rung_lines
 from phone_host.measure.delays import DELAYS
 from phone_host.measure.doubt_history import history_lines
 from phone_host.measure.headline import headline
-from phone_host.measure.image_doubts import ImageTrust
+from phone_host.measure.image_trust import ImageTrust
 from phone_host.measure.numbers import pairing_words
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures, history

@@ -6,10 +6,11 @@ from typing import Final
 from common.orientation import UPRIGHT, Orientation
 from phone_host.measure.file_remedies import ImageSource
 from phone_host.measure.headline import answer
-from phone_host.measure.image_doubts import gravest_first, image_doubts, median_figures
+from phone_host.measure.image_doubts import image_doubts
+from phone_host.measure.image_trust import median_figures
 from phone_host.measure.no_depth import no_depth
 from phone_host.measure.orient_words import with_final_options
-from phone_host.measure.trust import REJECTED_RIG, Concern, Doubt
+from phone_host.measure.trust import REJECTED_RIG, Concern, Doubt, gravest_first
 from phone_host.model import Processed
 from phone_host.report.depth_data import density
 from phone_host.report.stereo_trust import PairTrust

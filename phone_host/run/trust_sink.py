@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Final
 
 from common import now
-from phone_host.measure.image_doubts import ImageTrust
 from phone_host.measure.image_judge import ImageJudge
+from phone_host.measure.image_trust import ImageTrust
 from phone_host.model import DepthLimits, Result, StereoGeometry
 from phone_host.run.sinks import OneQueueSink, SinkQueue
 from phone_host.stereo.core import StereoCore

@@ -10,7 +10,8 @@ import pytest
 
 from common import now
 from phone_host.measure.headline import Grade, answer
-from phone_host.measure.image_doubts import image_doubts, median_figures
+from phone_host.measure.image_doubts import image_doubts
+from phone_host.measure.image_trust import median_figures
 from phone_host.measure.no_depth import no_depth
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import CameraModel, Crop, Evidence, Image, Rig, StereoGeometry

@@ -11,8 +11,9 @@ import pytest
 from phone_host.measure.depth_error import depth_error_m
 from phone_host.measure.file_remedies import EXCHANGE, ImageSource, tries_of
 from phone_host.measure.headline import Grade, answer, headline
-from phone_host.measure.image_doubts import ImageFigures, ImageTrust, image_doubts, median_figures
+from phone_host.measure.image_doubts import image_doubts
 from phone_host.measure.image_judge import ImageJudge
+from phone_host.measure.image_trust import ImageFigures, ImageTrust, median_figures
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, depth_is_wrong
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import (

@@ -8,7 +8,7 @@ import pytest
 
 from phone_host.measure.file_remedies import FILE_REMEDIES
 from phone_host.measure.headline import Answer, Grade
-from phone_host.measure.image_doubts import ImageFigures
+from phone_host.measure.image_trust import ImageFigures
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement
 from phone_host.output.axes import Axes

@@ -11,8 +11,9 @@ from phone_host.measure.absence import Away
 from phone_host.measure.doubt_history import history_lines, past_seconds
 from phone_host.measure.file_remedies import ImageSource
 from phone_host.measure.headline import Answer, Grade, headline
-from phone_host.measure.image_doubts import ImageFigures, ImageTrust, image_doubts
+from phone_host.measure.image_doubts import image_doubts
 from phone_host.measure.image_judge import ImageJudge
+from phone_host.measure.image_trust import ImageFigures, ImageTrust
 from phone_host.measure.numbers import ImageEvidence
 from phone_host.measure.orient_words import mirrored_further, turned_further, with_final_options
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, depth_is_wrong

@@ -16,7 +16,7 @@ from phone_host.measure.absence import Absence, away_of, away_words
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.measure.delays import DelayStatistics, Series
 from phone_host.measure.headline import headline
-from phone_host.measure.image_doubts import ImageFigures, ImageTrust
+from phone_host.measure.image_trust import ImageFigures, ImageTrust
 from phone_host.measure.numbers import ImageEvidence, pairing_words
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount

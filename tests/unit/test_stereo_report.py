@@ -6,7 +6,7 @@ from textwrap import wrap
 import pytest
 
 from phone_host.measure.headline import Answer, Grade
-from phone_host.measure.image_doubts import ImageFigures
+from phone_host.measure.image_trust import ImageFigures
 from phone_host.measure.no_depth import no_depth
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 from phone_host.output.axes import Axes
