@@ -30,7 +30,6 @@ from phone_host.stereo.depth_limits import (
     DepthWanted,
     above_zero,
     crop_inside,
-    cut_cloud,
     depth_limits,
     disparity_error_px,
 )
@@ -38,7 +37,8 @@ from phone_host.stereo.images import require_same_size, size_px
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.rectify import Rectifier
-from phone_host.stereo.reproject import disparities_for_near, reproject
+from phone_host.stereo.points import points_of
+from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.scaled_rig import scaled_rig
 from phone_host.stereo.stacked import lying_pair, upright_again
 from phone_host.stereo.working import MARGIN_PX, Part, chosen_scale, part_for, reduced, to_full_size
@@ -234,15 +234,11 @@ def _reproject(matched: Disparity, ready: _Ready) -> tuple[Disparity, CloudImage
     geometry, limits = ready.geometry, ready.limits
     crop = None if ready.part is None else ready.part.crop
     inside = matched.size if crop is None else crop.width_px * crop.height_px
-    found = int(np.count_nonzero(np.isfinite(matched)))
-    disparity, at_zero = above_zero(matched, 0.0 if geometry is None else geometry.doffs_px, ready.error_px)
-    counts = CutCounts(kept=found - at_zero)
-    cloud = None
     if geometry is not None and limits is not None:
-        cloud = reproject(disparity, geometry)
-        counts = cut_cloud(cloud, geometry, limits)
-    return (
-        disparity,
-        cloud,
-        replace(counts, outside=matched.size - inside, unmatched=inside - found, at_zero=at_zero),
-    )
+        points = points_of(matched, geometry, limits)
+        disparity, cloud, found, counts = points.disparity, points.cloud, points.found, points.counts
+    else:
+        cloud, found = None, int(np.count_nonzero(np.isfinite(matched)))
+        disparity, at_zero = above_zero(matched, 0.0, ready.error_px)
+        counts = CutCounts(kept=found - at_zero, at_zero=at_zero)
+    return disparity, cloud, replace(counts, outside=matched.size - inside, unmatched=inside - found)

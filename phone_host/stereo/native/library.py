@@ -19,7 +19,7 @@ VARIABLE: Final = "TANDEMSCAN_SIMD"
 
 _ABI: Final = 1  # TANDEM_ABI of tandem.h
 _HERE: Final = Path(__file__).resolve().parent
-_INSTALL: Final = "install gcc or clang and reinstall"
+_INSTALL: Final = "install gcc or clang and reinstall; in a checkout: make native"
 _REINSTALL: Final = "reinstall"
 
 
