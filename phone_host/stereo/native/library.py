@@ -89,7 +89,8 @@ class PackJob(ctypes.Structure):
         ("width", ctypes.c_int32),
         ("height", ctypes.c_int32),
         ("channels", ctypes.c_int32),
-        ("signs", ctypes.c_float * 3),
+        ("flips", ctypes.c_uint8 * 3),
+        ("reserved", ctypes.c_uint8),
         ("count", ctypes.c_int64),
     )
 

@@ -70,13 +70,14 @@ TANDEM_API int32_t tandem_reproject(int32_t isa, struct tandem_reproject_job *jo
 struct tandem_pack_job {
     const float *cloud_m;     /* (height, width, 3), rows `cloud_stride` floats apart, NaN = none */
     const uint8_t *colours;   /* (height, width, channels) grey or BGR, rows `colour_stride` bytes apart */
-    uint8_t *records;         /* room for height * width records; written from its beginning */
+    uint8_t *records;         /* room for height * width + 1 records; written from its beginning */
     int64_t cloud_stride;
     int64_t colour_stride;
     int32_t width;
     int32_t height;
     int32_t channels;         /* 1 or 3 */
-    float signs[3];           /* factors of x, y, z: 1 or -1 */
+    uint8_t flips[3];         /* 1: x, y or z changes its sign */
+    uint8_t reserved;
     int64_t count;            /* written: records */
 };
 
