@@ -43,7 +43,7 @@ from phone_host.doctor.host_checks import (
     check_python,
     check_rig,
 )
-from phone_host.stereo.native.library import Library, Missing, native
+from phone_host.stereo.native.library import native
 
 _CONNECT_S: Final = 2.0
 
@@ -85,7 +85,7 @@ def examine(question: Question) -> list[Finding]:
     findings = [check_python(sys.version_info[:3], sys.platform)]
     packages = [check_package(package) for package in _packages()]
     findings += packages
-    findings.append(check_native(_native()))
+    findings.append(native_finding())
     works = all(finding.verdict is not Grade.FAIL for finding in packages)
     if is_http(question.camera):
         findings.append(_server(question.camera))
@@ -112,6 +112,14 @@ def examine(question: Question) -> list[Finding]:
     return findings
 
 
+def native_finding() -> Finding:
+    """Check the native library, with which the own matcher computes."""
+    try:
+        return check_native(native())
+    except SettingsError as error:
+        return check_native(error)
+
+
 def examine_out(out: Path) -> list[Finding]:
     """Check the folder of the results, or where it would be made, as a run would find it.
 
@@ -127,13 +135,6 @@ def examine_out(out: Path) -> list[Finding]:
         return check_out(str(out), f"{there} is {kind.value}, not a folder")
     may_write = os.access(there, os.W_OK | os.X_OK)
     return [*check_out(str(out), "" if may_write else os.strerror(errno.EACCES)), check_disk(disk)]
-
-
-def _native() -> Library | Missing | SettingsError:
-    try:
-        return native()
-    except SettingsError as error:
-        return error
 
 
 def _packages() -> list[Package]:

@@ -36,8 +36,8 @@ from phone_host.stereo.depth_limits import (
 from phone_host.stereo.images import require_same_size, size_px
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_protocol import Matcher
-from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.points import points_of
+from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.scaled_rig import scaled_rig
 from phone_host.stereo.stacked import lying_pair, upright_again
