@@ -61,26 +61,9 @@ def _by_numpy(matched: Disparity, geometry: StereoGeometry, limits: DepthLimits)
 
 def _by_library(matched: Disparity, geometry: StereoGeometry, limits: DepthLimits, library: Library) -> Points:
     matched = _with_packed_rows(matched)
-    height, width = matched.shape
-    columns, rows = rays(geometry, width, height)
-    cloud = np.empty((height, width, 3), np.float32)
-    at_zero_px = np.float32(limits.disparity_error_px - geometry.doffs_px)
-    job = ReprojectJob(
-        disparity_px=matched.ctypes.data,
-        column_slopes=columns.ctypes.data,
-        row_slopes=rows.ctypes.data,
-        cloud_m=cloud.ctypes.data,
-        disparity_stride=matched.strides[0] // matched.itemsize,
-        width=width,
-        height=height,
-        doffs_px=np.float32(geometry.doffs_px),
-        product=np.float32(geometry.focal_px * geometry.baseline_m),
-        least_px=np.float32(least_in_front_px(geometry)),
-        at_zero_px=at_zero_px,
-        far_m=float32_below(limits.far_m),
-        near_m=np.float32(max(limits.near_m, 0.0)),
-        wide=is_wide(geometry, width, height),
-    )
+    cloud = np.empty((*matched.shape, 3), np.float32)
+    slopes = rays(geometry, matched.shape[1], matched.shape[0])
+    job = reproject_job(matched, slopes, geometry, limits, cloud)
     library.reproject(job)
     counts = CutCounts(
         kept=job.in_front - job.too_far - job.too_near,
@@ -88,8 +71,44 @@ def _by_library(matched: Disparity, geometry: StereoGeometry, limits: DepthLimit
         too_far=job.too_far,
         too_near=job.too_near,
     )
-    disparity = drop_zeros(matched, at_zero_px) if job.at_zero else matched
+    disparity = drop_zeros(matched, np.float32(job.at_zero_px)) if job.at_zero else matched
     return Points(disparity=disparity, cloud=cloud, counts=counts, found=job.found)
+
+
+def reproject_job(
+    disparity: Disparity,
+    slopes: tuple[NDArray[np.float32], NDArray[np.float32]],
+    geometry: StereoGeometry,
+    limits: DepthLimits,
+    cloud: CloudImage,
+) -> ReprojectJob:
+    """Describe the computation of a cloud for the native library; the arrays must outlive the job.
+
+    Args:
+        disparity: (H, W) float32, px, neighbours in a row beside each other in memory.
+        slopes: of columns and rows, as `rays` gives them.
+        geometry: of the rectified pair.
+        limits: of its depths.
+        cloud: (H, W, 3) float32, packed; will be written.
+    """
+    height, width = disparity.shape
+    columns, rows = slopes
+    return ReprojectJob(
+        disparity_px=disparity.ctypes.data,
+        column_slopes=columns.ctypes.data,
+        row_slopes=rows.ctypes.data,
+        cloud_m=cloud.ctypes.data,
+        disparity_stride=disparity.strides[0] // disparity.itemsize,
+        width=width,
+        height=height,
+        doffs_px=np.float32(geometry.doffs_px),
+        product=np.float32(geometry.focal_px * geometry.baseline_m),
+        least_px=np.float32(least_in_front_px(geometry)),
+        at_zero_px=np.float32(limits.disparity_error_px - geometry.doffs_px),
+        far_m=float32_below(limits.far_m),
+        near_m=np.float32(max(limits.near_m, 0.0)),
+        wide=is_wide(geometry, width, height),
+    )
 
 
 def _with_packed_rows(array: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -15,7 +15,7 @@ from tests.native.conftest import FOLDER
 
 FLAGS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-O1", "-g1")
 HERE = Path(__file__).resolve().parent
-NOT_AGAIN = ("test_sanitized.py", "test_build.py")
+NOT_AGAIN = ("test_sanitized.py", "test_build.py", "test_arm_program.py")
 
 
 def runtime(compiler: tuple[str, ...]) -> str:
