@@ -12,6 +12,8 @@ Rules:
 
 import logging
 import re
+import threading
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -129,7 +131,8 @@ def decode_file(image: EncodedFile) -> Image:
 
 def decode_files(left: EncodedFile, right: EncodedFile) -> tuple[Image, Image]:
     """Decode the two examined images of a pair, like `decode_pair`."""
-    first, second = to_8_bit((_decoded(left), _decoded(right)))
+    both = _decoded_at_once(left, right) or (_decoded(left), _decoded(right))
+    first, second = to_8_bit(both)
     return _upright(first, left), _upright(second, right)
 
 
@@ -237,6 +240,33 @@ def to_grey(image: Image) -> Image:
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
+def _decoded_at_once(left: EncodedFile, right: EncodedFile) -> tuple[AnyImage, AnyImage] | None:
+    """Decode two images in two threads: OpenCV lets go of Python's lock meanwhile.
+
+    Returns:
+        Both; None unless all is well with both. Then each must be decoded alone, to tell which of them the trouble
+        comes from: libraries print without a name.
+    """
+    payloads = tuple(whole_image(image.payload, image.head, image.name) for image in (left, right))
+    found: list[AnyImage | None] = [None, None]
+
+    def decode_one(side: int) -> None:
+        with suppress(cv2.error):
+            found[side] = cv2.imdecode(np.frombuffer(payloads[side], dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+
+    def decode_both() -> None:
+        other = threading.Thread(target=decode_one, args=(1,), name="decode")
+        other.start()
+        decode_one(0)
+        other.join()
+
+    said = overhear(decode_both)
+    first, second = found
+    if said or first is None or second is None:
+        return None
+    return _checked(first, left), _checked(second, right)
+
+
 def _decoded(image: EncodedFile) -> AnyImage:
     name, kind = image.name, image.head.kind
     payload = np.frombuffer(whole_image(image.payload, image.head, name), dtype=np.uint8)
@@ -251,10 +281,15 @@ def _decoded(image: EncodedFile) -> AnyImage:
     complaint = _complaint(said.splitlines())
     if kind is ImageKind.JPEG and complaint:
         raise SpoiledImageError(FrameFault.CORRUPT, f"{name} is spoiled ({complaint})", _REPLACE)
+    return _checked(decoded, image)
+
+
+def _checked(decoded: AnyImage, image: EncodedFile) -> AnyImage:
+    """Return a decoded image as grey or BGR, of the size that its header claims."""
     if size_px(decoded) != image.head.size_px:
         raise ImageSizeError(
             FrameFault.OTHER_SIZE,
-            f"{name} is {size_text(decoded)} px, its header says {px_text(image.head.size_px)}",
+            f"{image.name} is {size_text(decoded)} px, its header says {px_text(image.head.size_px)}",
             _REPLACE,
         )
     if decoded.ndim == 3:
