@@ -28,10 +28,10 @@ LIBRARY_FILE: Final = "_tandem.so"
 REASON_FILE: Final = "_not_built.txt"
 SOURCES: Final = Path(__file__).resolve().parent / "src"
 
-PER_ISA: Final = ("isa_table.c", "reproject_kernel.c", "pack_kernel.c")
+PER_ISA: Final = ("isa_table.c", "reproject_kernel.c", "pack_kernel.c", "sweep_kernel.c", "finish_kernel.c")
 """Compiled once per instruction set."""
 
-ONCE: Final = ("dispatch.c",)
+ONCE: Final = ("dispatch.c", "match.c", "crew.c")
 """Compiled once, for the plainest processor of the architecture."""
 
 FLAGS: Final = (
@@ -72,7 +72,7 @@ _X86: Final = (
     Isa("avx2", ("-mavx2", "-mbmi", "-mbmi2", "-mpopcnt")),
     Isa(
         "avx512",
-        ("-mavx512f", "-mavx512bw", "-mavx512vl", "-mavx512dq", "-mavx512vbmi", "-mavx2", "-mbmi", "-mbmi2", "-mpopcnt"),
+        ("-mavx512f", "-mavx512bw", "-mavx512vl", "-mavx512dq", "-mavx512vbmi", "-mavx512bitalg", "-mavx2", "-mbmi", "-mbmi2", "-mpopcnt"),
     ),
 )  # fmt: skip
 _BY_MACRO: Final = (

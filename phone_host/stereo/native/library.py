@@ -17,7 +17,7 @@ from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
 VARIABLE: Final = "TANDEMSCAN_SIMD"
 """Environment variable that chooses another instruction set than the widest, to compare or to find a fault."""
 
-_ABI: Final = 1  # TANDEM_ABI of tandem.h
+_ABI: Final = 2  # TANDEM_ABI of tandem.h
 _HERE: Final = Path(__file__).resolve().parent
 _INSTALL: Final = "install gcc or clang and reinstall; in a checkout: make native"
 _REINSTALL: Final = "reinstall"
@@ -95,6 +95,25 @@ class PackJob(ctypes.Structure):
     )
 
 
+class MatchJob(ctypes.Structure):
+    """`struct tandem_match_job`."""
+
+    _fields_ = (
+        ("left", ctypes.c_void_p),
+        ("right", ctypes.c_void_p),
+        ("left_stride", ctypes.c_int64),
+        ("right_stride", ctypes.c_int64),
+        ("disparity", ctypes.c_void_p),
+        ("confidence", ctypes.c_void_p),
+        ("workspace", ctypes.c_void_p),
+        ("workspace_bytes", ctypes.c_int64),
+        ("width", ctypes.c_int32),
+        ("height", ctypes.c_int32),
+        ("disparities", ctypes.c_int32),
+        ("threads", ctypes.c_int32),
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Missing:
     """There is no library to use.
@@ -158,6 +177,14 @@ class Library:
     def reproject(self, job: ReprojectJob) -> None:
         """Compute the points of disparities; see reproject_kernel.c."""
         _require_done(self.handle.tandem_reproject(self.isa, ctypes.byref(job)))
+
+    def match_bytes(self, job: MatchJob) -> int:
+        """Return the size of the workspace that a pair needs, bytes."""
+        return int(self.handle.tandem_match_bytes(self.isa, ctypes.byref(job)))
+
+    def match(self, job: MatchJob) -> None:
+        """Find the disparities of a rectified pair; see match.c."""
+        _require_done(self.handle.tandem_match(self.isa, ctypes.byref(job)))
 
     def pack(self, job: PackJob) -> None:
         """Pack finite points with their colours; see pack_kernel.c."""
@@ -239,7 +266,10 @@ def _declare(handle: ctypes.CDLL) -> None:
     handle.tandem_isa_name.argtypes, handle.tandem_isa_name.restype = [ctypes.c_int32], ctypes.c_char_p
     handle.tandem_isa_state.argtypes, handle.tandem_isa_state.restype = [ctypes.c_int32], ctypes.c_int32
     handle.tandem_isa_best.argtypes, handle.tandem_isa_best.restype = [], ctypes.c_int32
-    for function, job in ((handle.tandem_reproject, ReprojectJob), (handle.tandem_pack, PackJob)):
+    handle.tandem_match_bytes.argtypes = [ctypes.c_int32, ctypes.POINTER(MatchJob)]
+    handle.tandem_match_bytes.restype = ctypes.c_int64
+    jobs = ((handle.tandem_reproject, ReprojectJob), (handle.tandem_pack, PackJob), (handle.tandem_match, MatchJob))
+    for function, job in jobs:
         function.argtypes, function.restype = [ctypes.c_int32, ctypes.POINTER(job)], ctypes.c_int32
 
 

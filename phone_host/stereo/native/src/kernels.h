@@ -13,6 +13,7 @@
 
 #include <float.h>
 
+#include "match.h"
 #include "tandem.h"
 
 #if FLT_EVAL_METHOD != 0
@@ -24,10 +25,18 @@
 
 typedef void tandem_reproject_fn(struct tandem_reproject_job *job);
 typedef void tandem_pack_fn(struct tandem_pack_job *job);
+typedef void tandem_sweep_fn(const struct sweep *job);
+typedef size_t tandem_sweep_scratch_fn(int width, int disparities);
+typedef void tandem_check_rows_fn(const struct finish *job, int from, int to);
+typedef void tandem_smooth_rows_fn(const struct finish *job, int from, int to);
 
 #define TANDEM_KERNELS(KERNEL) \
     KERNEL(reproject)          \
-    KERNEL(pack)
+    KERNEL(pack)           \
+    KERNEL(sweep)          \
+    KERNEL(sweep_scratch)  \
+    KERNEL(check_rows)     \
+    KERNEL(smooth_rows)
 
 struct tandem_kernels {
 #define TANDEM_FIELD(name) tandem_##name##_fn *name;

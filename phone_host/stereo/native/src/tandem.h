@@ -16,7 +16,7 @@
 #define TANDEM_API __attribute__((visibility("default")))
 
 /* Raise it, here and in library.py, when a signature or a struct changes. */
-#define TANDEM_ABI 1
+#define TANDEM_ABI 2
 
 /* Instruction sets, from the plainest. The numbers are part of the ABI, isa_name() their names for people. */
 enum tandem_isa {
@@ -83,10 +83,31 @@ struct tandem_pack_job {
 
 TANDEM_API int32_t tandem_pack(int32_t isa, struct tandem_pack_job *job);
 
+/* Disparities of a rectified pair; see match.c. */
+struct tandem_match_job {
+    const uint8_t *left;     /* (height, width) grey, rows `left_stride` bytes apart (it may be negative) */
+    const uint8_t *right;
+    int64_t left_stride;
+    int64_t right_stride;
+    float *disparity;        /* (height, width), packed; written: px, NAN = none */
+    uint8_t *confidence;     /* (height, width), packed; written: 0 = none, 255 = best */
+    uint8_t *workspace;      /* tandem_match_bytes() bytes */
+    int64_t workspace_bytes;
+    int32_t width;
+    int32_t height;
+    int32_t disparities;     /* 0 <= d < disparities */
+    int32_t threads;         /* results do not depend on it */
+};
+
+TANDEM_API int64_t tandem_match_bytes(int32_t isa, const struct tandem_match_job *job); /* of the workspace; -1: no such set */
+TANDEM_API int32_t tandem_match(int32_t isa, struct tandem_match_job *job);
+
 /* What these functions return. */
 enum tandem_result {
     TANDEM_DONE = 0,
-    TANDEM_NO_SUCH_ISA = 1
+    TANDEM_NO_SUCH_ISA = 1,
+    TANDEM_BAD_SIZE = 2,
+    TANDEM_NO_ROOM = 3
 };
 
 #endif
