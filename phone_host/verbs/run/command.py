@@ -32,7 +32,8 @@ from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
 from phone_host.report.summary import summary
 from phone_host.run.file_sink import NAMES
-from phone_host.run.host import EndReason, Host, HostSettings
+from phone_host.run.host import Host
+from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.terminal_view import LiveTable
 from phone_host.run.time_limit import patience_s
 from phone_host.run.waiting_note import WaitingNote
