@@ -29,7 +29,7 @@ from phone_host.model import (
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
 from phone_host.verbs.orientation_arguments import add_orientation_arguments
-from tests.unit.test_run_report import run
+from tests.support.run_snapshots import run
 
 SHARP: Final = Exposure(mean_level=110, bright_level=200, structure=30, blur_px=1.0, features=400)
 GEOMETRY: Final = StereoGeometry(focal_px=500, baseline_m=0.1, cx_px=320, cy_px=240)
