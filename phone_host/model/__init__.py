@@ -8,6 +8,7 @@ from phone_host.model.evidence import (
     Arrangement,
     Evidence,
     Exposure,
+    OffMiddle,
     Support,
 )
 from phone_host.model.images import (
@@ -56,6 +57,7 @@ __all__ = [
     "Exposure",
     "FramePair",
     "Image",
+    "OffMiddle",
     "PairCounts",
     "Processed",
     "Rectification",
