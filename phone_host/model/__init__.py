@@ -4,6 +4,7 @@ Conventions: camera axes x right, y down, z forward; pixel centres are integers 
     measurement.
 """
 
+from phone_host.model.budget import BudgetAccount, BudgetChange, BudgetReason, BudgetStep
 from phone_host.model.evidence import (
     Arrangement,
     Evidence,
@@ -45,6 +46,10 @@ __all__ = [
     "UNMEASURED_NS",
     "Arrangement",
     "BoardFrame",
+    "BudgetAccount",
+    "BudgetChange",
+    "BudgetReason",
+    "BudgetStep",
     "CameraModel",
     "CloudImage",
     "Crop",

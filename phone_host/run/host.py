@@ -22,6 +22,7 @@ from phone_host.run.doubt_log import DoubtLog
 from phone_host.run.file_sink import FileSink
 from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.ledgerer import Ledgerer
+from phone_host.run.pair_budget import PairBudget
 from phone_host.run.phase_steering import PhaseSteering
 from phone_host.run.pipeline import Pipeline
 from phone_host.run.rig_cameras import RigCameras
@@ -101,12 +102,15 @@ class Host:
         self._rig_rejected = rig is not None and rig.is_rejected
         self._cameras = RigCameras(rig, settings.board_side, self._own, self._camera, self._receiver)
         interpolator = Interpolator() if settings.interpolate else None
+        wanted = settings.budget
+        self._budget = None if core is None or wanted is None else PairBudget(wanted, core)
         pipeline = Pipeline(
             core,
             settings.board_side,
             now.monotonic_ns,
             interpolator,
             settings.most_pixels,
+            budget=self._budget,
             host_orientation=self._own.orientation,
         )
         self._ledgerer = Ledgerer(self._receiver.account.was_away, lambda: demand.is_timeless)
@@ -274,6 +278,7 @@ class Host:
             save_every=0 if self._settings.out is None else self._settings.save_every,
             last_s=max(0, books.last_done_ns - self.started_ns) / 1e9,
             orientations=self._orientations,
+            budget=None if self._budget is None else self._budget.account,
         )
 
     def _is_unneeded(self, account: SinkAccount) -> bool:

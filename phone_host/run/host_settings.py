@@ -8,6 +8,7 @@ from pathlib import Path
 from common.imagesize.head import MOST_PIXELS
 from phone_host.model import Side, TimeOffset
 from phone_host.output.axes import Axes
+from phone_host.stereo.budget_ladder import BudgetWanted
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
 
@@ -40,6 +41,7 @@ class HostSettings:
         most_pixels: largest accepted image size of either camera, pixels.
         resolved: the settings of the run with their origins, for settings.json; None: not saved.
         axes: of the points in saved clouds.
+        budget: time budget for each pair; None: there is none. Only with a core that was built from settings.
     """
 
     board_side: Side = Side.LEFT
@@ -56,3 +58,4 @@ class HostSettings:
     most_pixels: int = MOST_PIXELS
     resolved: Mapping[str, object] | None = None
     axes: Axes = Axes.CAMERA
+    budget: BudgetWanted | None = None

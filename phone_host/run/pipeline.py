@@ -13,7 +13,9 @@ from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
 from common.orientation import UPRIGHT, Orientation
 from phone_host.model import BoardFrame, FramePair, Image, Processed, RectifiedPair, Side
+from phone_host.run.pair_budget import PairBudget
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.images import size_px
 from phone_host.stereo.interpolate import LARGEST_FRACTION, Interpolator
 from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_frames
 
@@ -29,6 +31,7 @@ class Pipeline:
         clock: returns CLOCK_MONOTONIC, ns.
         interpolator: interpolates the board's image to the moment of the host's; None to leave it unchanged.
         most_pixels: largest accepted image size of either camera, pixels.
+        budget: holds a time budget for each pair; None: there is none.
         host_orientation: how the host camera's images become upright; a board's frame says that itself.
     """
 
@@ -40,8 +43,10 @@ class Pipeline:
         interpolator: Interpolator | None = None,
         most_pixels: int = MOST_PIXELS,
         *,
+        budget: PairBudget | None = None,
         host_orientation: Orientation = UPRIGHT,
     ) -> None:
+        self._budget = budget
         self._host_orientation = host_orientation
         self._most_pixels = most_pixels
         self._interpolator = interpolator
@@ -72,8 +77,12 @@ class Pipeline:
         if self._core is None:
             processed = Processed(RectifiedPair(left, right), None, None, StageTimes())
         else:
-            processed = self._core.compute(left, right, self._clock)
+            choice = None if self._budget is None else self._budget.choice(size_px(left), size_px(right))
+            processed = self._core.compute(left, right, self._clock, choice)
         stages = replace(processed.stages, decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
+        if self._budget is not None:
+            end_ns = self._clock()
+            self._budget.add(end_ns - start_ns, stages.match, end_ns)
         return replace(processed, stages=stages)
 
     def _of_host(self, frame: Frame) -> EncodedImage:

@@ -35,6 +35,33 @@ class RegisteredMatcher:
 AnyMatcher = MatcherName | RegisteredMatcher
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UsualCost:
+    """What a matcher takes on a usual machine: a first guess, which a run with a time budget corrects by what it measures.
+
+    Attributes:
+        step_ns: for each pixel and disparity, ns.
+        pixel_ns: for each pixel besides, ns.
+    """
+
+    step_ns: float
+    pixel_ns: float
+
+
+BEST_FIRST: Final = {
+    MatcherName.SGBM: UsualCost(step_ns=1.1, pixel_ns=140.0),
+    MatcherName.BLOCK: UsualCost(step_ns=2.2, pixel_ns=10.0),
+}
+"""Our matchers, those with the best depth first (decision 0002). Costs: two cores of a server, 640x480, 32 to 128 disparities."""
+
+_UNKNOWN_COST: Final = UsualCost(step_ns=1.0, pixel_ns=100.0)
+
+
+def usual_cost(matcher: AnyMatcher) -> UsualCost:
+    """Return what a matcher may cost; of other packages' matchers nothing is known."""
+    return BEST_FIRST.get(matcher, _UNKNOWN_COST) if isinstance(matcher, MatcherName) else _UNKNOWN_COST
+
+
 def matcher_named(text: str) -> AnyMatcher:
     """Find the matcher that a user names, without loading it.
 

@@ -42,6 +42,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
 from phone_host.verbs.output_folders import keep_other_report, spare_inputs
+from phone_host.verbs.run.budget import budget_wanted
 from phone_host.verbs.stereo_options import build_core, output_options
 
 _CHECK_FAILED = 4
@@ -200,6 +201,7 @@ def _host_settings(
         time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
         interpolate=settings.interpolate,
         most_pixels=settings.most_pixels,
+        budget=budget_wanted(options, resolved, core),
         steered=frozenset(whose for whose in Whose if settings.align_phase in {"either", whose.value}),
     )
 
