@@ -13,6 +13,7 @@ _MS: Final = 1e6
 _WHY: Final = {
     BudgetReason.TOO_SLOW: "pairs took too long",
     BudgetReason.ROOM: "there was room",
+    BudgetReason.AS_FAST: "a better way takes no longer",
     BudgetReason.OTHER_SIZE: "images came in another size",
 }
 

@@ -30,6 +30,7 @@ class BudgetReason(Enum):
 
     TOO_SLOW = "too_slow"
     ROOM = "room"
+    AS_FAST = "as_fast"
     OTHER_SIZE = "other_size"
 
 
@@ -67,7 +68,7 @@ class BudgetAccount:
         narrowed: pairs whose search was narrower than the best one.
         changed: how often the way was changed.
         changes: the newest changes, in order.
-        is_cheapest: whether nothing that is expected to be faster is left.
+        is_cheapest: whether pairs are too slow and nothing is left that is expected to be faster.
     """
 
     budget_ns: int

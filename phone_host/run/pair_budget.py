@@ -67,7 +67,6 @@ class PairBudget:
         self._first_ns = 0
         self._pairs = self._within = self._narrowed = self._changed = 0
         self._changes: deque[BudgetChange] = deque(maxlen=_MOST_CHANGES)
-        self._processing_ns = self._match_ns = math.nan
         self.account: BudgetAccount | None = None
         """The account so far; None before the first pair."""
 
@@ -106,8 +105,6 @@ class PairBudget:
         self._within += total_ns <= self._wanted.budget_ns
         self._narrowed += step.choice.disparities < held.best.choice.disparities
         reason = controller.add(total_ns, match_ns, now_ns)
-        if reason is None and not math.isnan(controller.processing_ns):
-            self._processing_ns, self._match_ns = controller.processing_ns, controller.match_ns
         if reason is not None:
             self._note_change(held, reason, now_ns)
             _LOG.info(_told("budget_changed", controller.step, reason=reason.value))
@@ -126,7 +123,7 @@ class PairBudget:
                 pair=self._pairs,
                 at_s=(now_ns - self._first_ns) / 1e9 if self._first_ns else 0.0,
                 reason=reason,
-                processing_ns=self._processing_ns,
+                processing_ns=held.controller.processing_ns,
                 step=_shown(held.controller.step, held.geometry),
             )
         )
@@ -136,8 +133,8 @@ class PairBudget:
             budget_ns=self._wanted.budget_ns,
             now=_shown(held.controller.step, held.geometry),
             best=_shown(held.best, held.geometry),
-            processing_ns=self._processing_ns,
-            match_ns=self._match_ns,
+            processing_ns=held.controller.processing_ns,
+            match_ns=held.controller.match_ns,
             pairs=self._pairs,
             held=self._within,
             narrowed=self._narrowed,

@@ -30,6 +30,10 @@ _ROOMY: Final = 0.75
 _GAIN: Final = 0.95
 """A step that is expected to take more than this share of the present time is no remedy."""
 
+_AS_FAST: Final = 1.1
+"""Where nothing holds the budget, the best step is taken that is slower than the fastest by no more than this: when decoding takes
+most of the time, nothing is won by less depth."""
+
 _PATIENCE_NS: Final = 2_000_000_000
 _MOST_PATIENCE_NS: Final = 60_000_000_000
 _UNDONE_NS: Final = 10_000_000_000
@@ -53,19 +57,11 @@ class BudgetController:
         self._patience_ns = _PATIENCE_NS
         self._changed_ns = now_ns
         self._climbed_ns = now_ns - _UNDONE_NS
-        self.is_cheapest = len(self._steps) == 1
+        self.processing_ns = self.match_ns = float("nan")
+        """Median time of the newest pairs that were matched alike, and of matching alone, ns; NaN: not measured yet."""
+        self.is_cheapest = False
         """Whether pairs are too slow and no step is expected to be faster."""
-        self.step = self._first_within(_ROOMY * budget_ns, self._steps) or self._cheapest()
-
-    @property
-    def processing_ns(self) -> float:
-        """Median time of the newest pairs, ns; NaN: not measured since the last change."""
-        return statistics.median(total for total, _ in self._newest) if self._newest else float("nan")
-
-    @property
-    def match_ns(self) -> float:
-        """The same of matching alone."""
-        return statistics.median(match for _, match in self._newest) if self._newest else float("nan")
+        self.step = self._first_within(_ROOMY * budget_ns, self._steps) or self._fastest()
 
     def add(self, total_ns: int, match_ns: int, now_ns: int) -> BudgetReason | None:
         """Take the times of a pair that was matched as `step` says; `step` may then be another.
@@ -84,20 +80,26 @@ class BudgetController:
         self._newest.append((total_ns, max(1, match_ns)))
         if len(self._newest) < _ENOUGH:
             return None
+        self.processing_ns = statistics.median(total for total, _ in self._newest)
+        self.match_ns = statistics.median(match for _, match in self._newest)
         self._model.observe(self.step, self.match_ns)
         if self.processing_ns > self._budget_ns:
             return self._descend(now_ns)
         self.is_cheapest = False
-        if len(self._newest) == _NEWEST and now_ns - self._changed_ns >= self._patience_ns:
-            return self._climb(now_ns)
-        return None
+        return self._climb(now_ns) if self._is_patient(now_ns) else None
+
+    def _is_patient(self, now_ns: int) -> bool:
+        return len(self._newest) == _NEWEST and now_ns - self._changed_ns >= self._patience_ns
 
     def _descend(self, now_ns: int) -> BudgetReason | None:
-        worse = self._steps[self._steps.index(self.step) + 1 :]
-        step = self._first_within(_FITS * self._budget_ns, worse) or self._cheapest()
+        here = self._steps.index(self.step)
+        step = self._first_within(_FITS * self._budget_ns, self._steps[here + 1 :]) or self._fastest()
         self.is_cheapest = step == self.step or self._model.expected_ns(step) > _GAIN * self.match_ns
         if self.is_cheapest:
-            return None
+            if self._steps.index(step) >= here or not self._is_patient(now_ns):
+                return None
+            self._change(step, now_ns)
+            return BudgetReason.AS_FAST
         is_undone = now_ns - self._climbed_ns < _UNDONE_NS
         self._patience_ns = min(2 * self._patience_ns, _MOST_PATIENCE_NS) if is_undone else _PATIENCE_NS
         self._change(step, now_ns)
@@ -117,8 +119,16 @@ class BudgetController:
         self._newest.clear()
 
     def _first_within(self, limit_ns: float, steps: Sequence[Step]) -> Step | None:
-        rest_ns = statistics.median(total - match for total, match in self._newest) if self._newest else 0.0
+        rest_ns = self._rest_ns
         return next((step for step in steps if rest_ns + self._model.expected_ns(step) <= limit_ns), None)
 
-    def _cheapest(self) -> Step:
-        return min(self._steps, key=self._model.expected_ns)
+    def _fastest(self) -> Step:
+        least_ns = self._rest_ns + min(map(self._model.expected_ns, self._steps))
+        step = self._first_within(_AS_FAST * least_ns, self._steps)
+        assert step is not None
+        return step
+
+    @property
+    def _rest_ns(self) -> float:
+        """What the newest pairs took besides matching, ns."""
+        return statistics.median(total - match for total, match in self._newest) if self._newest else 0.0

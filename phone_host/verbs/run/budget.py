@@ -27,8 +27,6 @@ def budget_wanted(
     Raises:
         SettingsError: there is nothing to choose, or no depth to compute though the option asks for it.
     """
-    if options.budget == 0:
-        raise SettingsError("--budget is 0 ms", "give the time for each pair, for example 30ms, or leave it out")
     settings = resolved.values
     if not settings.budget:
         return None
