@@ -20,9 +20,7 @@ from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import (
     BudgetAccount,
-    BudgetChange,
     BudgetReason,
-    BudgetStep,
     Crop,
     CutCounts,
     Side,
@@ -41,11 +39,11 @@ from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectify import Rectifier
 from phone_host.verbs.run.arguments import add_arguments
 from phone_host.verbs.run.budget import budget_wanted
+from tests.support.budget_accounts import ACCOUNT, BEST, MS, NARROW, SMALL
 from tests.support.planes import plane
 from tests.support.rigs import unlike_rig
 from tests.support.run_snapshots import run
 
-MS: Final = 1_000_000
 GEOMETRY: Final = StereoGeometry(focal_px=400.0, baseline_m=0.1, cx_px=159.5, cy_px=79.5)
 """f b = 40 px m: 64 disparities reach 0.625 m, 48 reach 0.833 m, 32 reach 1.25 m."""
 
@@ -141,15 +139,6 @@ def test_every_matcher_of_ours_works_here_or_is_left_out() -> None:
         MatcherName.SGBM,
         MatcherName.BLOCK,
     ]
-
-
-BEST: Final = BudgetStep(matcher="sgbm", scale=1.0, width_px=640, height_px=480, disparities=96, nearest_m=0.3)
-SMALL: Final = replace(BEST, scale=0.25, width_px=160, height_px=120)
-NARROW: Final = replace(SMALL, disparities=48, nearest_m=0.6)
-ACCOUNT: Final = BudgetAccount(
-    budget_ns=20 * MS, now=NARROW, best=BEST, processing_ns=14.2 * MS, match_ns=6 * MS, pairs=200, held=190, narrowed=7,
-    changed=3, changes=(BudgetChange(pair=40, at_s=2.5, reason=BudgetReason.TOO_SLOW, processing_ns=31e6, step=NARROW),),
-)  # fmt: skip
 
 
 def with_account(account: BudgetAccount | None) -> RunSnapshot:

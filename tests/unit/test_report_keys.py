@@ -23,7 +23,7 @@ from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.phase import Aligning, Alignment, Phase
 from phone_host.sync.quarantine import Suspects
 from tests.docs.commands import ROOT
-from tests.support import bench_results, run_snapshots
+from tests.support import bench_results, budget_accounts, run_snapshots
 from tests.support.pictures import encoded
 from tests.unit import test_calibrate_verb, test_stereo_report
 
@@ -78,6 +78,7 @@ def _eventful_run() -> RunSnapshot:
             ),
         ),
         own_future=4,
+        budget=budget_accounts.ACCOUNT,
         depth=DepthAccount(
             cut=CutCounts(kept=5),
             limits=DepthLimits(near_m=0.0, far_m=9.0, disparity_error_px=0.25, from_rig=True),
