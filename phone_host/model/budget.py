@@ -68,7 +68,7 @@ class BudgetAccount:
         narrowed: pairs whose search was narrower than the best one.
         changed: how often the way was changed.
         changes: the newest changes, in order.
-        is_cheapest: whether pairs are too slow and nothing is left that is expected to be faster.
+        is_missed: whether pairs take too long, and no way is expected to hold the budget.
     """
 
     budget_ns: int
@@ -81,12 +81,7 @@ class BudgetAccount:
     narrowed: int = 0
     changed: int = 0
     changes: tuple[BudgetChange, ...] = ()
-    is_cheapest: bool = False
-
-    @property
-    def is_missed(self) -> bool:
-        """Whether pairs take longer than the budget, and nothing is left to mend it."""
-        return self.is_cheapest and self.processing_ns > self.budget_ns
+    is_missed: bool = False
 
     @property
     def is_narrowed(self) -> bool:

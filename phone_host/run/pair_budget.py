@@ -140,7 +140,7 @@ class PairBudget:
             narrowed=self._narrowed,
             changed=self._changed,
             changes=tuple(self._changes),
-            is_cheapest=held.controller.is_cheapest,
+            is_missed=held.controller.is_missed,
         )
 
 
