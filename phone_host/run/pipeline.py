@@ -78,7 +78,7 @@ class Pipeline:
             processed = Processed(RectifiedPair(left, right), None, None, StageTimes())
         else:
             choice = None if self._budget is None else self._budget.choice(size_px(left), size_px(right))
-            processed = self._core.compute(left, right, self._clock, choice)
+            processed = self._core.compute(left, right, self._clock, choice=choice)
         stages = replace(processed.stages, decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
         if self._budget is not None:
             end_ns = self._clock()

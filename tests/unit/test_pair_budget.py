@@ -64,7 +64,7 @@ def test_a_choice_gives_the_bits_of_a_core_that_was_built_so(
     pair, core = plane().pair, settings_core()
     plain = core.compute(pair.left, pair.right, lambda: 0).disparity
     choice = Choice(matcher=matcher, scale=scale, disparities=disparities)
-    chosen = core.compute(pair.left, pair.right, lambda: 0, choice)
+    chosen = core.compute(pair.left, pair.right, lambda: 0, choice=choice)
     built = StereoCore(MatchSettings(matcher, disparities), None, GEOMETRY, DepthWanted(scale=scale))
     expected = built.compute(pair.left, pair.right, lambda: 0)
     assert chosen.search == expected.search
@@ -82,7 +82,7 @@ def test_choices_share_the_maps_of_the_rectification() -> None:
     made = set()
     for scale in (0.25, 0.3):
         choice = Choice(matcher=MatcherName.BLOCK, scale=scale, disparities=16)
-        processed = core.compute(left, right, lambda: 0, choice)
+        processed = core.compute(left, right, lambda: 0, choice=choice)
         height_px, width_px = processed.pair.left.shape
         made.add(id(core.rectifier_for((width_px, height_px))))
     assert len(made) == 1
@@ -282,7 +282,10 @@ def test_counts_of_pixels_go_on_over_changes() -> None:
     pair, core = plane().pair, settings_core()
     for scale in (1.0, 0.42):
         cut = core.compute(
-            pair.left, pair.right, lambda: 0, Choice(matcher=MatcherName.SGBM, scale=scale, disparities=32)
+            pair.left,
+            pair.right,
+            lambda: 0,
+            choice=Choice(matcher=MatcherName.SGBM, scale=scale, disparities=32),
         ).cut
         assert cut is not None
         assert sum(getattr(cut, name) for name in CutCounts.__slots__) == 320 * 160
