@@ -3,8 +3,8 @@
 Cases: the 20 of bench_depth ($SCAN_DATA: eight scenes, clean and as two cheap cameras give them) and ten rendered rooms
 with hardly textured walls, a glossy box, thin poles, tiles and bars, seen by two unlike webcams (depth_rooms). The
 reference is the better, column by column, of tuned OpenCV's two recipes; the second needs OpenCV's contrib modules.
-Where they are missing, `--anchors FILE` reads the reference's rows from a file that `python -m
-tests.bench.depth_accuracy FILE` wrote in an environment that has them; without that the first recipe alone is the reference.
+Where they are missing, its
+rows on the real scenes are those kept in wls_rows.json, and the rooms stand beside the first alone.
 
 Figures to reach, all on the real scenes: mean ratio to the reference bad2 <= 0.65, fill2 <= 0.70, bad1 <= 0.58, density
 >= 96 %; each kind of case alone <= 0.80 in its mean fill2; no case above 1.00 in fill2. Where the matcher reports its
@@ -19,7 +19,6 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Final
 
 import cv2
@@ -38,7 +37,6 @@ from tests.bench.depth_accuracy import (
     evaluate,
     mean,
     ratio,
-    read_rows,
     room_cases,
     scene_cases,
 )
@@ -138,14 +136,13 @@ def main() -> int:
     )
     parser.add_argument("--matcher", default=DEFAULT, help="a matcher's name (default: %(default)s)")
     parser.add_argument("--only", default="", help="cases whose name contains this; no figure is judged then")
-    parser.add_argument("--anchors", type=Path, metavar="FILE", help="read the reference's rows from this file")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
     if not os.environ.get("SCAN_DATA"):
         print("bench_accuracy was not run: SCAN_DATA does not name the folder of real images", file=sys.stderr)
         return 3
     cases = [case for case in (*scene_cases(), *room_cases()) if options.only in case.name]
-    found = measure(options.matcher, cases, options.anchors)
+    found = measure(options.matcher, cases)
     verdicts = [] if options.only else judge(found)
     if options.json:
         rows = {name: [asdict(row) for row in theirs] for name, theirs in found.anchors.items()}
@@ -160,18 +157,17 @@ def main() -> int:
     return exit_code(verdicts)
 
 
-def measure(matcher: str, cases: Sequence[Case], anchors: Path | None) -> Judged:
+def measure(matcher: str, cases: Sequence[Case]) -> Judged:
     """Match everything.
 
     Args:
         matcher: its name.
         cases: the pairs.
-        anchors: a file of the reference's rows; None: compute them.
     """
     curves = curves_of(matcher, cases)
     return Judged(
         ours=evaluate(matcher, cases),
-        anchors=anchor_rows(cases) if anchors is None else read_rows(anchors, cases),
+        anchors=anchor_rows(cases),
         curves=curves,
         margins=opencv_curves(cases) if curves else [],
         margins_on_ours=curves_by_margin(cases, matcher) if curves else [],

@@ -14,7 +14,6 @@ project's accuracy has always been told (decision 0002).
 
 import json
 import os
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -40,6 +39,9 @@ ROOM: Final = "webcams"
 
 ANCHORS: Final = ("3way", "3way+wls")
 """OpenCV's recipes that ours stand beside; the second needs OpenCV's contrib modules."""
+
+WLS_ROWS: Final = Path(__file__).with_name("wls_rows.json")
+"""What the second anchor scored on the real scenes: opencv-contrib-python-headless 4.14.0, 22 November 2026."""
 
 Matching = Callable[[Image, Image, int], Values]
 """From two BGR images and N to a disparity map."""
@@ -292,25 +294,21 @@ def ratio(ours: Sequence[Row], anchor: Sequence[Row] | Row) -> Row:
 
 
 def anchor_rows(cases: Sequence[Case]) -> dict[str, list[Row]]:
-    """The rows of the anchors that this OpenCV can compute."""
-    return {name: evaluate(name, cases) for name in (ANCHORS if has_wls() else ANCHORS[:1])}
+    """The rows of the anchors: computed, or of the second as kept in WLS_ROWS where this OpenCV cannot compute it.
 
-
-def read_rows(path: Path, cases: Sequence[Case]) -> dict[str, list[Row]]:
-    """Read the rows of several recipes that `main` wrote.
-
-    Raises:
-        KeyError: the file has no row for a case.
+    A case that is not kept (a room, another folder of images) has the first anchor's row in both.
     """
-    kept = json.loads(path.read_text(encoding="utf-8"))
-    named = {name: {(row["scene"], row["kind"]): Row(**row) for row in rows} for name, rows in kept.items()}
-    return {name: [rows[case.scene, case.kind] for case in cases] for name, rows in named.items()}
+    first = evaluate(ANCHORS[0], cases)
+    if has_wls():
+        return {ANCHORS[0]: first, ANCHORS[1]: evaluate(ANCHORS[1], cases)}
+    kept = {(row["scene"], row["kind"]): Row(**row) for row in json.loads(WLS_ROWS.read_text(encoding="utf-8"))}
+    return {ANCHORS[0]: first, ANCHORS[1]: [kept.get((row.scene, row.kind), row) for row in first]}
 
 
 def main() -> None:
-    """Write the anchors' rows on all cases into a file: it needs numpy and an OpenCV with contrib modules, no more."""
-    kept = {name: [asdict(row) for row in rows] for name, rows in anchor_rows(default_cases()).items()}
-    Path(sys.argv[1]).write_text(json.dumps(kept), encoding="utf-8")
+    """Write WLS_ROWS anew. Needs numpy and an OpenCV with contrib modules, no more, and $SCAN_DATA."""
+    rows = [asdict(row) for row in evaluate(ANCHORS[1], list(scene_cases()))]
+    WLS_ROWS.write_text("[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
