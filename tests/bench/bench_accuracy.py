@@ -7,7 +7,8 @@ Where they are missing, its
 rows on the real scenes are those kept in wls_rows.json, and the rooms stand beside the first alone.
 
 Figures to reach, all on the real scenes: mean ratio to the reference bad2 <= 0.65, fill2 <= 0.70, bad1 <= 0.58, density
->= 96 %; each kind of case alone <= 0.80 in its mean fill2; no case above 1.00 in fill2. Where the matcher reports its
+>= 96 %; each kind of case alone <= 0.80 in its mean fill2; no case above 1.00 in fill2. On the boards of real rigs
+(depth_boards): bad2 of every rig <= 1.0 %, of every view <= 4 %, right2 not below the first recipe's. Where the matcher reports its
 confidence: on every scene bad2 falls as less is kept; the area above the oracle's curve is at most 0.35 of random
 order's and below that of OpenCV's uniqueness margin (depth_confidence). Exit 4 when one is missed, 3 when there is no
 SCAN_DATA.
@@ -28,6 +29,7 @@ from rich.table import Table
 
 from phone_host.stereo.matcher_names import MatcherName
 from tests.bench.depth_accuracy import (
+    ANCHORS,
     COLUMNS,
     ROOM,
     Case,
@@ -40,6 +42,8 @@ from tests.bench.depth_accuracy import (
     room_cases,
     scene_cases,
 )
+from tests.bench.depth_boards import COLUMNS as BOARD_COLUMNS
+from tests.bench.depth_boards import BoardRow, View, board_views, evaluate_boards
 from tests.bench.depth_confidence import (
     GREATEST_AREA,
     KEPT,
@@ -56,6 +60,8 @@ GREATEST_RATIO: Final = {"bad2": 0.65, "fill2": 0.70, "bad1": 0.58}
 LEAST_DENSITY: Final = 96.0
 GREATEST_KIND: Final = 0.80
 GREATEST_CASE: Final = 1.00
+GREATEST_BOARD_BAD2: Final = 1.0
+GREATEST_VIEW_BAD2: Final = 4.0
 
 DEFAULT: Final = "tandem" if "tandem" in {name.value for name in MatcherName} else MatcherName.SGBM.value
 
@@ -72,6 +78,8 @@ class Judged:
         curves: of the matcher's confidence; empty: it reports none.
         margins: of OpenCV's margin on its own values.
         margins_on_ours: of OpenCV's margin on the matcher's values.
+        boards: the matcher's rows on the boards of real rigs.
+        anchor_boards: the first recipe's.
     """
 
     ours: Sequence[Row]
@@ -79,6 +87,8 @@ class Judged:
     curves: Sequence[Curve]
     margins: Sequence[Curve]
     margins_on_ours: Sequence[Curve]
+    boards: Sequence[BoardRow]
+    anchor_boards: Sequence[BoardRow]
 
 
 def best_of(anchors: Anchors, index: int) -> float:
@@ -112,7 +122,26 @@ def judge(found: Judged) -> list[Verdict]:
     worst = max(shares, key=lambda name: shares[name])
     what = f"greatest ratio of fill2 of one case ({worst})"
     verdicts.append(Verdict(what, shares[worst] <= GREATEST_CASE, f"{shares[worst]:.3f}", f"{GREATEST_CASE:.2f}"))
-    return verdicts + (judge_confidence(found) if found.curves else [])
+    return [*verdicts, *judge_boards(found), *(judge_confidence(found) if found.curves else [])]
+
+
+def judge_boards(found: Judged) -> list[Verdict]:
+    """Compare the boards with their figures."""
+    verdicts = []
+    for row, theirs in zip(found.boards, found.anchor_boards, strict=True):
+        what = f"board of {row.rig}"
+        found_bad2, found_right2 = f"{row.bad2:.2f} %", f"{row.right2:.2f} %"
+        verdicts += [
+            Verdict(f"{what}, bad2", row.bad2 <= GREATEST_BOARD_BAD2, found_bad2, f"{GREATEST_BOARD_BAD2:g} %"),
+            Verdict(
+                f"{what}, worst view",
+                row.worst <= GREATEST_VIEW_BAD2,
+                f"{row.worst:.2f} %",
+                f"{GREATEST_VIEW_BAD2:g} %",
+            ),
+            Verdict(f"{what}, right2", row.right2 >= theirs.right2, found_right2, f"{theirs.right2:.2f} % of 3WAY"),
+        ]
+    return verdicts
 
 
 def judge_confidence(found: Judged) -> list[Verdict]:
@@ -142,11 +171,12 @@ def main() -> int:
         print("bench_accuracy was not run: SCAN_DATA does not name the folder of real images", file=sys.stderr)
         return 3
     cases = [case for case in (*scene_cases(), *room_cases()) if options.only in case.name]
-    found = measure(options.matcher, cases)
+    found = measure(options.matcher, cases, [] if options.only else list(board_views()))
     verdicts = [] if options.only else judge(found)
     if options.json:
         rows = {name: [asdict(row) for row in theirs] for name, theirs in found.anchors.items()}
-        shown = {"ours": [asdict(row) for row in found.ours], "anchors": rows}
+        boards = {"boards": [asdict(row) for row in found.boards]}
+        shown = {"ours": [asdict(row) for row in found.ours], "anchors": rows, **boards}
         said = {"verdicts": [asdict(verdict) for verdict in verdicts]}
         head = {"machine": str(machine()), "opencv": cv2.__version__, "matcher": options.matcher}
         print(json.dumps({**head, **shown, **said}))
@@ -157,12 +187,13 @@ def main() -> int:
     return exit_code(verdicts)
 
 
-def measure(matcher: str, cases: Sequence[Case]) -> Judged:
+def measure(matcher: str, cases: Sequence[Case], views: Sequence[View]) -> Judged:
     """Match everything.
 
     Args:
         matcher: its name.
         cases: the pairs.
+        views: of boards.
     """
     curves = curves_of(matcher, cases)
     return Judged(
@@ -171,6 +202,8 @@ def measure(matcher: str, cases: Sequence[Case]) -> Judged:
         curves=curves,
         margins=opencv_curves(cases) if curves else [],
         margins_on_ours=curves_by_margin(cases, matcher) if curves else [],
+        boards=evaluate_boards(matcher, views),
+        anchor_boards=evaluate_boards(ANCHORS[0], views),
     )
 
 
@@ -191,6 +224,10 @@ def _print(found: Judged) -> None:
                 "ratio", "rooms" if room else "real", "", *(f"{getattr(shares, name):.3f}" for name in COLUMNS[1:])
             )
     Console(width=130).print(table)
+    for name, boards in (("ours", found.boards), ("3WAY", found.anchor_boards)):
+        for board in boards:
+            shown = "  ".join(f"{column} {getattr(board, column):6.2f}" for column in BOARD_COLUMNS)
+            print(f"board of {board.rig:9} {name:4} {board.views:2} views  {shown}")
     for title, curves in (
         ("confidence", found.curves),
         ("OpenCV's margin", found.margins),

@@ -2,7 +2,7 @@
 
 The rays and the exact truth are those of `phone_host.scene`. The paint is not: it is stated in grey levels, because
 how many of them a wall's texture spans is what decides whether a matcher can see it. A highlight depends on where the
-eye is, so the two cameras see it in different places; the truth stays that of the surface.
+eye is: a flat face mirrors a far lamp as if it were at infinity, with disparity 0; the truth stays that of the face.
 """
 
 from dataclasses import dataclass, replace
