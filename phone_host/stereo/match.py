@@ -1,6 +1,6 @@
 """Matchers: from a rectified pair to a disparity map. One protocol, one factory; each algorithm has its own module.
 
-Rules that every matcher keeps (tests/contract/test_matcher.py):
+Rules that every matcher keeps (tests/contract/test_matcher.py, test_matcher_inputs.py):
 
 - disparity d = left x - right x, px, float32, the left image's size; NaN where it cannot be trusted; every value in [0,
   N);
