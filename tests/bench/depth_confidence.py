@@ -43,8 +43,8 @@ class Matched(Protocol):
         """(H, W) float32, px; NaN: none."""
 
     @property
-    def confidence(self) -> Confidence:
-        """(H, W) uint8; more is surer."""
+    def confidence(self) -> Confidence | None:
+        """(H, W) uint8; more is surer; None: this matcher has none."""
 
 
 @runtime_checkable
@@ -140,6 +140,8 @@ def curves_of(name: str, cases: Sequence[Case]) -> list[Curve]:
         if matcher is None:
             return []
         result = matcher.matched(RectifiedPair(case.left, case.right))
+        if result.confidence is None:
+            return []
         found.append(curve(case, result.disparity, result.confidence))
     return found
 
