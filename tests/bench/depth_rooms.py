@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import StereoGeometry
+from phone_host.scene.cast import pixel_rays, to_body
 from phone_host.scene.scene import Body, Box, Plane, RectifiedView, Scene, Sphere, rectified_cameras, rotation, truth
 from phone_host.scene.scene_model import Rotation, Vector
 from tests.bench import room_painter
@@ -34,6 +35,9 @@ GAIN, OFFSET = 0.7, 20.0
 QUALITY: Final = 80
 BLURS_PX: Final = (0.5, 0.7)
 """Standard deviation of each lens's blur: a webcam in focus, a cheaper one nearly so."""
+
+PARTS: Final = ("nothing", "wall", "plain", "side", "floor", "pole", "bar", "glossy", "ball", "screen", "blind")
+"""What rooms are made of; `plain` is the part of the wall without texture, `bar` one of the fence's."""
 
 _BASELINE_M: Final = 0.1
 _UP: Final = (0.0, 1.0, 0.0)
@@ -70,6 +74,7 @@ class Room:
         left: (H, W, 3).
         right: the same.
         truth: (H, W), disparity, px; NaN where only one camera sees the surface.
+        parts: (H, W) uint8, what each pixel shows: index in PARTS.
         disparities: how far to search, px.
     """
 
@@ -77,6 +82,7 @@ class Room:
     left: Image
     right: Image
     truth: Values
+    parts: NDArray[np.uint8]
     disparities: int
 
 
@@ -101,12 +107,11 @@ def room(seed: int, width_px: int = 640) -> Room:
         path.parent.mkdir(parents=True, exist_ok=True)
         made = _paint(seed, width_px)
         part = path.with_suffix(".part.npz")
-        np.savez(part, left=made.left, right=made.right, truth=made.truth)
+        np.savez(part, left=made.left, right=made.right, truth=made.truth, parts=made.parts)
         part.rename(path)
     with np.load(path) as kept:
-        return Room(
-            f"room{seed}-{width_px}", kept["left"], kept["right"], kept["truth"], 64 if width_px == 640 else 128
-        )
+        images = kept["left"], kept["right"]
+        return Room(f"room{seed}-{width_px}", *images, kept["truth"], kept["parts"], width_px // 10)
 
 
 def _version() -> str:
@@ -130,7 +135,22 @@ def _paint(seed: int, width_px: int) -> Room:
     )
     exact = truth(painted.scene, view)
     known = np.where(exact.visible, exact.disparity_px, np.nan).astype(np.float32)
-    return Room(f"room{seed}-{width_px}", *images, known, 64 if width_px == 640 else 128)
+    parts = _parts(painted, exact.body, exact.depth_m, pixel_rays(left))
+    return Room(f"room{seed}-{width_px}", *images, known, parts, width_px // 10)
+
+
+def _parts(
+    painted: Painted, owner: NDArray[np.int16], depth_m: NDArray[np.float64], rays: NDArray[np.float64]
+) -> NDArray[np.uint8]:
+    """Name what each pixel of the left image shows."""
+    numbers = [PARTS.index(body.name.rstrip("0123456789")) for body in painted.scene.bodies]
+    parts = np.array([*numbers, 0], np.uint8)[owner]  # owner -1: nothing
+    for index, (body, paint) in enumerate(zip(painted.scene.bodies, painted.paints, strict=True)):
+        if np.isfinite(paint.plain_beyond_m):
+            mine = owner == index
+            bare = to_body(body, depth_m[mine] * rays[:, mine])[0] > paint.plain_beyond_m
+            parts[mine] = np.where(bare, PARTS.index("plain"), parts[mine])
+    return parts
 
 
 def _photographed(levels: NDArray[np.float32], sensor: Sensor, random: np.random.Generator) -> Image:

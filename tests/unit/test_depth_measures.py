@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from phone_host.model import Disparity
+from phone_host.model import Disparity, RectifiedPair
+from phone_host.scene.cast import pixel_rays
 from phone_host.scene.scene import Body, Plane, Scene, rectified_cameras, truth
 from tests.bench.depth_accuracy import Case, Row, by_three_way, score
 from tests.bench.depth_boards import View, view_scores
 from tests.bench.depth_choice import choices
 from tests.bench.depth_confidence import curve, relative_area
-from tests.bench.depth_rooms import furnished, view_of
+from tests.bench.depth_parts import evaluate_parts
+from tests.bench.depth_rooms import PARTS, Room, _parts, furnished, view_of
 from tests.bench.depth_scenes import Image
 from tests.bench.match_limit import OPERATIONS, Peak
 from tests.bench.room_painter import Paint, Painted, paint_view
@@ -152,3 +154,35 @@ def test_a_wall_has_the_grey_levels_it_was_given_and_a_highlight_lies_at_infinit
     assert peaks[0][0] > 30
     assert peaks[0] == pytest.approx(peaks[1], abs=1)
     assert float(truth(box.scene, view_of(640)).disparity_px[peaks[0][1], peaks[0][2]]) > 30
+
+
+def test_what_a_rooms_pixels_show_is_known() -> None:
+    """The bare half of a wall is told from the other, and a pixel that sees nothing from both."""
+    wall = Body("wall", Plane(2.0, 2.0), (0.0, 0.0, 2.0))
+    painted = Painted(Scene((wall,)), (Paint(plain_beyond_m=0.25),))
+    view = view_of(640)
+    exact = truth(painted.scene, view)
+    parts = _parts(painted, exact.body, exact.depth_m, pixel_rays(rectified_cameras(view)[0][0]))
+    # f = 525 px at 2 m: the wall ends 262.5 px from the middle, at column 319.5, and is bare from 65.6 px right of it.
+    row = [PARTS[part] for part in parts[240]]
+    assert row == ["nothing"] * 57 + ["wall"] * (386 - 57) + ["plain"] * (583 - 386) + ["nothing"] * (640 - 583)
+
+
+def test_errors_are_counted_by_what_the_pixel_shows() -> None:
+    """All pixels of one surface wrong, all of another right, a third without a value."""
+
+    class Fixed:
+        def match(self, pair: RectifiedPair) -> Disparity:
+            found = np.full(pair.left.shape[:2], TRUTH_PX, np.float32)
+            found[:2] += 5
+            found[4:] = np.nan
+            return found
+
+    parts = np.repeat(np.array([1, 1, 4, 4, 5, 5], np.uint8)[:, None], 8, axis=1)
+    nothing: Image = np.zeros((6, 8, 3), np.uint8)
+    room = Room("room", nothing, nothing, np.full((6, 8), TRUTH_PX, np.float32), parts, 16)
+    rows = {row.part: row for row in evaluate_parts(lambda _: Fixed(), [room])}
+    assert set(rows) == {"wall", "floor", "pole"}
+    assert (rows["wall"].wrong2, rows["floor"].right2, rows["pole"].density) == (100, 100, 0)
+    assert rows["pole"].bad2 == 100
+    assert sum(row.share for row in rows.values()) == pytest.approx(100)
