@@ -155,7 +155,9 @@ def in_process(matcher: str, runs: int, peak: Peak) -> list[Row]:
 
 def _child(*arguments: str, environment: Mapping[str, str] | None = None) -> dict[str, object]:
     command = [sys.executable, "-m", "tests.bench.match_child", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    if done.returncode:
+        raise RuntimeError(f"{' '.join(arguments)}: {done.stderr.strip().splitlines()[-1]}")
     found: dict[str, object] = json.loads(done.stdout)
     return found
 

@@ -240,7 +240,7 @@ def _furniture(random: np.random.Generator, seed: int, depth_m: float, floor_m: 
         tint_bgr=_tint(random),
         texture_levels=_levels(random),
         gloss_levels=float(random.uniform(80, 160)),
-        gloss_exponent=float(random.uniform(60, 200)),
+        gloss_exponent=float(random.uniform(250, 1500)),
         gloss_towards=_mirrored_by(turn, place, random),
         seed=100 * seed + 20,
     )

@@ -51,7 +51,7 @@ class Paint:
         period_m: how far apart.
         pattern_levels: how much darker joints and gaps are.
         gloss_levels: brightness of the highlight of the lamp.
-        gloss_exponent: how small the highlight is (Phong's exponent).
+        gloss_exponent: how small the highlight is (Phong's exponent): half as bright at 3.9 degrees for 300, 1.7 for 1500.
         gloss_towards: direction to the lamp or window that is mirrored; None: the scene's lamp.
         seed: of the texture.
     """
