@@ -6,6 +6,7 @@ from typing import Final
 
 from common.errors import SettingsError
 from common.program.extensions import registered_names
+from phone_host.stereo.network_name import PREFIX, NetworkMatcher, network_named
 
 MATCHERS: Final = "tandemscan.matchers"
 """Entry points of other packages' matchers; see `match`."""
@@ -32,7 +33,7 @@ class RegisteredMatcher:
     value: str
 
 
-AnyMatcher = MatcherName | RegisteredMatcher
+AnyMatcher = MatcherName | RegisteredMatcher | NetworkMatcher
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,18 +64,20 @@ def usual_cost(matcher: AnyMatcher) -> UsualCost:
 
 
 def matcher_named(text: str) -> AnyMatcher:
-    """Find the matcher that a user names, without loading it.
+    """Find the matcher that a user names, without loading it: ours, another package's, or a network's file.
 
     Args:
         text: the name.
 
     Raises:
-        SettingsError: no matcher has that name.
+        SettingsError: no matcher has that name, or an option of a network makes no sense.
     """
+    if text.startswith(PREFIX):
+        return network_named(text)
     own = [name.value for name in MatcherName]
     if text in own:
         return MatcherName(text)
     registered = registered_names(MATCHERS)
     if text in registered:
         return RegisteredMatcher(text)
-    raise SettingsError(f"matcher {text!r} is unknown", f"give {' or '.join((*own, *registered))}")
+    raise SettingsError(f"matcher {text!r} is unknown", f"give {' or '.join((*own, *registered))}, or onnx:PATH")
