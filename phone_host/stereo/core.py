@@ -33,7 +33,7 @@ from phone_host.stereo.depth_limits import (
     depth_limits,
     disparity_error_px,
 )
-from phone_host.stereo.images import require_same_size, size_px
+from phone_host.stereo.images import WHOLE, require_same_size, size_px
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.points import points_of
@@ -99,13 +99,15 @@ class StereoCore:
         if isinstance(matcher, MatchSettings):
             create_matcher(matcher)  # a name or a number that is wrong is told before the first pair comes
 
-    def compute(self, left: Image, right: Image, clock: Callable[[], int]) -> Processed:
+    def compute(self, left: Image, right: Image, clock: Callable[[], int], whole_px: _Sizes | None = None) -> Processed:
         """Run and time all stages: rectify or pass through, match, and reproject if the geometry is known.
 
         Args:
             left: (H, W) grey or (H, W, 3) BGR, uint8.
             right: the same; it may have another size only with a rectifier.
             clock: monotonic, ns.
+            whole_px: width and height of left and right image before they were decoded smaller by `reductions`, px;
+                None: they were not.
 
         Returns:
             The rectified pair, its disparity, its cloud (None without geometry), how they were found, and the times of
@@ -115,7 +117,7 @@ class StereoCore:
             DataError: a size does not fit the rig, the sizes differ and there is no rig, or the crop lies outside.
         """
         start_ns = clock()
-        ready = self._ready(size_px(left), size_px(right))
+        ready = self._ready(*(whole_px or (size_px(left), size_px(right))))
         pair = RectifiedPair(left, right) if ready.rectifier is None else ready.rectifier.rectify(left, right)
         rectified_ns = clock()
         matched = _match(pair, ready)
@@ -127,6 +129,22 @@ class StereoCore:
         return Processed(
             pair, disparity, cloud, times, geometry=ready.geometry, limits=ready.limits, cut=cut, search=ready.search
         )
+
+    def reductions(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> tuple[int, int]:
+        """Return by how much images of these sizes may be decoded smaller, left and right; see `Rectifier.reductions`.
+
+        Args:
+            left_px: width and height of the left image, px.
+            right_px: width and height of the right image, px.
+
+        Raises:
+            DataError: as `require_sizes`.
+        """
+        if self._rectifier is None:
+            self.require_sizes(left_px, right_px)
+            return WHOLE
+        rectifier = self._ready(left_px, right_px).rectifier
+        return WHOLE if rectifier is None else rectifier.reductions
 
     def require_sizes(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> None:
         """Check that images of these sizes can be rectified and hold the crop, before they are decoded.
