@@ -12,7 +12,6 @@ Rules:
 
 import logging
 import re
-import threading
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,6 +32,7 @@ from phone_host.model import Image
 from phone_host.stereo.eight_bit import AnyImage, to_8_bit
 from phone_host.stereo.orient import upright
 from phone_host.stereo.overheard import overhear
+from phone_host.stereo.two_threads import in_two_threads
 
 _LOG = logging.getLogger(__name__)
 
@@ -286,13 +286,7 @@ def _decoded_at_once(
             payload = np.frombuffer(payloads[side], dtype=np.uint8)
             found[side] = cv2.imdecode(payload, _REDUCED.get(scales[side], cv2.IMREAD_UNCHANGED))
 
-    def decode_both() -> None:
-        other = threading.Thread(target=decode_one, args=(1,), name="decode")
-        other.start()
-        decode_one(0)
-        other.join()
-
-    said = overhear(decode_both)
+    said = overhear(lambda: in_two_threads(lambda: decode_one(0), lambda: decode_one(1)))
     first, second = found
     if said or first is None or second is None:
         return None

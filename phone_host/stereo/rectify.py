@@ -28,9 +28,10 @@ from common.errors import DataError
 from common.imagesize.head import size_text
 from phone_host.model import CameraModel, Epipolar, Image, Rectification, RectifiedPair, Rig, Side, StereoGeometry
 from phone_host.stereo.images import size_px
+from phone_host.stereo.remap import Maps, remap
+from phone_host.stereo.two_threads import in_two_threads
 
 Matrix = NDArray[np.float64]
-Maps = tuple[cv2.typing.MatLike, cv2.typing.MatLike]
 
 _LEAST_BASELINE_M = 5e-4
 """No two cameras stand nearer to each other."""
@@ -209,7 +210,8 @@ class Rectifier:
             DataError: an image's size differs from that of its camera in the rig.
         """
         self.require_sizes(self._left.whole_px(size_px(left)), self._right.whole_px(size_px(right)))
-        return RectifiedPair(self._left.apply(left), self._right.apply(right), self.rectification.epipolar)
+        first, second = in_two_threads(lambda: self._left.apply(left), lambda: self._right.apply(right))
+        return RectifiedPair(first, second, self.rectification.epipolar)
 
 
 class _Remap:
@@ -243,12 +245,13 @@ class _Remap:
             height, width = (length // shrink for length in image.shape[:2])
             whole_blocks = image[: height * shrink, : width * shrink]
             image = np.asarray(cv2.resize(whole_blocks, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        # The maps stay inside the image, but the last half block of a reduced one may lie 0.5 px outside.
         if self._kept is not None:
-            return self._remapped(image, self._kept)
+            return remap(image, self._kept)
         result = np.empty((self._height, self._width, *image.shape[2:]), np.uint8)
         for top in range(0, self._height, _STRIP_ROWS):
             bottom = min(top + _STRIP_ROWS, self._height)
-            result[top:bottom] = self._remapped(image, self._maps(top, bottom))
+            result[top:bottom] = remap(image, self._maps(top, bottom))
         return result
 
     def _maps(self, top: int, bottom: int) -> Maps:
@@ -265,12 +268,6 @@ class _Remap:
         if self._shrink > 1:
             x, y = ((axis + 0.5) / self._shrink - 0.5 for axis in (x, y))
         return cv2.convertMaps(x, y, cv2.CV_16SC2)  # half the time of float maps, the same 1/32 px
-
-    @staticmethod
-    def _remapped(image: Image, maps: Maps) -> Image:
-        # Replicate: the maps stay inside, but the last half block of a reduced image may lie 0.5 px outside.
-        remapped = cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        return np.asarray(remapped, dtype=np.uint8)
 
 
 def _rotations(rig: Rig) -> tuple[Matrix, Matrix, float, Epipolar]:

@@ -20,7 +20,7 @@ from phone_host.stereo.native.build_library import (
     build_or_explain,
     sources_digest,
 )
-from phone_host.stereo.native.library import IsaState, Library, Missing, Simd, described, fallback_note, load
+from phone_host.stereo.native.library import IsaState, Library, Missing, Simd, fallback_note, load
 
 ROOT = Path(__file__).resolve().parents[2]
 NATIVE = "phone_host/stereo/native"
@@ -90,7 +90,6 @@ def test_a_build_that_fails_leaves_its_reason(
     monkeypatch.delenv("CC")
     assert isinstance(build_or_explain(tmp_path), Built)
     assert not (tmp_path / REASON_FILE).exists()
-    assert described(loaded(tmp_path))
     assert fallback_note(loaded(tmp_path)) == ""
 
 

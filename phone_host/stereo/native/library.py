@@ -95,6 +95,21 @@ class PackJob(ctypes.Structure):
     )
 
 
+class RemapJob(ctypes.Structure):
+    """`struct tandem_remap_job`."""
+
+    _fields_ = (
+        ("image", ctypes.c_void_p),
+        ("places", ctypes.c_void_p),
+        ("fractions", ctypes.c_void_p),
+        ("out", ctypes.c_void_p),
+        ("image_stride", ctypes.c_int64),
+        ("out_pixels", ctypes.c_int64),
+        ("image_width", ctypes.c_int32),
+        ("image_height", ctypes.c_int32),
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Missing:
     """There is no library to use.
@@ -163,6 +178,10 @@ class Library:
         """Pack finite points with their colours; see pack_kernel.c."""
         _require_done(self.handle.tandem_pack(self.isa, ctypes.byref(job)))
 
+    def remap(self, job: RemapJob) -> None:
+        """See a coloured image through a map; see remap_kernel.c."""
+        _require_done(self.handle.tandem_remap(self.isa, ctypes.byref(job)))
+
 
 @cache
 def native() -> Library | Missing:
@@ -204,11 +223,6 @@ def load(folder: Path, wanted: str = "") -> Library | Missing:
     return library.using(Simd(wanted))
 
 
-def described(found: Library | Missing) -> str:
-    """Return in a few words what computes: for `doctor` and reports."""
-    return found.simd.text if isinstance(found, Library) else f"{found.reason}; {found.remedy}"
-
-
 def fallback_note(found: Library | Missing) -> str:
     """Return the sentence for a run's summary where the default matcher had to fall back; empty where the library is there."""
     if isinstance(found, Library):
@@ -239,7 +253,11 @@ def _declare(handle: ctypes.CDLL) -> None:
     handle.tandem_isa_name.argtypes, handle.tandem_isa_name.restype = [ctypes.c_int32], ctypes.c_char_p
     handle.tandem_isa_state.argtypes, handle.tandem_isa_state.restype = [ctypes.c_int32], ctypes.c_int32
     handle.tandem_isa_best.argtypes, handle.tandem_isa_best.restype = [], ctypes.c_int32
-    for function, job in ((handle.tandem_reproject, ReprojectJob), (handle.tandem_pack, PackJob)):
+    for function, job in (
+        (handle.tandem_reproject, ReprojectJob),
+        (handle.tandem_pack, PackJob),
+        (handle.tandem_remap, RemapJob),
+    ):
         function.argtypes, function.restype = [ctypes.c_int32, ctypes.POINTER(job)], ctypes.c_int32
 
 

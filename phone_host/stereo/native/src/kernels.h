@@ -24,10 +24,12 @@
 
 typedef void tandem_reproject_fn(struct tandem_reproject_job *job);
 typedef void tandem_pack_fn(struct tandem_pack_job *job);
+typedef void tandem_remap_fn(struct tandem_remap_job *job);
 
 #define TANDEM_KERNELS(KERNEL) \
     KERNEL(reproject)          \
-    KERNEL(pack)
+    KERNEL(pack)               \
+    KERNEL(remap)
 
 struct tandem_kernels {
 #define TANDEM_FIELD(name) tandem_##name##_fn *name;
