@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,7 +28,7 @@ from phone_host.stereo.points import points_of, reproject_job
 from phone_host.stereo.reproject import rays
 
 PROGRAM = Path(__file__).resolve().parent / "arm_program"
-KINDS = ("points", "records")
+KINDS = ("points", "records", "remap")
 """As `checks` in check.c orders them."""
 
 
@@ -107,6 +108,22 @@ def record_cases(library: Library) -> Iterator[Case]:
         yield Case("records", (whole, np.zeros(3, np.uint8), cloud, colours, records))
 
 
+def remap_cases() -> Iterator[Case]:
+    """Maps that stay inside an image, and maps that leave it on all sides; the results are OpenCV's."""
+    random = np.random.default_rng(19)
+    for width, height, reach in ((1, 1, 3), (2, 9, 3), (90, 41, 0), (90, 41, 30)):
+        image = random.integers(0, 256, (height, width, 3), np.uint8)
+        x, y = (random.uniform(-reach, side - 1 + reach, (23, 37)).astype(np.float32) for side in (width, height))
+        places, fractions = cv2.convertMaps(x, y, cv2.CV_16SC2)
+        out = cv2.remap(image, places, fractions, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        yield Case("remap", (np.array([width, height], "<i4"), image, places, fractions, out))
+
+
+def every_case(library: Library) -> list[Case]:
+    """All cases of all kinds."""
+    return [*point_cases(library), *record_cases(library), *remap_cases()]
+
+
 def write_cases(path: Path, cases: list[Case]) -> None:
     """Write cases as check.c reads them."""
     with path.open("wb") as file:
@@ -157,7 +174,7 @@ def main() -> int:
         return 3
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        cases = [*point_cases(library), *record_cases(library)]
+        cases = every_case(library)
         write_cases(folder / "cases", cases)
         print(f"{len(cases)} cases, computed here with {library.simd.text} ({LIBRARY_FILE})")
         results = []

@@ -67,7 +67,7 @@ def test_an_old_compiler_leaves_out_what_it_does_not_know(tmp_path: Path, monkey
     assert any("unrecognized option" in text for text in built.left_out)
     assert loaded(tmp_path).state_of(Simd.AVX512) is IsaState.NOT_BUILT
     with pytest.raises(
-        SettingsError, match=r"TANDEMSCAN_SIMD=avx512 cannot be used \(the library was built without it\).*scalar"
+        SettingsError, match=r"TANDEMSCAN_SIMD=avx512 cannot be used: the native library was built without it.*scalar"
     ):
         load(tmp_path, "avx512")
 

@@ -156,14 +156,17 @@ class Library:
         Raises:
             SettingsError: it is not built or this processor lacks it.
         """
-        state = self.state_of(simd)
-        if state is not IsaState.USABLE:
-            lacks = (
-                "the library was built without it"
-                if state is IsaState.NOT_BUILT
-                else f"this processor has no {simd.text}"
+        state, choices = self.state_of(simd), _choices(self)
+        if state is IsaState.NOT_BUILT:
+            raise SettingsError(
+                f"TANDEMSCAN_SIMD={simd.value} cannot be used: the native library was built without it",
+                f"give {choices}, or leave it empty for the fastest",
             )
-            raise SettingsError(f"{VARIABLE}={simd.value} cannot be used ({lacks})", _choices(self))
+        if state is IsaState.NOT_SUPPORTED:
+            raise SettingsError(
+                f"TANDEMSCAN_SIMD={simd.value} cannot be used: this processor has no {simd.text}",
+                f"give {choices}, or leave it empty for the fastest",
+            )
         return Library(handle=self.handle, simd=simd, path=self.path)
 
     def sources(self) -> str:
@@ -219,7 +222,10 @@ def load(folder: Path, wanted: str = "") -> Library | Missing:
     if not wanted:
         return library
     if wanted not in [simd.value for simd in Simd]:
-        raise SettingsError(f"{VARIABLE}={wanted} is no instruction set", _choices(library))
+        choices = _choices(library)
+        raise SettingsError(
+            f"TANDEMSCAN_SIMD={wanted} is no instruction set", f"give {choices}, or leave it empty for the fastest"
+        )
     return library.using(Simd(wanted))
 
 
@@ -243,7 +249,7 @@ def _missing(folder: Path, error: Exception) -> Missing:
 
 
 def _choices(library: Library) -> str:
-    return f"give {' or '.join(simd.value for simd in library.usable_sets())}, or nothing for the fastest"
+    return " or ".join(simd.value for simd in library.usable_sets())
 
 
 def _declare(handle: ctypes.CDLL) -> None:
