@@ -94,7 +94,7 @@ class Pipeline:
         if self._core is None:
             processed = Processed(RectifiedPair(left, right), None, None, StageTimes())
         else:
-            processed = self._core.compute(left, right, self._clock, self._in_sides(*decoding.whole_px))
+            processed = self._core.compute(left, right, self._clock, whole_px=self._in_sides(*decoding.whole_px))
         stages = replace(processed.stages, decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
         return replace(processed, stages=stages)
 

@@ -231,7 +231,7 @@ class _Work:
         images = decode_files(*opened, core.reductions(*sizes_px))
         self._results.open()
         watch.lap("read")
-        processed = core.compute(*images, _StageClock(self._watcher, about), sizes_px)
+        processed = core.compute(*images, _StageClock(self._watcher, about), whole_px=sizes_px)
         watch.take_over(processed.stages)
         self._watcher.say(f"checking{about}")
         trust = judge_pair(core, processed, self._job.mounted)

@@ -99,7 +99,9 @@ class StereoCore:
         if isinstance(matcher, MatchSettings):
             create_matcher(matcher)  # a name or a number that is wrong is told before the first pair comes
 
-    def compute(self, left: Image, right: Image, clock: Callable[[], int], whole_px: _Sizes | None = None) -> Processed:
+    def compute(
+        self, left: Image, right: Image, clock: Callable[[], int], *, whole_px: _Sizes | None = None
+    ) -> Processed:
         """Run and time all stages: rectify or pass through, match, and reproject if the geometry is known.
 
         Args:

@@ -76,7 +76,7 @@ def test_a_finer_camera_is_rectified_alike_from_its_reduced_image() -> None:
     assert reductions == (1, 2)
     left, right = (examine(jpeg(smooth(*size)), "a", 10**7) for size in sizes_px)
     whole = core.compute(*decode_files(left, right), lambda: 0).pair
-    small = core.compute(*decode_files(left, right, reductions), lambda: 0, sizes_px).pair
+    small = core.compute(*decode_files(left, right, reductions), lambda: 0, whole_px=sizes_px).pair
     assert small.left.tobytes() == whole.left.tobytes()
     assert small.right.shape == whole.right.shape
     assert np.abs(small.right.astype(int) - whole.right).mean() < 1
