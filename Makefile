@@ -7,7 +7,9 @@ SHELL := /bin/sh
 BIN := .venv/bin
 READY := .venv/.ready
 RUN := .venv/.ready-run
-PARTS := unit contract system hostile
+PARTS := unit contract native system hostile
+# What the native library is made of; .ci/venv knows the same.
+NATIVE := setup.py phone_host/stereo/native/build_library.py $(wildcard phone_host/stereo/native/src/*)
 BENCHES := $(patsubst tests/bench/%.py,%,$(sort $(wildcard tests/bench/bench_*.py)))
 
 ifndef SCAN_DATA
@@ -17,25 +19,28 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help run-venv venv demo docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-board deb lint types bench fuzz lock clean
+.PHONY: help run-venv venv demo native docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-arm test-board deb lint types bench fuzz lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 run-venv: $(RUN) ## create .venv with what the commands need at run time (make demo does this itself)
 
-$(RUN): requirements/run.txt pyproject.toml common/versions.py
+$(RUN): requirements/run.txt pyproject.toml common/versions.py $(NATIVE)
 	@.ci/venv run
 
 venv: $(READY) ## create or update .venv with the development tools, too (the other targets do this themselves)
 
-$(READY): requirements/dev.txt pyproject.toml common/versions.py
+$(READY): requirements/dev.txt pyproject.toml common/versions.py $(NATIVE)
 	@.ci/venv dev
 
 demo: $(RUN) ## run both programs on this machine with a rendered scene; writes a full report to out/demo
 	@$(BIN)/phone-host demo --out out/demo
 
-test: $(READY) ## run the unit, contract, system and hostile tests; prints the minutes of each part
+native: $(RUN) ## build the native library again, in place (the set-up does this itself; after installing a compiler, or with CC=clang)
+	@$(BIN)/python -m phone_host.stereo.native.build_library
+
+test: $(READY) ## run the unit, contract, native, system and hostile tests; prints the minutes of each part
 	@.ci/test $(PARTS)
 
 $(PARTS:%=test-%): test-%: $(READY) # run one part: make test-unit
@@ -46,6 +51,9 @@ test-slow: $(READY) ## run the tests with large samples, too slow for every day;
 
 coverage: $(READY) ## run the unit tests; lists branches of the pure modules that no test takes (CI requires 98 %)
 	@COVERAGE=1 .ci/test unit
+
+test-arm: $(READY) ## compare the native library's bits on aarch64, armv7 and older x86 with this machine's, under qemu-user
+	@$(BIN)/python -m tests.native.arm
 
 test-board: $(READY) ## run the tests on booted virtual boards (the first run builds their images: needs apt and root)
 	@.ci/board

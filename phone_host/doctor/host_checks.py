@@ -6,6 +6,8 @@ from enum import Enum
 from typing import Final, assert_never
 
 from common.doctor.finding import Finding, fail, ok, warn
+from common.errors import SettingsError
+from phone_host.stereo.native.library import Library, Missing
 from phone_host.stereo.scaled_rig import fits_rig, is_scaling
 
 OPENCV_WHEELS: Final = (
@@ -134,6 +136,17 @@ def check_package(package: Package) -> Finding:
         span = f"{package.least} or newer" + (f", below {package.below}" if package.below else "")
         return warn(package.name, text, f"tested with {span}: make run-venv, or pipx reinstall tandemscan, installs it")
     return ok(package.name, text)
+
+
+def check_native(library: Library | Missing | SettingsError) -> Finding:
+    """Judge the native library: without it everything works, but slower."""
+    match library:
+        case Library():
+            return ok("native", f"own matcher: {library.simd.text}")
+        case Missing(reason=reason, remedy=remedy):
+            return warn("native", f"own matcher {reason}; sgbm is used", remedy)
+        case _:
+            return fail("native", library.problem, library.remedy)
 
 
 def check_rig(rig: RigReadings) -> Finding:

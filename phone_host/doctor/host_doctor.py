@@ -23,7 +23,7 @@ from common.doctor.camera_probe import examine_camera
 from common.doctor.finding import Finding, Grade, fail, ok
 from common.doctor.machine_checks import check_bluetooth, check_clocks, check_disk, check_power, check_usb_log
 from common.doctor.unit_check import Unit
-from common.errors import TandemError, UnavailableError
+from common.errors import SettingsError, TandemError, UnavailableError
 from common.keys import KeyFolder
 from common.link.factory import parse_link
 from common.places import Kind, nearest
@@ -36,12 +36,14 @@ from phone_host.doctor.host_checks import (
     BoardReadings,
     Package,
     check_board,
+    check_native,
     check_out,
     check_package,
     check_ports,
     check_python,
     check_rig,
 )
+from phone_host.stereo.native.library import native
 
 _CONNECT_S: Final = 2.0
 
@@ -83,6 +85,7 @@ def examine(question: Question) -> list[Finding]:
     findings = [check_python(sys.version_info[:3], sys.platform)]
     packages = [check_package(package) for package in _packages()]
     findings += packages
+    findings.append(native_finding())
     works = all(finding.verdict is not Grade.FAIL for finding in packages)
     if is_http(question.camera):
         findings.append(_server(question.camera))
@@ -107,6 +110,14 @@ def examine(question: Question) -> list[Finding]:
     log = machine.read_kernel_log()
     findings += [check_power(log, machine.read_supply()), check_usb_log(log)]
     return findings
+
+
+def native_finding() -> Finding:
+    """Check the native library, with which the own matcher computes."""
+    try:
+        return check_native(native())
+    except SettingsError as error:
+        return check_native(error)
 
 
 def examine_out(out: Path) -> list[Finding]:

@@ -20,6 +20,7 @@ from phone_host.measure.trouble import Trouble
 from phone_host.model import Processed, Result, Side
 from phone_host.run.doubt_log import DoubtLog
 from phone_host.run.file_sink import FileSink
+from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.pair_budget import PairBudget
@@ -142,6 +143,7 @@ class Host:
             UnavailableError: no board came in time, or it does not talk to this host.
             DataError: the streams' images or the cameras do not fit the rig.
         """
+        keep_freed_memory()
         try:
             self._worker.start()
             self._receiver.start()

@@ -31,19 +31,20 @@ from phone_host.stereo.depth_limits import (
     DepthWanted,
     above_zero,
     crop_inside,
-    cut_cloud,
     depth_limits,
     disparity_error_px,
 )
-from phone_host.stereo.images import require_same_size, size_px
+from phone_host.stereo.images import WHOLE, require_same_size, size_px
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_protocol import Matcher
+from phone_host.stereo.points import points_of
 from phone_host.stereo.rectify import Rectifier
-from phone_host.stereo.reproject import disparities_for_near, reproject
+from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.scaled_rig import scaled_rig
 from phone_host.stereo.stacked import lying_pair, upright_again
 from phone_host.stereo.working import MARGIN_PX, Part, chosen_scale, part_for, reduced, to_full_size
 
+_Sizes = tuple[tuple[int, int], tuple[int, int]]
 _Key = tuple[tuple[int, int], tuple[int, int], Choice | None]
 _MOST_KEPT: Final = 4
 """Pairs of image sizes and choices that are kept ready. Cameras change their size rarely, a time budget its choice every few seconds."""
@@ -101,7 +102,13 @@ class StereoCore:
             create_matcher(matcher)  # a name or a number that is wrong is told before the first pair comes
 
     def compute(
-        self, left: Image, right: Image, clock: Callable[[], int], *, choice: Choice | None = None
+        self,
+        left: Image,
+        right: Image,
+        clock: Callable[[], int],
+        *,
+        whole_px: _Sizes | None = None,
+        choice: Choice | None = None,
     ) -> Processed:
         """Run and time all stages: rectify or pass through, match, and reproject if the geometry is known.
 
@@ -109,6 +116,8 @@ class StereoCore:
             left: (H, W) grey or (H, W, 3) BGR, uint8.
             right: the same; it may have another size only with a rectifier.
             clock: monotonic, ns.
+            whole_px: width and height of left and right image before they were decoded smaller by `reductions`, px;
+                None: they were not.
             choice: how to match this pair; None: as the core was built. Only for a core that was built from settings.
 
         Returns:
@@ -119,7 +128,7 @@ class StereoCore:
             DataError: a size does not fit the rig, the sizes differ and there is no rig, or the crop lies outside.
         """
         start_ns = clock()
-        ready = self._ready(size_px(left), size_px(right), choice)
+        ready = self._ready(*(whole_px or (size_px(left), size_px(right))), choice)
         pair = RectifiedPair(left, right) if ready.rectifier is None else ready.rectifier.rectify(left, right)
         rectified_ns = clock()
         matched = _match(pair, ready)
@@ -131,6 +140,22 @@ class StereoCore:
         return Processed(
             pair, disparity, cloud, times, geometry=ready.geometry, limits=ready.limits, cut=cut, search=ready.search
         )
+
+    def reductions(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> tuple[int, int]:
+        """Return by how much images of these sizes may be decoded smaller, left and right; see `Rectifier.reductions`.
+
+        Args:
+            left_px: width and height of the left image, px.
+            right_px: width and height of the right image, px.
+
+        Raises:
+            DataError: as `require_sizes`.
+        """
+        if self._rectifier is None:
+            self.require_sizes(left_px, right_px)
+            return WHOLE
+        rectifier = self._ready(left_px, right_px).rectifier
+        return WHOLE if rectifier is None else rectifier.reductions
 
     def extent(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> Extent:
         """Return what is matched of images of these sizes if nothing is chosen.
@@ -263,15 +288,11 @@ def _reproject(matched: Disparity, ready: _Ready) -> tuple[Disparity, CloudImage
     geometry, limits = ready.geometry, ready.limits
     crop = None if ready.part is None else ready.part.crop
     inside = matched.size if crop is None else crop.width_px * crop.height_px
-    found = int(np.count_nonzero(np.isfinite(matched)))
-    disparity, at_zero = above_zero(matched, 0.0 if geometry is None else geometry.doffs_px, ready.error_px)
-    counts = CutCounts(kept=found - at_zero)
-    cloud = None
     if geometry is not None and limits is not None:
-        cloud = reproject(disparity, geometry)
-        counts = cut_cloud(cloud, geometry, limits)
-    return (
-        disparity,
-        cloud,
-        replace(counts, outside=matched.size - inside, unmatched=inside - found, at_zero=at_zero),
-    )
+        points = points_of(matched, geometry, limits)
+        disparity, cloud, found, counts = points.disparity, points.cloud, points.found, points.counts
+    else:
+        cloud, found = None, int(np.count_nonzero(np.isfinite(matched)))
+        disparity, at_zero = above_zero(matched, 0.0, ready.error_px)
+        counts = CutCounts(kept=found - at_zero, at_zero=at_zero)
+    return disparity, cloud, replace(counts, outside=matched.size - inside, unmatched=inside - found)

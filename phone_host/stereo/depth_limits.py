@@ -94,9 +94,19 @@ def above_zero(disparity: Disparity, doffs_px: float, error_px: float) -> tuple[
     Returns:
         The remaining disparities (the same array if none was dropped), and how many were dropped.
     """
-    at_zero = disparity <= np.float32(error_px - doffs_px)
-    count = int(np.count_nonzero(at_zero))
-    return (np.where(at_zero, np.float32(np.nan), disparity) if count else disparity), count
+    limit = np.float32(error_px - doffs_px)
+    count = int(np.count_nonzero(disparity <= limit))
+    return (drop_zeros(disparity, limit) if count else disparity), count
+
+
+def drop_zeros(disparity: Disparity, at_zero_px: np.float32) -> Disparity:
+    """Return a copy without the disparities up to a limit.
+
+    Args:
+        disparity: (H, W) float32, px, NaN = none.
+        at_zero_px: the limit, px.
+    """
+    return np.where(disparity <= at_zero_px, np.float32(np.nan), disparity)
 
 
 def cut_cloud(cloud: CloudImage, geometry: StereoGeometry, limits: DepthLimits) -> CutCounts:
@@ -112,9 +122,9 @@ def cut_cloud(cloud: CloudImage, geometry: StereoGeometry, limits: DepthLimits) 
     """
     depth = cloud[..., 2]
     before = int(np.count_nonzero(np.isfinite(depth)))
-    far_m = _float32_below(limits.far_m)
+    far_m = float32_below(limits.far_m)
     too_far = depth >= far_m
-    if _is_wide(geometry, cloud.shape[1], cloud.shape[0]):
+    if is_wide(geometry, cloud.shape[1], cloud.shape[0]):
         for axis in (0, 1):
             too_far |= np.abs(cloud[..., axis]) >= far_m
     too_near = (depth < limits.near_m) & ~too_far if limits.near_m > 0 else np.zeros(0, np.bool_)
@@ -126,13 +136,13 @@ def cut_cloud(cloud: CloudImage, geometry: StereoGeometry, limits: DepthLimits) 
     return replace(counts, kept=before - counts.too_far - counts.too_near)
 
 
-def _is_wide(geometry: StereoGeometry, width_px: int, height_px: int) -> bool:
+def is_wide(geometry: StereoGeometry, width_px: int, height_px: int) -> bool:
     """Return whether an image reaches more than 45 degrees to a side; else no |x| or |y| is larger than z."""
     sides = (geometry.cx_px, width_px - 1 - geometry.cx_px, geometry.cy_px, height_px - 1 - geometry.cy_px)
     return max(sides) > geometry.focal_px
 
 
-def _float32_below(value: float) -> np.float32:
+def float32_below(value: float) -> np.float32:
     """Return the largest float32 that is not above a value; plain rounding might be, and pass a point beyond the limit."""
     rounded = np.float32(value)
     return rounded if float(rounded) <= value else np.nextafter(rounded, np.float32(-np.inf))

@@ -19,11 +19,16 @@ _FARTHEST_M = 1e30
 
 
 @lru_cache(maxsize=8)
-def _rays(geometry: StereoGeometry, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the slopes (u - cx) / f of the columns, (W,), and (v - cy) / f of the rows, (H, 1)."""
+def rays(geometry: StereoGeometry, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the slopes (u - cx) / f of the columns, (W,) float32, and (v - cy) / f of the rows, (H, 1) float32; both packed."""
     columns = (np.arange(width) - geometry.cx_px) / geometry.focal_px
     rows = (np.arange(height) - geometry.cy_px) / geometry.focal_px
     return columns.astype(np.float32), rows.astype(np.float32)[:, np.newaxis]
+
+
+def least_in_front_px(geometry: StereoGeometry) -> float:
+    """Return the value that d + doffs exceeds for points in front of the cameras, px."""
+    return geometry.focal_px * geometry.baseline_m / _FARTHEST_M
 
 
 def reproject(disparity: Disparity, geometry: StereoGeometry) -> CloudImage:
@@ -38,10 +43,10 @@ def reproject(disparity: Disparity, geometry: StereoGeometry) -> CloudImage:
         beyond 1e30 m.
     """
     height, width = disparity.shape
-    columns, rows = _rays(geometry, width, height)
+    columns, rows = rays(geometry, width, height)
     product = geometry.focal_px * geometry.baseline_m
     shifted = disparity + np.float32(geometry.doffs_px) if geometry.doffs_px else disparity
-    in_front = shifted > product / _FARTHEST_M
+    in_front = shifted > least_in_front_px(geometry)
     depth = np.full(disparity.shape, np.nan, dtype=np.float32)
     np.divide(np.float32(product), shifted, out=depth, where=in_front)
     cloud = np.empty((height, width, 3), dtype=np.float32)

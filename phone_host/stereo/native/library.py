@@ -1,0 +1,272 @@
+"""Finds, checks and loads the native library, and declares its functions: the one place that knows both sides (src/tandem.h).
+
+Needs neither numpy nor OpenCV. Callers check shapes and strides; the C code trusts them.
+"""
+
+import ctypes
+import os
+from dataclasses import dataclass
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from common.errors import SettingsError
+from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
+
+VARIABLE: Final = "TANDEMSCAN_SIMD"
+"""Environment variable that chooses another instruction set than the widest, to compare or to find a fault."""
+
+_ABI: Final = 1  # TANDEM_ABI of tandem.h
+_HERE: Final = Path(__file__).resolve().parent
+_INSTALL: Final = "install gcc or clang and reinstall; in a checkout: make native"
+_REINSTALL: Final = "reinstall"
+
+
+class Simd(Enum):
+    """Instruction sets of the processors, by the names of tandem.h and of `TANDEMSCAN_SIMD`, the widest first."""
+
+    AVX512 = "avx512"
+    AVX2 = "avx2"
+    SSE41 = "sse41"
+    NEON = "neon"
+    SCALAR = "scalar"
+
+    @property
+    def text(self) -> str:
+        """The name as people know it."""
+        return {"avx512": "AVX-512", "sse41": "SSE4.1", "scalar": "no SIMD"}.get(self.value, self.value.upper())
+
+
+class IsaState(Enum):
+    """Whether an instruction set can be used: `enum tandem_isa_state`."""
+
+    USABLE = 0
+    NOT_BUILT = 1
+    NOT_SUPPORTED = 2
+
+
+_NUMBERS: Final = {Simd.SCALAR: 0, Simd.SSE41: 1, Simd.AVX2: 2, Simd.AVX512: 3, Simd.NEON: 4}
+"""`enum tandem_isa`."""
+
+
+class ReprojectJob(ctypes.Structure):
+    """`struct tandem_reproject_job`."""
+
+    _fields_ = (
+        ("disparity_px", ctypes.c_void_p),
+        ("column_slopes", ctypes.c_void_p),
+        ("row_slopes", ctypes.c_void_p),
+        ("cloud_m", ctypes.c_void_p),
+        ("disparity_stride", ctypes.c_int64),
+        ("width", ctypes.c_int32),
+        ("height", ctypes.c_int32),
+        ("doffs_px", ctypes.c_float),
+        ("product", ctypes.c_float),
+        ("least_px", ctypes.c_float),
+        ("at_zero_px", ctypes.c_float),
+        ("far_m", ctypes.c_float),
+        ("near_m", ctypes.c_float),
+        ("wide", ctypes.c_int32),
+        ("reserved", ctypes.c_int32),
+        ("found", ctypes.c_int64),
+        ("at_zero", ctypes.c_int64),
+        ("in_front", ctypes.c_int64),
+        ("too_far", ctypes.c_int64),
+        ("too_near", ctypes.c_int64),
+    )
+
+
+class PackJob(ctypes.Structure):
+    """`struct tandem_pack_job`."""
+
+    _fields_ = (
+        ("cloud_m", ctypes.c_void_p),
+        ("colours", ctypes.c_void_p),
+        ("records", ctypes.c_void_p),
+        ("cloud_stride", ctypes.c_int64),
+        ("colour_stride", ctypes.c_int64),
+        ("width", ctypes.c_int32),
+        ("height", ctypes.c_int32),
+        ("channels", ctypes.c_int32),
+        ("flips", ctypes.c_uint8 * 3),
+        ("reserved", ctypes.c_uint8),
+        ("count", ctypes.c_int64),
+    )
+
+
+class RemapJob(ctypes.Structure):
+    """`struct tandem_remap_job`."""
+
+    _fields_ = (
+        ("image", ctypes.c_void_p),
+        ("places", ctypes.c_void_p),
+        ("fractions", ctypes.c_void_p),
+        ("out", ctypes.c_void_p),
+        ("image_stride", ctypes.c_int64),
+        ("out_pixels", ctypes.c_int64),
+        ("image_width", ctypes.c_int32),
+        ("image_height", ctypes.c_int32),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Missing:
+    """There is no library to use.
+
+    Attributes:
+        reason: why, such as "not built: no C compiler".
+        remedy: what to do about it.
+    """
+
+    reason: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Library:
+    """The loaded library, set to one instruction set. Its functions release the GIL and may run in several threads.
+
+    Attributes:
+        handle: the shared library.
+        simd: the instruction set that its functions use.
+        path: the file.
+    """
+
+    handle: ctypes.CDLL
+    simd: Simd
+    path: Path
+
+    @property
+    def isa(self) -> int:
+        """The instruction set's number: the first argument of every function that computes."""
+        return _NUMBERS[self.simd]
+
+    def state_of(self, simd: Simd) -> IsaState:
+        """Return whether an instruction set can be used on this processor."""
+        return IsaState(self.handle.tandem_isa_state(_NUMBERS[simd]))
+
+    def usable_sets(self) -> tuple[Simd, ...]:
+        """Return the instruction sets that can be used on this processor, the widest first."""
+        return tuple(simd for simd in Simd if self.state_of(simd) is IsaState.USABLE)
+
+    def using(self, simd: Simd) -> "Library":
+        """Return the same library, set to another instruction set.
+
+        Raises:
+            SettingsError: it is not built or this processor lacks it.
+        """
+        state, choices = self.state_of(simd), _choices(self)
+        if state is IsaState.NOT_BUILT:
+            raise SettingsError(
+                f"TANDEMSCAN_SIMD={simd.value} cannot be used: the native library was built without it",
+                f"give {choices}, or leave it empty for the fastest",
+            )
+        if state is IsaState.NOT_SUPPORTED:
+            raise SettingsError(
+                f"TANDEMSCAN_SIMD={simd.value} cannot be used: this processor has no {simd.text}",
+                f"give {choices}, or leave it empty for the fastest",
+            )
+        return Library(handle=self.handle, simd=simd, path=self.path)
+
+    def sources(self) -> str:
+        """Return the digest of the sources that it was built from; see `build_library.sources_digest`."""
+        return str(self.handle.tandem_sources().decode())
+
+    def reproject(self, job: ReprojectJob) -> None:
+        """Compute the points of disparities; see reproject_kernel.c."""
+        _require_done(self.handle.tandem_reproject(self.isa, ctypes.byref(job)))
+
+    def pack(self, job: PackJob) -> None:
+        """Pack finite points with their colours; see pack_kernel.c."""
+        _require_done(self.handle.tandem_pack(self.isa, ctypes.byref(job)))
+
+    def remap(self, job: RemapJob) -> None:
+        """See a coloured image through a map; see remap_kernel.c."""
+        _require_done(self.handle.tandem_remap(self.isa, ctypes.byref(job)))
+
+
+@cache
+def native() -> Library | Missing:
+    """Return the library of this installation, loaded once, or why there is none.
+
+    Raises:
+        SettingsError: `TANDEMSCAN_SIMD` names no instruction set, or one that cannot be used here.
+    """
+    return load(_HERE, os.environ.get(VARIABLE, ""))
+
+
+def load(folder: Path, wanted: str = "") -> Library | Missing:
+    """Load a library.
+
+    Args:
+        folder: where it lies.
+        wanted: name of the instruction set to use; empty: the widest that this processor has.
+
+    Returns:
+        The library, or why there is none.
+
+    Raises:
+        SettingsError: no instruction set has that name, or it cannot be used here.
+    """
+    path = folder / LIBRARY_FILE
+    try:
+        handle = ctypes.CDLL(str(path))
+        _declare(handle)
+    except (OSError, AttributeError) as error:
+        return _missing(folder, error)
+    if handle.tandem_abi() != _ABI:
+        return Missing(reason=f"{path} belongs to another version", remedy=_REINSTALL)
+    best = next(simd for simd, number in _NUMBERS.items() if number == handle.tandem_isa_best())
+    library = Library(handle=handle, simd=best, path=path)
+    if not wanted:
+        return library
+    if wanted not in [simd.value for simd in Simd]:
+        choices = _choices(library)
+        raise SettingsError(
+            f"TANDEMSCAN_SIMD={wanted} is no instruction set", f"give {choices}, or leave it empty for the fastest"
+        )
+    return library.using(Simd(wanted))
+
+
+def fallback_note(found: Library | Missing) -> str:
+    """Return the sentence for a run's summary where the default matcher had to fall back; empty where the library is there."""
+    if isinstance(found, Library):
+        return ""
+    return f"own matcher {found.reason}; sgbm is used; {found.remedy}"
+
+
+def _missing(folder: Path, error: Exception) -> Missing:
+    path = folder / LIBRARY_FILE
+    if path.exists():
+        detail = " ".join(str(error).split())
+        return Missing(reason=f"cannot be loaded ({detail})", remedy=_REINSTALL)
+    try:
+        reason = (folder / REASON_FILE).read_text(encoding="utf-8", errors="replace").strip()
+    except OSError:
+        return Missing(reason="not built", remedy=_INSTALL)
+    return Missing(reason=f"not built: {reason}", remedy=_INSTALL)
+
+
+def _choices(library: Library) -> str:
+    return " or ".join(simd.value for simd in library.usable_sets())
+
+
+def _declare(handle: ctypes.CDLL) -> None:
+    """State the arguments and results of the library's functions."""
+    handle.tandem_abi.argtypes, handle.tandem_abi.restype = [], ctypes.c_int32
+    handle.tandem_sources.argtypes, handle.tandem_sources.restype = [], ctypes.c_char_p
+    handle.tandem_isa_name.argtypes, handle.tandem_isa_name.restype = [ctypes.c_int32], ctypes.c_char_p
+    handle.tandem_isa_state.argtypes, handle.tandem_isa_state.restype = [ctypes.c_int32], ctypes.c_int32
+    handle.tandem_isa_best.argtypes, handle.tandem_isa_best.restype = [], ctypes.c_int32
+    for function, job in (
+        (handle.tandem_reproject, ReprojectJob),
+        (handle.tandem_pack, PackJob),
+        (handle.tandem_remap, RemapJob),
+    ):
+        function.argtypes, function.restype = [ctypes.c_int32, ctypes.POINTER(job)], ctypes.c_int32
+
+
+def _require_done(result: int) -> None:
+    """Check a result; the set was checked when the library was made, so another answer is a fault of ours."""
+    assert result == 0, f"the native library answered {result}"

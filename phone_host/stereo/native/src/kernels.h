@@ -1,0 +1,52 @@
+/* The functions that are compiled once per instruction set, and the table that leads to them.
+ *
+ * To add one: give it a `typedef ... tandem_NAME_fn(...)` and a line in TANDEM_KERNELS, define it in a file NAME_kernel.c as
+ * `... ISA_NAME(NAME)(...)`, name that file in PER_ISA of build_library.py, call it by `tandem_kernels_of(isa)->NAME`.
+ *
+ * The compiler is given -DTANDEM_ISA=avx512 (or avx2, sse41, neon, scalar) and -DTANDEM_IS_AVX512=1 (...) with the flags of that
+ * set. A file may choose intrinsics by TANDEM_IS_...; without a choice the compiler vectorises what it can.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef TANDEM_KERNELS_H
+#define TANDEM_KERNELS_H
+
+#include <float.h>
+
+#include "tandem.h"
+
+#if FLT_EVAL_METHOD != 0
+#error "float32 must be computed as float32, or results differ between machines (x86: -mfpmath=sse)"
+#endif
+#if __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
+#error "the records of a cloud are little endian; numpy does it elsewhere"
+#endif
+
+typedef void tandem_reproject_fn(struct tandem_reproject_job *job);
+typedef void tandem_pack_fn(struct tandem_pack_job *job);
+typedef void tandem_remap_fn(struct tandem_remap_job *job);
+
+#define TANDEM_KERNELS(KERNEL) \
+    KERNEL(reproject)          \
+    KERNEL(pack)               \
+    KERNEL(remap)
+
+struct tandem_kernels {
+#define TANDEM_FIELD(name) tandem_##name##_fn *name;
+    TANDEM_KERNELS(TANDEM_FIELD)
+#undef TANDEM_FIELD
+};
+
+/* NULL if the set is not built or this processor lacks it. */
+const struct tandem_kernels *tandem_kernels_of(int32_t isa);
+
+#ifdef TANDEM_ISA
+#define TANDEM_PASTE_(name, isa) name##_##isa
+#define TANDEM_PASTE(name, isa) TANDEM_PASTE_(name, isa)
+#define ISA_NAME(name) TANDEM_PASTE(tandem_##name, TANDEM_ISA)
+#define TANDEM_DECLARED(name) tandem_##name##_fn ISA_NAME(name);
+TANDEM_KERNELS(TANDEM_DECLARED)
+#undef TANDEM_DECLARED
+#endif
+
+#endif

@@ -1,0 +1,106 @@
+/* What the library offers to Python (library.py declares the same). Plain C11, no global state.
+ *
+ * Rules:
+ * - every function that computes takes the instruction set as its first argument and gives the same bits for all of them:
+ *   IEEE float32 in the stated order, no contraction, no reordering;
+ * - lengths and strides are checked by the Python side (one place per function), pointers are never kept;
+ * - nothing here prints, exits or throws.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef TANDEM_H
+#define TANDEM_H
+
+#include <stdint.h>
+
+#define TANDEM_API __attribute__((visibility("default")))
+
+/* Raise it, here and in library.py, when a signature or a struct changes. */
+#define TANDEM_ABI 1
+
+/* Instruction sets, from the plainest. The numbers are part of the ABI, isa_name() their names for people. */
+enum tandem_isa {
+    TANDEM_SCALAR = 0,
+    TANDEM_SSE41 = 1,
+    TANDEM_AVX2 = 2,
+    TANDEM_AVX512 = 3,
+    TANDEM_NEON = 4,
+    TANDEM_ISA_COUNT = 5
+};
+
+enum tandem_isa_state {
+    TANDEM_USABLE = 0,
+    TANDEM_NOT_BUILT = 1,    /* the compiler has no such flags, or this is another architecture */
+    TANDEM_NOT_SUPPORTED = 2 /* built, but this processor lacks it */
+};
+
+TANDEM_API int32_t tandem_abi(void);
+TANDEM_API const char *tandem_sources(void); /* digest of the sources it was built from */
+TANDEM_API const char *tandem_isa_name(int32_t isa); /* NULL beyond the last */
+TANDEM_API int32_t tandem_isa_state(int32_t isa);
+TANDEM_API int32_t tandem_isa_best(void); /* the widest that is usable */
+
+/* From disparities to points, cut to the limits; see reproject_kernel.c. */
+struct tandem_reproject_job {
+    const float *disparity_px;  /* (height, width), rows `disparity_stride` floats apart, NaN = none */
+    const float *column_slopes; /* (width,) (u - cx) / f */
+    const float *row_slopes;    /* (height,) (v - cy) / f */
+    float *cloud_m;             /* (height, width, 3), packed; written */
+    int64_t disparity_stride;
+    int32_t width;
+    int32_t height;
+    float doffs_px;
+    float product;     /* f b, px m */
+    float least_px;    /* d + doffs at or below it is behind infinity */
+    float at_zero_px;  /* d at or below it cannot be told from infinity */
+    float far_m;       /* coordinates at or beyond it are cut */
+    float near_m;      /* depths below it are cut; 0: none */
+    int32_t wide;      /* 1: |x| and |y| are compared with far_m, too */
+    int32_t reserved;
+    int64_t found;     /* written: disparities that are finite */
+    int64_t at_zero;   /* written: disparities dropped by at_zero_px */
+    int64_t in_front;  /* written: points before the cut */
+    int64_t too_far;   /* written */
+    int64_t too_near;  /* written */
+};
+
+TANDEM_API int32_t tandem_reproject(int32_t isa, struct tandem_reproject_job *job);
+
+/* Finite points as records of 15 bytes: x y z float32, red green blue uint8; see pack_kernel.c. */
+struct tandem_pack_job {
+    const float *cloud_m;     /* (height, width, 3), rows `cloud_stride` floats apart, NaN = none */
+    const uint8_t *colours;   /* (height, width, channels) grey or BGR, rows `colour_stride` bytes apart */
+    uint8_t *records;         /* room for height * width + 1 records; written from its beginning */
+    int64_t cloud_stride;
+    int64_t colour_stride;
+    int32_t width;
+    int32_t height;
+    int32_t channels;         /* 1 or 3 */
+    uint8_t flips[3];         /* 1: x, y or z changes its sign */
+    uint8_t reserved;
+    int64_t count;            /* written: records */
+};
+
+TANDEM_API int32_t tandem_pack(int32_t isa, struct tandem_pack_job *job);
+
+/* A coloured image through a map of OpenCV's kind; see remap_kernel.c. */
+struct tandem_remap_job {
+    const uint8_t *image;      /* (image_height, image_width, 3), rows `image_stride` bytes apart */
+    const int16_t *places;     /* (out_pixels, 2): x and y of the upper left of 2 x 2 pixels, px */
+    const uint16_t *fractions; /* (out_pixels,): 32 fy + fx, 1/32 px */
+    uint8_t *out;              /* (out_pixels, 3); written */
+    int64_t image_stride;
+    int64_t out_pixels;
+    int32_t image_width;       /* at least 1, at most 32767 */
+    int32_t image_height;
+};
+
+TANDEM_API int32_t tandem_remap(int32_t isa, struct tandem_remap_job *job);
+
+/* What these functions return. */
+enum tandem_result {
+    TANDEM_DONE = 0,
+    TANDEM_NO_SUCH_ISA = 1
+};
+
+#endif
